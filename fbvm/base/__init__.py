@@ -1,0 +1,1 @@
+"""The ground floor: types, arithmetic, memory areas, addresses, diagnostics and their codes."""

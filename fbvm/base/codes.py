@@ -1,0 +1,95 @@
+"""Every diagnostic code: S = source, R = running (trap).  Each has a page in `pages/` and a test.
+
+Ranges: S01 text and syntax, S02 names and declarations, S03 types, S04 calls, S05 statements, S06 addresses and memory,
+S07 constants and initial values, S08 configuration and tasks, S09 understood but refused, R01 traps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Code:
+    """A row of the table: the code, how severe it is, and its title for lists."""
+
+    code: str
+    severity: str
+    title: str
+
+
+def _table(severity: str, rows: dict[str, str]) -> dict[str, Code]:
+    return {code: Code(code, severity, title) for code, title in rows.items()}
+
+
+CODES: dict[str, Code] = {
+    **_table("error", {
+        "S0101": "unexpected text",
+        "S0102": "character that no word begins with",
+        "S0103": "comment or pragma without end",
+        "S0104": "string literal without end or with a wrong escape",
+        "S0105": "malformed literal",
+        "S0106": "nested too deep",
+        "S0107": "file cannot be read as text",
+        "S0108": "literal out of range of its type",
+        "S0201": "unknown name",
+        "S0202": "name declared twice",
+        "S0203": "POU or type declared twice",
+        "S0204": "unknown type",
+        "S0205": "section not allowed in this POU",
+        "S0206": "qualifier not allowed here",
+        "S0207": "recursive declaration",
+        "S0208": "VAR_EXTERNAL without matching VAR_GLOBAL",
+        "S0209": "no program to run",
+        "S0210": "no such member",
+        "S0301": "types do not fit",
+        "S0302": "operator not defined for these types",
+        "S0303": "condition is not BOOL",
+        "S0304": "not an array, structure or instance",
+        "S0305": "wrong number of subscripts",
+        "S0401": "not callable",
+        "S0402": "unknown parameter",
+        "S0403": "parameter given twice",
+        "S0404": "parameter missing",
+        "S0405": "argument does not fit",
+        "S0406": "positional and named arguments mixed",
+        "S0407": "in-out or output needs a variable",
+        "S0408": "recursive call",
+        "S0409": "function without result used as a value",
+        "S0501": "target cannot be written",
+        "S0502": "EXIT or CONTINUE outside a loop",
+        "S0503": "CASE label wrong or doubled",
+        "S0504": "FOR variable or step wrong",
+        "S0601": "no such address",
+        "S0602": "address does not fit the type",
+        "S0603": "memory is full",
+        "S0604": "location not allowed here",
+        "S0701": "constant expression needed",
+        "S0702": "constant out of range",
+        "S0703": "constant expression divides by zero or is not defined",
+        "S0704": "bounds are wrong",
+        "S0705": "initial value does not fit",
+        "S0801": "task or resource declared wrongly",
+        "S0901": "understood, but not executed by this version",
+        "S0902": "object-oriented text is refused",
+    }),
+    **_table("warning", {
+        "S0190": "pragma is not known and has no effect",
+        "S0191": "name with doubled or trailing underscore",
+        "S0590": "FOR variable written inside its loop",
+        "S0591": "input written inside its block",
+    }),
+    **_table("trap", {
+        "R0101": "division by zero",
+        "R0102": "index outside its array",
+        "R0103": "value outside its subrange",
+        "R0104": "step budget used up (watchdog)",
+        "R0105": "conversion out of range",
+        "R0106": "negative shift or rotate",
+        "R0107": "selector of MUX out of range",
+        "R0108": "string position or length out of range",
+        "R0109": "FOR step is zero",
+        "R0110": "reference is null or its object has ended",
+        "R0111": "text cannot be converted",
+    }),
+}

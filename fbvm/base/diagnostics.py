@@ -1,0 +1,116 @@
+"""Messages about a program: each with a code, a place, what is wrong and where it helps what to write instead."""
+
+from __future__ import annotations
+
+import bisect
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from fbvm.base.codes import CODES
+
+
+@dataclass(eq=False)
+class Source:
+    """One source text and its name (relative to its library or project).  Positions in it are character offsets."""
+
+    name: str
+    text: str
+    library: str = ""
+    """Name of the library that the text belongs to, "" for the user's own."""
+
+    @cached_property
+    def line_starts(self) -> list[int]:
+        starts, at = [0], self.text.find("\n")
+        while at >= 0:
+            starts.append(at + 1)
+            at = self.text.find("\n", at + 1)
+        return starts
+
+    def place(self, offset: int) -> tuple[int, int]:
+        """Line and column, both from 1, of a character offset."""
+        row = bisect.bisect_right(self.line_starts, offset) - 1
+        return row + 1, offset - self.line_starts[row] + 1
+
+    def line(self, number: int) -> str:
+        """The text of line `number` (from 1) without its end."""
+        start = self.line_starts[number - 1]
+        end = self.line_starts[number] if number < len(self.line_starts) else len(self.text)
+        return self.text[start:end].rstrip("\r\n")
+
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """One message.  `start` and `end` are character offsets in `source`; `related` names a second place."""
+
+    code: str
+    source: Source = field(compare=False)
+    start: int
+    end: int
+    message: str
+    hint: str = ""
+    related: tuple[Source, int, str] | None = field(default=None, compare=False)
+
+    @property
+    def severity(self) -> str:
+        """"error" or "warning", as the table of codes has it."""
+        return CODES[self.code].severity
+
+    @property
+    def line(self) -> int:
+        return self.source.place(self.start)[0]
+
+    @property
+    def column(self) -> int:
+        return self.source.place(self.start)[1]
+
+    def order(self) -> tuple[str, int, str]:
+        return self.source.name, self.start, self.code
+
+    def as_dict(self) -> dict[str, Any]:
+        """The message as plain data for `--json`."""
+        line, column = self.source.place(self.start)
+        end_line, end_column = self.source.place(max(self.end, self.start))
+        data: dict[str, Any] = {
+            "code": self.code, "severity": self.severity, "file": self.source.name, "line": line, "column": column,
+            "end_line": end_line, "end_column": end_column, "message": self.message, "hint": self.hint,
+        }
+        if self.related:
+            source, at, text = self.related
+            data["related"] = {"file": source.name, "line": source.place(at)[0], "column": source.place(at)[1],
+                               "message": text}
+        return data
+
+    def render(self) -> str:
+        """The message as text: place, code, what is wrong, the line with a caret, the hint."""
+        line, column = self.source.place(self.start)
+        lines = [f"{self.source.name}:{line}:{column}: {self.severity} {self.code}: {self.message}"]
+        lines += caret_lines(self.source, self.start, self.end)
+        if self.related:
+            other, at, text = self.related
+            other_line, other_column = other.place(at)
+            lines.append(f"  {other.name}:{other_line}:{other_column}: {text}")
+            lines += caret_lines(other, at, at + 1)
+        if self.hint:
+            lines.append(f"  help: {self.hint}")
+        return "\n".join(lines)
+
+
+WIDTH = 160
+"""Longest piece of a source line that a message shows, in characters."""
+
+
+def caret_lines(source: Source, start: int, end: int) -> list[str]:
+    """The source line of `start` and a line of carets below the span."""
+    number, column = source.place(start)
+    text = source.line(number)
+    first = max(0, column - 1 - WIDTH // 2) if len(text) > WIDTH else 0
+    shown = "".join(c if c.isprintable() or c == "\t" else "\N{REPLACEMENT CHARACTER}" for c in text[first:first + WIDTH])
+    lead = "".join("\t" if c == "\t" else " " for c in shown[:column - 1 - first])
+    width = max(1, min(end - start, len(shown) - len(lead)))
+    return [f"    {shown}", f"    {lead}{'^' * width}"]
+
+
+def errors(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
+    """Those that forbid running."""
+    return [d for d in diagnostics if d.severity == "error"]

@@ -1,0 +1,1 @@
+"""Emulated communication units: memory + events + time -> memory + requests.  They never see a program."""

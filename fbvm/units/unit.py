@@ -1,0 +1,36 @@
+"""What every emulated unit offers to the machine, and what it may see of the PLC."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from fbvm.wire.link import Event, Request
+
+
+class AreaMemory(Protocol):
+    """The part of a PLC's memory that a unit exchanges: whole areas as 16-bit words."""
+
+    def words(self, area: str) -> memoryview:
+        """The words of an area ("CIO", "D", "W", "H", "A", "E0" ...) as a writable memoryview of format "H".
+
+        Raises KeyError for an area that this PLC does not have."""
+
+
+class Unit(Protocol):
+    """One unit on the backplane.  The machine calls `refresh` once per cycle, in the I/O refresh."""
+
+    name: str
+    """Short name with the unit number for charts and messages, such as "ETN21 0"."""
+
+    address: str
+    """IPv4 address of the unit, by which it is attached to a network."""
+
+    def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
+        """Exchange the unit's words once: read what the program set, write what the unit reports.
+
+        `events` are what the network told since the last refresh, `now_ns` is the time of this refresh.  Returns
+        what the network has to do.  Raises nothing that a program or a peer could cause."""
+
+    def reset(self, memory: AreaMemory) -> list[Request]:
+        """Power on or unit restart: words to their initial state; returns what closes connections left open."""
