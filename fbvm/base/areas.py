@@ -1,0 +1,173 @@
+"""The memory areas of a PLC, where each lies in the flat buffer, and addresses such as `D100` or `CIO 1519.03`.
+
+Omron areas count 16-bit words, the portable areas %I %Q %M count bytes.  The buffer begins with the system page (what
+machine and engines tell each other); behind the areas come the slots of globals and instances, E banks come last and
+only if a program or a unit names them.
+Sizes: W394 and etn21 facts, CS1/CJ1/CJ2 (CIO 6144, W 512, H 512 + 1024 for blocks, A 960, D 32768, 13 E banks, T/C 4096).
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+PAGE_BYTES = 4096
+
+
+@dataclass(frozen=True)
+class Area:
+    """One area: `unit_bits` is 16 for word areas, 8 for byte areas, 1 for completion flags; `offset` in the buffer."""
+
+    name: str
+    offset: int
+    count: int
+    unit_bits: int
+    read_only: int = 0
+    """How many units from the start on a program must not write."""
+    retained: bool = False
+    """Kept over a warm start and a mode change."""
+
+    @property
+    def size_bytes(self) -> int:
+        return self.count * self.unit_bits // 8
+
+
+_ROWS = (
+    # name, offset, count, bits of a unit, read-only, retained
+    ("CIO", 4096, 6144, 16, 0, False),
+    ("W", 16384, 512, 16, 0, False),
+    ("H", 17408, 1536, 16, 0, True),
+    ("A", 20480, 960, 16, 448, True),
+    ("TF", 22528, 4096, 1, 0, False),
+    ("CF", 23040, 4096, 1, 0, True),
+    ("T", 24576, 4096, 16, 0, False),
+    ("C", 32768, 4096, 16, 0, True),
+    ("I", 40960, 4096, 8, 0, False),
+    ("Q", 45056, 4096, 8, 0, False),
+    ("M", 49152, 65536, 8, 0, False),
+    ("D", 114688, 32768, 16, 0, True),
+)
+AREAS: dict[str, Area] = {row[0]: Area(*row) for row in _ROWS}
+
+SLOTS_OFFSET = 180224
+"""Where the slots of globals and instances begin."""
+
+E_BANKS = 13
+E_WORDS = 32768
+
+
+def e_bank(name: str, offset: int) -> Area:
+    """The area of E bank `name` ("E0".."EC") when it lies at `offset`."""
+    return Area(name, offset, E_WORDS, 16, 0, True)
+
+
+E_NAMES = tuple(f"E{bank:X}" for bank in range(E_BANKS))
+
+
+# --- the system page ------------------------------------------------------------------------------------------------
+
+NOW = 0
+"""Time of the scan in ns since power-on, 64-bit signed."""
+DUE = 8
+"""Earliest moment (ns) at which a timer changes by itself; NEVER if none runs."""
+BUDGET = 16
+"""Statements that the scan may still execute, 64-bit signed."""
+SCANS = 24
+"""Number of scans done, 64-bit."""
+NEVER = (1 << 63) - 1
+
+
+# --- addresses ------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Address:
+    """A place in an area.  `number` counts units of the area (word areas) or of `size_bits` (I, Q, M).
+
+    `bit` is None for a whole unit.  `size_bits` is 0 where the text names no size (Omron words)."""
+
+    area: str
+    number: int
+    bit: int | None = None
+    size_bits: int = 0
+
+    def byte_offset(self) -> int:
+        """Offset in bytes from the start of the area (of the byte that holds the bit, if one is named)."""
+        if self.area in ("TF", "CF"):
+            return self.number // 8
+        unit = (self.size_bits or 8) // 8 if self.area in "IQM" else 2
+        if self.bit is None:
+            return self.number * unit
+        return self.number * (1 if self.area in "IQM" else 2) + self.bit // 8
+
+    def bit_in_byte(self) -> int:
+        return self.number % 8 if self.area in ("TF", "CF") else (self.bit or 0) % 8
+
+    def __str__(self) -> str:
+        if self.area in "IQM":
+            size = "X" if self.bit is not None else {8: "B", 16: "W", 32: "D", 64: "L"}[self.size_bits or 8]
+            return f"%{self.area}{size}{self.number}" + (f".{self.bit}" if self.bit is not None else "")
+        bit = f".{self.bit:02}" if self.bit is not None else ""
+        if self.area in ("TF", "CF"):
+            return f"{self.area[0]}{self.number:04}"
+        if self.area[0] == "E":
+            return f"{self.area}_{self.number}{bit}"
+        return f"{self.area}{' ' if self.area == 'CIO' else ''}{self.number}{bit}"
+
+
+_OMRON = re.compile(r"%?\s*(CIO|DM|D|W|H|A|TF|CF|T|C|E([0-9A-F])_|E([0-9A-F])\s*:)?\s*(\d+)(?:\.(\d+))?", re.I)
+_PORTABLE = re.compile(r"%\s*([IQM])([XBWDL]?)(\d+)(?:\.(\d+))?", re.I)
+_SIZES = {"X": 1, "": 1, "B": 8, "W": 16, "D": 32, "L": 64}
+
+
+class AddressError(ValueError):
+    """The text is no address, or the address does not exist; the message says why."""
+
+
+def parse_address(text: str) -> Address:
+    """The address that `text` names: `D100`, `%D100`, `CIO 1519.03`, `1519.03`, `E0_100`, `%MW10`, `%IX0.3`.
+
+    Raises AddressError for text that is no address or lies outside its area."""
+    text = text.strip()
+    if match := _PORTABLE.fullmatch(text):
+        return _portable(match)
+    match = _OMRON.fullmatch(text)
+    if not match:
+        raise AddressError(f"{text!r} is not an address")
+    name = (match[1] or "CIO").upper().replace(" ", "")
+    if name.startswith("E") or name == "DM":
+        name = "D" if name == "DM" else name[:2]
+    bit = int(match[5]) if match[5] is not None else None
+    return check_address(Address(name, int(match[4]), bit))
+
+
+def _portable(match: re.Match[str]) -> Address:
+    area, size = match[1].upper(), _SIZES[match[2].upper()]
+    if size == 1:
+        if match[4] is None and match[2] == "":
+            raise AddressError(f"%{area}{match[3]} has no size: write %{area}X{match[3]}.0 or %{area}W{match[3]}")
+        return check_address(Address(area, int(match[3]), int(match[4] or 0), 1))
+    if match[4] is not None:
+        raise AddressError(f"a bit is written %{area}X{match[3]}.{match[4]}")
+    return check_address(Address(area, int(match[3]), None, size))
+
+
+def check_address(address: Address) -> Address:
+    """The same address.  Raises AddressError if it lies outside its area."""
+    if address.area[0] == "E":
+        if address.area not in E_NAMES:
+            raise AddressError(f"there is no E bank {address.area[1:]}; banks are 0 to {E_BANKS - 1:X}")
+        area = e_bank(address.area, 0)
+    else:
+        area = AREAS[address.area]
+    if area.unit_bits == 1 and address.bit is not None:
+        raise AddressError(f"{address} is a flag and has no bits")
+    top = 7 if area.unit_bits == 8 else 15
+    if address.bit is not None and not 0 <= address.bit <= top:
+        raise AddressError(f"bit {address.bit} does not exist; bits are 0 to {top}")
+    size = max(1, address.size_bits // 8) if area.unit_bits == 8 else 1
+    step = size if address.bit is None else 1
+    if address.number < 0 or (address.number + 1) * step > area.count:
+        shown = area.name if area.unit_bits != 8 else f"%{area.name}"
+        raise AddressError(f"{shown} ends at {area.count // step - 1}; {address.number} does not exist")
+    return address

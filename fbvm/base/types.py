@@ -1,0 +1,248 @@
+"""Data types: their names, sizes in memory, ranges, and what converts to what without being asked.
+
+Layout (little-endian, naturally aligned): BOOL one byte, STRING[n] n + 1 bytes, TIME and dates 64-bit nanoseconds,
+references 64 bits.  Source: IEC 61131-3 ed. 3 tables 10 and 11, figures 5 and 11.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+
+def fold(name: str) -> str:
+    """A name as it is compared: case does not matter."""
+    return name.upper()
+
+
+@dataclass(frozen=True)
+class Type:
+    """Any type: name for messages, size and alignment in bytes."""
+
+    name: str
+    size: int
+    align: int
+
+    def __str__(self) -> str:
+        return self.name
+
+
+@dataclass(frozen=True)
+class Elementary(Type):
+    """An elementary type.  `machine` is the form that code works on, `families` the generic types that hold it."""
+
+    machine: str
+    families: frozenset[str]
+    low: int = 0
+    high: int = 0
+    bits: int = 0
+
+
+@dataclass(frozen=True)
+class StringType(Type):
+    """STRING[capacity] or WSTRING[capacity]."""
+
+    capacity: int
+    wide: bool = False
+
+
+@dataclass(frozen=True)
+class ArrayType(Type):
+    """ARRAY with constant bounds; the rightmost subscript varies fastest."""
+
+    bounds: tuple[tuple[int, int], ...]
+    element: Type
+
+    @property
+    def count(self) -> int:
+        total = 1
+        for low, high in self.bounds:
+            total *= high - low + 1
+        return total
+
+
+@dataclass(frozen=True)
+class Field:
+    """A member of a structure or a variable of a POU, at `offset` bytes from the start of the whole.
+
+    `kind` is "" for structure members, else the section's word (VAR_INPUT ...); `bit` is set for a BOOL located on a
+    bit; `absolute` for a located variable, whose offset is one of the buffer; `reference` for an in-out, whose slot
+    holds a reference to a value of `type`."""
+
+    name: str
+    type: Type
+    offset: int
+    kind: str = ""
+    bit: int | None = None
+    absolute: bool = False
+    reference: bool = False
+    constant: bool = False
+
+
+@dataclass(frozen=True)
+class StructType(Type):
+    """A structure, or the instance of a function block or program (`block` TRUE), which begins with its type identifier."""
+
+    fields: dict[str, Field] = field(hash=False, compare=False)
+    block: bool = False
+
+    def member(self, name: str) -> Field | None:
+        return self.fields.get(fold(name))
+
+
+@dataclass(frozen=True)
+class EnumType(Type):
+    """An enumeration; `members` by folded name to value."""
+
+    base: Elementary
+    members: dict[str, int] = field(hash=False, compare=False)
+    shown: dict[int, str] = field(hash=False, compare=False)
+
+
+@dataclass(frozen=True)
+class SubrangeType(Type):
+    """An integer type with narrower limits."""
+
+    base: Elementary
+    low: int
+    high: int
+
+
+@dataclass(frozen=True)
+class RefType(Type):
+    """REF_TO target; `target` None is the type of NULL."""
+
+    target: Type | None
+
+
+_PARENTS = {
+    "ANY_SIGNED": "ANY_INT", "ANY_UNSIGNED": "ANY_INT", "ANY_INT": "ANY_NUM", "ANY_REAL": "ANY_NUM",
+    "ANY_NUM": "ANY_MAGNITUDE", "ANY_DURATION": "ANY_MAGNITUDE", "ANY_MAGNITUDE": "ANY_ELEMENTARY",
+    "ANY_BIT": "ANY_ELEMENTARY", "ANY_DATE": "ANY_ELEMENTARY", "ANY_CHARS": "ANY_ELEMENTARY",
+    "ANY_CHAR": "ANY_CHARS", "ANY_STRING": "ANY_CHARS", "ANY_ELEMENTARY": "ANY",
+}
+
+
+def families_of(leaf: str) -> frozenset[str]:
+    """A generic type and all that contain it (figure 5)."""
+    names = [leaf]
+    while names[-1] in _PARENTS:
+        names.append(_PARENTS[names[-1]])
+    return frozenset(names)
+
+
+def _elementary() -> Iterator[Elementary]:
+    yield Elementary("BOOL", 1, 1, "b", families_of("ANY_BIT"), 0, 1, 1)
+    for bits, signed, unsigned, string in ((8, "SINT", "USINT", "BYTE"), (16, "INT", "UINT", "WORD"),
+                                           (32, "DINT", "UDINT", "DWORD"), (64, "LINT", "ULINT", "LWORD")):
+        size, top = bits // 8, (1 << bits) - 1
+        yield Elementary(signed, size, size, f"i{bits}", families_of("ANY_SIGNED"), -(top // 2) - 1, top // 2, bits)
+        yield Elementary(unsigned, size, size, f"u{bits}", families_of("ANY_UNSIGNED"), 0, top, bits)
+        yield Elementary(string, size, size, f"u{bits}", families_of("ANY_BIT"), 0, top, bits)
+    yield Elementary("REAL", 4, 4, "f32", families_of("ANY_REAL"), bits=32)
+    yield Elementary("LREAL", 8, 8, "f64", families_of("ANY_REAL"), bits=64)
+    for names, family in ((("TIME", "LTIME"), "ANY_DURATION"),
+                          (("DATE", "LDATE", "TIME_OF_DAY", "LTIME_OF_DAY", "DATE_AND_TIME", "LDATE_AND_TIME"),
+                           "ANY_DATE")):
+        for name in names:
+            yield Elementary(name, 8, 8, "i64", families_of(family), -(1 << 63), (1 << 63) - 1, 64)
+
+
+ELEMENTARY: dict[str, Elementary] = {t.name: t for t in _elementary()}
+SHORT_NAMES = {
+    "TOD": "TIME_OF_DAY", "LTOD": "LTIME_OF_DAY", "DT": "DATE_AND_TIME", "LDT": "LDATE_AND_TIME",
+    "T": "TIME", "LT": "LTIME", "D": "DATE", "LD": "LDATE",
+}
+GENERIC = frozenset(_PARENTS) | {"ANY", "ANY_DERIVED"}
+DEFAULT_STRING = 80
+"""Characters of a STRING declared without a length (as CODESYS; the standard leaves it to the maker)."""
+DAY_NS = 86_400_000_000_000
+
+BOOL, SINT, INT, DINT, LINT = (ELEMENTARY[n] for n in ("BOOL", "SINT", "INT", "DINT", "LINT"))
+USINT, UINT, UDINT, ULINT = (ELEMENTARY[n] for n in ("USINT", "UINT", "UDINT", "ULINT"))
+BYTE, WORD, DWORD, LWORD = (ELEMENTARY[n] for n in ("BYTE", "WORD", "DWORD", "LWORD"))
+REAL, LREAL, TIME, LTIME = (ELEMENTARY[n] for n in ("REAL", "LREAL", "TIME", "LTIME"))
+DATE, TOD, DT = (ELEMENTARY[n] for n in ("DATE", "TIME_OF_DAY", "DATE_AND_TIME"))
+NULL = RefType("NULL", 8, 8, None)
+
+
+@lru_cache(maxsize=None)
+def string(capacity: int = DEFAULT_STRING, wide: bool = False) -> StringType:
+    """STRING[capacity] or WSTRING[capacity]."""
+    unit = 2 if wide else 1
+    name = "WSTRING" if wide else "STRING"
+    return StringType(f"{name}[{capacity}]", (capacity + 1) * unit, unit, capacity, wide)
+
+
+def array(bounds: tuple[tuple[int, int], ...], element: Type) -> ArrayType:
+    """ARRAY [bounds] OF element."""
+    shown = ", ".join(f"{low}..{high}" for low, high in bounds)
+    count = 1
+    for low, high in bounds:
+        count *= high - low + 1
+    return ArrayType(f"ARRAY [{shown}] OF {element.name}", count * element.size, element.align, bounds, element)
+
+
+def base(kind: Type) -> Type:
+    """The type that operations see: that of a subrange or of an enumeration's base stays, others are themselves."""
+    return kind.base if isinstance(kind, SubrangeType) else kind
+
+
+def families(kind: Type) -> frozenset[str]:
+    """The generic types that hold `kind`."""
+    kind = base(kind)
+    if isinstance(kind, Elementary):
+        return kind.families
+    if isinstance(kind, StringType):
+        return families_of("ANY_STRING")
+    return frozenset(("ANY_DERIVED", "ANY"))
+
+
+def machine(kind: Type) -> str:
+    """The machine form of a value of `kind`: b, i8..u64, f32, f64, s8, s16, ref; "" for aggregates."""
+    kind = base(kind)
+    if isinstance(kind, Elementary):
+        return kind.machine
+    if isinstance(kind, EnumType):
+        return kind.base.machine
+    if isinstance(kind, StringType):
+        return "s16" if kind.wide else "s8"
+    return "ref" if isinstance(kind, RefType) else ""
+
+
+_IMPLICIT = {
+    "SINT": "INT DINT LINT REAL LREAL", "INT": "DINT LINT REAL LREAL", "DINT": "LINT LREAL", "LINT": "",
+    "USINT": "UINT UDINT ULINT INT DINT LINT REAL LREAL", "UINT": "UDINT ULINT DINT LINT REAL LREAL",
+    "UDINT": "ULINT LINT LREAL", "ULINT": "", "REAL": "LREAL",
+    "BYTE": "WORD DWORD LWORD", "WORD": "DWORD LWORD", "DWORD": "LWORD",
+    "TIME": "LTIME", "DATE": "LDATE", "TIME_OF_DAY": "LTIME_OF_DAY", "DATE_AND_TIME": "LDATE_AND_TIME",
+}
+IMPLICIT: dict[str, tuple[str, ...]] = {name: tuple(to.split()) for name, to in _IMPLICIT.items()}
+"""What each type converts to by itself, smallest first (figure 11; contested rows: LINT and ULINT to LREAL explicit)."""
+
+
+def converts(source: Type, target: Type) -> bool:
+    """True if a value of `source` may stand where `target` is wanted without a conversion being written."""
+    source, target = base(source), base(target)
+    if source == target:
+        return True
+    if isinstance(source, StringType) and isinstance(target, StringType):
+        return source.wide == target.wide
+    if isinstance(source, RefType) and isinstance(target, RefType):
+        return source.target is None
+    return isinstance(source, Elementary) and target.name in IMPLICIT.get(source.name, ()) \
+        and isinstance(target, Elementary)
+
+
+def common(left: Type, right: Type) -> Type | None:
+    """The smallest type that both convert to by themselves, or None."""
+    left, right = base(left), base(right)
+    if converts(left, right):
+        return right
+    if converts(right, left):
+        return left
+    for name in IMPLICIT.get(left.name, ()):
+        if name in IMPLICIT.get(right.name, ()):
+            return ELEMENTARY[name]
+    return None
