@@ -1,0 +1,115 @@
+"""The Image: everything that is needed to run, trace and draw a program, and nothing of its tree.
+
+All code is plain data (see `operations`).  Names of sources stand in `sites`' table of files only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, Area
+from fbvm.base.types import Field, Type
+from fbvm.code.operations import Block
+
+
+@dataclass(frozen=True)
+class Site:
+    """A place in the source: file name, POU, line, column."""
+
+    file: str
+    pou: str
+    line: int
+    column: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}:{self.column}" + (f" in {self.pou}" if self.pou else "")
+
+
+@dataclass(frozen=True)
+class Body:
+    """The code of one POU.
+
+    `instance_size` is the size of an instance in bytes, 0 for a function, whose frame lies at a fixed place."""
+
+    name: str
+    kind: str
+    code: Block
+    instance_size: int
+    statements: int
+    """Statements of the body outside loops: what an execution charges at its start."""
+
+
+@dataclass(frozen=True)
+class ProgramRun:
+    """One program instance: its path name, the number of its body, the place of its instance."""
+
+    name: str
+    body: int
+    offset: int
+
+
+@dataclass(frozen=True)
+class TaskRow:
+    """A task: `interval_ns` 0 means in every cycle; `single` is the path of the BOOL that starts it, or "".
+
+    Smaller `priority` goes first; programs run in the order of writing."""
+
+    name: str
+    priority: int
+    interval_ns: int
+    single: str
+    programs: tuple[ProgramRun, ...]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where things lie in the flat buffer of a PLC."""
+
+    slots_size: int
+    e_banks: tuple[str, ...] = ()
+
+    @property
+    def areas(self) -> dict[str, Area]:
+        """All areas that a PLC with this image has, E banks behind the slots."""
+        areas = dict(AREAS)
+        at = _page_up(SLOTS_OFFSET + self.slots_size)
+        for name in self.e_banks:
+            areas[name] = Area(name, at, 32768, 16, 0, True)
+            at += areas[name].size_bytes
+        return areas
+
+    @property
+    def size(self) -> int:
+        """Bytes of the whole buffer, in whole pages."""
+        return _page_up(SLOTS_OFFSET + self.slots_size) + 65536 * len(self.e_banks)
+
+
+def _page_up(size: int) -> int:
+    return (size + PAGE_BYTES - 1) // PAGE_BYTES * PAGE_BYTES
+
+
+@dataclass(frozen=True)
+class Retained:
+    """Bytes that a warm start keeps, by the name under which they are found after a change of program."""
+
+    name: str
+    offset: int
+    size: int
+
+
+@dataclass(frozen=True)
+class Image:
+    """A compiled program."""
+
+    layout: Layout
+    bodies: tuple[Body, ...]
+    tasks: tuple[TaskRow, ...]
+    symbols: dict[str, Field]
+    """Programs and global variables by folded name; their offsets count from the start of the buffer.
+    Members are found through their types."""
+    initial: tuple[tuple[int, bytes], ...]
+    """Bytes to write at power-on over a buffer of zeros."""
+    retained: tuple[Retained, ...]
+    sites: tuple[Site, ...]
+    types: dict[str, Type] = field(default_factory=dict)
+    """Derived types and blocks by folded name."""

@@ -1,0 +1,164 @@
+"""The table of operations: every meaning that code can have.  A back end decides nothing.
+
+Code is plain data: nested tuples whose first item names the operation.  *Expressions* are `(name, type, *operands)` and
+have no effect but a trap; *statements* are `(name, *operands)`.  `type` is a machine type:
+
+    b            BOOL, 0 or 1                     f32 f64   REAL, LREAL (NaN is stored canonical)
+    i8 .. i64    signed, two's complement         s8        STRING: bytes without the ending 0
+    u8 .. u64    unsigned, bit strings            ref       a reference (64 bits: object << 40 | offset << 8 | bit)
+
+*Addresses* say where a value lies in the flat buffer: `(base, offset, terms)`, offset a constant number of bytes and terms
+a tuple of `(stride, expression i64)` to be added.  `base` is
+
+    "abs"                          offset counts from the start of the buffer
+    "self"                         from the start of the instance that is executed
+    ("ref", expression, site)      from where a reference points (R0110 if it is null or its object has ended)
+
+A reference's offset is one of the buffer; its object number selects a row of the extents; its bit is 0 to 7 for a located
+BOOL and 255 for a value that fills bytes.  `site` is the number of a place in the source (Image.sites), for traps.
+Operands are evaluated from left to right.  `let` temporaries belong to one execution of one body.
+Meaning: IEC 61131-3 ed. 3 with the decisions on edges that are stated beside each row.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+Node = tuple[Any, ...]
+"""An operation with its operands."""
+Address = tuple[Any, int, tuple[tuple[int, Node], ...]]
+Block = tuple[Node, ...]
+
+INTEGERS = ("i8", "i16", "i32", "i64", "u8", "u16", "u32", "u64")
+FLOATS = ("f32", "f64")
+WHOLE_BYTES = 255
+"""Bit field of a reference to a value that fills bytes."""
+SIZES = {"b": 1, "i8": 1, "u8": 1, "i16": 2, "u16": 2, "i32": 4, "u32": 4, "i64": 8, "u64": 8, "f32": 4, "f64": 8,
+         "ref": 8}
+
+
+def limits(machine: str) -> tuple[int, int]:
+    """Smallest and greatest value of an integer machine type ("b" counts as one bit)."""
+    if machine == "b":
+        return 0, 1
+    bits = int(machine[1:])
+    return (0, (1 << bits) - 1) if machine[0] == "u" else (-(1 << bits - 1), (1 << bits - 1) - 1)
+
+
+@dataclass(frozen=True)
+class Operation:
+    """A row: name, operands in words, what it yields ("" for statements), traps, meaning."""
+
+    name: str
+    operands: str
+    result: str
+    traps: tuple[str, ...]
+    meaning: str
+
+
+_EXPRESSIONS = """
+const      | value                  | any    |             | the value itself
+tmp        | number                 | any    |             | the temporary of that number
+load       | address                | not s8 |             | the value at a naturally aligned place
+load_raw   | address                | not s8 |             | the same at any place
+load_bit   | address bit            | b      |             | bit 0..7 of the byte at the place
+load_flag  | address                | b      | R0110       | a BOOL behind a reference: its byte, or the bit it names
+load_text  | address capacity       | s8     |             | the bytes up to the first 0, at most capacity
+add        | a b                    | number |             | sum; integers wrap; f32 is rounded to 32 bits
+sub        | a b                    | number |             | difference; likewise
+mul        | a b                    | number |             | product; likewise
+div        | a b site               | number | R0101       | integers toward zero, min / -1 wraps; floats per IEEE 754, no trap
+mod        | a b site               | integer| R0101       | remainder with the sign of a; min mod -1 is 0
+neg        | a                      | number |             | minus a, wraps
+abs        | a                      | number |             | magnitude; of the smallest integer: itself
+pow        | a b                    | float  |             | a to the b; x**0 is 1, 0**negative inf, negative**fraction NaN
+and        | a b                    | b, uN  |             | bitwise
+or         | a b                    | b, uN  |             | bitwise
+xor        | a b                    | b, uN  |             | bitwise
+not        | a                      | b, uN  |             | bitwise, in the width
+and_then   | a b                    | b      |             | b is evaluated only if a is TRUE
+or_else    | a b                    | b      |             | b is evaluated only if a is FALSE
+shl        | a n site               | integer| R0106       | n is i64; n >= width gives 0
+shr        | a n site               | integer| R0106       | zeros enter, also for signed types
+rol        | a n site               | integer| R0106       | n modulo width
+ror        | a n site               | integer| R0106       | n modulo width
+eq         | type a b               | b      |             | operands of `type`; NaN equals nothing; s8 by bytes
+ne         | type a b               | b      |             | not eq
+lt         | type a b               | b      |             | less; s8 by bytes, a prefix is less
+le         | type a b               | b      |             | less or equal
+gt         | type a b               | b      |             | greater
+ge         | type a b               | b      |             | greater or equal
+convert    | from a                 | number |             | integer to integer: low bits, sign read anew; to float: nearest
+nearest    | from a site            | integer| R0105       | float to integer, ties to even; NaN, inf, out of range trap
+truncate   | from a site            | integer| R0105       | float to integer toward zero; likewise
+bits       | from a                 | any    |             | the same bits read as another type of that width (NaN canonical)
+is_set     | from a                 | b      |             | a <> 0 (NaN is)
+select     | g a b                  | any    |             | a if g is FALSE, b if TRUE; both are evaluated
+mux        | k (a ...) site         | any    | R0107       | k is i64; all are evaluated
+min        | a b                    | not ref|             | the lesser; NaN if one is NaN
+max        | a b                    | not ref|             | the greater; NaN if one is NaN
+check      | a low high code site   | integer| code        | a itself; trap `code` (R0102, R0103, R0105) outside low..high
+math       | function a             | float  |             | sqrt ln log exp sin cos tan asin acos atan; NaN outside the domain
+atan2      | y x                    | float  |             | angle; both 0 give 0
+floor_div  | a b                    | i64    |             | quotient toward minus infinity, b a positive constant
+now        |                        | i64    |             | the scan's time, ns
+from_bcd   | from a site            | integer| R0105       | decimal digits in nibbles to a number; a nibble above 9 traps
+to_bcd     | from a site            | integer| R0105       | the reverse; more digits than nibbles or a negative number trap
+length     | a                      | i16    |             | number of characters of a string
+left       | a n site               | s8     | R0108       | the first n characters; n is i64, negative traps
+right      | a n site               | s8     | R0108       | the last n characters
+mid        | a n p site             | s8     | R0108       | n characters from position p (first is 1; p < 1 traps)
+concat     | a b                    | s8     |             | a followed by b
+insert     | a b p site             | s8     | R0108       | b after character p of a; p = 0 in front; p < 0 traps
+delete     | a n p site             | s8     | R0108       | without n characters from p; p behind the end: unchanged
+replace    | a b n p site           | s8     | R0108       | n characters from p replaced by b; p behind the end: appended
+find       | a b                    | i16    |             | first position of b in a, 0 if none or b is empty
+to_text    | data_type a            | s8     |             | the value as a literal would be read back, by data type's name
+from_text  | data_type a site       | any    | R0111 R0105 | reads a literal with or without type prefix, spaces trimmed
+enum_text  | names a                | s8     |             | the member's name by value from `names`, else the number
+reference  | address bit            | ref    |             | where the place is; bit 0..7, or 255 for a value that fills bytes
+"""
+
+_STATEMENTS = """
+store      | type address a         |        |             | a to a naturally aligned place
+store_raw  | type address a         |        |             | the same to any place
+store_bit  | address bit a          |        |             | a to bit 0..7 of the byte
+store_flag | address a              |        | R0110       | a to a BOOL behind a reference
+store_text | address capacity a     |        |             | the bytes cut to capacity, then one 0
+copy       | to from size           |        |             | size bytes as if all were read before any is written
+fill       | address bytes          |        |             | constant bytes (initial values of a frame)
+let        | number type a          |        |             | a becomes the temporary
+if         | ((c block) ...) block  |        |             | the block of the first c that is TRUE, else the last
+case       | type a (((low high) ...) block) ... | |       | rows `(ranges, block)`; first fit; then the block for no fit
+loop       | head body tail         |        |             | head, body, tail, again; `next` in the body goes to the tail
+exit       |                        |        |             | leaves the innermost loop
+next       |                        |        |             | to the tail of the innermost loop
+return     |                        |        |             | leaves the body
+call       | pou address            |        |             | executes the body of that number; address of its instance, or None
+charge     | count site             |        | R0104       | takes count from the step budget; below 0 traps
+due        | a                      |        |             | notes time a (ns) if it is earlier than what is noted
+stop       | code site              |        | code        | traps
+observe    | kind site detail       |        |             | statement, rung, contact, read or write; a plain build drops it
+"""
+
+
+def _rows(text: str, kind: str) -> dict[str, Operation]:
+    table = {}
+    for line in text.strip().splitlines():
+        name, operands, result, traps, meaning = (part.strip() for part in line.split("|", 4))
+        table[name] = Operation(name, operands, result if kind == "expression" else "", tuple(traps.split()), meaning)
+    return table
+
+
+EXPRESSIONS = _rows(_EXPRESSIONS, "expression")
+STATEMENTS = _rows(_STATEMENTS, "statement")
+
+OBSERVATIONS: dict[str, str] = {
+    "statement": "a statement is about to be executed; no detail",
+    "rung": "a rung is about to be executed; detail: its number",
+    "contact": "a contact was evaluated; detail: (element, expression b)",
+    "read": "a variable was read; detail: (type, address, bit); bit 255 for a value that fills bytes",
+    "write": "a variable was written; detail: (type, address, bit); observed after the store",
+}
+"""Kinds of `observe` and what their detail carries.  A text's type is ("s8", capacity), an aggregate's ("", size)."""
