@@ -1,0 +1,1 @@
+"""Networks: in memory with virtual time (`loop`), or over the real TCP of the host (`tcp`)."""
