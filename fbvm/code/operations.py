@@ -95,7 +95,7 @@ truncate   | from a site            | integer| R0105       | float to integer to
 bits       | from a                 | any    |             | the same bits read as another type of that width (NaN canonical)
 is_set     | from a                 | b      |             | a <> 0 (NaN is)
 select     | g a b                  | any    |             | a if g is FALSE, b if TRUE; both are evaluated
-mux        | k (a ...) site         | any    | R0107       | k is i64; all are evaluated
+mux        | k (a, ...) site        | any    | R0107       | k is i64; all are evaluated
 min        | a b                    | not ref|             | the lesser; NaN if one is NaN
 max        | a b                    | not ref|             | the greater; NaN if one is NaN
 check      | a low high code site   | integer| code        | a itself; trap `code` (R0102, R0103, R0105) outside low..high
@@ -117,7 +117,7 @@ find       | a b                    | i16    |             | first position of b
 to_text    | data_type a            | s8     |             | the value as a literal would be read back, by data type's name
 from_text  | data_type a site       | any    | R0111 R0105 | reads a literal with or without type prefix, spaces trimmed
 enum_text  | names a                | s8     |             | the member's name by value from `names`, else the number
-reference  | address bit            | ref    |             | where the place is; bit 0..7, or 255 for a value that fills bytes
+reference  | address bit            | ref    |             | object 1 (the whole buffer) or that of the base: where the place is; bit 0..7, or 255 for a value that fills bytes
 """
 
 _STATEMENTS = """
@@ -129,8 +129,8 @@ store_text | address capacity a     |        |             | the bytes cut to ca
 copy       | to from size           |        |             | size bytes as if all were read before any is written
 fill       | address bytes          |        |             | constant bytes (initial values of a frame)
 let        | number type a          |        |             | a becomes the temporary
-if         | ((c block) ...) block  |        |             | the block of the first c that is TRUE, else the last
-case       | type a (((low high) ...) block) ... | |       | rows `(ranges, block)`; first fit; then the block for no fit
+if         | ((c, block), ...) block|        |             | the block of the first c that is TRUE, else the last
+case       | type a rows block      |        |             | rows are (((low, high), ...), block); first fit, else the last block
 loop       | head body tail         |        |             | head, body, tail, again; `next` in the body goes to the tail
 exit       |                        |        |             | leaves the innermost loop
 next       |                        |        |             | to the tail of the innermost loop
