@@ -34,12 +34,13 @@ class Area:
 
 _ROWS = (
     # name, offset, count, bits of a unit, read-only, retained
+    ("CF", 1024, 128, 1, 128, False),  # condition flags and clock pulses, on the system page
     ("CIO", 4096, 6144, 16, 0, False),
     ("W", 16384, 512, 16, 0, False),
     ("H", 17408, 1536, 16, 0, True),
     ("A", 20480, 960, 16, 448, True),
-    ("TF", 22528, 4096, 1, 0, False),
-    ("CF", 23040, 4096, 1, 0, True),
+    ("TF", 22528, 4096, 1, 0, False),  # completion flags of timers
+    ("CNF", 23040, 4096, 1, 0, True),  # completion flags of counters
     ("T", 24576, 4096, 16, 0, False),
     ("C", 32768, 4096, 16, 0, True),
     ("I", 40960, 4096, 8, 0, False),
@@ -48,6 +49,8 @@ _ROWS = (
     ("D", 114688, 32768, 16, 0, True),
 )
 AREAS: dict[str, Area] = {row[0]: Area(*row) for row in _ROWS}
+FLAG_AREAS = frozenset(("CF", "TF", "CNF"))
+"""Areas that count bits."""
 
 SLOTS_OFFSET = 180224
 """Where the slots of globals and instances begin."""
@@ -93,7 +96,7 @@ class Address:
 
     def byte_offset(self) -> int:
         """Offset in bytes from the start of the area (of the byte that holds the bit, if one is named)."""
-        if self.area in ("TF", "CF"):
+        if self.area in FLAG_AREAS:
             return self.number // 8
         unit = (self.size_bits or 8) // 8 if self.area in "IQM" else 2
         if self.bit is None:
@@ -101,21 +104,21 @@ class Address:
         return self.number * (1 if self.area in "IQM" else 2) + self.bit // 8
 
     def bit_in_byte(self) -> int:
-        return self.number % 8 if self.area in ("TF", "CF") else (self.bit or 0) % 8
+        return self.number % 8 if self.area in FLAG_AREAS else (self.bit or 0) % 8
 
     def __str__(self) -> str:
         if self.area in "IQM":
             size = "X" if self.bit is not None else {8: "B", 16: "W", 32: "D", 64: "L"}[self.size_bits or 8]
             return f"%{self.area}{size}{self.number}" + (f".{self.bit}" if self.bit is not None else "")
         bit = f".{self.bit:02}" if self.bit is not None else ""
-        if self.area in ("TF", "CF"):
-            return f"{self.area[0]}{self.number:04}"
+        if self.area in FLAG_AREAS:
+            return f"CF{self.number:03}" if self.area == "CF" else f"{self.area[0]}{self.number:04}"
         if self.area[0] == "E":
             return f"{self.area}_{self.number}{bit}"
         return f"{self.area}{' ' if self.area == 'CIO' else ''}{self.number}{bit}"
 
 
-_OMRON = re.compile(r"%?\s*(CIO|DM|D|W|H|A|TF|CF|T|C|E([0-9A-F])_|E([0-9A-F])\s*:)?\s*(\d+)(?:\.(\d+))?", re.I)
+_OMRON = re.compile(r"%?\s*(CIO|DM|D|W|H|A|TF|CNF|CF|T|C|E([0-9A-F])_|E([0-9A-F])\s*:)?\s*(\d+)(?:\.(\d+))?", re.I)
 _PORTABLE = re.compile(r"%\s*([IQM])([XBWDL]?)(\d+)(?:\.(\d+))?", re.I)
 _SIZES = {"X": 1, "": 1, "B": 8, "W": 16, "D": 32, "L": 64}
 
