@@ -32,7 +32,8 @@ class Happening:
     """One happening at one unit.  `local` is the unit's endpoint, `remote` its peer's, with the program's addresses.
 
     `out` says who did it: the unit (for SYN and OPEN: the unit opens actively) or its peer.  `mirrored`: the peer is a
-    unit of the same network, which tells the same from its side; who wants each frame once takes `out or not mirrored`."""
+    unit of the same network, which tells the same from its side; who wants each frame once takes those that are `out`
+    or not `mirrored`."""
 
     what: What
     local: Peer

@@ -1,0 +1,191 @@
+"""Peers that live in a `LoopNetwork`: a Modbus server, and scripted ones that answer late, in pieces, wrong or never.
+
+A peer does no I/O.  It is told what happens to one of its connections and gives back actions for the network to do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+
+from fbvm.wire.link import Peer
+from fbvm.wire.modbus import Adu, Fault, Splitter
+from fbvm.wire.modbus_server import ModbusServer
+
+# --- actions -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Say:
+    """Send bytes, `after_ns` from now.  Several actions of one answer all count from the same moment."""
+
+    data: bytes
+    after_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Fin:
+    """Half close: nothing more will be said, listening goes on."""
+
+    after_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Leave:
+    """Close in both directions: FIN, and RST if anything still comes."""
+
+    after_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Reset:
+    """Tear the connection down by RST."""
+
+    after_ns: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Wake:
+    """Call `woken` after this time."""
+
+    after_ns: int
+
+
+Action = Say | Fin | Leave | Reset | Wake
+Actions = Iterable[Action]
+
+
+# --- what a peer is ------------------------------------------------------------------------------------------------
+
+
+class Conversation:
+    """A peer's side of one connection.  Override what matters; each method gives back actions."""
+
+    reads = True
+    """False: leaves everything in the network, so that the window closes."""
+
+    def connected(self, now_ns: int) -> Actions:
+        """The connection is open."""
+        return ()
+
+    def received(self, data: bytes, now_ns: int) -> Actions:
+        """Bytes of the stream, in whatever pieces they came."""
+        return ()
+
+    def peer_closed(self, now_ns: int) -> Actions:
+        """The unit sent FIN.  By default the peer closes, too."""
+        return (Leave(),)
+
+    def woken(self, now_ns: int) -> Actions:
+        """The time of a `Wake` has come."""
+        return ()
+
+    def lost(self, error: str, now_ns: int) -> None:
+        """The connection is gone ("ECONNRESET", "ETIMEDOUT")."""
+
+
+class Station:
+    """What is placed at an endpoint of a network: opens a conversation for each connection, answers datagrams."""
+
+    def accept(self, caller: Peer) -> Conversation | None:
+        """A conversation for a new connection; None refuses it."""
+        return None
+
+    def datagram(self, data: bytes, caller: Peer) -> Iterable[bytes]:
+        """Datagrams that go back to the caller."""
+        return ()
+
+
+# --- ready ones ----------------------------------------------------------------------------------------------------
+
+
+class ModbusPeer(Station):
+    """A Modbus TCP server.  `reply` turns each right reply frame into actions, to be late or wrong on purpose."""
+
+    def __init__(
+        self, server: ModbusServer | None = None, reply: Callable[[bytes], Actions] = lambda frame: (Say(frame),)
+    ) -> None:
+        self.server = server or ModbusServer()
+        self.reply = reply
+        self.heard: list[bytes] = []
+        """Every frame that came, in order, over all connections."""
+
+    def accept(self, caller: Peer) -> Conversation:
+        return _ModbusConversation(self)
+
+
+class _ModbusConversation(Conversation):
+    def __init__(self, peer: ModbusPeer) -> None:
+        self._peer = peer
+        self._splitter = Splitter()
+
+    def received(self, data: bytes, now_ns: int) -> Actions:
+        actions: list[Action] = []
+        for found in self._splitter.feed(data):
+            if isinstance(found, Fault):
+                self._peer.heard.append(found.data)
+                if found.fatal:
+                    return [*actions, Leave()]
+                continue
+            self._peer.heard.append(found.to_bytes())
+            pdu = self._peer.server.answer_pdu(found.pdu, found.unit)
+            actions += self._peer.reply(Adu(found.transaction, found.unit, pdu).to_bytes())
+        return actions
+
+
+Step = Sequence[Action] | Callable[[bytes], Actions]
+
+
+class ScriptedPeer(Station):
+    """Does the next step of its script whenever bytes come in; after the last step it stays silent.
+
+    A step is a list of actions, or a function from the received bytes to actions.  The script goes on from connection
+    to connection.  `greeting` is done when a connection opens; `connections` limits how many are accepted."""
+
+    def __init__(
+        self,
+        *steps: Step,
+        greeting: Sequence[Action] = (),
+        connections: int | None = None,
+        reads: bool = True,
+        farewell: Sequence[Action] = (Leave(),),
+    ) -> None:
+        self.steps = list(steps)
+        self.greeting = greeting
+        self.connections = connections
+        self.reads = reads
+        self.farewell = farewell
+        """What is done when the unit sends FIN."""
+        self.heard: list[bytes] = []
+        self.callers: list[Peer] = []
+        self.log: list[str] = []
+        """"fin" and errno names, as connections end."""
+
+    def accept(self, caller: Peer) -> Conversation | None:
+        if self.connections is not None and len(self.callers) >= self.connections:
+            return None
+        self.callers.append(caller)
+        return _ScriptedConversation(self)
+
+
+class _ScriptedConversation(Conversation):
+    def __init__(self, peer: ScriptedPeer) -> None:
+        self._peer = peer
+        self.reads = peer.reads
+
+    def connected(self, now_ns: int) -> Actions:
+        return self._peer.greeting
+
+    def received(self, data: bytes, now_ns: int) -> Actions:
+        self._peer.heard.append(data)
+        if not self._peer.steps:
+            return ()
+        step = self._peer.steps.pop(0)
+        return step(data) if callable(step) else step
+
+    def peer_closed(self, now_ns: int) -> Actions:
+        self._peer.log.append("fin")
+        return self._peer.farewell
+
+    def lost(self, error: str, now_ns: int) -> None:
+        self._peer.log.append(error)
