@@ -1,0 +1,96 @@
+"""The Omron ETN21 Ethernet unit: socket services by request switches, as a CS/CJ program sees them in CIO and D words.
+
+A state machine without I/O: memory words, network events and the time go in; memory words and network requests come
+out.  FINS, mail, FTP and clock adjustment are not emulated; their words stay 0.  From W420, W421 and, for points that
+these leave open, W343.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from fbvm.units import etn21_map as at
+from fbvm.units.etn21_dispatch import NEVER_NS, Dispatch, Fault
+from fbvm.units.etn21_map import Layout
+from fbvm.units.etn21_timing import timing_of
+from fbvm.units.unit import AreaMemory
+from fbvm.wire.link import Event, Request
+
+TIME_WAIT_NS = 60_000_000_000  # W421 6-9-3 p156
+
+
+class Etn21:
+    """One CS1W-ETN21 or CJ1W-ETN21 with a unit number from 0 to 15.
+
+    `timing` is "exact" (a switch is accepted by the next refresh and finished by the one after, all words together)
+    or "real" (seeded delays and words out of step).  `time_wait_ns` is how long a fixed local TCP port is held after
+    a close from this side.  Raises ValueError for a wrong argument."""
+
+    def __init__(
+        self,
+        unit_number: int = 0,
+        address: str = "192.168.250.1",
+        *,
+        timing: str = "exact",
+        seed: int = 0,
+        time_wait_ns: int = TIME_WAIT_NS,
+        faults: Iterable[Fault] = (),
+    ) -> None:
+        self.layout = Layout.of(unit_number)
+        self.name = f"ETN21 {unit_number}"
+        self.address = address
+        self.faults = list(faults)
+        """Each is used up by the first request that it fits."""
+        self.link_up = True
+        """Whether n+17 says that the cable is plugged; what the network does is the network's affair."""
+        self.error_status = 0
+        """What n+18 shows."""
+        self._dispatch = Dispatch(self.layout, address, timing_of(timing, seed), time_wait_ns, self.faults)
+        self._switches_at = slice(self.layout.n + at.SWITCHES, self.layout.n + at.FINS_TCP_STATUS)
+        self._seen = [0, 0, 0, 0]
+        self._wake_ns = NEVER_NS
+
+    def reset(self, memory: AreaMemory) -> list[Request]:
+        """Power on or restart: the unit's own words and all switches 0, connections broken by RST."""
+        self._dispatch.forget()
+        self._seen = [0, 0, 0, 0]
+        self._wake_ns = NEVER_NS
+        cio, d = memory.words("CIO"), memory.words("D")
+        n, m = self.layout.n, self.layout.m
+        for word in range(n + 1, n + at.FINS_TCP_STATUS + 1):
+            cio[word] = 0
+        cio[n] &= ~at.FORCE_CLOSE
+        for word in range(m + 1, m + at.MAIL_STATUS + 1):
+            d[word] = 0
+        self._show_unit_status(cio)
+        return self._dispatch.reset_sockets()
+
+    def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
+        """One I/O refresh: take the network's events and new switches, end what is ready, show what changed."""
+        dispatch = self._dispatch
+        dispatch.cycle += 1
+        cio = memory.words("CIO")
+        self._show_unit_status(cio)
+        switches = cio[self._switches_at].tolist()
+        force = cio[self.layout.n] & at.FORCE_CLOSE
+        if not events and not force and switches == self._seen and now_ns < self._wake_ns:
+            return []
+        start_force = force and not dispatch.is_force_closing
+        found = dispatch.find(switches)
+        requests = [request for event in events for request in dispatch.take(event)]
+        requests += dispatch.expire(now_ns)
+        dispatch.conclude(memory, now_ns)
+        for new in found:
+            dispatch.notice(new)
+        requests += dispatch.accept(memory, now_ns)
+        if start_force:
+            requests += dispatch.force_close(now_ns)
+        dispatch.show(memory)
+        self._seen = cio[self._switches_at].tolist()
+        self._wake_ns = dispatch.wake_ns()
+        return requests
+
+    def _show_unit_status(self, cio: memoryview) -> None:
+        n = self.layout.n
+        cio[n + at.SERVICE_STATUS] = at.LINK_UP if self.link_up else 0
+        cio[n + at.ERROR_STATUS] = self.error_status

@@ -1,0 +1,83 @@
+"""Checks a request before the unit accepts it and says which response code it deserves.
+
+Pure: reads, changes nothing.  The order of the checks is assumed, because the manuals give none; what each code means
+is from W421 6-7-6 p120-125 and W343 6-2-2 p118.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from fbvm.units import etn21_codes as codes
+from fbvm.units.etn21_data import check_address
+from fbvm.units.etn21_map import FLAG_OF, OPENS, Parameters, Switch
+from fbvm.units.etn21_service import Area
+from fbvm.units.etn21_socket import SERVICE_LIMIT, Phase, Socket
+from fbvm.units.unit import AreaMemory
+
+ANY_HOST = "0.0.0.0"
+PROTOCOL_OF = {Switch.UDP_OPEN: "UDP", Switch.PASSIVE_OPEN: "TCP", Switch.ACTIVE_OPEN: "TCP"}
+
+
+def check_request(
+    switch: Switch,
+    parameters: Parameters,
+    area: Area,
+    sockets: Mapping[int, Socket],
+    memory: AreaMemory,
+    cycle: int,
+) -> int:
+    """0000 if the request can be processed, else the code that refuses it."""
+    socket = sockets.get(parameters.socket)
+    if socket is None:
+        return _without_socket(switch, area)
+    return (
+        _check_binding(switch, area, socket)
+        or _check_open(switch, socket, cycle)
+        or _check_ranges(switch, parameters, socket)
+        or (check_address(memory, parameters) if switch in (Switch.SEND, Switch.RECEIVE) else codes.NORMAL_END)
+    )
+
+
+def _without_socket(switch: Switch, area: Area) -> int:
+    """A close knows no 1100 (W421 p125); assumed that it sees a socket that is not open."""
+    if switch is not Switch.CLOSE:
+        return codes.PARAMETER_RANGE
+    return codes.NOT_OPEN if area.bound is None else codes.OTHER_SOCKET
+
+
+def _check_binding(switch: Switch, area: Area, socket: Socket) -> int:
+    protocol = PROTOCOL_OF.get(switch, socket.protocol)
+    if area.bound is not None and (area.bound is not socket or protocol != socket.protocol):
+        return codes.OTHER_SOCKET
+    if protocol != socket.protocol and socket.phase is not Phase.CLOSED:
+        return codes.OTHER_PROTOCOL
+    return codes.NORMAL_END
+
+
+def _check_open(switch: Switch, socket: Socket, cycle: int) -> int:
+    """Open or not is what bit 15 has shown for a cycle at least: nobody can know it earlier."""
+    settled = cycle > socket.settled_cycle
+    if switch in OPENS:
+        free = socket.phase is Phase.CLOSED and not socket.services and settled
+        return codes.NORMAL_END if free else codes.ALREADY_OPEN
+    if switch is Switch.CLOSE:
+        return codes.NORMAL_END if socket.phase in (Phase.OPENING, Phase.OPEN) else codes.NOT_OPEN
+    if not (socket.is_open and settled):
+        return codes.NOT_OPEN
+    return codes.ALREADY_OPEN if FLAG_OF[switch] in socket.services else codes.NORMAL_END
+
+
+def _check_ranges(switch: Switch, parameters: Parameters, socket: Socket) -> int:
+    remote = parameters.remote
+    if switch in (Switch.UDP_OPEN, Switch.PASSIVE_OPEN):
+        wrong = not parameters.local_port
+    elif switch is Switch.ACTIVE_OPEN:
+        wrong = remote.host == ANY_HOST or not remote.port
+    elif switch is Switch.SEND and socket.protocol == "UDP":
+        wrong = parameters.count > SERVICE_LIMIT or remote.host == ANY_HOST or not remote.port
+    elif switch is Switch.CLOSE:
+        wrong = False
+    else:
+        wrong = parameters.count > SERVICE_LIMIT
+    return codes.PARAMETER_RANGE if wrong else codes.NORMAL_END

@@ -1,0 +1,62 @@
+"""Moves socket data between PLC memory and bytes by the data address of a parameter area (area code, word, bit).
+
+A word is two bytes of the stream, high byte first; an odd last byte is the high byte of the last word.  From W343
+6-2-1 p117 and W421 6-8 p151.
+"""
+
+from __future__ import annotations
+
+from array import array
+from sys import byteorder
+
+from fbvm.units import etn21_codes as codes
+from fbvm.units.etn21_map import Parameters
+from fbvm.units.unit import AreaMemory
+
+AREA_OF_CODE: dict[int, tuple[str, int, int]] = {  # code: (area, first word, last word)
+    0xB0: ("CIO", 0, 6143),
+    0xB1: ("W", 0, 511),  # assumed: absent from W343's list, but the standard FINS code
+    0xB2: ("H", 0, 511),
+    0xB3: ("A", 448, 959),  # A000..A447 are read-only
+    0x82: ("D", 0, 32767),
+    0x98: ("E0", 0, 32767),  # current bank, assumed to be bank 0
+    **{0xA0 + bank: (f"E{bank:X}", 0, 32767) for bank in range(13)},
+}
+
+
+def check_address(memory: AreaMemory, parameters: Parameters) -> int:
+    """0000, or the code that the data address deserves: 1101 or 1103.
+
+    A block that runs past the end of its area is 1101, assumed, because no table of the switches has 1104."""
+    found = AREA_OF_CODE.get(parameters.area_code)
+    if found is None:
+        return codes.AREA_CODE
+    area, first, last = found
+    try:
+        length = len(memory.words(area))
+    except KeyError:
+        return codes.AREA_CODE
+    end = parameters.word + max(1, (parameters.count + 1) // 2)
+    if parameters.word < first or end > min(last + 1, length):
+        return codes.AREA_CODE
+    return codes.BIT_NUMBER if parameters.bit else codes.NORMAL_END
+
+
+def fetch(memory: AreaMemory, parameters: Parameters) -> bytes:
+    """The `count` bytes to send, from an address that `check_address` has passed."""
+    words = memory.words(AREA_OF_CODE[parameters.area_code][0])
+    data = array("H", words[parameters.word : parameters.word + (parameters.count + 1) // 2].tolist())
+    if byteorder == "little":
+        data.byteswap()
+    return data.tobytes()[: parameters.count]
+
+
+def store(memory: AreaMemory, parameters: Parameters, data: bytes) -> None:
+    """Write received bytes; the low byte beside an odd last one becomes 00 (assumed), words after it stay."""
+    if not data:
+        return
+    words = array("H", data + b"\0" * (len(data) % 2))
+    if byteorder == "little":
+        words.byteswap()
+    area = AREA_OF_CODE[parameters.area_code][0]
+    memory.words(area)[parameters.word : parameters.word + len(words)] = memoryview(words)

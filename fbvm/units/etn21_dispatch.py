@@ -1,0 +1,285 @@
+"""Takes every request of an ETN21 from the switch to the response code: notice, accept, wait, conclude.
+
+Owns the parameter areas, the sockets and what runs; the unit calls its phases once per refresh, in the order in which
+they stand here.  Rules of switches are from W421 6-7-5 p120 and p125, W343 6-2-7 p128.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from fbvm.units import etn21_codes as codes
+from fbvm.units import etn21_map as at
+from fbvm.units.etn21_checks import check_request
+from fbvm.units.etn21_data import store
+from fbvm.units.etn21_display import Display
+from fbvm.units.etn21_map import Layout, Parameters, Switch
+from fbvm.units.etn21_service import Area, Service
+from fbvm.units.etn21_socket import Phase, Socket
+from fbvm.units.etn21_start import Surroundings, start
+from fbvm.units.etn21_timing import TOGETHER, Delay, Skew, Timing
+from fbvm.units.unit import AreaMemory
+from fbvm.wire.link import Event, Request
+
+NEVER_NS = 1 << 63
+TRANSFERS = at.SENDING | at.RECEIVING
+CHECKED_FIRST = frozenset({codes.CPU_UNIT_ERROR, codes.LOCAL_ADDRESS_ERROR})
+
+
+@dataclass(frozen=True, slots=True)
+class Fault:
+    """A response code that the unit gives to the next request that fits, instead of serving it."""
+
+    code: int
+    switch: Switch | None = None
+    """None fits every switch."""
+
+    socket: int | None = None
+    """None fits every socket number."""
+
+
+class Found(NamedTuple):
+    """Switches of an area that belong to no request yet."""
+
+    area: Area
+    switches: list[Switch]
+    busy: bool
+    """True if the program could see something running when it turned them ON."""
+
+
+class Dispatch:
+    """What runs in one unit."""
+
+    def __init__(self, layout: Layout, address: str, timing: Timing, time_wait_ns: int, faults: list[Fault]) -> None:
+        self._layout = layout
+        self._address = address
+        self._timing = timing
+        self._time_wait_ns = time_wait_ns
+        self._faults = faults
+        self._sockets = {number: Socket(number) for number in at.SOCKETS}
+        self.forget()
+
+    def forget(self) -> None:
+        """As after power-on, but for what the network still has to close."""
+        self.cycle = 0
+        self._areas = [Area(number) for number in at.AREAS]
+        self._services: list[Service] = []
+        self._forced: list[Service] | None = None
+        self._held_ports: dict[int, int] = {}
+        self._display = Display(self._layout)
+        self._touched: dict[int, Skew] = {}
+
+    def reset_sockets(self) -> list[Request]:
+        """Requests that end every connection."""
+        return [request for socket in self._sockets.values() for request in socket.reset()]
+
+    # --- 1. switches that are new ------------------------------------------------------------------------------------
+
+    def find(self, words: Sequence[int]) -> list[Found]:
+        """New switches in n+19..n+22, judged before this refresh ends anything."""
+        found = []
+        for area in self._areas:
+            shift = 0 if area.number % 2 else 8
+            new = words[(area.number - 1) // 2] >> shift & at.ALL_SWITCHES & ~area.owned()
+            if new:
+                busy = any(service.code != codes.OTHER_PROCESSING for service in area.services)
+                found.append(Found(area, [switch for switch in Switch if new >> switch & 1], busy))
+        return found
+
+    # --- 2. what the network and the clock say -----------------------------------------------------------------------
+
+    def take(self, event: Event) -> list[Request]:
+        """Let the socket of this channel take an event; events of unknown channels are dropped."""
+        socket = self._sockets.get(event.channel)
+        if socket is None:
+            return []
+        self._touch(socket, TOGETHER)
+        return socket.take(event)
+
+    def expire(self, now_ns: int) -> list[Request]:
+        """End services whose time has run out; an open is withdrawn from the network."""
+        requests: list[Request] = []
+        for service in self._services:
+            late = service.code is None and service.deadline_ns is not None and now_ns >= service.deadline_ns
+            if late and service.socket is not None:
+                service.code = service.deadline_code
+                self._touch(service.socket, TOGETHER)
+                if service.switch in at.OPENS:
+                    requests += service.socket.withdraw()
+        return requests
+
+    # --- 3. services that are ready ----------------------------------------------------------------------------------
+
+    def conclude(self, memory: AreaMemory, now_ns: int) -> None:
+        """Write the results of what has ended: refusals first, closes last, one result an area and refresh."""
+        for service in sorted(self._services, key=lambda service: service.rank):
+            if service.concluded_cycle is None and self._is_ready(service, now_ns):
+                self._conclude(service, memory, now_ns)
+        for service in [service for service in self._services if self._is_over(service, self.cycle)]:
+            self._services.remove(service)
+            if service.area is not None:
+                service.area.services.remove(service)
+        self._conclude_force_close()
+
+    def _is_ready(self, service: Service, now_ns: int) -> bool:
+        return (
+            service.code is not None
+            and self.cycle >= service.earliest_cycle
+            and now_ns >= service.earliest_ns
+            and (service.area is None or service.area.result_cycle < self.cycle)
+            and all(self._is_over(other, self.cycle - 1) for other in service.interrupts)
+        )
+
+    @staticmethod
+    def _is_over(service: Service, cycle: int) -> bool:
+        return service.concluded_cycle is not None and service.concluded_cycle <= cycle
+
+    def _conclude(self, service: Service, memory: AreaMemory, now_ns: int) -> None:
+        skew = self._timing.skew()
+        service.concluded_cycle = self.cycle + skew.switch
+        socket = service.socket
+        if socket is not None:
+            self._hold_port(service, socket, now_ns)
+            was_connected = socket.connected
+            socket.end(service)
+            if service.switch in at.OPENS or service.switch is Switch.CLOSE:
+                socket.settled_cycle = self.cycle + (skew.open if socket.connected != was_connected else 0)
+            self._touched[socket.number] = skew
+        if service.area is not None:
+            self._write_result(service, service.area, memory)
+
+    def _write_result(self, service: Service, area: Area, memory: AreaMemory) -> None:
+        due = self.cycle if service.concluded_cycle is None else service.concluded_cycle
+        if service.socket is not None and service.parameters is not None and service.flag & TRANSFERS:
+            store(memory, service.parameters, service.data)
+            service.results[at.COUNT] = service.count
+        first = self._layout.parameters(area.number)
+        for offset, value in service.results.items():
+            self._display.put("D", first + offset, value, due)
+        self._display.put("D", first + at.RESPONSE, service.code or codes.NORMAL_END, due)
+        word, first_bit = self._layout.switches(area.number)
+        self._display.clear_bit("CIO", word, first_bit + service.switch, due)
+        area.result_cycle = due
+
+    def _hold_port(self, service: Service, socket: Socket, now_ns: int) -> None:
+        """A fixed local port stays taken after a close from this side, unless it was by RST (W421 6-9-3 p156)."""
+        if service.switch is Switch.CLOSE and socket.holds_port and self._time_wait_ns:
+            self._held_ports[socket.local_port] = now_ns + self._time_wait_ns
+
+    # --- 4. new requests ---------------------------------------------------------------------------------------------
+
+    def notice(self, found: Found) -> None:
+        """Latch new switches of an area: a close always, else the lowest (assumed), and 110C for the others."""
+        close = Switch.CLOSE in found.switches
+        chosen = Switch.CLOSE if close else None if found.busy else found.switches[0]
+        for switch in found.switches:
+            service = Service(switch, found.area, self.cycle + self._timing.accept_refreshes)
+            if switch is not chosen:
+                service.code = codes.OTHER_PROCESSING
+                service.earliest_cycle = self.cycle + 1
+            found.area.services.append(service)
+            self._services.append(service)
+
+    def accept(self, memory: AreaMemory, now_ns: int) -> list[Request]:
+        """Check and start what was noticed."""
+        requests: list[Request] = []
+        for service in self._services:
+            waiting = service.code is None and service.parameters is None and service.accept_cycle <= self.cycle
+            if waiting and service.area is not None:
+                requests += self._accept(service, service.area, memory, now_ns)
+        return requests
+
+    def _accept(self, service: Service, area: Area, memory: AreaMemory, now_ns: int) -> list[Request]:
+        parameters = Parameters.read(memory.words("D"), self._layout.parameters(area.number))
+        service.parameters = parameters
+        self._delay(service, self._timing.delay(), now_ns)
+        service.code = (
+            self._fault(service.switch, parameters.socket, first=True)
+            or check_request(service.switch, parameters, area, self._sockets, memory, self.cycle)
+            or self._fault(service.switch, parameters.socket, first=False)
+            or None
+        )
+        if service.code is not None:
+            return []
+        socket = self._sockets[parameters.socket]
+        if service.switch is Switch.CLOSE:
+            service.interrupts = self._interrupt(socket, now_ns)
+        around = Surroundings(memory, self._address, self._held_ports, now_ns)
+        requests = start(service, parameters, socket, around)
+        self._touch(socket, TOGETHER)
+        return requests
+
+    def _interrupt(self, socket: Socket, now_ns: int) -> tuple[Service, ...]:
+        """End what runs on a socket with 0081; a result that is already decided stays."""
+        running = tuple(service for service in socket.services.values() if service.switch is not Switch.CLOSE)
+        for service in running:
+            if service.code is None:
+                service.code = codes.SOCKET_CLOSED
+                self._delay(service, Delay(1, 0), now_ns)
+        return running
+
+    def _delay(self, service: Service, delay: Delay, now_ns: int) -> None:
+        service.earliest_cycle = self.cycle + delay.refreshes
+        service.earliest_ns = now_ns + delay.time_ns
+
+    def _fault(self, switch: Switch, socket: int, first: bool) -> int:
+        """The code of the next fault that fits, which is then used up; 0 if none does."""
+        for fault in self._faults:
+            fits = fault.switch in (None, switch) and fault.socket in (None, socket)
+            if fits and (fault.code in CHECKED_FIRST) == first:
+                self._faults.remove(fault)
+                return fault.code
+        return codes.NORMAL_END
+
+    # --- 5. force-close ----------------------------------------------------------------------------------------------
+
+    @property
+    def is_force_closing(self) -> bool:
+        """True from the acceptance of n bit 2 until it goes OFF."""
+        return self._forced is not None
+
+    def force_close(self, now_ns: int) -> list[Request]:
+        """Close every socket, whatever it does (W421 6-7-5 p120).  Stores no response code of its own (assumed)."""
+        requests: list[Request] = []
+        self._forced = []
+        for socket in self._sockets.values():
+            if socket.phase in (Phase.OPENING, Phase.OPEN):
+                service = Service(Switch.CLOSE, None, self.cycle)
+                service.interrupts = self._interrupt(socket, now_ns)
+                self._delay(service, self._timing.delay(), now_ns)
+                requests += socket.begin_close(service)
+                self._touch(socket, TOGETHER)
+                self._forced.append(service)
+        self._services += self._forced
+        return requests
+
+    def _conclude_force_close(self) -> None:
+        if self._forced is not None and all(self._is_over(service, self.cycle) for service in self._forced):
+            self._display.clear_bit("CIO", self._layout.n, at.FORCE_CLOSE_BIT, self.cycle)
+            self._forced = None
+
+    # --- 6. what is seen ---------------------------------------------------------------------------------------------
+
+    def show(self, memory: AreaMemory) -> None:
+        """Write what changed and is due."""
+        for number, skew in self._touched.items():
+            self._display.show(self._sockets[number], skew, self.cycle)
+        self._touched.clear()
+        self._display.flush(memory, self.cycle)
+
+    def _touch(self, socket: Socket, skew: Skew) -> None:
+        self._touched.setdefault(socket.number, skew)
+
+    def wake_ns(self) -> int:
+        """Until when nothing happens by itself: 0 if the next refresh has work, `NEVER_NS` if nothing is timed."""
+        if self._display.pending or self._forced is not None:
+            return 0
+        wake_ns = NEVER_NS
+        for service in self._services:
+            if service.code is not None or service.accept_cycle > self.cycle:
+                return 0
+            if service.deadline_ns is not None:
+                wake_ns = min(wake_ns, service.deadline_ns)
+        return wake_ns
