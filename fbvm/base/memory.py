@@ -1,0 +1,152 @@
+"""The flat memory of one PLC: one anonymous mapping, typed views over it, and snapshots that share unchanged pages.
+
+It costs only the pages that are touched.  It does not know what lies where but for the areas that it is told."""
+
+from __future__ import annotations
+
+import contextlib
+import mmap
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fbvm.base.areas import PAGE_BYTES, Area
+
+WHOLE_BYTES = 255
+"""Bit number of a value that fills bytes."""
+FORMATS = {"b": "?", "i8": "b", "u8": "B", "i16": "h", "u16": "H", "i32": "i", "u32": "I", "i64": "q", "u64": "Q",
+           "f32": "f", "f64": "d", "ref": "Q"}
+"""Machine types and the letters by which `struct` and memoryview know them."""
+STRUCTS = {machine: struct.Struct("<" + letter) for machine, letter in FORMATS.items()}
+_ZERO_PAGE = bytes(PAGE_BYTES)
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """The contents of a memory at one moment: its pages, None for a page of zeros."""
+
+    pages: tuple[bytes | None, ...]
+
+    def __bytes__(self) -> bytes:
+        return b"".join(page or _ZERO_PAGE for page in self.pages)
+
+
+class Memory:
+    """A buffer of `size` bytes, all zeros at first, and the areas in it.
+
+    `views` are writable memoryviews by machine type, each over the whole buffer (item i lies at i * its size).  Values
+    are little-endian.  Reading and writing outside the buffer raises IndexError."""
+
+    def __init__(self, size: int, areas: Mapping[str, Area]) -> None:
+        self.size = size
+        self.areas = dict(areas)
+        self.map = _anonymous(size)
+        self.u8 = memoryview(self.map)
+        self.views = {machine: self.u8.cast("B").cast(letter) if letter != "B" else self.u8  # type: ignore[call-overload]
+                      for machine, letter in FORMATS.items()}
+        self._words: dict[str, memoryview] = {}
+        self._last: Snapshot | None = None
+
+    def words(self, area: str) -> memoryview:
+        """The words of an area as a writable memoryview of format "H".  Raises KeyError if there is no such area."""
+        view = self._words.get(area)
+        if view is None:
+            row = self.areas[area]
+            view = self._words[area] = self.views["u16"][row.offset // 2:(row.offset + row.size_bytes) // 2]
+        return view
+
+    def read(self, offset: int, machine: str, bit: int = WHOLE_BYTES) -> int | float | bool:
+        """The value of a machine type at any offset; of BOOL, the byte or the `bit` that is named."""
+        self._check(offset, STRUCTS[machine].size)
+        if bit != WHOLE_BYTES:
+            return self.u8[offset] >> bit & 1 == 1
+        value: int | float | bool = STRUCTS[machine].unpack_from(self.map, offset)[0]
+        return value
+
+    def write(self, offset: int, machine: str, value: Any, bit: int = WHOLE_BYTES) -> None:
+        """Write a value where `read` finds it.  Raises struct.error for a value that the type cannot hold."""
+        self._check(offset, STRUCTS[machine].size)
+        if bit != WHOLE_BYTES:
+            self.u8[offset] = self.u8[offset] & ~(1 << bit) | bool(value) << bit
+        else:
+            STRUCTS[machine].pack_into(self.map, offset, value)
+
+    def read_text(self, offset: int, capacity: int) -> bytes:
+        """The bytes of a STRING[capacity] up to its ending 0."""
+        self._check(offset, capacity)
+        return self.map[offset:offset + capacity].partition(b"\0")[0]
+
+    def write_text(self, offset: int, capacity: int, text: bytes) -> None:
+        """Write a STRING[capacity], cut to its capacity, and its ending 0."""
+        self._check(offset, capacity + 1)
+        text = text[:capacity] + b"\0"
+        self.map[offset:offset + len(text)] = text
+
+    def _check(self, offset: int, size: int) -> None:
+        if offset < 0 or offset + size > self.size:
+            raise IndexError(f"{size} bytes at {offset} are not in a memory of {self.size}")
+
+    def snapshot(self) -> Snapshot:
+        """The contents now.  Pages that did not change are shared with the snapshot that was taken or restored last."""
+        last = self._last.pages if self._last else (None,) * (-(-self.size // PAGE_BYTES))
+        pages: list[bytes | None] = []
+        for number, known in enumerate(last):
+            page = self.map[number * PAGE_BYTES:(number + 1) * PAGE_BYTES]
+            pages.append(known if page == (known or _ZERO_PAGE) else None if page == _ZERO_PAGE else page)
+        if self._last is None or any(new is not old for new, old in zip(pages, last, strict=True)):
+            self._last = Snapshot(tuple(pages))
+        return self._last
+
+    def restore(self, snapshot: Snapshot) -> None:
+        """Bring back the contents of a snapshot of a memory of this size; pages that are the same are not written."""
+        for number, page in enumerate(snapshot.pages):
+            page = page or _ZERO_PAGE
+            at = slice(number * PAGE_BYTES, (number + 1) * PAGE_BYTES)
+            now = self.map[at]
+            if now != page[:len(now)]:
+                self.map[at] = page[:len(now)]
+        self._last = snapshot
+
+    def fork(self) -> Memory:
+        """Another memory with the same areas and contents, which shares its first snapshot's pages with this one."""
+        other = Memory(self.size, self.areas)
+        other.restore(self.snapshot())
+        return other
+
+    def close(self) -> None:
+        """Give the buffer back.  Views that were handed out cannot be used any more."""
+        for view in (*self._words.values(), *self.views.values(), self.u8):
+            view.release()
+        with contextlib.suppress(BufferError):  # somebody still holds a slice: the mapping ends with it
+            self.map.close()
+
+
+def compare(a: Snapshot, b: Snapshot) -> list[tuple[int, int]]:
+    """Where two snapshots of one size differ: (offset, length) of each run of bytes, from low to high."""
+    runs: list[tuple[int, int]] = []
+    for number, (left, right) in enumerate(zip(a.pages, b.pages, strict=True)):
+        if left is not right:
+            _differences(left or _ZERO_PAGE, right or _ZERO_PAGE, number * PAGE_BYTES, runs)
+    return runs
+
+
+def _differences(left: bytes, right: bytes, at: int, runs: list[tuple[int, int]]) -> None:
+    """Append the runs of one piece: halves that are equal are not looked at byte by byte."""
+    if left == right:
+        return
+    if len(left) > 1:
+        half = len(left) // 2
+        _differences(left[:half], right[:half], at, runs)
+        _differences(left[half:], right[half:], at + half, runs)
+    elif runs and sum(runs[-1]) == at:
+        runs[-1] = (runs[-1][0], runs[-1][1] + 1)
+    else:
+        runs.append((at, 1))
+
+
+def _anonymous(size: int) -> mmap.mmap:
+    """A private mapping: reading a page that nobody wrote takes no memory, which a shared one would."""
+    if hasattr(mmap, "MAP_ANONYMOUS"):
+        return mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
+    return mmap.mmap(-1, size)
