@@ -76,6 +76,7 @@ CODES: dict[str, Code] = {
     **_table("warning", {
         "S0190": "pragma is not known and has no effect",
         "S0191": "name with doubled or trailing underscore",
+        "S0192": "characters beyond the type of the literal",
         "S0590": "FOR variable written inside its loop",
         "S0591": "input written inside its block",
     }),

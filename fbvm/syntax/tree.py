@@ -8,8 +8,14 @@ Names are kept as written; comparing them without case is the checker's work.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeVar, dataclass_transform
 
-_node = dataclass(eq=False, slots=True, kw_only=False)
+_T = TypeVar("_T")
+
+
+@dataclass_transform(eq_default=False, field_specifiers=(field,))
+def _node(cls: type[_T]) -> type[_T]:
+    return dataclass(eq=False, slots=True)(cls)
 
 
 @_node

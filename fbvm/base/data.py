@@ -1,0 +1,33 @@
+"""Finds the folders `grammar/` and `fblib/` that travel with the package, and the folder for what may be computed again."""
+
+from __future__ import annotations
+
+import os
+import sys
+from functools import cache
+from pathlib import Path
+
+
+@cache
+def data_folder(name: str) -> Path:
+    """The folder `grammar` or `fblib`: inside the package in a wheel, beside it in a checkout or an editable install.
+
+    Raises FileNotFoundError if the installation is damaged and has neither."""
+    package = Path(__file__).resolve().parent.parent
+    for folder in (package / "_data" / name, package.parent / name):
+        if folder.is_dir():
+            return folder
+    raise FileNotFoundError(f"{name}/ is missing from this installation of fbvm")
+
+
+def cache_folder() -> Path:
+    """The user's folder for things that save time and may be lost; it need not exist and perhaps cannot be written.
+
+    `FBVM_CACHE` names another one."""
+    if named := os.environ.get("FBVM_CACHE"):
+        return Path(named)
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "fbvm" / "cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "fbvm"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fbvm"

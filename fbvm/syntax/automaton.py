@@ -1,0 +1,129 @@
+"""Runs the grammar's tables over tokens: shift, reduce, and ask somebody else at a token that cannot stand there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+from fbvm.syntax.builder import TooDeep
+from fbvm.syntax.lexer import Token, lexis
+from fbvm.syntax.refused import whole
+from fbvm.syntax.tables import Tables, tables
+
+NESTING_LIMIT = 200
+"""Most brackets, blocks and composite types inside one another; those who walk trees rely on it."""
+
+STACK_LIMIT = 4000
+"""States of a parse that keeps NESTING_LIMIT; only a chain of signs or NOTs without end needs more."""
+
+NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "STRUCT", "UNION", "ARRAY", "REF_TO", "POINTER",
+                     "REFERENCE"))
+REFUSED = frozenset(("REFUSED_SECTION", "REFUSED_BLOCK"))
+FUNCTION_OPERATORS = frozenset(("AND", "OR", "XOR", "MOD", "NOT"))
+"""Reserved words that are names in front of `(`, as in `AND(a, b)`."""
+
+
+class Mender(Protocol):
+    """Who takes over at an error.  It changes the stacks, and says which tokens come next before the lexer's."""
+
+    def unexpected(self, token: Token) -> list[Token]: ...
+
+    def too_deep(self, token: Token, why: str) -> list[Token]: ...
+
+    def without_end(self, opener: Token, found: Token) -> None: ...
+
+
+class Automaton:
+    """One parse in progress.  `states` and `values` are its stacks; `states` is longer by the start."""
+
+    def __init__(self, builder: Any, stream: Iterator[Token]) -> None:
+        self.tables: Tables = tables()
+        self.rows = self.tables.actions
+        self.actions = [r.action and getattr(builder, r.action) for r in self.tables.rules]
+        self.states: list[int] = [self.tables.start]
+        self.values: list[Any] = []
+        self.stream = stream
+        self.ahead: list[Token] = []
+        """Tokens that come before the stream's, the next one last."""
+        lex = lexis()
+        self.soft = frozenset(lex.words.values()) - lex.reserved
+        self.text = ""
+
+    def run(self, mender: Mender) -> Any:
+        """Feed every token; the value of the start symbol."""
+        while True:
+            token = self.next()
+            try:
+                refused = self.feed(token)
+            except TooDeep:
+                self.ahead.extend(reversed(mender.too_deep(token, "operators in one expression")))
+                continue
+            if refused is not None:
+                self.ahead.extend(reversed(mender.unexpected(refused)))
+            elif token.type in NESTING and len(self.states) > NESTING_LIMIT and self.nested_too_deep():
+                self.ahead.extend(reversed(mender.too_deep(token, "levels")))
+            elif token.type == "$END":
+                return self.values[-1]
+            elif token.type in REFUSED and self.values[-1] is token:
+                self.values[-1], missed = whole(token, self.text, self.next)
+                if missed:
+                    mender.without_end(token, missed)
+                    self.ahead.append(missed)
+
+    def next(self) -> Token:
+        return self.ahead.pop() if self.ahead else next(self.stream)
+
+    def nested_too_deep(self) -> bool:
+        """Whether the brackets and blocks that are open are more than allowed."""
+        if len(self.states) > STACK_LIMIT:
+            return True
+        return sum(1 for v in self.values if isinstance(v, Token) and v.type in NESTING) > NESTING_LIMIT
+
+    def feed(self, token: Token) -> Token | None:
+        """Take one token: reduce as it demands, then shift it.  Returns the token if it cannot stand here; nothing is
+        undone then, since reducing more cannot do harm."""
+        rows, rules, states, values = self.rows, self.tables.rules, self.states, self.values
+        kind = token.type
+        while True:
+            act = rows[states[-1]].get(kind)
+            if act is None:
+                if kind == "NAME" or not self.may_be_name(token):
+                    return token
+                token = Token("NAME", token.text, token.start, token.end)
+                kind = "NAME"
+                continue
+            if act >= 0:
+                states.append(act)
+                values.append(token)
+                return None
+            rule = rules[~act]
+            size = rule.size
+            children: list[Any]
+            if size:
+                children = values[-size:]
+                del values[-size:]
+                del states[-size:]
+            else:
+                children = []
+            action = self.actions[~act]
+            if action is None:
+                values.append(children[0])
+            elif rule.places is None:
+                values.append(action(*children))
+            else:
+                values.append(action(*[None if p is None else children[p] for p in rule.places]))
+            row = rows[states[-1]]
+            state = row[rule.origin]
+            act = rows[state].get(kind)
+            while act is not None and act < 0 and self.actions[~act] is None:
+                state = row[rules[~act].origin]
+                act = rows[state].get(kind)
+            states.append(state)
+            if state == self.tables.end:
+                return None
+
+    def may_be_name(self, token: Token) -> bool:
+        """Whether a word that the grammar cannot take here may be the user's name."""
+        if token.type in self.soft:
+            return token.text[-1] != "="
+        return token.type in FUNCTION_OPERATORS and self.text[token.end:token.end + 20].lstrip().startswith("(")

@@ -1,0 +1,90 @@
+"""What all builders share: reporting, lists, names.  The functions of a builder are named as the grammar's rules."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.syntax.lexer import Token
+from fbvm.syntax.refused import refused_what
+from fbvm.syntax.tree import Expr, Name, Refused
+
+CHAIN_LIMIT = 1000
+"""Deepest tree of one expression, in nodes; those who walk trees rely on it."""
+
+
+class TooDeep(Exception):
+    """An expression grew deeper than CHAIN_LIMIT; the driver reports it and goes on behind the statement."""
+
+
+class Builder:
+    """Makes the nodes of one source text.  Lists grow in place while their rule repeats."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.diagnostics: list[Diagnostic] = []
+        self.selves: list[Token] = []
+        """THIS and SUPER seen since the last statement."""
+        self.depths: dict[Expr, int] = {}
+        """Depth of the expressions under construction, where it is not 1."""
+
+    def report(self, code: str, start: int, end: int, message: str, hint: str = "") -> None:
+        self.diagnostics.append(Diagnostic(code, self.source, start, end, message, hint))
+
+    def empty(self) -> list[Any]:
+        return []
+
+    def one(self, item: Any) -> list[Any]:
+        return [item]
+
+    def add(self, items: list[Any], item: Any) -> list[Any]:
+        items.append(item)
+        return items
+
+    def add_separated(self, items: list[Any], comma: Token, item: Any) -> list[Any]:
+        items.append(item)
+        return items
+
+    def join(self, items: list[Any], more: Sequence[Any]) -> list[Any]:
+        items.extend(more)
+        return items
+
+    def name(self, token: Token) -> Name:
+        return Name(token.start, token.end, token.text)
+
+    def declared(self, token: Token) -> Name:
+        """A name at its declaration, where the standard's rule for underscores is checked."""
+        text = token.text
+        if "__" in text or text.endswith("_"):
+            self.report("S0191", token.start, token.end, f"`{text}` has a doubled or trailing underscore",
+                        "the standard forbids it; other compilers may refuse this name")
+        return Name(token.start, token.end, text)
+
+    def one_name(self, token: Token) -> list[Name]:
+        return [self.declared(token)]
+
+    def add_name_separated(self, names: list[Name], comma: Token, token: Token) -> list[Name]:
+        names.append(self.declared(token))
+        return names
+
+    def add_name(self, names: list[Name], token: Token) -> list[Name]:
+        names.append(Name(token.start, token.end, token.text.upper()))
+        return names
+
+    def refused(self, token: Token) -> Refused:
+        """A whole METHOD .. END_METHOD and its like."""
+        what, code = refused_what(token.text)
+        return Refused(token.start, token.end, what, code)
+
+    def add_refused(self, items: list[Any], token: Token) -> list[Any]:
+        items.append(self.refused(token))
+        return items
+
+    def deepen(self, node: Expr, *parts: Expr) -> None:
+        """Note the depth of a new node over its parts."""
+        depths = self.depths
+        depth = 1 + max(depths.pop(part, 1) for part in parts)
+        if depth > CHAIN_LIMIT:
+            raise TooDeep
+        depths[node] = depth

@@ -1,0 +1,187 @@
+"""Builds the nodes of declarations: POUs, variables, types, configurations (grammar/declarations.lark)."""
+
+from __future__ import annotations
+
+from fbvm.syntax.lexer import Token
+from fbvm.syntax.refused import refused_what
+from fbvm.syntax.statements import Items, Statements
+from fbvm.syntax.tree import (
+    Argument,
+    ArrayInit,
+    Configuration,
+    Declaration,
+    Expr,
+    GlobalVars,
+    Initial,
+    Literal,
+    Location,
+    Name,
+    NamedType,
+    Pou,
+    ProgramInstance,
+    Refused,
+    RefusedStatement,
+    Resource,
+    SourceText,
+    StructInit,
+    Task,
+    TypeDecl,
+    TypeSpec,
+    VarDecl,
+    VarSection,
+)
+
+Head = tuple[Name, list[Refused]]
+Item = tuple[Expr | None, Initial | None]
+ConfigItem = VarSection | Task | ProgramInstance | Refused
+
+REPEATED_LIMIT = 1_000_000
+"""Most values that one `n(a, b)` of an array may stand for."""
+
+
+class Declarations(Statements):
+    """The functions of the rules of declarations."""
+
+    def source_text(self, declarations: list[Declaration]) -> SourceText:
+        return SourceText(0, len(self.source.text), tuple(declarations))
+
+    # --- POUs ---
+
+    def add_inheritance(self, refused: list[Refused], word: Token, names: list[NamedType]) -> list[Refused]:
+        what, code = refused_what(word.text)
+        refused.append(Refused(word.start, names[-1].end, what, code))
+        return refused
+
+    def pou_head(self, modifiers: list[Token], token: Token, inheritance: list[Refused]) -> Head:
+        return self.declared(token), [*map(self.refused, modifiers), *inheritance]
+
+    def pou(self, word: Token, head: Head, sections: list[VarSection | Refused], items: Items, end: Token) -> Pou:
+        return self.function(word, head, None, None, sections, items, end)
+
+    def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None,
+                 sections: list[VarSection | Refused], items: Items, end: Token) -> Pou:
+        name, refused = head
+        refused += [s for s in sections if isinstance(s, Refused)]
+        blocks = [i for i in items if isinstance(i, RefusedStatement) and self.is_block(i)]
+        refused += [Refused(b.start, b.end, b.what, b.code) for b in blocks]
+        body = self.block([i for i in items if i not in blocks] if blocks else items)
+        self.refuse_selves()
+        return Pou(word.start, end.end, word.text.upper(), name, result,
+                   tuple(s for s in sections if isinstance(s, VarSection)), body, tuple(refused))
+
+    def is_block(self, statement: RefusedStatement) -> bool:
+        """Whether a refused statement is a METHOD, ACTION or the like, which belongs to the POU and not to its body."""
+        return statement.what not in ("THIS", "SUPER", "JMP", "__TRY") and not statement.what.startswith("label")
+
+    def refuse_selves(self) -> None:
+        """Report THIS and SUPER that stand where no statement could carry the refusal."""
+        for token in self.selves:
+            word = token.text.upper()
+            self.report("S0902", token.start, token.end, f"{word} is object-oriented text, which is refused", "")
+        self.selves.clear()
+
+    # --- variables ---
+
+    def var_section(self, word: Token, qualifiers: list[Name], variables: list[VarDecl], end: Token) -> VarSection:
+        return VarSection(word.start, end.end, word.text.upper(), tuple(qualifiers), tuple(variables))
+
+    def global_vars(self, section: VarSection) -> GlobalVars:
+        return GlobalVars(section.start, section.end, section)
+
+    def var_decl(self, names: list[Name], at: Token | None, location: Token | None, colon: Token, spec: TypeSpec,
+                 edge: Token | None, sign: Token | None, initial: Initial | None, end: Token) -> VarDecl:
+        place = self.location(location) if location else None
+        return VarDecl(names[0].start, end.end, tuple(names), place, spec, initial, edge.text.upper() if edge else "")
+
+    def var_decl_nameless(self, at: Token, location: Token, colon: Token, spec: TypeSpec, sign: Token | None,
+                          initial: Initial | None, end: Token) -> VarDecl:
+        return VarDecl(at.start, end.end, (), self.location(location), spec, initial)
+
+    def var_decl_struct(self, names: list[Name], at: Token | None, location: Token | None, colon: Token, spec: TypeSpec,
+                        end: Token | None) -> VarDecl:
+        place = self.location(location) if location else None
+        return VarDecl(names[0].start, end.end if end else spec.end, tuple(names), place, spec, None)
+
+    def var_decl_struct_init(self, names: list[Name], at: Token | None, location: Token | None, colon: Token,
+                             spec: TypeSpec, sign: Token, initial: Initial, end: Token) -> VarDecl:
+        return self.var_decl(names, at, location, colon, spec, None, sign, initial, end)
+
+    def location(self, token: Token) -> Location:
+        return Location(token.start, token.end, token.text)
+
+    # --- initial values ---
+
+    def array_init(self, opener: Token, items: list[list[Item]] | None, closer: Token) -> ArrayInit:
+        flat = tuple(item for group in items or () for item in group)
+        return ArrayInit(opener.start, closer.end, flat)
+
+    def array_item(self, value: Initial) -> list[Item]:
+        return [(None, value)]
+
+    def array_repeated(self, count: Token, opener: Token, values: list[Initial] | None, closer: Token) -> list[Item]:
+        """`3(0)`; with several values in the parentheses they are written out, since each repetition has one value."""
+        times = self.number(count)
+        if values is None or len(values) == 1:
+            return [(times, values[0] if values else None)]
+        if not isinstance(times.value, int) or times.value * len(values) > REPEATED_LIMIT:
+            self.report("S0108", times.start, times.end, f"`{count.text}` repetitions of {len(values)} values are too many", "")
+            return []
+        return [(None, value) for value in values] * times.value
+
+    def struct_init(self, opener: Token, fields: list[tuple[Name, Initial]], closer: Token) -> StructInit:
+        return StructInit(opener.start, closer.end, tuple(fields))
+
+    def struct_field(self, token: Token, sign: Token, value: Initial) -> tuple[Name, Initial]:
+        return self.name(token), value
+
+    # --- configuration ---
+
+    def configuration(self, word: Token, token: Token, items: list[ConfigItem | Resource], end: Token) -> Configuration:
+        loose = [i for i in items if isinstance(i, (Task, ProgramInstance))]
+        resources = [i for i in items if isinstance(i, Resource)]
+        if loose:
+            resources.append(_resource(loose[0].start, loose[-1].end, None, None, loose))
+        return Configuration(word.start, end.end, self.declared(token), tuple(i for i in items if isinstance(i, VarSection)),
+                             tuple(resources), tuple(i for i in items if isinstance(i, Refused)))
+
+    def resource(self, word: Token, token: Token, on: Token | None, processor: Token | None, items: list[ConfigItem],
+                 end: Token) -> Resource:
+        return _resource(word.start, end.end, self.declared(token), self.name(processor) if processor else None, items)
+
+    def task(self, word: Token, token: Token, opener: Token, arguments: list[Argument] | None, closer: Token,
+             end: Token) -> Task:
+        parts: dict[str, Expr | None] = dict.fromkeys(("SINGLE", "INTERVAL", "PRIORITY"))
+        for argument in arguments or ():
+            key = argument.name.text.upper() if argument.name and argument.kind == ":=" else ""
+            if key not in parts or argument.value is None:
+                self.report("S0101", argument.start, argument.end, "a TASK takes SINGLE, INTERVAL and PRIORITY",
+                            "write `INTERVAL := T#10ms, PRIORITY := 1`")
+            elif parts[key] is not None:
+                self.report("S0801", argument.start, argument.end, f"{key} is given twice", "")
+            else:
+                parts[key] = argument.value
+        return Task(word.start, end.end, self.declared(token), parts["SINGLE"], parts["INTERVAL"], parts["PRIORITY"])
+
+    def program_instance(self, word: Token, qualifiers: list[Name], token: Token, with_: Token | None, task: Token | None,
+                         colon: Token, type_name: NamedType, end: Token) -> ProgramInstance:
+        return self.program_connected(word, qualifiers, token, with_, task, colon, type_name, None, None, None, end)
+
+    def program_connected(self, word: Token, qualifiers: list[Name], token: Token, with_: Token | None,
+                          task: Token | None, colon: Token, type_name: NamedType, opener: Token | None,
+                          connections: list[Argument | Refused] | None, closer: Token | None, end: Token) -> ProgramInstance:
+        given = connections or []
+        return ProgramInstance(
+            word.start, end.end, self.declared(token), tuple(qualifiers), self.name(task) if task else None,
+            Name(type_name.start, type_name.end, type_name.text), tuple(c for c in given if isinstance(c, Argument)),
+            tuple(c for c in given if isinstance(c, Refused)))
+
+    def fb_task(self, instance: Expr, with_: Token, task: Token) -> Refused:
+        return Refused(instance.start, task.end, "function block with a task of its own", "S0901")
+
+
+def _resource(start: int, end: int, name: Name | None, processor: Name | None,
+              items: list[ConfigItem] | list[Task | ProgramInstance]) -> Resource:
+    return Resource(
+        start, end, name, processor, tuple(i for i in items if isinstance(i, VarSection)),
+        tuple(i for i in items if isinstance(i, Task)), tuple(i for i in items if isinstance(i, ProgramInstance)),
+        tuple(i for i in items if isinstance(i, Refused)))

@@ -1,0 +1,139 @@
+"""Builds the nodes of expressions: literals, variables, operators, calls (grammar/st.lark, 7.3.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fbvm.syntax import literals
+from fbvm.syntax.builder import Builder
+from fbvm.syntax.lexer import Token
+from fbvm.syntax.tree import (
+    Argument,
+    Binary,
+    Call,
+    Deref,
+    Direct,
+    EnumLiteral,
+    Expr,
+    Index,
+    Literal,
+    Member,
+    Name,
+    NameRef,
+    NullLiteral,
+    Part,
+    Unary,
+)
+
+Decode = Callable[[], literals.Decoded]
+
+
+class Expressions(Builder):
+    """The functions of the rules of expressions."""
+
+    def number(self, token: Token) -> Literal:
+        return self._decoded(token, lambda: literals.number(token.text), ("int", 0, None))
+
+    def string_literal(self, token: Token) -> Literal:
+        wide = token.text[0] == '"'
+        kind = "wstring" if wide else "string"
+        if not wide and not token.text.isascii() and any(ord(c) > 255 for c in token.text):
+            self.report("S0192", token.start, token.end, "characters beyond Latin-1 become several bytes (UTF-8) each",
+                        'write a WSTRING, ".."')
+        return self._decoded(token, lambda: literals.text_literal(token.text), (kind, "", None))
+
+    def truth(self, token: Token) -> Literal:
+        return Literal(token.start, token.end, "bool", token.type == "TRUE", None, token.text)
+
+    def null(self, token: Token) -> NullLiteral:
+        return NullLiteral(token.start, token.end)
+
+    def typed_literal(self, token: Token) -> Literal | EnumLiteral:
+        prefix, rest = token.text.split("#", 1)
+        if prefix.upper() in literals.ELEMENTARY:
+            return self._decoded(token, lambda: literals.typed(prefix.upper(), rest), ("int", 0, None))
+        middle = token.start + len(prefix)
+        if not rest[:1].isalpha() and rest[:1] != "_":
+            self.report("S0105", token.start, token.end, f"`{prefix}` is no elementary type, so no value can stand behind `#`",
+                        f"`{prefix}#` wants the name of a member of an enumeration")
+        return EnumLiteral(token.start, token.end, Name(token.start, middle, prefix), Name(middle + 1, token.end, rest))
+
+    def _decoded(self, token: Token, decode: Decode, instead: literals.Decoded) -> Literal:
+        try:
+            kind, value, type_name = decode()
+        except literals.OutOfRange as error:
+            self.report("S0108", token.start, token.end, *error.args)
+            kind, value, type_name = instead
+        except literals.Malformed as error:
+            code = "S0104" if instead[0] in ("string", "wstring") else "S0105"
+            self.report(code, token.start, token.end, *error.args)
+            kind, value, type_name = instead
+        return Literal(token.start, token.end, kind, value, type_name, token.text)
+
+    # --- variables ---
+
+    def name_ref(self, token: Token) -> NameRef:
+        return NameRef(token.start, token.end, token.text)
+
+    def direct(self, token: Token) -> Direct:
+        return Direct(token.start, token.end, token.text)
+
+    def self_reference(self, token: Token) -> NameRef:
+        self.selves.append(token)
+        return NameRef(token.start, token.end, token.text)
+
+    def member(self, of: Expr, dot: Token, token: Token) -> Member:
+        node = Member(of.start, token.end, of, Name(token.start, token.end, token.text))
+        self.deepen(node, of)
+        return node
+
+    def part(self, of: Expr, token: Token) -> Part:
+        text = token.text[1:].lstrip()
+        size, digits = (text[1].upper(), text[2:]) if text[0] == "%" else ("X", text)
+        if not digits.isdigit() or len(digits) > 9:
+            self.report("S0105", token.start, token.end, f"`{token.text}` is no part of a variable",
+                        "write the number of the bit, .3 or .%X3, or of the byte or word, .%B1 or .%W1")
+            digits = "0"
+        node = Part(of.start, token.end, of, size, int(digits))
+        self.deepen(node, of)
+        return node
+
+    def index(self, of: Expr, opener: Token, subscripts: list[Expr], closer: Token) -> Index:
+        node = Index(of.start, closer.end, of, tuple(subscripts))
+        self.deepen(node, of, *subscripts)
+        return node
+
+    def deref(self, of: Expr, caret: Token) -> Deref:
+        node = Deref(of.start, caret.end, of)
+        self.deepen(node, of)
+        return node
+
+    def call(self, callee: Expr, opener: Token, arguments: list[Argument] | None, closer: Token) -> Call:
+        node = Call(callee.start, closer.end, callee, tuple(arguments or ()))
+        self.deepen(node, callee, *(a.value for a in node.arguments if a.value is not None))
+        return node
+
+    def argument_positional(self, value: Expr) -> Argument:
+        return Argument(value.start, value.end, "", None, value)
+
+    def argument_named(self, token: Token, sign: Token, value: Expr | None) -> Argument:
+        return Argument(token.start, value.end if value else sign.end, sign.text, self.name(token), value)
+
+    def argument_negated(self, word: Token, token: Token, sign: Token, value: Expr | None) -> Argument:
+        return Argument(word.start, value.end if value else sign.end, sign.text, self.name(token), value, True)
+
+    # --- operators ---
+
+    def parenthesized(self, opener: Token, inner: Expr, closer: Token) -> Expr:
+        return inner
+
+    def unary(self, operator: Token, operand: Expr) -> Unary:
+        node = Unary(operator.start, operand.end, operator.text.upper(), operand)
+        self.deepen(node, operand)
+        return node
+
+    def binary(self, left: Expr, operator: Token, right: Expr) -> Binary:
+        op = "AND" if operator.type == "AMPERSAND" else operator.text.upper()
+        node = Binary(left.start, right.end, op, left, right, operator.start)
+        self.deepen(node, left, right)
+        return node

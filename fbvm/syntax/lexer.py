@@ -1,0 +1,178 @@
+"""Characters to tokens: words, literals, signs; comments skipped, pragmas collected.
+
+The patterns and words come from `grammar/common.lark`.  A word that the grammar takes only in some places is handed on as
+that word; the driver makes it a name where the word cannot stand.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from typing import NamedTuple
+
+from fbvm.syntax.tables import Terminal, tables
+from fbvm.syntax.tree import Pragma
+
+Report = Callable[..., None]
+"""Called with code, start, end, message and hint."""
+
+
+class Token(NamedTuple):
+    """A terminal of the grammar as it stands in the text; `type` "$END" ends the stream."""
+
+    type: str
+    text: str
+    start: int
+    end: int
+
+
+_WORDS = re.compile(r"\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?", re.DOTALL)
+_BY_HAND = {"LOCATION", "SET_ASSIGN"}
+"""Terminals that only exist behind certain others."""
+
+_ORDER = ("NAME", "PART", "NUMBER", "DATE_LITERAL", "TYPED_LITERAL", "STRING_LITERAL", "DIRECT")
+_OPERAND_ENDS = {"NAME", "RPAR", "RSQB", "CARET", "DIRECT", "PART"}
+
+
+@dataclass(frozen=True)
+class Lexis:
+    """What the grammar says about words and characters, ready for use."""
+
+    words: dict[str, str]
+    """Word in capitals -> terminal."""
+    conditions: dict[str, re.Pattern[str]]
+    """Terminal -> what must follow the word."""
+    reserved: frozenset[str]
+    signs: dict[str, str]
+    master: re.Pattern[str]
+    location: re.Pattern[str]
+    set_assign: re.Pattern[str]
+
+
+@cache
+def lexis() -> Lexis:
+    """The lexis of the grammar in use."""
+    words: dict[str, str] = {}
+    conditions: dict[str, re.Pattern[str]] = {}
+    reserved: set[str] = set()
+    signs: dict[str, str] = {}
+    patterns: dict[str, str] = {}
+    for terminal in tables().terminals:
+        shape = _WORDS.fullmatch(terminal.pattern)
+        if shape and terminal.ignore_case:
+            words.update(dict.fromkeys(shape[1].split("|"), terminal.name))
+            if shape[2]:
+                conditions[terminal.name] = re.compile(shape[2], re.IGNORECASE)
+            if terminal.reserved:
+                reserved.add(terminal.name)
+        elif terminal.literal:
+            signs[terminal.pattern] = terminal.name
+        else:
+            patterns[terminal.name] = _pattern(terminal)
+    alternatives = [f"(?P<{name}>{patterns[name]})" for name in _ORDER]
+    alternatives.insert(1, r"(?P<COMMENT>//[^\n]*|\(\*|/\*)")
+    alternatives.insert(2, "(?P<SIGN>" + "|".join(re.escape(s) for s in sorted(signs, key=len, reverse=True)) + ")")
+    # `.` begins PART and `..`; a part is the longer word, a range is not one
+    alternatives.insert(1, alternatives.pop(alternatives.index(f"(?P<PART>{patterns['PART']})")))
+    return Lexis(words, conditions, frozenset(reserved), signs, re.compile(r"\s*(?:" + "|".join(alternatives) + ")"),
+                 re.compile(r"\s*(" + patterns["LOCATION"] + ")"), re.compile(patterns["SET_ASSIGN"]))
+
+
+def _pattern(terminal: Terminal) -> str:
+    return f"(?i:{terminal.pattern})" if terminal.ignore_case else f"(?:{terminal.pattern})"
+
+
+@dataclass
+class Lexer:
+    """The tokens of one text, in order; `pragmas` fills while they are taken."""
+
+    text: str
+    report: Report
+    pragmas: list[Pragma] = field(default_factory=list)
+
+    def tokens(self) -> Iterator[Token]:
+        """Every token, then one of type "$END"."""
+        text, at, lex = self.text, 0, lexis()
+        match, signs, words, conditions = lex.master.match, lex.signs, lex.words, lex.conditions
+        known: dict[str, str] = {}
+        before, length = "", len(text)
+        while True:
+            found = match(text, at)
+            if found is None:
+                at = self._odd(at)
+                if at >= length:
+                    break
+                continue
+            kind, at = found.lastgroup or "", found.end()
+            word = found[kind]
+            start = at - len(word)
+            if kind == "SIGN":
+                kind = signs[word]
+            elif kind == "NAME":
+                kind = known.get(word, "")
+                if not kind:
+                    kind = known[word] = words.get(word.upper(), "NAME")
+                if kind in conditions and not conditions[kind].match(text, at):
+                    kind = "NAME"
+                if before == "AT" or (before in _OPERAND_ENDS and text.startswith("=", at)):
+                    kind, at = self._special(lex, before, kind, start, at)
+                    word = text[start:at]
+            elif kind == "COMMENT":
+                if word[:2] != "//":
+                    at = self._comment(start)
+                continue
+            elif before == "AT":
+                kind, at = self._special(lex, before, kind, start, at)
+                word = text[start:at]
+            yield Token(kind, word, start, at)
+            before = kind
+        yield Token("$END", "", length, length)
+
+    def _special(self, lex: Lexis, before: str, kind: str, start: int, end: int) -> tuple[str, int]:
+        """LOCATION behind AT, `S=` behind an operand; else what it was."""
+        pattern, name = (lex.location, "LOCATION") if before == "AT" else (lex.set_assign, "SET_ASSIGN")
+        found = pattern.match(self.text, start)
+        return (name, found.end()) if found else (kind, end)
+
+    def _odd(self, at: int) -> int:
+        """Pass over what no terminal begins with: spaces at the end, pragmas, unknown characters.  Returns where to go on."""
+        text = self.text
+        while at < len(text) and text[at].isspace():
+            at += 1
+        if at >= len(text):
+            return at
+        character = text[at]
+        if character == "{":
+            return self._pragma(at)
+        if character in "'\"":
+            end = min((e for e in (text.find("\n", at), text.find("\r", at)) if e >= 0), default=len(text))
+            self.report("S0104", at, end, "string literal without end on its line",
+                        f"close it with {character}, and write $N for a line end inside")
+            return end
+        self.report("S0102", at, at + 1, f"unexpected character {character!a}", "")
+        return at + 1
+
+    def _pragma(self, start: int) -> int:
+        end = self.text.find("}", start)
+        if end < 0:
+            self.report("S0103", start, start + 1, "pragma without end", "close it with }")
+            return len(self.text)
+        self.pragmas.append(Pragma(start, end + 1, self.text[start + 1:end]))
+        return end + 1
+
+    def _comment(self, start: int) -> int:
+        """Where the bracket comment of `start` ends; each kind nests in itself."""
+        opener = self.text[start:start + 2]
+        closer = opener[::-1].replace("(", ")")
+        mark = re.compile(re.escape(opener) + "|" + re.escape(closer))
+        depth, at = 1, start + 2
+        while depth:
+            found = mark.search(self.text, at)
+            if not found:
+                self.report("S0103", start, start + 2, "comment without end", f"close it with {closer}")
+                return len(self.text)
+            depth += 1 if found[0] == opener else -1
+            at = found.end()
+        return at

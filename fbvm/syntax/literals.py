@@ -1,0 +1,261 @@
+"""Text of a literal to its value: numbers, strings, times and dates, exactly.
+
+Raises Malformed or OutOfRange with the words for the message; the builders report them.  From 2.1 of the language's
+tables: units d h m s ms us ns in this order, a fraction only in the last; dates of the proleptic Gregorian calendar.
+"""
+
+from __future__ import annotations
+
+import re
+from datetime import date
+from fractions import Fraction
+
+Value = int | float | bool | str
+Decoded = tuple[str, Value, str | None]
+"""kind, value and type name of a Literal."""
+
+
+class Malformed(ValueError):
+    """The text is no literal; `args` are message and hint."""
+
+
+class OutOfRange(ValueError):
+    """The literal's value does not fit its type; `args` are message and hint."""
+
+
+SIGNED = {"SINT": 8, "INT": 16, "DINT": 32, "LINT": 64}
+UNSIGNED = {"USINT": 8, "UINT": 16, "UDINT": 32, "ULINT": 64, "BYTE": 8, "WORD": 16, "DWORD": 32, "LWORD": 64}
+REALS = {"REAL": 3.4028235677973366e38, "LREAL": float("inf")}
+"""First magnitude that rounds to infinity."""
+
+TEXTS = {"STRING": "string", "CHAR": "string", "WSTRING": "wstring", "WCHAR": "wstring"}
+TIMES = {"T": "TIME", "TIME": "TIME", "LT": "LTIME", "LTIME": "LTIME"}
+DATES = {"D": "DATE", "DATE": "DATE", "LD": "LDATE", "LDATE": "LDATE"}
+CLOCKS = {"TOD": "TIME_OF_DAY", "TIME_OF_DAY": "TIME_OF_DAY", "LTOD": "LTIME_OF_DAY", "LTIME_OF_DAY": "LTIME_OF_DAY"}
+MOMENTS = {"DT": "DATE_AND_TIME", "DATE_AND_TIME": "DATE_AND_TIME", "LDT": "LDATE_AND_TIME",
+           "LDATE_AND_TIME": "LDATE_AND_TIME"}
+ELEMENTARY = {"BOOL", *SIGNED, *UNSIGNED, *REALS, *TEXTS, *TIMES, *DATES, *CLOCKS, *MOMENTS}
+
+SECOND_NS = 1_000_000_000
+DAY_NS = 86_400 * SECOND_NS
+UNITS_NS = {"d": DAY_NS, "h": 3600 * SECOND_NS, "m": 60 * SECOND_NS, "s": SECOND_NS, "ms": 1_000_000, "us": 1000, "ns": 1}
+NS_MAX = 2**63 - 1
+INTEGER_MAX = 2**64 - 1
+LONGEST = 400
+"""Digits of a number beyond which nobody meant it; Python's own conversion is slow for millions of them."""
+
+_BASED = re.compile(r"([0-9]+)#([0-9A-Za-z_]*)")
+_INTEGER = re.compile(r"[0-9]+(?:_[0-9]+)*")
+_REAL = re.compile(r"[0-9]+(?:_[0-9]+)*(?:\.[0-9]+(?:_[0-9]+)*)?(?:[eE][+-]?[0-9]+)?")
+_DURATION_PART = re.compile(r"_?([0-9]+(?:_[0-9]+)*)(?:\.([0-9]+(?:_[0-9]+)*))?(ms|us|ns|d|h|m|s)", re.IGNORECASE)
+_DATE = re.compile(r"([0-9]{1,4})-([0-9]{1,2})-([0-9]{1,2})")
+_CLOCK = re.compile(r"([0-9]{1,2}):([0-9]{1,2})(?::([0-9]{1,2})(?:\.([0-9]+(?:_[0-9]+)*))?)?")
+
+
+def number(text: str) -> Decoded:
+    """An untyped integer or real without sign."""
+    kind, value = _number(text)
+    if kind == "int" and value > INTEGER_MAX:
+        raise OutOfRange(f"`{_short(text)}` is greater than the largest integer, {INTEGER_MAX}", "")
+    if kind == "real" and value == float("inf"):
+        raise OutOfRange(f"`{_short(text)}` is greater than the largest LREAL", "")
+    return kind, value, None
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _number(text: str) -> tuple[str, int | float]:
+    if len(text) > LONGEST:
+        raise OutOfRange(f"a number of {len(text)} characters fits no type", "")
+    if "#" in text:
+        return "int", _based(text)
+    if _INTEGER.fullmatch(text):
+        return "int", int(text.replace("_", ""))
+    if _REAL.fullmatch(text):
+        return "real", float(text.replace("_", ""))
+    raise Malformed(f"`{text}` is no number", "digits, with single `_` between them, a point with digits on both sides, an exponent")
+
+
+def _based(text: str) -> int:
+    base, digits = text.split("#", 1)
+    if base not in ("2", "8", "16"):
+        raise Malformed(f"`{text}` has the base {base}", "write 2#, 8# or 16#")
+    if not re.fullmatch(r"[0-9A-Za-z]+(?:_[0-9A-Za-z]+)*", digits):
+        raise Malformed(f"`{text}` needs digits behind `#`, with single `_` between them", "")
+    known = "0123456789ABCDEF"[:int(base)]
+    wrong = [d for d in digits.upper() if d not in known and d != "_"]
+    if wrong:
+        raise Malformed(f"`{text}` has the digit `{wrong[0]}`, which base {base} does not know", "")
+    return int(digits.replace("_", ""), int(base))
+
+
+def typed(prefix: str, rest: str) -> Decoded:
+    """`prefix#rest` of an elementary type (`prefix` in capitals, one of ELEMENTARY)."""
+    if prefix in TIMES:
+        return "time", duration(rest), TIMES[prefix]
+    if prefix in DATES:
+        return "date", _day(rest) * DAY_NS, DATES[prefix]
+    if prefix in CLOCKS:
+        return "tod", _clock(rest), CLOCKS[prefix]
+    if prefix in MOMENTS:
+        return "dt", _moment(rest), MOMENTS[prefix]
+    if prefix in TEXTS:
+        return _typed_text(prefix, rest)
+    if prefix == "BOOL":
+        if rest.upper() in ("0", "FALSE", "1", "TRUE"):
+            return "bool", rest.upper() in ("1", "TRUE"), "BOOL"
+        raise Malformed(f"`BOOL#{rest}` is neither 0, 1, FALSE nor TRUE", "")
+    return _typed_number(prefix, rest)
+
+
+def _typed_number(prefix: str, rest: str) -> Decoded:
+    negative = rest.startswith("-")
+    digits = rest[1:] if rest[:1] in ("-", "+") else rest
+    if not digits:
+        raise Malformed(f"a value is missing behind `{prefix}#`", "no space may stand around `#`")
+    if "#" in digits and digits != rest:
+        raise Malformed(f"`{prefix}#{rest}`: a number with a base has no sign", "")
+    kind, value = _number(digits)
+    if negative:
+        value = -value
+    if prefix in REALS:
+        if abs(value) >= REALS[prefix]:
+            raise OutOfRange(f"`{prefix}#{rest}` is out of the range of {prefix}", "")
+        return "real", float(value), prefix
+    if kind != "int":
+        raise Malformed(f"`{prefix}#{rest}`: {prefix} takes whole numbers only", "")
+    bits = SIGNED.get(prefix) or UNSIGNED[prefix]
+    low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if prefix in SIGNED else (0, (1 << bits) - 1)
+    if not low <= value <= high:
+        raise OutOfRange(f"`{prefix}#{rest}` is out of the range of {prefix}, {low} to {high}", "")
+    return "int", value, prefix
+
+
+# --- strings ---
+
+_ESCAPES = {"$": "$", "L": "\n", "N": "\n", "P": "\f", "R": "\r", "T": "\t"}
+_HEX = re.compile(r"[0-9A-Fa-f]+")
+
+
+def text_literal(text: str) -> Decoded:
+    """`'..'` or `".."` with its quotes: one character per STRING byte or WSTRING unit."""
+    wide = text[0] == '"'
+    return ("wstring" if wide else "string"), unescape(text, wide), None
+
+
+def _typed_text(prefix: str, rest: str) -> Decoded:
+    if rest[:1] not in ("'", '"'):
+        raise Malformed(f"`{prefix}#` wants a text in quotes", "")
+    kind = TEXTS[prefix]
+    if kind == "string" and rest[0] == '"':
+        raise Malformed(f"{prefix} literals stand in single quotes", "")
+    value = unescape(rest, kind == "wstring")
+    if prefix in ("CHAR", "WCHAR") and len(value) != 1:
+        raise Malformed(f"{prefix} is exactly one character, here are {len(value)}", "")
+    return kind, value, prefix
+
+
+def unescape(text: str, wide: bool) -> str:
+    """Contents of a literal in its quotes, `$` escapes replaced; characters beyond the type's become several."""
+    quote, inner = text[0], text[1:-1]
+    if "$" in inner:
+        inner = _without_escapes(inner, quote, 4 if wide else 2)
+    if wide:
+        return "".join(c if ord(c) < 0x10000 else _surrogates(c) for c in inner)
+    return "".join(c if ord(c) < 0x100 else c.encode("utf-8", "replace").decode("latin-1") for c in inner)
+
+
+def _surrogates(character: str) -> str:
+    offset = ord(character) - 0x10000
+    return chr(0xD800 + (offset >> 10)) + chr(0xDC00 + (offset & 0x3FF))
+
+
+def _without_escapes(inner: str, quote: str, digits: int) -> str:
+    parts, at = [], 0
+    while True:
+        mark = inner.find("$", at)
+        if mark < 0:
+            parts.append(inner[at:])
+            return "".join(parts)
+        parts.append(inner[at:mark])
+        letter = inner[mark + 1]
+        code = inner[mark + 1:mark + 1 + digits]
+        if letter == quote or letter.upper() in _ESCAPES:
+            parts.append(quote if letter == quote else _ESCAPES[letter.upper()])
+            at = mark + 2
+        elif len(code) == digits and _HEX.fullmatch(code):
+            parts.append(chr(int(code, 16)))
+            at = mark + 1 + digits
+        else:
+            raise Malformed(f"`${letter}` is no escape", f"$$ $' $L $N $P $R $T, or $ and {digits} hexadecimal digits")
+
+
+# --- times and dates ---
+
+
+def duration(text: str) -> int:
+    """`1d2h3.5s` or `-5us300ns` as whole nanoseconds; a rest below one nanosecond is an error, not rounded away."""
+    negative = text.startswith("-")
+    rest = text[1:] if text[:1] in ("-", "+") else text
+    units, at, total, last = list(UNITS_NS), 0, Fraction(0), -1
+    if not rest:
+        raise Malformed("a duration needs a number and a unit, as in `T#1s500ms`", "")
+    while at < len(rest):
+        part = _DURATION_PART.match(rest, at)
+        if not part or len(part[0]) > LONGEST:
+            raise Malformed(f"`{_short(rest[at:])}` is no part of a duration", "units are d h m s ms us ns, as in `T#1d2h3m4s5ms`")
+        unit = units.index(part[3].lower())
+        if unit <= last:
+            raise Malformed(f"unit `{part[3]}` stands too late or twice in the duration", "the order is d h m s ms us ns")
+        if part[2] and part.end() != len(rest):
+            raise Malformed("only the last unit of a duration may have a fraction", "")
+        digits = part[1] + "." + (part[2] or "0")
+        total += Fraction(digits.replace("_", "")) * UNITS_NS[units[unit]]
+        last, at = unit, part.end()
+    return _whole_ns(-total if negative else total, text)
+
+
+def _whole_ns(total: Fraction, text: str) -> int:
+    if total.denominator != 1:
+        raise OutOfRange(f"`{_short(text)}` is finer than one nanosecond", "")
+    if not -NS_MAX - 1 <= total <= NS_MAX:
+        raise OutOfRange(f"`{_short(text)}` does not fit 64 bits of nanoseconds, about 292 years", "")
+    return int(total)
+
+
+def _day(text: str) -> int:
+    """Days since 1970-01-01."""
+    found = _DATE.fullmatch(text)
+    if not found:
+        raise Malformed(f"`{_short(text)}` is no date", "write it as 2024-05-31")
+    try:
+        days = date(int(found[1]), int(found[2]), int(found[3])).toordinal() - date(1970, 1, 1).toordinal()
+    except ValueError:
+        raise Malformed(f"there is no date {text}", "") from None
+    if not -NS_MAX <= days * DAY_NS <= NS_MAX:
+        raise OutOfRange(f"the date {text} is outside 1677-09-22 to 2262-04-11", "")
+    return days
+
+
+def _clock(text: str) -> int:
+    """Nanoseconds since midnight."""
+    found = _CLOCK.fullmatch(text)
+    if not found or len(text) > LONGEST:
+        raise Malformed(f"`{_short(text)}` is no time of day", "write it as 13:45:30 or 13:45:30.250")
+    hour, minute, second = int(found[1]), int(found[2]), int(found[3] or 0)
+    if hour > 23 or minute > 59 or second > 59:
+        raise Malformed(f"there is no time of day {_short(text)}", "")
+    fraction = Fraction("0." + (found[4] or "0").replace("_", ""))
+    return _whole_ns((hour * 3600 + minute * 60 + second + fraction) * SECOND_NS, text)
+
+
+def _moment(text: str) -> int:
+    day, mark, clock = text.rpartition("-")
+    if not mark or ":" not in clock:
+        raise Malformed(f"`{_short(text)}` is no date with time", "write it as 2024-05-31-13:45:30")
+    moment = _day(day) * DAY_NS + _clock(clock)
+    if moment > NS_MAX:
+        raise OutOfRange(f"the moment {text} is outside 1677-09-22 to 2262-04-11", "")
+    return moment

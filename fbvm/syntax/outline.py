@@ -1,0 +1,60 @@
+"""A tree as readable text, one node a line: for golden tests and for looking at what the parser understood."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+from fbvm.syntax.tree import Binary, Direct, Literal, Location, Name, NamedType, NameRef, Node
+
+HIDDEN = {"start", "end", "op_start", "type_name"}
+
+
+def dump(tree: Node) -> str:
+    """The outline of a tree.  Leaves stand on their parent's line; positions are left out."""
+    lines: list[str] = []
+    _walk(tree, "", 0, lines)
+    return "\n".join(lines) + "\n"
+
+
+def _leaf(value: Any) -> str | None:
+    """A value that needs no line of its own, or None."""
+    if isinstance(value, (Name, NameRef, NamedType, Direct, Location)):
+        return value.text
+    if isinstance(value, Literal):
+        typed = f"{value.type_name}#" if value.type_name else ""
+        return f"{typed}{value.kind}:{value.value!r}"
+    if not isinstance(value, (Node, tuple)):
+        return str(value)
+    if isinstance(value, tuple) and value and all(isinstance(v, Name) for v in value):
+        return ", ".join(v.text for v in value)
+    return None
+
+
+def _walk(value: Any, label: str, depth: int, lines: list[str]) -> None:
+    pad = "  " * depth
+    leaf = _leaf(value)
+    if leaf is not None:
+        lines.append(f"{pad}{label}{leaf}")
+    elif isinstance(value, tuple):
+        lines.append(f"{pad}{label}-")
+        for item in value:
+            _walk(item, "", depth + 1, lines)
+    else:
+        _node(value, label, depth, lines)
+
+
+def _node(node: Node, label: str, depth: int, lines: list[str]) -> None:
+    short, long = [], []
+    for name in (f.name for f in fields(node) if f.name not in HIDDEN):
+        value = getattr(node, name)
+        if value is None or value is False or value == () or value == "":
+            continue
+        leaf = _leaf(value)
+        if leaf is None:
+            long.append((name, value))
+        else:
+            short.append(leaf if isinstance(node, Binary) else f"{name}={leaf}")
+    lines.append("  " * depth + label + " ".join([type(node).__name__, *short]))
+    for name, value in long:
+        _walk(value, f"{name}: ", depth + 1, lines)

@@ -1,0 +1,160 @@
+"""Builds the nodes of statements (grammar/st.lark, 7.3.3)."""
+
+from __future__ import annotations
+
+from fbvm.syntax.expressions import Expressions
+from fbvm.syntax.lexer import Token
+from fbvm.syntax.refused import refused_what
+from fbvm.syntax.tree import (
+    Assign,
+    Block,
+    CallStatement,
+    Case,
+    CaseBranch,
+    Continue,
+    Empty,
+    Exit,
+    Expr,
+    For,
+    If,
+    Node,
+    RefusedStatement,
+    Repeat,
+    Return,
+    Statement,
+    While,
+)
+
+Value = tuple[Expr, Expr | None]
+Branch = tuple[Expr, Block]
+
+
+class Label(Node):
+    """`1, 3..5:`; stands in a list of statements until its CASE takes it."""
+
+    __slots__ = ("values",)
+
+    def __init__(self, start: int, end: int, values: tuple[Value, ...]) -> None:
+        super().__init__(start, end)
+        self.values = values
+
+
+Items = list[Statement | Label]
+
+
+class Statements(Expressions):
+    """The functions of the rules of statements."""
+
+    # --- lists ---
+
+    def add_empty(self, items: Items, semicolon: Token) -> Items:
+        items.append(Empty(semicolon.start, semicolon.end))
+        return items
+
+    def add_ended(self, items: Items, statement: Statement, semicolon: Token) -> Items:
+        items.append(statement)
+        self.depths.clear()
+        return items
+
+    def close(self, items: Items, semicolon: Token) -> Items:
+        return items
+
+    def block(self, items: Items) -> Block:
+        """A list as it stands outside CASE: a label of one name is one for JMP, another one is misplaced."""
+        return tuple(self._outside_case(item) if isinstance(item, Label) else item for item in items)
+
+    def _outside_case(self, label: Label) -> Statement:
+        value, high = label.values[0]
+        if len(label.values) == 1 and high is None and hasattr(value, "text"):
+            return RefusedStatement(label.start, label.end, f"label `{value.text}`")
+        self.report("S0101", label.start, label.end, "label of CASE outside of a CASE statement", "")
+        return Empty(label.start, label.end)
+
+    def checked(self, statement: Statement) -> Statement:
+        """The statement itself, or its refusal if it spoke of THIS or SUPER."""
+        if not self.selves:
+            return statement
+        word = self.selves[0].text.upper()
+        self.selves.clear()
+        return RefusedStatement(statement.start, statement.end, word, "S0902")
+
+    # --- simple statements ---
+
+    def one_target(self, target: Expr, sign: Token) -> list[Expr]:
+        return [target]
+
+    def add_target(self, targets: list[Expr], target: Expr, sign: Token) -> list[Expr]:
+        targets.append(target)
+        return targets
+
+    def assignment(self, targets: list[Expr], value: Expr) -> Statement:
+        return self.checked(Assign(targets[0].start, value.end, tuple(targets), ":=", value))
+
+    def assignment_other(self, target: Expr, sign: Token, value: Expr) -> Statement:
+        return self.checked(Assign(target.start, value.end, (target,), sign.text.upper(), value))
+
+    def call_statement(self, call: Expr) -> Statement:
+        return self.checked(CallStatement(call.start, call.end, call))
+
+    def exit_statement(self, word: Token) -> Exit:
+        return Exit(word.start, word.end)
+
+    def continue_statement(self, word: Token) -> Continue:
+        return Continue(word.start, word.end)
+
+    def return_statement(self, word: Token, value: Expr | None) -> Statement:
+        return self.checked(Return(word.start, value.end if value else word.end, value))
+
+    def jump(self, word: Token, target: Token) -> RefusedStatement:
+        return RefusedStatement(word.start, target.end, "JMP")
+
+    def refused_statement(self, token: Token) -> RefusedStatement:
+        """A METHOD, ACTION, STEP ... among statements; directly in a body its POU takes it."""
+        return RefusedStatement(token.start, token.end, *refused_what(token.text))
+
+    # --- compound statements ---
+
+    def if_statement(self, word: Token, condition: Expr, then: Token, items: Items, more: list[Branch],
+                     other: Token | None, otherwise: Items | None, end: Token) -> Statement:
+        branches = ((condition, self.block(items)), *more)
+        return self.checked(If(word.start, end.end, branches, None if otherwise is None else self.block(otherwise)))
+
+    def add_elsif(self, branches: list[Branch], word: Token, condition: Expr, then: Token, items: Items) -> list[Branch]:
+        branches.append((condition, self.block(items)))
+        return branches
+
+    def label_value(self, value: Expr) -> Value:
+        return value, None
+
+    def label_range(self, low: Expr, sign: Token, high: Expr) -> Value:
+        return low, high
+
+    def label(self, values: list[Value], colon: Token) -> Label:
+        return Label(values[0][0].start, colon.end, tuple(values))
+
+    def case_statement(self, word: Token, selector: Expr, of: Token, items: Items, other: Token | None,
+                       otherwise: Items | None, end: Token) -> Statement:
+        starts = [at for at, item in enumerate(items) if isinstance(item, Label)]
+        if items and (not starts or starts[0] > 0):
+            first = items[0]
+            self.report("S0101", first.start, first.end, "a statement in CASE stands behind a label, none is in front of this one",
+                        "write `value:` in front of it")
+        branches = tuple(self._branch(items[at:until]) for at, until in zip(starts, [*starts[1:], len(items)], strict=True))
+        rest = None if otherwise is None else self.block(otherwise)
+        return self.checked(Case(word.start, end.end, selector, branches, rest))
+
+    def _branch(self, items: Items) -> CaseBranch:
+        label = items[0]
+        assert isinstance(label, Label)
+        return CaseBranch(label.start, items[-1].end, label.values, self.block(items[1:]))
+
+    def for_statement(self, word: Token, variable: Expr, sign: Token, first: Expr, to: Token, last: Expr, by: Token | None,
+                      step: Expr | None, do: Token, items: Items, end: Token) -> Statement:
+        return self.checked(For(word.start, end.end, variable, first, last, step, self.block(items)))
+
+    def while_statement(self, word: Token, condition: Expr, do: Token, items: Items, end: Token) -> Statement:
+        return self.checked(While(word.start, end.end, condition, self.block(items)))
+
+    def repeat_statement(self, word: Token, items: Items, until: Token, condition: Expr, semicolon: Token | None,
+                         end: Token) -> Statement:
+        return self.checked(Repeat(word.start, end.end, self.block(items), condition))

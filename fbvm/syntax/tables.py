@@ -1,0 +1,149 @@
+"""The grammar as tables: LALR(1) actions, rules and terminals, made from `grammar/*.lark` by lark and cached as JSON.
+
+lark is only imported when no valid cache file is found.  The driver that runs the tables is in `automaton`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from fbvm.base.data import cache_folder, data_folder
+
+FILES = ("common.lark", "declarations.lark", "st.lark")
+FORMAT = 1
+"""Of the cache file; another number makes old files worthless."""
+
+START = "source_text"
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One alternative of a production.
+
+    `action` names the builder's function; None for a rule that hands on its only child.  `places` tells for each argument
+    of the function which child it is, None for an optional part that is absent; None if they are all children in order."""
+
+    origin: str
+    size: int
+    action: str | None
+    places: tuple[int | None, ...] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    name: str
+    pattern: str
+    ignore_case: bool
+    literal: bool
+    reserved: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """`actions[state][symbol]`: a state to shift to (>= 0), or ~index of the rule to reduce by."""
+
+    start: int
+    end: int
+    actions: tuple[dict[str, int], ...]
+    rules: tuple[Rule, ...]
+    terminals: tuple[Terminal, ...]
+
+
+@cache
+def tables() -> Tables:
+    """The tables of the grammar, from the cache if it holds them."""
+    text = "\n".join((data_folder("grammar") / name).read_text(encoding="utf-8") for name in FILES)
+    key = f"{FORMAT} {version('lark')} {sys.version_info[:2]} {text}"
+    path = cache_folder() / f"grammar-{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
+    try:
+        return _from_plain(json.loads(path.read_bytes()))
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        plain = compile_grammar(text)
+    _store(path, plain)
+    return _from_plain(plain)
+
+
+def _store(path: Path, plain: dict[str, Any]) -> None:
+    """Write through a file of its own, so that nobody reads half of it.  A folder that cannot be written does no harm."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, part = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".part")
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            json.dump(plain, file, separators=(",", ":"))
+        os.replace(part, path)
+    except OSError:
+        return
+
+
+def _from_plain(plain: dict[str, Any]) -> Tables:
+    rules = tuple(Rule(str(o), int(n), a, None if p is None else tuple(p)) for o, n, a, p in plain["rules"])
+    actions: tuple[dict[str, int], ...] = tuple(plain["actions"])
+    states, count = len(actions), len(rules)
+    if not all(-count <= act < states for row in actions for act in row.values()):
+        raise ValueError("an action points outside the tables")
+    return Tables(plain["start"], plain["end"], actions, rules, tuple(Terminal(*row) for row in plain["terminals"]))
+
+
+def compile_grammar(text: str) -> dict[str, Any]:
+    """Run lark over the grammar's text and take its tables as plain lists and dictionaries."""
+    from lark import Lark
+    from lark.grammar import Rule as LarkRule
+    from lark.lexer import Lexer, TerminalDef
+
+    class NoLexer(Lexer):
+        """Ours is `lexer`; lark need not prepare one."""
+
+        __future_interface__ = 2  # type: ignore[assignment]
+
+        def __init__(self, conf: Any) -> None:
+            pass
+
+        def lex(self, lexer_state: Any, parser_state: Any) -> Any:
+            return iter(())
+
+    lark = Lark(text, parser="lalr", lexer=NoLexer, start=START, keep_all_tokens=True, maybe_placeholders=True)
+    data, memo = lark.memo_serialize([TerminalDef, LarkRule])
+    table = data["parser"]["parser"]
+    numbers: dict[int, int] = {}
+    rules: list[Any] = []
+    actions: list[dict[str, int]] = [{} for _ in table["states"]]
+    order = {state: index for index, state in enumerate(table["states"])}
+    for state, row in table["states"].items():
+        for token, (kind, arg) in row.items():
+            if kind == 0:
+                act = order[arg]
+            else:
+                if arg["@"] not in numbers:
+                    numbers[arg["@"]] = len(rules)
+                    rules.append(_plain_rule(memo[arg["@"]]))
+                act = ~numbers[arg["@"]]
+            actions[order[state]][table["tokens"][token]] = act
+    terminals = [
+        [t.name, t.pattern.value, "i" in t.pattern.flags, t.pattern.type == "str", t.priority > 0] for t in lark.terminals
+    ]
+    return {"start": order[table["start_states"][START]], "end": order[table["end_states"][START]],
+            "actions": actions, "rules": rules, "terminals": terminals}
+
+
+def _plain_rule(rule: dict[str, Any]) -> list[Any]:
+    options, size = rule["options"], len(rule["expansion"])
+    action = rule["alias"] or rule["origin"]["name"]
+    if options["expand1"] and size == 1 and not rule["alias"]:
+        action = None
+    empty = options["empty_indices"]
+    places: list[int | None] | None = None
+    if any(empty):
+        places, child = [], 0
+        for absent in empty:
+            places.append(None if absent else child)
+            child += not absent
+    return [rule["origin"]["name"], size, action, places]

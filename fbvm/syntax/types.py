@@ -1,0 +1,103 @@
+"""Builds the nodes of type declarations and type specifications (grammar/declarations.lark, 6.4)."""
+
+from __future__ import annotations
+
+from fbvm.syntax.declarations import Declarations
+from fbvm.syntax.lexer import Token
+from fbvm.syntax.tree import (
+    ArraySpec,
+    Declaration,
+    EnumSpec,
+    Expr,
+    Initial,
+    Name,
+    NamedType,
+    RefSpec,
+    Refused,
+    StringSpec,
+    StructSpec,
+    SubrangeSpec,
+    TypeDecl,
+    TypeSpec,
+    UnionSpec,
+    VarDecl,
+)
+
+EnumMember = tuple[Name, Expr | None]
+
+
+class Types(Declarations):
+    """The functions of the rules of types; with those it inherits, the whole grammar's."""
+
+    def type_declaration(self, word: Token, declarations: list[Declaration], end: Token) -> list[Declaration]:
+        return declarations
+
+    def type_decl(self, token: Token, colon: Token, spec: TypeSpec, sign: Token | None, initial: Initial | None,
+                  end: Token) -> TypeDecl:
+        return TypeDecl(token.start, end.end, self.declared(token), spec, initial)
+
+    def type_decl_open(self, token: Token, colon: Token, spec: TypeSpec, end: Token | None = None) -> TypeDecl:
+        return TypeDecl(token.start, end.end if end else spec.end, self.declared(token), spec, None)
+
+    def type_decl_extends(self, token: Token, word: Token, bases: list[NamedType], colon: Token, spec: TypeSpec,
+                          end: Token | None) -> Refused:
+        return Refused(token.start, end.end if end else spec.end, f"{word.text.upper()} of a structure", "S0902")
+
+    # --- names and strings ---
+
+    def type_name(self, token: Token) -> NamedType:
+        return NamedType(token.start, token.end, token.text)
+
+    def type_name_dotted(self, name: NamedType, dot: Token, token: Token) -> NamedType:
+        return NamedType(name.start, token.end, f"{name.text}.{token.text}")
+
+    def named_type(self, name: NamedType) -> NamedType:
+        return name
+
+    def string_plain(self, word: Token) -> StringSpec:
+        return StringSpec(word.start, word.end, word.type == "WSTRING", None)
+
+    def string_sized(self, word: Token, opener: Token, length: Expr, closer: Token) -> StringSpec:
+        return StringSpec(word.start, closer.end, word.type == "WSTRING", length)
+
+    # --- subranges and enumerations ---
+
+    def subrange_spec(self, base: NamedType, opener: Token, low: Expr, sign: Token, high: Expr,
+                      closer: Token) -> SubrangeSpec:
+        return SubrangeSpec(base.start, closer.end, base, low, high)
+
+    def enum_plain(self, opener: Token, members: list[EnumMember], closer: Token) -> EnumSpec:
+        return EnumSpec(opener.start, closer.end, None, tuple(members))
+
+    def enum_based(self, base: NamedType, opener: Token, members: list[EnumMember], closer: Token) -> EnumSpec:
+        return EnumSpec(base.start, closer.end, base, tuple(members))
+
+    def enum_based_behind(self, opener: Token, members: list[EnumMember], closer: Token, base: NamedType) -> EnumSpec:
+        return EnumSpec(opener.start, base.end, base, tuple(members))
+
+    def enum_member(self, token: Token, sign: Token | None, value: Expr | None) -> EnumMember:
+        return self.declared(token), value
+
+    # --- composite types ---
+
+    def array_spec(self, word: Token, opener: Token, dimensions: list[tuple[Expr, Expr] | None], closer: Token, of: Token,
+                   element: TypeSpec) -> ArraySpec:
+        return ArraySpec(word.start, element.end, tuple(dimensions), element)
+
+    def dimension(self, low: Expr, sign: Token, high: Expr) -> tuple[Expr, Expr]:
+        return low, high
+
+    def dimension_open(self, star: Token) -> None:
+        return None
+
+    def struct_spec(self, word: Token, overlap: Token | None, members: list[VarDecl], end: Token) -> StructSpec:
+        return StructSpec(word.start, end.end, tuple(members), overlap is not None)
+
+    def union_spec(self, word: Token, members: list[VarDecl], end: Token) -> UnionSpec:
+        return UnionSpec(word.start, end.end, tuple(members))
+
+    def ref_to(self, word: Token, target: TypeSpec) -> RefSpec:
+        return RefSpec(word.start, target.end, "REF_TO", target)
+
+    def pointer_to(self, word: Token, to: Token, target: TypeSpec) -> RefSpec:
+        return RefSpec(word.start, target.end, f"{word.text.upper()} TO", target)
