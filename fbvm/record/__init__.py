@@ -1,1 +1,1 @@
-"""What is kept of a run, and its renderings: charts, tables, captures."""
+"""What happened inside each scan, and renderings of it: the chart for terminals and tests, captures of the network."""

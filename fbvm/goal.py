@@ -1,0 +1,60 @@
+"""When a run ends: after so many scans, so much time, or when a condition holds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from fbvm.watch.conditions import Condition, parse_condition
+
+if TYPE_CHECKING:
+    from fbvm.plc import Plc
+
+
+class Goal:
+    """The end of a run that begins now.  Raises ValueError if nothing would ever end it, or a bound makes no sense."""
+
+    def __init__(
+        self,
+        plc: Plc,
+        *,
+        scans: int | None = None,
+        for_ns: int | None = None,
+        until: str | Callable[[Plc], bool] | None = None,
+        max_ns: int | None = None,
+    ) -> None:
+        if scans is None and for_ns is None and until is None:
+            raise ValueError("say when to end: scans, for_ns or until")
+        for name, bound in (("scans", scans), ("for_ns", for_ns), ("max_ns", max_ns)):
+            if bound is not None and bound < 0:
+                raise ValueError(f"{name} is {bound}; it cannot be negative")
+        self._plc = plc
+        self.scans = None if scans is None else plc.scans + scans
+        self.for_ns = None if for_ns is None else plc.elapsed_ns + for_ns
+        self.max_ns = None if max_ns is None else plc.elapsed_ns + max_ns
+        self._until = self._condition(until)
+        self._started = plc.scans
+
+    def _condition(self, until: str | Callable[[Plc], bool] | None) -> Callable[[], bool] | None:
+        if until is None:
+            return None
+        if callable(until):
+            function = until
+            return lambda: bool(function(self._plc))
+        condition: Condition = parse_condition(until, self._plc.find)
+        return lambda: condition.holds(self._plc.read)
+
+    def reached(self) -> str:
+        """"trap", "until", "scans", "time" or "max" if that ended the run, else ""."""
+        plc = self._plc
+        if plc.trap:
+            return "trap"
+        if self._until and plc.scans > self._started and self._until():
+            return "until"
+        if self.scans is not None and plc.scans >= self.scans:
+            return "scans"
+        if self.for_ns is not None and plc.elapsed_ns >= self.for_ns:
+            return "time"
+        if self.max_ns is not None and plc.elapsed_ns >= self.max_ns:
+            return "max"
+        return ""

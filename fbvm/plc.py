@@ -1,0 +1,313 @@
+"""The PLC: an image and its memory, the units on its backplane and the network they talk through, one scan at a time.
+
+`plc.scan()` is the scan cycle as W394 draws it.  A PLC is told the time and never waits; what waits is in `run`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from fbvm import flags
+from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
+from fbvm.base.memory import Memory, Snapshot
+from fbvm.code.image import Image
+from fbvm.engine.python import PythonEngine
+from fbvm.engine.trap import Trap
+from fbvm.goal import Goal
+from fbvm.schedule import Schedule
+from fbvm.units.unit import Unit
+from fbvm.watch import places
+from fbvm.watch.paths import Place, Span, find, find_place
+from fbvm.watch.values import Value
+from fbvm.wire.link import Link, Network
+
+STEP_BUDGET = 2_000_000
+"""Statements that one scan may execute before the watchdog ends it."""
+
+
+class Mode(Enum):
+    """PROGRAM: units are refreshed, the program stands.  RUN: the program is executed."""
+
+    PROGRAM = "PROGRAM"
+    RUN = "RUN"
+
+
+class Stopped(RuntimeError):
+    """The PLC was asked to go on after a trap; `trap` says what stopped it.  Restart it first."""
+
+    def __init__(self, trap: Trap) -> None:
+        super().__init__(f"the PLC has stopped: {trap.message}")
+        self.trap = trap
+
+
+class Engine(Protocol):
+    """What executes the tasks of an image on a memory."""
+
+    def run(self, task_index: int) -> Trap | None:
+        """Executes the programs of one task once."""
+
+
+@dataclass(frozen=True)
+class Attached:
+    """A unit on the backplane and its place on a network."""
+
+    unit: Unit
+    link: Link
+    network: Network
+
+
+@dataclass(frozen=True)
+class State:
+    """All that `Plc.snapshot` keeps: memory, time, schedule, forces, mode and trap.  Not units and connections."""
+
+    memory: Snapshot
+    now_ns: int
+    scans: int
+    schedule: tuple[dict[int, int], dict[int, bool]]
+    forces: dict[Place, Value]
+    mode: Mode
+    first: bool
+    trap: Trap | None
+
+
+class Plc:
+    """One PLC with a compiled program, in RUN mode at time 0, before its first scan.
+
+    `cycle_ns` is how far a scan advances virtual time; `budget` the statements a scan may execute; `observed` runs the
+    build that reports each statement.  Raises nothing that a program, a file or a peer could cause: look at `trap`."""
+
+    def __init__(
+        self, image: Image, cycle_ns: int = 10_000_000, *, budget: int = STEP_BUDGET, observed: bool = False
+    ) -> None:
+        if cycle_ns <= 0:
+            raise ValueError(f"a cycle takes time; {cycle_ns} ns is not possible")
+        self.image = image
+        self.cycle_ns = cycle_ns
+        self.budget = budget
+        self.memory = Memory(image.layout.size, image.layout.areas)
+        self.engine: Engine = PythonEngine(image, self.memory, observed=observed)
+        self.units: list[Attached] = []
+        self.watchers: list[Callable[[Plc], None]] = []
+        """Called at the end of each scan, after its I/O refresh: recorders, watches."""
+        self.now_ns = 0
+        """Time of the last scan; `elapsed_ns` is where the next one begins in virtual time."""
+        self.scans = 0
+        self.trap: Trap | None = None
+        self.stirred = False
+        """True if in the last scan something passed between a unit and its network."""
+        self._mode = Mode.RUN
+        self._first = True
+        self._forces: dict[Place, Value] = {}
+        self._schedule = Schedule(image.tasks, lambda path: self.read(path) is True)
+        self._write_initial()
+
+    # --- one scan -----------------------------------------------------------------------------------------------------
+
+    def scan(self, now_ns: int | None = None) -> Trap | None:
+        """One cycle at time `now_ns`, or in virtual time one cycle after the last.  Returns the trap that stopped it.
+
+        A scan that traps ends there: its outputs do not reach the units.  Raises Stopped if a trap was before, and
+        ValueError if time runs backwards or real connections are to live in virtual time."""
+        if self.trap:
+            raise Stopped(self.trap)
+        self._oversee(now_ns)
+        if self._mode is Mode.RUN:
+            self._apply_forces()
+            self.trap = self._execute()
+            self._apply_forces()
+        if not self.trap:
+            self._refresh()
+        self.scans += 1
+        self.memory.write(SCANS, "i64", self.scans)
+        for watcher in self.watchers:
+            watcher(self)
+        return self.trap
+
+    def _oversee(self, now_ns: int | None) -> None:
+        """Time, first-cycle flag, clock pulses, cycle time of the cycle before, step budget."""
+        if now_ns is None:
+            if not all(attached.network.virtual_time for attached in self.units):
+                raise ValueError("real connections need real time: run this PLC with fbvm.run, or say scan(now_ns)")
+            now_ns = self.elapsed_ns
+        elif now_ns < self.now_ns:
+            raise ValueError(f"time runs forward only: {now_ns} ns is before {self.now_ns} ns")
+        cycle_time_ns = 0 if self._first else now_ns - self.now_ns
+        self.now_ns = now_ns
+        self.memory.write(NOW, "i64", now_ns)
+        self.memory.write(DUE, "i64", NEVER)
+        self.memory.write(BUDGET, "i64", self.budget)
+        flags.update(self.memory, now_ns, cycle_time_ns, self._first and self._mode is Mode.RUN)
+
+    def _execute(self) -> Trap | None:
+        """Program execution: the tasks that are due, by priority."""
+        for number in self._schedule.due(self.now_ns):
+            trap = self.engine.run(number)
+            if trap:
+                return trap
+        self._first = False
+        return None
+
+    def _refresh(self) -> None:
+        """I/O refresh: each unit exchanges its words once, the networks take what the units ask for."""
+        self.stirred = False
+        for attached in self.units:
+            events = attached.link.events(self.now_ns)
+            requests = attached.unit.refresh(self.memory, events, self.now_ns)
+            attached.link.submit(requests, self.now_ns)
+            self.stirred = self.stirred or bool(events or requests)
+
+    @property
+    def elapsed_ns(self) -> int:
+        """Time from power-on to the end of the last cycle."""
+        return self.now_ns + self.cycle_ns if self.scans else self.now_ns
+
+    @property
+    def due_ns(self) -> int:
+        """The earliest time at which a timer of the program or a task's interval changes something by itself."""
+        return min(int(self.memory.read(DUE, "i64")), self._schedule.next_ns(self.now_ns))
+
+    def run(
+        self,
+        *,
+        scans: int | None = None,
+        for_ns: int | None = None,
+        until: str | Callable[[Plc], bool] | None = None,
+        max_ns: int | None = None,
+    ) -> str:
+        """Scans in virtual time until the first of these: so many more `scans`, so much more time, a condition.
+
+        `until` is a function of the PLC or an expression such as `Main.done AND D200 > 5`, looked at after each scan;
+        `max_ns` bounds the time.  Returns what ended it: "scans", "time", "until", "max" or "trap"."""
+        goal = Goal(self, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
+        while not (reason := goal.reached()):
+            self.scan()
+        return reason
+
+    # --- values -------------------------------------------------------------------------------------------------------
+
+    def find(self, text: str) -> Place | Span:
+        """The place or span of places that `text` names.  Raises UnknownPlace."""
+        return find(self.image.symbols, self.memory.areas, text)
+
+    def read(self, where: str | Place | Span) -> Value:
+        """The value of a variable, address or range.  Raises UnknownPlace."""
+        found = self.find(where) if isinstance(where, str) else where
+        if isinstance(found, Span):
+            return [places.read(self.memory, place) for place in found.places]
+        return places.read(self.memory, found)
+
+    def write(self, where: str | Place | Span, value: object) -> None:
+        """Writes a variable, an address, or a range (a list).  Raises UnknownPlace, ValueError (range), TypeError."""
+        found = self.find(where) if isinstance(where, str) else where
+        if isinstance(found, Place):
+            places.write(self.memory, found, value)
+            return
+        if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(found.places):
+            raise ValueError(f"{found.name} takes a list of {len(found.places)} values")
+        for place, item in zip(found.places, value, strict=True):
+            places.write(self.memory, place, item)
+
+    def force(self, where: str, value: object) -> None:
+        """Holds a variable or an address at `value` before and after the program, until `unforce`."""
+        place = find_place(self.image.symbols, self.memory.areas, where)
+        places.write(self.memory, place, value)
+        self._forces[place] = places.read(self.memory, place)
+
+    def unforce(self, where: str | None = None) -> None:
+        """Ends a force, or all forces; the value stays until somebody writes it."""
+        if where is None:
+            self._forces.clear()
+        else:
+            self._forces.pop(find_place(self.image.symbols, self.memory.areas, where), None)
+
+    @property
+    def forces(self) -> dict[str, Value]:
+        """What is forced, by name."""
+        return {place.name: value for place, value in self._forces.items()}
+
+    def _apply_forces(self) -> None:
+        for place, value in self._forces.items():
+            places.write(self.memory, place, value)
+
+    # --- units --------------------------------------------------------------------------------------------------------
+
+    def attach(self, unit: Unit, network: Network) -> None:
+        """Puts a unit on the backplane and connects it to a network.  Raises ValueError if its address is taken."""
+        if any(other.unit.name == unit.name for other in self.units):
+            raise ValueError(f"{unit.name} is on the backplane already")
+        attached = Attached(unit, network.attach(unit.address), network)
+        self.units.append(attached)
+        attached.link.submit(unit.reset(self.memory), self.now_ns)
+
+    # --- start, stop and travel ---------------------------------------------------------------------------------------
+
+    @property
+    def mode(self) -> Mode:
+        """PROGRAM or RUN.  Setting RUN clears what is not retained, but CIO, W and timers stay if A500.12 is ON."""
+        return self._mode
+
+    @mode.setter
+    def mode(self, mode: Mode) -> None:
+        if mode is Mode.RUN and self._mode is Mode.PROGRAM:
+            held = ("CIO", "W", "TF", "T") if flags.io_memory_held(self.memory) else ()
+            self._restart(self._kept(held))
+        self._mode = mode
+
+    def warm_start(self) -> None:
+        """Power off and on: retained variables and areas keep their values, everything else begins anew."""
+        self._power_on(self._kept(()))
+
+    def cold_start(self) -> None:
+        """As new: all memory at its initial values."""
+        self._power_on([])
+
+    def _power_on(self, kept: list[tuple[int, bytes]]) -> None:
+        self._restart(kept)
+        self._mode = Mode.RUN
+        for attached in self.units:
+            attached.link.submit(attached.unit.reset(self.memory), self.now_ns)
+
+    def _restart(self, kept: list[tuple[int, bytes]]) -> None:
+        self.memory.restore(Snapshot((None,) * (self.memory.size // PAGE_BYTES)))
+        self._write_initial()
+        for offset, data in kept:
+            self.memory.u8[offset : offset + len(data)] = data
+        self._schedule.reset()
+        self._first = True
+        self.trap = None
+
+    def _kept(self, held: Sequence[str]) -> list[tuple[int, bytes]]:
+        """What a restart keeps: retained areas and variables, and the areas named."""
+        areas = [area for area in self.memory.areas.values() if area.retained or area.name in held]
+        extents = [(area.offset, area.size_bytes) for area in areas]
+        extents += [(row.offset, row.size) for row in self.image.retained]
+        return [(offset, bytes(self.memory.u8[offset : offset + size])) for offset, size in extents]
+
+    def _write_initial(self) -> None:
+        for offset, data in self.image.initial:
+            self.memory.u8[offset : offset + len(data)] = data
+
+    def snapshot(self) -> State:
+        """The state of the PLC itself at this moment; pages that did not change are shared, not copied."""
+        return State(
+            self.memory.snapshot(), self.now_ns, self.scans, self._schedule.state(), dict(self._forces),
+            self._mode, self._first, self.trap,
+        )  # fmt: skip
+
+    def restore(self, state: State) -> None:
+        """Back to a snapshot.  Raises ValueError with units attached: connections do not travel in time."""
+        if self.units:
+            raise ValueError("a PLC with units attached cannot go back: their connections do not travel in time")
+        self.memory.restore(state.memory)
+        self.now_ns, self.scans, self.trap = state.now_ns, state.scans, state.trap
+        self._mode, self._first, self._forces = state.mode, state.first, dict(state.forces)
+        self._schedule.restore(state.schedule)
+
+    def fork(self) -> Plc:
+        """A second PLC in the same state, without units, watchers and connections."""
+        twin = Plc(self.image, self.cycle_ns, budget=self.budget)
+        twin.restore(self.snapshot())
+        return twin

@@ -1,0 +1,131 @@
+"""Writes down chosen signals once a scan, after the I/O refresh, as lists of changes.
+
+Sees what the memory holds at the end of a scan and nothing of what happened inside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from fbvm.base.types import BOOL, Elementary, EnumType, StringType, base
+from fbvm.plc import Plc
+from fbvm.watch.paths import Place, Span, UnknownPlace
+from fbvm.watch.values import Value, show
+
+HEXADECIMAL_AREAS = frozenset(("CIO", "W", "H", "A"))
+"""Areas whose words are mostly flags and are shown in hexadecimal."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One row of a recording: the place, how it is called, what it is."""
+
+    place: Place
+    label: str
+    description: str = ""
+
+    @property
+    def is_bit(self) -> bool:
+        return base(self.place.type) is BOOL
+
+    def text(self, value: Value) -> str:
+        """A value as a chart shows it: short, flag words in hexadecimal."""
+        if self.place.area in HEXADECIMAL_AREAS and isinstance(value, int):
+            return f"{value:04X}h"
+        kind = base(self.place.type)
+        if isinstance(kind, EnumType) and isinstance(value, int):
+            return kind.shown.get(value, str(value))
+        return show(self.place.type, value).removeprefix("T#")
+
+
+@dataclass
+class Track:
+    """What a signal did: (scan, value) for the first recorded scan and for each at whose end it was another."""
+
+    signal: Signal
+    changes: list[tuple[int, Value]] = field(default_factory=list)
+
+    def add(self, scan: int, value: Value) -> None:
+        """Notes the value at the end of a scan."""
+        if not self.changes or self.changes[-1][1] != value:
+            self.changes.append((scan, value))
+
+    def values(self, scans: range) -> Iterator[Value]:
+        """The value at the end of each of these scans, in order; the first must have been recorded."""
+        at = 0
+        for scan in scans:
+            while at + 1 < len(self.changes) and self.changes[at + 1][0] <= scan:
+                at += 1
+            yield self.changes[at][1]
+
+
+class Recorder:
+    """Records from the next scan of `plc` until `stop`.  `signals` are names, addresses, ranges or (one, description).
+
+    Raises UnknownPlace for a name that is none, TypeError for an array or structure."""
+
+    def __init__(self, plc: Plc, signals: Iterable[str | tuple[str, str] | Signal]) -> None:
+        self.tracks = [Track(signal) for given in signals for signal in signals_of(plc, given)]
+        self.first = plc.scans
+        """Number of the first recorded scan, counted from 0 at power-on."""
+        self.times_ns: list[int] = []
+        self._plc = plc
+        plc.watchers.append(self._watch)
+
+    @property
+    def scans(self) -> range:
+        """Numbers of the scans that are recorded."""
+        return range(self.first, self.first + len(self.times_ns))
+
+    def stop(self) -> None:
+        """Ends the recording; what was recorded stays."""
+        if self._watch in self._plc.watchers:
+            self._plc.watchers.remove(self._watch)
+
+    def _watch(self, plc: Plc) -> None:
+        scan = self.first + len(self.times_ns)
+        self.times_ns.append(plc.now_ns)
+        for track in self.tracks:
+            track.add(scan, plc.read(track.signal.place))
+
+
+def signals_of(plc: Plc, given: str | tuple[str, str] | Signal) -> list[Signal]:
+    """The signals that a name, an address or a range stands for; descriptions come from the attached units."""
+    if isinstance(given, Signal):
+        return [given]
+    text, description = given if isinstance(given, tuple) else (given, "")
+    found = plc.find(text)
+    places = found.places if isinstance(found, Span) else (found,)
+    return [Signal(place, place.name.replace("CIO ", "CIO"), description or described(plc, place))
+            for place in map(_single, places)]  # fmt: skip
+
+
+def _single(place: Place) -> Place:
+    if not isinstance(base(place.type), Elementary | StringType | EnumType):
+        raise TypeError(f"{place.name} is {place.type.name}; a chart shows single values, name its members")
+    return place
+
+
+def described(plc: Plc, place: Place) -> str:
+    """What an attached unit says of an address, "" if nobody knows it."""
+    for attached in plc.units:
+        descriptions: dict[str, str] = getattr(attached.unit, "descriptions", {})
+        if place.area and place.name in descriptions:
+            return descriptions[place.name]
+    return ""
+
+
+def default_signals(plc: Plc) -> list[Signal]:
+    """What is charted when nobody says what: all that units describe, and the programs' own single values."""
+    signals: list[Signal] = []
+    for attached in plc.units:
+        for address in getattr(attached.unit, "descriptions", {}):
+            signals += signals_of(plc, address)
+    for symbol in plc.image.symbols.values():
+        for text in [symbol.name, *(f"{symbol.name}.{name}" for name in getattr(symbol.type, "fields", ()))]:
+            try:
+                signals += signals_of(plc, text)
+            except (TypeError, UnknownPlace):
+                continue
+    return signals

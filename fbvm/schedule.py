@@ -1,0 +1,62 @@
+"""Which tasks are due in a scan, in the order in which they run.
+
+Tasks never preempt each other.  A task without interval and SINGLE runs in every cycle; with SINGLE it runs once at
+each rising edge, and with both also by its interval while SINGLE is FALSE (IEC 61131-3 ed. 3, 6.8.2).  An interval that
+was missed is not made up for: the next one counts from the grid of the first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from fbvm.base.areas import NEVER
+from fbvm.code.image import TaskRow
+
+
+@dataclass
+class Schedule:
+    """When each task runs next.  `single` tells whether the BOOL of a path is TRUE."""
+
+    tasks: tuple[TaskRow, ...]
+    single: Callable[[str], bool]
+    _next_ns: dict[int, int] = field(default_factory=dict)
+    _levels: dict[int, bool] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._order = sorted(range(len(self.tasks)), key=lambda number: self.tasks[number].priority)
+
+    def due(self, now_ns: int) -> list[int]:
+        """Numbers of the tasks that run in the scan at `now_ns`, by priority."""
+        return [number for number in self._order if self._is_due(number, now_ns)]
+
+    def next_ns(self, now_ns: int) -> int:
+        """The earliest time after `now_ns` at which an interval has passed; NEVER if no task has one."""
+        return min((planned_ns for planned_ns in self._next_ns.values() if planned_ns > now_ns), default=NEVER)
+
+    def _is_due(self, number: int, now_ns: int) -> bool:
+        task = self.tasks[number]
+        level = bool(task.single) and self.single(task.single)
+        edge = level and not self._levels.get(number, False)
+        self._levels[number] = level
+        if not task.interval_ns:
+            return edge or not task.single
+        planned_ns = self._next_ns.setdefault(number, now_ns)
+        if now_ns < planned_ns:
+            return edge
+        missed = (now_ns - planned_ns) // task.interval_ns
+        self._next_ns[number] = planned_ns + (missed + 1) * task.interval_ns
+        return edge or not level
+
+    def reset(self) -> None:
+        """As at power-on."""
+        self._next_ns.clear()
+        self._levels.clear()
+
+    def state(self) -> tuple[dict[int, int], dict[int, bool]]:
+        """What a snapshot keeps."""
+        return dict(self._next_ns), dict(self._levels)
+
+    def restore(self, state: tuple[dict[int, int], dict[int, bool]]) -> None:
+        """Back to a state that `state` gave."""
+        self._next_ns, self._levels = dict(state[0]), dict(state[1])

@@ -1,0 +1,62 @@
+"""What the bits and words of an ETN21 are called, for charts and lists.
+
+From W420 4-1 p80-85, 4-2 p88 and W421 6-6, 6-7.
+"""
+
+from __future__ import annotations
+
+from fbvm.units import etn21_map as at
+from fbvm.units.etn21_map import Layout, Switch
+
+SWITCH_NAMES = {
+    Switch.UDP_OPEN: "UDP Open Request Switch",
+    Switch.PASSIVE_OPEN: "TCP Passive Open Request Switch",
+    Switch.ACTIVE_OPEN: "TCP Active Open Request Switch",
+    Switch.SEND: "Send Request Switch",
+    Switch.RECEIVE: "Receive Request Switch",
+    Switch.CLOSE: "Close Request Switch",
+}
+FLAG_NAMES = {
+    0: "Opening Flag",
+    1: "Receiving Flag",
+    2: "Sending Flag",
+    3: "Closing Flag",
+    13: "Data Received Flag",
+    15: "Open Flag",
+}
+PARAMETER_NAMES = {
+    at.OPTION_AND_SOCKET: "Option and Socket Number",
+    at.LOCAL_PORT: "Local Port",
+    at.REMOTE_HOST: "Remote IP Address, high",
+    at.REMOTE_HOST + 1: "Remote IP Address, low",
+    at.REMOTE_PORT: "Remote Port",
+    at.COUNT: "Number of Bytes to Send or Receive",
+    at.DATA_ADDRESS: "Send or Receive Data Address, high",
+    at.DATA_ADDRESS + 1: "Send or Receive Data Address, low",
+    at.TIMEOUT: "Time-out Value",
+    at.RESPONSE: "Response Code",
+}
+
+
+def descriptions(layout: Layout) -> dict[str, str]:
+    """The name of each bit and word by its address, such as `CIO 1519.02`; area and socket 1 go unnumbered."""
+    names = {f"CIO {layout.n}.02": "Socket Force-close Switch"}
+    for area in at.AREAS:
+        word, first = layout.switches(area)
+        for switch, name in SWITCH_NAMES.items():
+            names[f"CIO {word}.{first + switch:02}"] = _numbered(name, area)
+    for protocol in ("TCP", "UDP"):
+        for socket in at.SOCKETS:
+            for bit, name in FLAG_NAMES.items():
+                names[f"CIO {layout.status(protocol, socket)}.{bit:02}"] = _numbered(f"{protocol} {name}", socket)
+    for socket in at.SOCKETS:
+        names[f"D{layout.m + at.BYTES_RECEIVED + socket}"] = _numbered("Number of Bytes Received", socket)
+        names[f"D{layout.m + at.TCP_STATE + socket}"] = _numbered("TCP Connection State", socket)
+    for area in at.AREAS:
+        for offset, name in PARAMETER_NAMES.items():
+            names[f"D{layout.parameters(area) + offset}"] = _numbered(name, area)
+    return names
+
+
+def _numbered(name: str, number: int) -> str:
+    return name if number == 1 else f"{name} {number}"

@@ -1,0 +1,223 @@
+"""From what a user writes to a place in memory: `Main.conn.ENO`, `Main.a[3].b`, `D200`, `CIO 1509.15`, `D200..D202`.
+
+A name beats an address, `%D200` is always an address.  Knows where things lie, not what they hold (see `values`).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from fbvm.base.areas import FLAG_AREAS, Address, AddressError, Area, parse_address
+from fbvm.base.types import (
+    BOOL,
+    BYTE,
+    DWORD,
+    LWORD,
+    WORD,
+    ArrayType,
+    Elementary,
+    Field,
+    RefType,
+    StructType,
+    Type,
+    base,
+)
+
+
+class UnknownPlace(LookupError):
+    """The text names nothing in this PLC; the message says which part and what would."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """One value in the buffer: `offset` in bytes, `bit` 0..7 for a BOOL that shares its byte.
+
+    `hops` is not empty if the way leads through references: at each step the 64 bits at the place are a reference, and
+    the value lies the given number of bytes behind where it points.  `area` names the Omron area of an address."""
+
+    name: str
+    type: Type
+    offset: int
+    bit: int | None = None
+    hops: tuple[int, ...] = ()
+    area: str = ""
+    constant: bool = False
+
+    def inner(self, name: str, type_: Type, distance: int, bit: int | None = None) -> Place:
+        """The part of this place that begins `distance` bytes behind its start."""
+        if self.hops:
+            return replace(self, name=name, type=type_, hops=(*self.hops[:-1], self.hops[-1] + distance), bit=bit)
+        return replace(self, name=name, type=type_, offset=self.offset + distance, bit=bit)
+
+
+@dataclass(frozen=True)
+class Span:
+    """Several places of an area in a row, `D200..D202`: read and written as a list."""
+
+    name: str
+    places: tuple[Place, ...]
+
+
+_TOKEN = re.compile(
+    r"\s*(?:(?P<name>[^\W\d]\w*)|(?P<bit>\.\s*%?X?\d+)|(?P<dot>\.)|\[(?P<index>[^\]]*)\]|(?P<hat>\^))", re.I
+)
+_FIRST = re.compile(r"\s*([^\W\d]\w*)")
+_ADDRESS_TYPES = {8: BYTE, 16: WORD, 32: DWORD, 64: LWORD}
+
+
+def find(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> Place | Span:
+    """The place or the span that `text` names.  Raises UnknownPlace for text that names nothing."""
+    if ".." in text:
+        return _span(symbols, areas, text)
+    first = _FIRST.match(text)
+    if first and first[1].upper() in symbols:
+        return _walk(symbols, text)
+    try:
+        address = parse_address(text)
+    except AddressError as error:
+        raise UnknownPlace(_unknown(symbols, text, first[1] if first else "", str(error))) from None
+    return _at(areas, address)
+
+
+def find_place(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> Place:
+    """Like `find`, for one value only.  Raises UnknownPlace for a span, too."""
+    found = find(symbols, areas, text)
+    if isinstance(found, Span):
+        raise UnknownPlace(f"{text} is a range; name one place")
+    return found
+
+
+def _unknown(symbols: Mapping[str, Field], text: str, first: str, reason: str) -> str:
+    """What to say about a name that is neither a symbol nor an address."""
+    if not first or re.fullmatch(r"\s*(%.*|[A-Za-z]{1,3}\s*\d+(\.\d+)?|\d+(\.\d+)?|E\w\s*[_:]\s*\d+.*)", text):
+        return reason
+    for field in symbols.values():
+        if isinstance(field.type, StructType) and field.type.block and field.type.member(first):
+            return f"there is no {first}; did you mean {field.name}.{text.strip()}?"
+    known = ", ".join(sorted(field.name for field in symbols.values())[:8])
+    return f"there is no {first}" + (f"; known here: {known}" if known else " (the program declares nothing)")
+
+
+def _span(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> Span:
+    low_text, _, high_text = text.partition("..")
+    low, high = (_span_end(areas, part, text) for part in (low_text, high_text))
+    same = (low.area, low.size_bits, low.bit is None) == (high.area, high.size_bits, high.bit is None)
+    if not same or (low.number, low.bit or 0) > (high.number, high.bit or 0):
+        raise UnknownPlace(f"{text} is no range: both ends must lie in one area, the lower end first")
+    if low.bit is None:
+        addresses = [replace(low, number=number) for number in range(low.number, high.number + 1)]
+    else:
+        width = 8 if low.area in "IQM" else 16
+        bits = range(low.number * width + low.bit, high.number * width + (high.bit or 0) + 1)
+        addresses = [replace(low, number=bit // width, bit=bit % width) for bit in bits]
+    return Span(f"{low}..{high}", tuple(_at(areas, address) for address in addresses))
+
+
+def _span_end(areas: Mapping[str, Area], part: str, text: str) -> Address:
+    try:
+        return parse_address(part)
+    except AddressError as error:
+        raise UnknownPlace(f"{text} is no range of addresses: {error}") from None
+
+
+def _at(areas: Mapping[str, Area], address: Address) -> Place:
+    """The place of an address.  Raises UnknownPlace if this PLC does not have the area (an E bank not in use)."""
+    area = areas.get(address.area)
+    if area is None:
+        raise UnknownPlace(f"{address}: this PLC has no {address.area} bank; the program does not use it")
+    offset = area.offset + address.byte_offset()
+    if address.bit is not None or address.area in FLAG_AREAS:
+        return Place(str(address), BOOL, offset, address.bit_in_byte(), area=address.area)
+    return Place(str(address), _ADDRESS_TYPES[address.size_bits or 16], offset, area=address.area)
+
+
+# --- names ------------------------------------------------------------------------------------------------------------
+
+
+def _walk(symbols: Mapping[str, Field], text: str) -> Place:
+    """Follows a path step by step through the types."""
+    place: Place | None = None
+    at, dot = 0, False
+    while at < len(text.rstrip()):
+        match = _TOKEN.match(text, at)
+        if not match or (match["name"] and place is not None and not dot):
+            raise UnknownPlace(f"{text.strip()!r} is not a path of names, subscripts and members")
+        at = match.end()
+        if match["dot"]:
+            dot = True
+        elif match["name"] and place is None:
+            field = symbols[match["name"].upper()]
+            place = _of(Place(field.name, field.type, 0), field, field.name, field.offset)
+        elif place is not None:
+            place = _step(place, match)
+            dot = False
+    if place is None or dot:
+        raise UnknownPlace(f"{text.strip()!r} ends too early")
+    return place
+
+
+def _step(place: Place, match: re.Match[str]) -> Place:
+    if match["name"]:
+        return member(place, match["name"])
+    if match["index"] is not None:
+        return _element(place, match["index"])
+    if match["hat"]:
+        if not isinstance(place.type, RefType) or place.type.target is None:
+            raise UnknownPlace(f"{place.name} is no reference")
+        return replace(place, name=f"{place.name}^", type=place.type.target, hops=(*place.hops, 0))
+    return _part(place, int(re.sub(r"\D", "", match["bit"])))
+
+
+def _of(parent: Place, field: Field, name: str, distance: int) -> Place:
+    """The place of a member: absolute if it is located, behind a reference if it is an in-out."""
+    if field.absolute:
+        place = Place(name, field.type, field.offset, field.bit)
+    else:
+        place = parent.inner(name, field.type, distance, field.bit)
+    if field.reference:
+        place = replace(place, hops=(*place.hops, 0))
+    return replace(place, constant=field.constant or parent.constant)
+
+
+def member(place: Place, name: str) -> Place:
+    """A member of a structure or an instance.  Raises UnknownPlace."""
+    field = place.type.member(name) if isinstance(place.type, StructType) else None
+    if field is None:
+        if not isinstance(place.type, StructType):
+            raise UnknownPlace(f"{place.name} is {place.type.name} and has no member {name}")
+        known = ", ".join(f.name for f in list(place.type.fields.values())[:12])
+        raise UnknownPlace(f"{place.name} has no {name}; it has {known or 'no members'}")
+    return _of(place, field, f"{place.name}.{field.name}", field.offset)
+
+
+def _element(place: Place, text: str) -> Place:
+    if not isinstance(place.type, ArrayType):
+        raise UnknownPlace(f"{place.name} is {place.type.name}, not an array")
+    try:
+        indexes = [int(part) for part in text.split(",")]
+    except ValueError:
+        raise UnknownPlace(f"{place.name}[{text}]: a subscript is a whole number") from None
+    bounds = place.type.bounds
+    if len(indexes) != len(bounds):
+        raise UnknownPlace(f"{place.name} has {len(bounds)} subscripts, {len(indexes)} given")
+    at = 0
+    for index, (low, high) in zip(indexes, bounds, strict=True):
+        if not low <= index <= high:
+            raise UnknownPlace(f"{place.name}[{text}]: {index} is outside {low}..{high}")
+        at = at * (high - low + 1) + index - low
+    name = f"{place.name}[{', '.join(map(str, indexes))}]"
+    if place.bit is not None:
+        return place.inner(name, place.type.element, (place.bit + at) // 8, (place.bit + at) % 8)
+    return place.inner(name, place.type.element, at * place.type.element.size)
+
+
+def _part(place: Place, bit: int) -> Place:
+    """Bit number `bit` of an integer or bit string."""
+    kind = base(place.type)
+    if not isinstance(kind, Elementary) or kind.machine[0] not in "iu":
+        raise UnknownPlace(f"{place.name} is {place.type.name} and has no bits")
+    if bit >= kind.bits:
+        raise UnknownPlace(f"{place.name} has bits 0..{kind.bits - 1}; {bit} does not exist")
+    return place.inner(f"{place.name}.{bit}", BOOL, bit // 8, bit % 8)

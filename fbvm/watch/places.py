@@ -1,0 +1,111 @@
+"""Reading and writing the value at a place: Python values on one side, the bytes of a PLC on the other."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
+from fbvm.base.types import ArrayType, StringType, StructType, Type, base, machine
+from fbvm.watch.paths import Place, member
+from fbvm.watch.values import Value, conform
+
+POINTED_AT = 8
+"""Bits of a reference below its byte offset; above the offset is the object's number (see code.operations)."""
+OFFSET_BITS = 32
+
+
+def read(memory: Memory, place: Place) -> Value:
+    """The value at a place; None if the way to it leads through a null reference."""
+    at = _follow(memory, place)
+    if at is None:
+        return None
+    return _read(memory, place.type, *at)
+
+
+def write(memory: Memory, place: Place, value: object) -> None:
+    """Writes a value, wholly or not at all.
+
+    Raises ValueError (out of range, constant, null reference) or TypeError (a value of another kind)."""
+    for offset, data, bit in list(_pieces(memory, place, value)):
+        if bit is None:
+            memory.u8[offset : offset + len(data)] = data
+        else:
+            memory.write(offset, "b", data != b"\0", bit)
+
+
+def _follow(memory: Memory, place: Place) -> tuple[int, int | None] | None:
+    """Byte offset and bit where a place lies now, references followed."""
+    offset, bit = place.offset, place.bit
+    for distance in place.hops:
+        reference = int(memory.read(offset, "ref"))
+        if reference == 0:
+            return None
+        pointed = reference & 0xFF
+        offset = (reference >> POINTED_AT & (1 << OFFSET_BITS) - 1) + distance
+        bit = place.bit if pointed == WHOLE_BYTES else pointed
+    return offset, bit
+
+
+def _read(memory: Memory, kind: Type, offset: int, bit: int | None) -> Value:
+    plain = base(kind)
+    if isinstance(plain, ArrayType):
+        return [_read(memory, plain.element, *_element(plain, offset, bit, number)) for number in range(plain.count)]
+    if isinstance(plain, StructType):
+        members: dict[str, Value] = {}
+        for field in plain.fields.values():
+            start = field.offset if field.absolute else offset + field.offset
+            if field.reference:
+                members[field.name] = read(memory, Place(field.name, field.type, start, field.bit, (0,)))
+            else:
+                members[field.name] = _read(memory, field.type, start, field.bit)
+        return members
+    if isinstance(plain, StringType):
+        return _text(memory, plain, offset)
+    form = machine(plain)
+    value = memory.read(offset, form, WHOLE_BYTES if bit is None else bit)
+    if form == "b":
+        return bool(value)
+    if form == "ref":
+        return int(value) or None
+    return value
+
+
+def _element(kind: ArrayType, offset: int, bit: int | None, number: int) -> tuple[int, int | None]:
+    if bit is not None:
+        return offset + (bit + number) // 8, (bit + number) % 8
+    return offset + number * kind.element.size, None
+
+
+def _text(memory: Memory, kind: StringType, offset: int) -> str:
+    data = bytes(memory.u8[offset : offset + kind.size])
+    return data.decode("utf-16-le" if kind.wide else "latin-1", "replace").partition("\0")[0]
+
+
+def _pieces(memory: Memory, place: Place, value: object) -> Iterator[tuple[int, bytes, int | None]]:
+    """The bytes that writing `value` changes: offset, bytes, bit.  Checks everything on the way."""
+    if place.constant:
+        raise ValueError(f"{place.name} is CONSTANT")
+    at = _follow(memory, place)
+    if at is None:
+        raise ValueError(f"{place.name} lies behind a reference that is null now")
+    offset, bit = at
+    plain = base(place.type)
+    if isinstance(plain, ArrayType):
+        if not isinstance(value, list | tuple) or len(value) != plain.count:
+            raise ValueError(f"{place.name} is {place.type.name} and takes a list of {plain.count} values")
+        for number, item in enumerate(value):
+            element_offset, element_bit = _element(plain, offset, bit, number)
+            element = Place(f"{place.name}[{number}]", plain.element, element_offset, element_bit)
+            yield from _pieces(memory, element, item)
+    elif isinstance(plain, StructType) and isinstance(value, dict):
+        for name, item in value.items():
+            yield from _pieces(memory, member(replace(place, offset=offset, hops=()), name), item)
+    else:
+        yield offset, _encoded(plain, conform(place.type, value, place.name)), bit
+
+
+def _encoded(kind: Type, value: Value) -> bytes:
+    if isinstance(kind, StringType) and isinstance(value, str):
+        return f"{value}\0".encode("utf-16-le" if kind.wide else "latin-1")
+    return STRUCTS[machine(kind)].pack(value)

@@ -1,0 +1,101 @@
+"""Names and addresses to places."""
+
+import pytest
+
+from fbvm.base import types as t
+from fbvm.base.areas import AREAS
+from fbvm.base.types import Field, StructType
+from fbvm.watch.paths import Place, Span, UnknownPlace, find, find_place
+
+POINT = StructType("Point", 8, 4, {"X": Field("x", t.INT, 0), "Y": Field("y", t.DINT, 4)})
+ROWS = t.array(((1, 3), (0, 1)), POINT)
+CONN = StructType("Conn", 16, 8, {"ENO": Field("ENO", t.BOOL, 8, "VAR_OUTPUT")}, block=True)
+MAIN = StructType("Main", 200, 8, {
+    "CONN": Field("conn", CONN, 8),
+    "A": Field("a", ROWS, 24),
+    "FLAGS": Field("flags", t.WORD, 80),
+    "SWITCH": Field("switch", t.BOOL, AREAS["CIO"].offset + 3038, bit=2, absolute=True),
+    "SHARED": Field("shared", POINT, 88, "VAR_IN_OUT", reference=True),
+    "LIMIT": Field("limit", t.INT, 96, constant=True),
+}, block=True)
+SYMBOLS = {"MAIN": Field("Main", MAIN, 180224), "D200": Field("d200", t.INT, 181000)}
+
+
+def place(text: str) -> Place:
+    return find_place(SYMBOLS, AREAS, text)
+
+
+@pytest.mark.parametrize(("text", "name", "type_name", "offset", "bit"), [
+    ("Main.conn.ENO", "Main.conn.ENO", "BOOL", 180224 + 16, None),
+    ("main . CONN.eno", "Main.conn.ENO", "BOOL", 180224 + 16, None),
+    ("Main.a[1, 0].y", "Main.a[1, 0].y", "DINT", 180224 + 28, None),
+    ("Main.a[3,1].x", "Main.a[3, 1].x", "INT", 180224 + 24 + 40, None),
+    ("Main.flags.9", "Main.flags.9", "BOOL", 180224 + 81, 1),
+    ("Main.flags.%X0", "Main.flags.0", "BOOL", 180224 + 80, 0),
+    ("Main.switch", "Main.switch", "BOOL", AREAS["CIO"].offset + 3038, 2),
+    ("D200", "d200", "INT", 181000, None),
+    ("%D200", "D200", "WORD", AREAS["D"].offset + 400, None),
+    ("D201", "D201", "WORD", AREAS["D"].offset + 402, None),
+    ("CIO 1509.15", "CIO 1509.15", "BOOL", AREAS["CIO"].offset + 3019, 7),
+    ("cio1509.15", "CIO 1509.15", "BOOL", AREAS["CIO"].offset + 3019, 7),
+    ("%MW10", "%MW10", "WORD", AREAS["M"].offset + 20, None),
+    ("%IX0.3", "%IX0.3", "BOOL", AREAS["I"].offset, 3),
+    ("%ML1", "%ML1", "LWORD", AREAS["M"].offset + 8, None),
+    ("CF102", "CF102", "BOOL", AREAS["CF"].offset + 12, 6),
+])
+def test_text_names_a_place(text: str, name: str, type_name: str, offset: int, bit: int | None) -> None:
+    found = place(text)
+    assert (found.name, found.type.name, found.offset, found.bit) == (name, type_name, offset, bit)
+
+
+def test_a_way_through_a_reference_is_kept() -> None:
+    found = place("Main.shared.y")
+    assert (found.offset, found.hops, found.type.name) == (180224 + 88, (4,), "DINT")
+
+
+def test_constants_are_known() -> None:
+    assert place("Main.limit").constant
+
+
+@pytest.mark.parametrize(("text", "names"), [
+    ("D300..D302", ["D300", "D301", "D302"]),
+    ("%D200..%D201", ["D200", "D201"]),
+    ("CIO 1519.14..CIO 1520.01", ["CIO 1519.14", "CIO 1519.15", "CIO 1520.00", "CIO 1520.01"]),
+    ("%IX0.6..%IX1.1", ["%IX0.6", "%IX0.7", "%IX1.0", "%IX1.1"]),
+])
+def test_a_range_is_its_places(text: str, names: list[str]) -> None:
+    found = find(SYMBOLS, AREAS, text)
+    assert isinstance(found, Span)
+    assert [part.name for part in found.places] == names
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("Main.conn.EN", "Main.conn has no EN; it has ENO"),
+    ("conn.ENO", "did you mean Main.conn.ENO?"),
+    ("nothing", "there is no nothing; known here: Main, d200"),
+    ("D40000", "D ends at 32767; 40000 does not exist"),
+    ("Main.a[4, 0].x", "Main.a[4, 0]: 4 is outside 1..3"),
+    ("Main.a[1].x", "Main.a has 2 subscripts, 1 given"),
+    ("Main.a[i, 0]", "a subscript is a whole number"),
+    ("Main.flags[0]", "Main.flags is WORD, not an array"),
+    ("Main.flags.16", "Main.flags has bits 0..15; 16 does not exist"),
+    ("Main.flags.bit", "Main.flags is WORD and has no member bit"),
+    ("Main.conn.ENO.0", "has no bits"),
+    ("Main.", "ends too early"),
+    ("Main conn", "is not a path"),
+    ("Main.conn^", "is no reference"),
+    ("D5..D2", "the lower end first"),
+    ("D5..CIO 9", "both ends must lie in one area"),
+    ("D5..Main", "is no range of addresses"),
+    ("E0_5", "this PLC has no E0 bank"),
+    ("", "is not an address"),
+])
+def test_what_names_nothing_says_why(text: str, message: str) -> None:
+    with pytest.raises(UnknownPlace) as error:
+        find(SYMBOLS, AREAS, text)
+    assert message in str(error.value)
+
+
+def test_one_place_is_not_a_range() -> None:
+    with pytest.raises(UnknownPlace, match="is a range; name one place"):
+        place("D1..D3")

@@ -1,0 +1,183 @@
+"""Values on their way in and out, and the places that hold them."""
+
+import math
+
+import pytest
+
+from fbvm.base import types as t
+from fbvm.base.areas import AREAS, SLOTS_OFFSET
+from fbvm.base.memory import Memory
+from fbvm.base.types import EnumType, Field, StructType, SubrangeType, Type
+from fbvm.watch import places
+from fbvm.watch.paths import Place, UnknownPlace
+from fbvm.watch.values import conform, literal, parse_time_ns, parse_value, show, show_time
+
+COLOUR = EnumType("Colour", 2, 2, t.INT, {"RED": 0, "GREEN": 5}, {0: "Red", 5: "Green"})
+LEVEL = SubrangeType("Level", 2, 2, t.INT, 0, 100)
+PAIR = StructType("Pair", 16, 8, {"N": Field("n", t.INT, 0), "S": Field("s", t.string(5), 2)})
+
+
+@pytest.mark.parametrize(("text", "time_ns"), [
+    ("10ms", 10_000_000), ("1.5s", 1_500_000_000), ("T#10ms", 10_000_000), ("time#1m30s", 90_000_000_000),
+    ("LT#5us3ns", 5003), ("-2s", -2_000_000_000), ("T#-2s", -2_000_000_000), ("1d_2h", 93_600_000_000_000), ("0s", 0),
+    ("0.5ms", 500_000),
+])  # fmt: skip
+def test_times_are_read(text: str, time_ns: int) -> None:
+    assert parse_time_ns(text) == time_ns
+
+
+@pytest.mark.parametrize("text", ["", "10", "ms", "10 ms x", "5s,", "T#"])
+def test_what_is_no_time_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="is no time; write 10ms"):
+        parse_time_ns(text)
+
+
+@pytest.mark.parametrize(("time_ns", "text"), [
+    (0, "T#0s"), (90_000_000_000, "T#1m30s"), (-1_500_000_000, "T#-1s500ms"), (5003, "T#5us3ns"),
+])  # fmt: skip
+def test_times_are_shown_as_a_program_writes_them(time_ns: int, text: str) -> None:
+    assert show_time(time_ns) == text
+    assert parse_time_ns(text) == time_ns
+
+
+@pytest.mark.parametrize(("text", "value"), [
+    ("TRUE", True), ("false", False), ("12", 12), ("-1_000", -1000), ("16#FF", 255), ("0xff", 255), ("2#101", 5),
+    ("INT#5", 5), ("WORD#16#10", 16), ("1.5", 1.5), ("-2e3", -2000.0), ("'a b'", "a b"), ("T#1s", 1_000_000_000),
+    ("1s", 1_000_000_000),
+])  # fmt: skip
+def test_literals(text: str, value: object) -> None:
+    assert literal(text)[0] == value
+    assert type(literal(text)[0]) is type(value)
+
+
+@pytest.mark.parametrize(("kind", "text", "value"), [
+    (t.INT, "-5", -5), (t.WORD, "16#FFFF", 65535), (t.BOOL, "TRUE", True), (t.BOOL, "1", True), (t.REAL, "2", 2.0),
+    (t.TIME, "10ms", 10_000_000), (t.string(), "a, b", "a, b"), (t.string(), "'x'", "x"), (COLOUR, "green", 5),
+    (COLOUR, "Colour#Red", 0), (COLOUR, "5", 5), (LEVEL, "100", 100),
+])  # fmt: skip
+def test_text_becomes_a_value_of_the_type(kind: Type, text: str, value: object) -> None:
+    assert parse_value(kind, text, "x") == value
+
+
+@pytest.mark.parametrize(("kind", "value", "message"), [
+    (t.INT, 32768, "x: 32768 is out of range of INT, which holds -32768..32767"),
+    (t.WORD, -1, "x: -1 is out of range of WORD, which holds 0..65535"),
+    (LEVEL, 101, "x: 101 is out of range of Level, which holds 0..100"),
+    (t.REAL, 1e39, "x: 1e+39 is out of range of REAL"),
+    (t.LREAL, 10**400, "out of range of LREAL"),
+    (t.string(3), "four", "x: 4 characters are out of range of STRING[3]"),
+    (t.string(3), "\u20ac", "cannot hold the character"),
+    (t.string(3), "a\0", "cannot hold the character"),
+    (COLOUR, 1, "1 is no member of Colour; it has Red (0), Green (5)"),
+    (COLOUR, "Blue", "Colour has no member Blue"),
+])
+def test_a_value_out_of_range_is_refused(kind: Type, value: object, message: str) -> None:
+    with pytest.raises(ValueError) as error:
+        conform(kind, value, "x")
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize(("kind", "value"), [
+    (t.INT, 1.0), (t.INT, True), (t.BOOL, 2), (t.BOOL, "TRUE"), (t.REAL, "1"), (t.REAL, True), (t.string(), 5),
+    (PAIR, 5), (t.array(((0, 1),), t.INT), [1, 2]),
+])  # fmt: skip
+def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
+    with pytest.raises(TypeError, match="x is "):
+        conform(kind, value, "x")
+
+
+@pytest.mark.parametrize(("kind", "text", "message"), [
+    (t.TIME, "10", "x is TIME and takes a time such as 10ms, not 10"),
+    (t.INT, "10ms", "x is INT and takes no time, not 10ms"),
+    (t.INT, "ten", "x: 'ten' is no literal"),
+])
+def test_text_of_another_kind_is_refused(kind: Type, text: str, message: str) -> None:
+    with pytest.raises(ValueError) as error:
+        parse_value(kind, text, "x")
+    assert str(error.value) == message
+
+
+@pytest.mark.parametrize(("kind", "value", "text"), [
+    (t.BOOL, True, "TRUE"), (t.INT, -5, "-5"), (t.WORD, 255, "255"), (t.TIME, 1_500_000_000, "T#1s500ms"),
+    (t.string(), "a", "'a'"), (COLOUR, 5, "Green (5)"), (COLOUR, 3, "? (3)"), (t.REAL, math.inf, "inf"),
+    (t.array(((0, 1),), t.BOOL), [True, False], "[TRUE, FALSE]"), (PAIR, {"n": 1, "s": "x"}, "(n := 1, s := 'x')"),
+    (t.NULL, None, "NULL"),
+])  # fmt: skip
+def test_values_are_shown(kind: Type, value: object, text: str) -> None:
+    assert show(kind, value) == text  # type: ignore[arg-type]
+
+
+def test_bit_strings_are_shown_in_hexadecimal_on_request() -> None:
+    assert [show(kind, 255, hexadecimal=True) for kind in (t.WORD, t.BYTE, t.INT)] == ["16#00FF", "16#FF", "255"]
+
+
+# --- in memory --------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def memory() -> Memory:
+    return Memory(SLOTS_OFFSET + 4096, AREAS)
+
+
+@pytest.mark.parametrize(("kind", "value"), [
+    (t.BOOL, True), (t.LINT, -(1 << 63)), (t.ULINT, (1 << 64) - 1), (t.REAL, 1.5), (t.TIME, -1), (t.string(5), "h\xe9"),
+    (t.string(5, True), "h\u20ac"), (COLOUR, 5), (t.array(((1, 2), (0, 1)), t.INT), [1, -2, 3, 4]),
+    (t.array(((0, 1),), PAIR), [{"n": 1, "s": "a"}, {"n": 2, "s": ""}]),
+])  # fmt: skip
+def test_what_was_written_is_read(memory: Memory, kind: Type, value: object) -> None:
+    place = Place("x", kind, SLOTS_OFFSET + 16)
+    places.write(memory, place, value)
+    assert places.read(memory, place) == value
+
+
+def test_a_bit_leaves_its_neighbours(memory: Memory) -> None:
+    memory.u8[100] = 0b1010
+    places.write(memory, Place("x", t.BOOL, 100, 2), True)
+    places.write(memory, Place("x", t.BOOL, 100, 1), False)
+    assert memory.u8[100] == 0b1100
+
+
+def test_a_value_is_written_wholly_or_not_at_all(memory: Memory) -> None:
+    place = Place("x", t.array(((0, 2),), t.INT), SLOTS_OFFSET)
+    with pytest.raises(ValueError, match=r"x\[2\]: 70000 is out of range"):
+        places.write(memory, place, [1, 2, 70000])
+    assert places.read(memory, place) == [0, 0, 0]
+
+
+def test_an_array_takes_as_many_as_it_has(memory: Memory) -> None:
+    with pytest.raises(ValueError, match="takes a list of 3 values"):
+        places.write(memory, Place("x", t.array(((0, 2),), t.INT), SLOTS_OFFSET), [1])
+
+
+def test_a_structure_takes_some_of_its_members(memory: Memory) -> None:
+    place = Place("x", PAIR, SLOTS_OFFSET)
+    places.write(memory, place, {"s": "ab"})
+    assert places.read(memory, place) == {"n": 0, "s": "ab"}
+    with pytest.raises(UnknownPlace, match="x has no t"):
+        places.write(memory, place, {"t": 1})
+
+
+def test_a_reference_is_followed(memory: Memory) -> None:
+    memory.write(SLOTS_OFFSET, "ref", 1 << 40 | (SLOTS_OFFSET + 32) << 8 | 255)
+    place = Place("x", t.INT, SLOTS_OFFSET, hops=(4,))
+    places.write(memory, place, -7)
+    assert memory.read(SLOTS_OFFSET + 36, "i16") == -7
+    assert places.read(memory, place) == -7
+
+
+def test_a_reference_to_a_bit_is_followed(memory: Memory) -> None:
+    memory.write(SLOTS_OFFSET, "ref", 1 << 40 | 4096 << 8 | 3)
+    places.write(memory, Place("x", t.BOOL, SLOTS_OFFSET, hops=(0,)), True)
+    assert memory.u8[4096] == 0b1000
+
+
+def test_a_null_reference_reads_as_none_and_takes_nothing(memory: Memory) -> None:
+    place = Place("x", t.INT, SLOTS_OFFSET, hops=(0,))
+    assert places.read(memory, place) is None
+    with pytest.raises(ValueError, match="behind a reference that is null"):
+        places.write(memory, place, 1)
+
+
+def test_a_constant_is_not_written(memory: Memory) -> None:
+    with pytest.raises(ValueError, match="x is CONSTANT"):
+        places.write(memory, Place("x", t.INT, SLOTS_OFFSET, constant=True), 1)
