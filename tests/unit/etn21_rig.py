@@ -4,26 +4,14 @@ from __future__ import annotations
 
 from array import array
 
+from common_unit_tests import FakeMemory
+
 from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21_map import OPEN, Layout, Switch
 from fbvm.wire.link import Closed, Event, Opened, Peer, Request
 
 SERVER = Peer("192.168.250.7", 502)
 D, CIO, W, H, A, E2 = 0x82, 0xB0, 0xB1, 0xB2, 0xB3, 0xA2
-
-
-class FakeMemory:
-    """The areas that a unit may ask for, as a PLC with three E banks has them."""
-
-    def __init__(self) -> None:
-        sizes = {"CIO": 6144, "W": 512, "H": 1536, "A": 960, "D": 32768, "E0": 32768, "E2": 32768}
-        self._areas = {name: memoryview(array("H", bytes(2 * size))) for name, size in sizes.items()}
-
-    def words(self, area: str) -> memoryview:
-        return self._areas[area]
-
-    def snapshot(self) -> dict[str, list[int]]:
-        return {name: words.tolist() for name, words in self._areas.items()}
 
 
 class Rig:

@@ -1,0 +1,160 @@
+"""The ETN21 as a unit: what every unit owes, its ranges, restart, mode change, several units, wrong arguments."""
+
+from __future__ import annotations
+
+import pytest
+from common_unit_tests import CommonUnitTests, FakeMemory
+from etn21_rig import SERVER, Rig
+
+from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21_map import LINK_UP, Layout, Switch
+from fbvm.units.unit import Unit
+from fbvm.wire.link import Close, Closed, Connect, Opened
+
+
+def writable(unit_number: int) -> set[tuple[str, int]]:
+    """n, n+1..n+23, m+1..m+17 and the words +1..+5, +9 of the eight areas."""
+    n, m = 1500 + 25 * unit_number, 30000 + 100 * unit_number
+    own = {("CIO", word) for word in range(n, n + 24)} | {("D", word) for word in range(m + 1, m + 18)}
+    return own | {("D", m + 18 + 10 * area + offset) for area in range(8) for offset in (1, 2, 3, 4, 5, 9)}
+
+
+class TestEtn21IsAUnit(CommonUnitTests):
+    unit_number = 0
+
+    def new_unit(self) -> Unit:
+        return Etn21(self.unit_number)
+
+    def may_write(self) -> set[tuple[str, int]]:
+        return writable(self.unit_number)
+
+    def data_words(self) -> set[tuple[str, int]]:
+        return set()
+
+    def ask(self, memory: FakeMemory) -> None:
+        layout = Layout.of(self.unit_number)
+        first = layout.parameters(1)
+        for offset, value in enumerate((1, 0, 0xC0A8, 0xFA07, 502, 0, 0x8203, 0xE800, 0, 0xFFFF)):
+            memory.words("D")[first + offset] = value
+        memory.words("CIO")[layout.n + 19] |= 1 << Switch.ACTIVE_OPEN
+
+    def is_answered(self, memory: FakeMemory) -> bool:
+        layout = Layout.of(self.unit_number)
+        switch_off = not memory.words("CIO")[layout.n + 19]
+        return switch_off and memory.words("D")[layout.parameters(1) + 9] == 0
+
+
+class TestEtn21WithTheLastNumberIsAUnit(TestEtn21IsAUnit):
+    unit_number = 15
+
+
+@pytest.mark.parametrize(("number", "n", "m"), [(0, 1500, 30000), (1, 1525, 30100), (15, 1875, 31500)])
+def test_the_unit_number_sets_the_words(number: int, n: int, m: int) -> None:
+    rig = Rig(Etn21(number))
+    rig.open()
+    assert rig.memory.words("CIO")[n + 9] == 0x8000
+    assert rig.memory.words("D")[m + 9] == 4
+    assert rig.memory.words("D")[m + 18 + 9] == 0
+
+
+@pytest.mark.parametrize("number", [-1, 16])
+def test_other_unit_numbers_are_a_mistake(number: int) -> None:
+    with pytest.raises(ValueError, match="unit number"):
+        Etn21(number)
+
+
+def test_an_unknown_timing_is_a_mistake() -> None:
+    with pytest.raises(ValueError, match="timing"):
+        Etn21(timing="swift")
+
+
+@pytest.mark.parametrize("area", range(1, 9))
+def test_each_area_has_its_switches_and_words(area: int) -> None:
+    rig = Rig()
+    rig.parameters(area, socket=9 - area)
+    word, bit = 1519 + (area - 1) // 2, 2 + (0 if area % 2 else 8)
+    rig.cio[word] = 1 << bit
+    assert rig.scan() == [Connect(9 - area, SERVER)]
+    rig.scan(Opened(9 - area, 50000, SERVER))
+    assert rig.cio[word] == 0
+    assert rig.d[30018 + 10 * (area - 1) + 9] == 0
+    assert rig.status(9 - area) == 0x8000
+
+
+def test_eight_sockets_are_open_at_once() -> None:
+    rig = Rig()
+    for number in range(1, 9):
+        rig.open(number, number)
+    assert [rig.status(number) for number in range(1, 9)] == [0x8000] * 8
+
+
+def test_two_units_share_one_memory() -> None:
+    first, second = Rig(), Rig(Etn21(1, "192.168.250.2"))
+    second.memory, second.cio, second.d = first.memory, first.cio, first.d
+    first.open(1)
+    second.open(2)
+    assert (first.status(1), first.status(2), second.status(1), second.status(2)) == (0x8000, 0, 0, 0x8000)
+
+
+def test_link_bit_and_error_status_are_shown_assumed() -> None:
+    rig = Rig()
+    assert rig.cio[1517] == LINK_UP == 1 << 14
+    rig.unit.link_up = False
+    rig.unit.error_status = 1 << 14
+    rig.scan()
+    assert (rig.cio[1517], rig.cio[1518]) == (0, 1 << 14)
+
+
+def test_a_mode_change_clears_the_status_but_not_the_socket() -> None:
+    rig = Rig()
+    rig.open()
+    rig.cio[1500:1525] = memoryview(bytes(50)).cast("H")
+    rig.scan()
+    assert rig.status() == 0
+    rig.parameters()
+    assert rig.ask(Switch.ACTIVE_OPEN) == "220F"
+    rig.parameters()
+    assert rig.ask(Switch.CLOSE, Closed(1)) == "0000"
+    rig.open()
+
+
+def test_a_service_that_lost_its_switch_runs_on_assumed() -> None:
+    rig = Rig()
+    rig.parameters()
+    rig.scan(Switch.ACTIVE_OPEN)
+    rig.turn_off(Switch.ACTIVE_OPEN)
+    rig.scan()
+    rig.scan(Opened(1, 50000, SERVER))
+    assert rig.is_open()
+    assert rig.code() == "0000"
+
+
+def test_a_switch_held_on_starts_again_each_time_assumed() -> None:
+    rig = Rig()
+    rig.parameters()
+    codes = []
+    for _ in range(6):
+        rig.scan(Switch.SEND)
+        codes.append((rig.is_on(Switch.SEND), rig.code()))
+    assert codes == [(True, "FFFF"), (False, "2210"), (True, "2210"), (False, "2210"), (True, "2210"), (False, "2210")]
+
+
+def test_a_restart_clears_the_words_and_breaks_the_connections() -> None:
+    rig = Rig()
+    rig.open(1, 1)
+    rig.open(2, 2)
+    assert rig.unit.reset(rig.memory) == [Close(1, reset=True), Close(2, reset=True)]
+    assert rig.cio[1501:1517].tolist() == [0] * 16
+    assert rig.d[30001:30018].tolist() == [0] * 17
+
+
+def test_an_open_waits_until_the_network_has_closed_the_socket_of_before_a_restart() -> None:
+    rig = Rig()
+    rig.open()
+    rig.unit.reset(rig.memory)
+    rig.parameters()
+    assert rig.scan(Switch.ACTIVE_OPEN) == []
+    assert rig.scan() == []
+    assert rig.scan(Closed(1)) == [Connect(1, SERVER)]
+    rig.scan(Opened(1, 49153, SERVER))
+    assert rig.code() == "0000"

@@ -1,0 +1,322 @@
+"""Opening and closing: requests and result words, filters, time limits, socket options, the held port, force-close."""
+
+from __future__ import annotations
+
+import pytest
+from etn21_rig import SERVER, Rig
+
+from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21_map import Switch
+from fbvm.wire.link import (
+    Broken,
+    Close,
+    Closed,
+    Connect,
+    Event,
+    Failed,
+    Grant,
+    Listen,
+    Opened,
+    Peer,
+    PeerClosed,
+    Received,
+    Sent,
+)
+
+ANYBODY = Peer("0.0.0.0", 0)
+
+
+# --- active ---
+
+
+def test_active_open_asks_for_a_connection_and_grants_the_buffer() -> None:
+    rig = Rig()
+    rig.parameters()
+    assert rig.scan(Switch.ACTIVE_OPEN) == [Connect(1, SERVER)]
+    assert rig.scan(Opened(1, 49152, SERVER)) == [Grant(1, 4096)]
+
+
+def test_active_open_writes_the_local_port_that_was_chosen() -> None:
+    rig = Rig()
+    rig.open()
+    assert rig.result(1) == 49152
+
+
+def test_active_open_leaves_a_fixed_local_port_alone() -> None:
+    rig = Rig()
+    rig.parameters(local_port=3000)
+    assert rig.scan(Switch.ACTIVE_OPEN) == [Connect(1, SERVER, 3000)]
+    rig.scan(Opened(1, 3000, SERVER))
+    assert rig.result(1) == 3000
+
+
+def test_active_open_ignores_the_timeout_word() -> None:
+    rig = Rig()
+    rig.parameters(timeout=5)
+    rig.scan(Switch.ACTIVE_OPEN)
+    assert rig.wait(74) == []
+    assert rig.is_on(Switch.ACTIVE_OPEN)
+
+
+def test_active_open_gives_up_after_75_s_assumed() -> None:
+    rig = Rig()
+    rig.parameters()
+    rig.scan(Switch.ACTIVE_OPEN)
+    assert rig.wait(75) == [Close(1)]
+    assert (rig.code(), rig.is_on(Switch.ACTIVE_OPEN), rig.status(), rig.state()) == ("0053", False, 0, 0)
+
+
+def test_an_answer_after_the_end_of_the_open_counts_no_more() -> None:
+    rig = Rig()
+    rig.parameters()
+    rig.scan(Switch.ACTIVE_OPEN)
+    rig.wait(75)
+    assert rig.scan(Opened(1, 49152, SERVER), Received(1, b"late")) == []
+    assert rig.status() == 0
+    rig.parameters()
+    assert rig.scan(Switch.ACTIVE_OPEN) == []
+    assert rig.scan(Closed(1)) == [Connect(1, SERVER)]
+
+
+# --- passive ---
+
+
+@pytest.mark.parametrize(
+    "remote", [ANYBODY, Peer("0.0.0.0", 5000), Peer("192.168.250.7", 0), Peer("192.168.250.7", 5000)]
+)
+def test_passive_open_passes_its_filter_on_and_writes_the_peer(remote: Peer) -> None:
+    rig = Rig()
+    rig.parameters(local_port=502, remote=remote)
+    assert rig.scan(Switch.PASSIVE_OPEN) == [Listen(1, 502, remote)]
+    rig.scan(Opened(1, 502, Peer("192.168.250.7", 5000)))
+    assert [rig.result(offset) for offset in (1, 2, 3, 4)] == [502, 0xC0A8, 0xFA07, 5000]
+
+
+def test_passive_open_times_out() -> None:
+    rig = Rig()
+    rig.parameters(local_port=502, remote=ANYBODY, timeout=25)
+    rig.scan(Switch.PASSIVE_OPEN)
+    assert rig.wait(2.49) == []
+    assert rig.scan() == [Close(1)]
+    assert (rig.code(), rig.is_on(Switch.PASSIVE_OPEN), rig.status(), rig.state()) == ("0080", False, 0, 0)
+
+
+def test_passive_open_without_a_timeout_waits_for_ever() -> None:
+    rig = Rig()
+    rig.parameters(local_port=502, remote=ANYBODY)
+    rig.scan(Switch.PASSIVE_OPEN)
+    assert rig.wait(1e6) == []
+    assert rig.is_on(Switch.PASSIVE_OPEN)
+
+
+# --- options ---
+
+
+@pytest.mark.parametrize(("option", "keep_alive"), [(0, False), (1, True), (2, False), (3, True)])
+def test_keep_alive_assumed(option: int, keep_alive: bool) -> None:
+    rig = Rig()
+    rig.parameters(1, 1, option=option)
+    rig.parameters(2, 2, option=option, local_port=502)
+    assert rig.scan(Switch.ACTIVE_OPEN, area=1) == [Connect(1, SERVER, 0, keep_alive)]
+    assert rig.scan(Switch.PASSIVE_OPEN, area=2) == [Listen(2, 502, SERVER, keep_alive)]
+
+
+@pytest.mark.parametrize(("option", "reset"), [(0, False), (1, False), (2, True), (3, True)])
+def test_linger_of_the_open_closes_by_rst(option: int, reset: bool) -> None:
+    rig = Rig()
+    rig.open(option=option)
+    rig.parameters(option=0)
+    assert rig.scan(Switch.CLOSE) == [Close(1, reset)]
+    assert rig.state() == (0 if reset else 6)
+    rig.scan(Closed(1))
+    assert rig.state() == (0 if reset else 0xA)
+
+
+# --- close ---
+
+
+def test_close_throws_the_buffer_away() -> None:
+    rig = Rig()
+    rig.open()
+    rig.scan(Received(1, b"abc"))
+    assert rig.waiting() == 3
+    rig.close()
+    assert (rig.waiting(), rig.status()) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    ("switch", "flag"), [(Switch.ACTIVE_OPEN, 0), (Switch.PASSIVE_OPEN, 0), (Switch.SEND, 2), (Switch.RECEIVE, 1)]
+)
+def test_close_ends_a_service_with_0081_a_cycle_before_its_own_result_assumed(switch: Switch, flag: int) -> None:
+    rig = Rig()
+    if switch in (Switch.SEND, Switch.RECEIVE):
+        rig.open()
+    rig.parameters(local_port=502, count=4)
+    rig.scan(switch)
+    assert rig.scan(Switch.CLOSE) == [Close(1)]
+    assert (rig.code(), rig.status() & 0xF) == ("FFFF", 1 << flag | 8)
+    rig.scan(Closed(1))
+    assert (rig.code(), rig.is_on(switch), rig.is_on(Switch.CLOSE)) == ("0081", False, True)
+    rig.scan()
+    assert (rig.code(), rig.is_on(Switch.CLOSE), rig.status()) == ("0000", False, 0)
+
+
+def test_close_of_a_service_of_another_area_ends_it_too_assumed() -> None:
+    rig = Rig()
+    rig.open()
+    rig.parameters(2, count=4)
+    rig.scan(Switch.RECEIVE, area=2)
+    rig.parameters(1)
+    assert rig.ask(Switch.CLOSE, Closed(1)) == "0000"
+    assert (rig.code(2), rig.is_open()) == ("0081", False)
+
+
+@pytest.mark.parametrize("event", [PeerClosed(1), Broken(1, "ECONNRESET")])
+def test_bit_15_stays_until_the_program_closes(event: Event) -> None:
+    rig = Rig()
+    rig.open()
+    rig.scan(event)
+    rig.wait(100)
+    assert rig.is_open()
+    assert rig.state() == (5 if isinstance(event, PeerClosed) else 0)
+    rig.close()
+    assert rig.state() == 0
+
+
+def test_the_last_state_stays_until_the_next_open() -> None:
+    rig = Rig()
+    rig.open()
+    rig.close()
+    rig.wait(100)
+    assert rig.state() == 0xA
+    rig.parameters()
+    rig.scan(Switch.ACTIVE_OPEN)
+    assert rig.state() == 2
+
+
+# --- the held port ---
+
+
+def reopened(rig: Rig, switch: Switch = Switch.ACTIVE_OPEN) -> str:
+    rig.parameters(local_port=3000)
+    return rig.ask(switch, Opened(1, 3000, SERVER))
+
+
+@pytest.mark.parametrize("switch", [Switch.ACTIVE_OPEN, Switch.PASSIVE_OPEN])
+def test_0049_for_60_s_after_a_close_from_this_side_assumed(switch: Switch) -> None:
+    rig = Rig()
+    rig.open(local_port=3000)
+    rig.close()
+    assert reopened(rig, switch) == "0049"
+    rig.wait(59.8)
+    assert reopened(rig, switch) == "0049"
+    rig.wait(0.2)
+    assert reopened(rig, switch) == "0000"
+
+
+@pytest.mark.parametrize("end", [PeerClosed(1), Broken(1, "ECONNRESET")])
+def test_the_port_is_free_at_once_after_a_close_from_the_peer(end: Event) -> None:
+    rig = Rig()
+    rig.open(local_port=3000)
+    rig.scan(end)
+    rig.close()
+    assert reopened(rig) == "0000"
+
+
+def test_the_port_is_free_at_once_with_linger() -> None:
+    rig = Rig()
+    rig.open(local_port=3000, option=2)
+    rig.close()
+    assert reopened(rig) == "0000"
+
+
+def test_a_port_that_the_unit_chose_is_not_held() -> None:
+    rig = Rig()
+    rig.open(local_port=0)
+    rig.close()
+    rig.parameters(local_port=49152)
+    assert rig.ask(Switch.ACTIVE_OPEN, Opened(1, 49152, SERVER)) == "0000"
+
+
+def test_the_hold_can_be_switched_off() -> None:
+    rig = Rig(Etn21(time_wait_ns=0))
+    rig.open(local_port=3000)
+    rig.close()
+    assert reopened(rig) == "0000"
+
+
+def test_an_open_that_never_connected_holds_no_port() -> None:
+    rig = Rig()
+    rig.parameters(local_port=3000)
+    rig.scan(Switch.PASSIVE_OPEN)
+    rig.scan(Switch.CLOSE)
+    rig.scan(Closed(1))
+    rig.scan()
+    assert reopened(rig) == "0000"
+
+
+# --- force-close ---
+
+
+def test_force_close_ends_everything_that_is_open_assumed() -> None:
+    rig = Rig()
+    rig.open(1, 1)
+    rig.open(2, 2)
+    rig.parameters(2, 2, count=4)
+    rig.scan(Switch.RECEIVE, area=2)
+    rig.parameters(3, 3)
+    rig.scan(Switch.ACTIVE_OPEN, area=3)
+    rig.cio[1500] = 1 << 2
+    assert rig.scan() == [Close(1), Close(2), Close(3)]
+    rig.scan(Closed(1), Closed(2), Closed(3))
+    assert (rig.code(1), rig.code(2), rig.code(3)) == ("0000", "0081", "0081")
+    assert (rig.is_open(1), rig.is_open(2), rig.cio[1500]) == (False, True, 4)
+    rig.scan()
+    assert (rig.is_open(2), rig.status(3), rig.cio[1500]) == (False, 0, 0)
+    rig.open(4, 2)
+    assert rig.is_open(4)
+
+
+def test_force_close_with_nothing_open_goes_off_in_the_next_refresh_assumed() -> None:
+    rig = Rig()
+    rig.cio[1500] = 1 << 2
+    assert rig.scan() == []
+    assert rig.cio[1500] == 4
+    assert rig.scan() == []
+    assert rig.cio[1500] == 0
+
+
+def test_force_close_ends_a_service_that_starts_in_the_same_cycle_assumed() -> None:
+    rig = Rig()
+    rig.parameters()
+    rig.cio[1500] = 1 << 2
+    assert rig.scan(Switch.ACTIVE_OPEN) == [Connect(1, SERVER), Close(1)]
+    rig.scan(Closed(1))
+    assert rig.code() == "0081"
+
+
+def test_other_bits_of_n_are_left_alone() -> None:
+    rig = Rig()
+    rig.cio[1500] = 0xFFFF
+    rig.scan()
+    rig.scan()
+    assert rig.cio[1500] == 0xFFFB
+
+
+# --- several answers at once ---
+
+
+def test_an_open_and_its_first_data_in_one_refresh() -> None:
+    rig = Rig()
+    rig.parameters()
+    rig.scan(Switch.ACTIVE_OPEN)
+    rig.scan(Opened(1, 49152, SERVER), Received(1, b"hello"), PeerClosed(1))
+    assert (rig.status(), rig.waiting(), rig.state()) == (0xA000, 5, 5)
+
+
+def test_stray_events_change_nothing() -> None:
+    rig = Rig()
+    before = rig.memory.snapshot()
+    strays = (Opened(1, 1, SERVER), Sent(1, 1), Received(1, b"a"), Closed(1), PeerClosed(1), Failed(9, "open", "EPIPE"))
+    assert rig.scan(*strays) == []
+    assert list(rig.memory.differences(before)) == []

@@ -1,0 +1,99 @@
+"""Whatever a program switches and a network tells: the unit stays in its words and clears every switch in the end."""
+
+from __future__ import annotations
+
+import pytest
+from common_unit_tests import answer, events
+from etn21_rig import CIO, D, Rig
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21_dispatch import Fault
+from fbvm.units.etn21_map import Switch
+from fbvm.wire.link import Close, Closed, Event, Peer, Request
+
+n, m = 1500, 30000
+STATUS = {("CIO", word) for word in (*range(n + 1, n + 19), n + 23)} | {("D", word) for word in range(m + 1, m + 18)}
+SWITCHES = {("CIO", word) for word in (n, *range(n + 19, n + 23))}
+RESULTS = {("D", m + 18 + 10 * area + offset) for area in range(8) for offset in (1, 2, 3, 4, 5, 9)}
+DATA = {("D", word) for word in range(1000, 1992)} | {("CIO", word) for word in range(100, 1092)}
+
+areas = st.integers(1, 8)
+parameters = st.fixed_dictionaries(
+    {
+        "socket": st.sampled_from([1, 1, 2, 2, 3, 0, 9]),
+        "option": st.integers(0, 3),
+        "local_port": st.sampled_from([0, 502, 3000]),
+        "remote": st.builds(Peer, st.sampled_from(["0.0.0.0", "192.168.250.7"]), st.sampled_from([0, 502])),
+        "count": st.sampled_from([0, 1, 12, 1984, 1985]),
+        "address": st.sampled_from([(D, 1000, 0), (CIO, 100, 0), (0x30, 0, 0), (D, 1000, 7)]),
+        "timeout": st.sampled_from([0, 1, 100]),
+    }
+)
+turns = st.tuples(areas, st.sampled_from(Switch), parameters)
+cycles = st.tuples(
+    st.lists(turns, max_size=3),
+    st.lists(events(st.integers(1, 3)), max_size=3),
+    st.booleans(),
+    st.booleans(),
+    st.sampled_from([10, 10, 10, 200, 80_000]),
+)
+timings = st.sampled_from(["exact", "real"])
+
+
+def has_only_cleared_switches(rig: Rig, before: dict[str, bytes]) -> bool:
+    old = memoryview(before["CIO"]).cast("H")
+    return all(rig.cio[word] & ~old[word] == 0 for area, word in SWITCHES)
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(cycles, max_size=25), timings, st.integers(0, 9))
+def test_any_order_of_switches_and_events(
+    script: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, bool, int]],
+    timing: str,
+    seed: int,
+) -> None:
+    rig = Rig(Etn21(timing=timing, seed=seed, faults=[Fault(0x2211, Switch.SEND), Fault(0x0302, socket=2)]))
+    asked: list[Request] = []
+    for program, told, is_answered, force, cycle_ms in script:
+        for area, switch, values in program:
+            rig.parameters(area, **values)  # type: ignore[arg-type]
+            rig.turn_on(switch, area)
+        if force:
+            rig.cio[n] |= 1 << 2
+        before = rig.memory.snapshot()
+        replies = answer(asked) if is_answered else []
+        asked = [] if is_answered else asked
+        rig.cycle_ns = cycle_ms * 1_000_000
+        asked += rig.scan(*told, *replies)
+        assert set(rig.memory.differences(before)) <= STATUS | SWITCHES | RESULTS | DATA
+        assert has_only_cleared_switches(rig, before)
+    settle(rig, asked)
+    assert [rig.cio[n + 19 + word] for word in range(4)] == [0] * 4
+    assert rig.cio[n] & 4 == 0
+    assert [rig.cio[n + word] & 0xF for word in range(1, 17)] == [0] * 16
+
+
+def settle(rig: Rig, asked: list[Request]) -> None:
+    """A program that closes what is left, and a network that answers every close."""
+    rig.cycle_ns = 1_000_000_000
+    for cycle in range(60):
+        if cycle % 20 == 0:
+            rig.cio[n] |= 1 << 2
+        closes = [Closed(request.channel) for request in asked if isinstance(request, Close)]
+        asked = rig.scan(*closes)
+
+
+@pytest.mark.parametrize("timing", ["exact", "real"])
+def test_a_channel_is_opened_only_when_it_is_free(timing: str) -> None:
+    """A network may refuse a second open of a channel, so the unit waits for `Closed`."""
+    rig = Rig(Etn21(timing=timing))
+    for _ in range(3):
+        rig.parameters(timeout=1, local_port=502)
+        rig.scan(Switch.PASSIVE_OPEN)
+        rig.cycle_ns = 1_000_000_000
+        requests = [request for _ in range(9) for request in rig.scan()]
+        assert [type(request).__name__ for request in requests][-1:] == ["Close"]
+        assert rig.code() == "0080"
+        assert rig.scan(Closed(1)) == []
