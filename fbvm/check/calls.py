@@ -1,0 +1,218 @@
+"""Calls: which POU or standard function is meant, and which argument goes to which parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import BOOL, StructType, Type, base, fold
+from fbvm.check import functions
+from fbvm.check.expressions import assignable, conversion_hint, same
+from fbvm.check.facts import Pou, PouCall, Variable
+from fbvm.check.standard import StandardCalls
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.expressions import Expressions
+
+PARAMETER_KINDS = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
+
+
+class Calls:
+    """The calls in one POU."""
+
+    def __init__(self, expressions: Expressions) -> None:
+        self.expressions = expressions
+        self.facts = expressions.facts
+        self.project = expressions.project
+        self.checker = expressions.checker
+        self.standard = StandardCalls(expressions)
+        self.error = expressions.error
+
+    def value(self, call: tree.Call, want: Type | None) -> Type | None:
+        """A call as part of an expression."""
+        result = self._resolve(call, want, as_value=True)
+        if result == "":
+            self.error("S0409", call, f"{_shown(call.callee)} gives no value",
+                       "call it as a statement of its own and read its outputs")
+            return None
+        return result if isinstance(result, Type) else None
+
+    def statement(self, call: tree.Call) -> None:
+        """A call as a statement; a result is thrown away."""
+        self._resolve(call, None, as_value=False)
+
+    def _resolve(self, call: tree.Call, want: Type | None, as_value: bool) -> Type | str | None:
+        """The result's type, "" for a call without result, None after a diagnostic."""
+        callee = call.callee
+        if not isinstance(callee, tree.NameRef) or self.expressions.variable(callee.text) is not None:
+            return self._instance(call, as_value)
+        name = callee.text
+        pou = self.project.pou(name, self.expressions.source)
+        if pou is not None and pou.is_function:
+            return self._function(call, pou)
+        if pou is not None:
+            self.error("S0401", callee, f"{pou.name} is a {pou.kind}: what is called is an instance of it",
+                       f"declare one, such as  my_{pou.name.lower()} : {pou.name};" if pou.kind != "PROGRAM" else
+                       "programs are started by tasks")
+            self._arguments_alone(call)
+            return None
+        return self.standard.call(call, fold(name), want, as_value)
+
+    def _arguments_alone(self, call: tree.Call) -> None:
+        """Check the arguments of a call that could not be resolved, for their own mistakes."""
+        for argument in call.arguments:
+            if argument.value is not None:
+                self.expressions.infer(argument.value)
+
+    def _instance(self, call: tree.Call, as_value: bool) -> Type | str | None:
+        kind = self.expressions.infer(call.callee)
+        if kind is None:
+            self._arguments_alone(call)
+            return None
+        if not isinstance(kind, StructType) or not kind.block:
+            self.error("S0401", call.callee, f"{_shown(call.callee)} is {kind} and cannot be called")
+            return None
+        pou = self.checker.block_of(kind)
+        if as_value:
+            return ""
+        bound = PouCall(pou, call.callee)
+        self._bind(call, pou, bound)
+        self.facts.calls[call] = bound
+        return ""
+
+    def _function(self, call: tree.Call, pou: Pou) -> Type | str | None:
+        if not self.checker.interface(pou, self.expressions.source, call):
+            self._arguments_alone(call)
+            return None
+        bound = PouCall(pou, None)
+        self._bind(call, pou, bound)
+        self.facts.calls[call] = bound
+        if pou.tree.result is not None and pou.result is None:
+            return None
+        return pou.result.type if pou.result is not None else ""
+
+    # --- binding ----------------------------------------------------------------------------------------------------
+
+    def _bind(self, call: tree.Call, pou: Pou, bound: PouCall) -> None:
+        """Match arguments with parameters, complain about what does not fit or is missing."""
+        self.expressions.note_call(pou, call)
+        named = [a for a in call.arguments if a.kind]
+        positional = [a for a in call.arguments if not a.kind]
+        if named and positional:
+            self.error("S0406", positional[-1] if call.arguments[0].kind else named[0],
+                       "a call names all of its parameters or none", "name them: parameter := value")
+            return
+        given: dict[str, tree.Node] = {}
+        if positional:
+            self._positional(call, positional, pou, bound, given)
+        for argument in named:
+            self._named(argument, pou, bound, given)
+        missing = [v.name for v in pou.parameters("VAR_IN_OUT") if fold(v.name) not in given]
+        if missing and not pou.damaged:
+            self.error("S0404", call, f"the in-out {' and '.join(missing)} of {pou.name} is missing",
+                       f"pass a variable: {missing[0]} := ...")
+
+    def _positional(self, call: tree.Call, arguments: Sequence[tree.Argument], pou: Pou, bound: PouCall,
+                    given: dict[str, tree.Node]) -> None:
+        parameters = [v for v in pou.order if v.kind in PARAMETER_KINDS and fold(v.name) not in ("EN", "ENO")]
+        if len(arguments) > len(parameters):
+            self.error("S0402", arguments[len(parameters)],
+                       f"{pou.name} has {len(parameters)} parameters, {len(arguments)} arguments are given")
+        for argument, variable in zip(arguments, parameters, strict=False):
+            assert argument.value is not None
+            given[fold(variable.name)] = argument
+            self._pass(argument, variable, bound)
+        open_inputs = [v.name for v in parameters[len(arguments):] if v.kind == "VAR_INPUT"]
+        if open_inputs:
+            self.error("S0404", call, f"{pou.name} needs {' and '.join(open_inputs)} too",
+                       "a call without names gives all inputs; name the parameters to leave some out")
+
+    def _named(self, argument: tree.Argument, pou: Pou, bound: PouCall, given: dict[str, tree.Node]) -> None:
+        assert argument.name is not None
+        name = fold(argument.name.text)
+        if name in given:
+            self.error("S0403", argument.name, f"{argument.name.text} is given twice")
+            return
+        given[name] = argument
+        variable = next((v for v in pou.order if fold(v.name) == name and v.kind in PARAMETER_KINDS), None)
+        if variable is None:
+            self._implicit(argument, name, pou, bound)
+        elif (variable.kind == "VAR_OUTPUT") != (argument.kind == "=>"):
+            arrow = "=>" if variable.kind == "VAR_OUTPUT" else ":="
+            self.error("S0402", argument, f"{variable.name} is {_described(variable)}: write {variable.name} {arrow} ...")
+        elif argument.value is not None:
+            self._pass(argument, variable, bound)
+
+    def _implicit(self, argument: tree.Argument, name: str, pou: Pou, bound: PouCall) -> None:
+        """EN and ENO of a POU that does not declare them; anything else is unknown."""
+        assert argument.name is not None
+        if name == "EN" and argument.kind == ":=":
+            if argument.value is not None and self.expressions.fit(argument.value, BOOL, "S0405", "EN"):
+                bound.enable = argument.value
+        elif name == "ENO" and argument.kind == "=>":
+            if argument.value is not None and self._output(argument, BOOL, "ENO"):
+                bound.enabled.append((argument.value, argument.negated))
+        elif name not in pou.damaged:
+            known = [v.name for v in pou.order if v.kind in PARAMETER_KINDS]
+            self.error("S0402", argument.name, f"{pou.name} has no parameter {argument.name.text}",
+                       self.project.nearest(argument.name.text, known))
+            if argument.value is not None:
+                self.expressions.infer(argument.value)
+
+    def _pass(self, argument: tree.Argument, variable: Variable, bound: PouCall) -> None:
+        value = argument.value
+        assert value is not None
+        if variable.kind == "VAR_INPUT":
+            if fold(variable.name) == "EN":
+                if self.expressions.fit(value, BOOL, "S0405", "EN"):
+                    bound.enable = value
+            elif self.expressions.fit(value, variable.type, "S0405", variable.name):
+                bound.inputs.append((variable, value))
+        elif variable.kind == "VAR_IN_OUT":
+            if self._in_out(value, variable):
+                bound.in_outs.append((variable, value))
+        elif self._output(argument, variable.type, variable.name):
+            bound.outputs.append((variable, value, argument.negated))
+
+    def _in_out(self, value: tree.Expr, variable: Variable) -> bool:
+        kind = self.expressions.infer(value)
+        if kind is None:
+            return False
+        if not self.expressions.is_variable(value):
+            self.error("S0407", value, f"the in-out {variable.name} needs a variable, not a value")
+            return False
+        if not same(kind, variable.type):
+            self.error("S0405", value, f"the in-out {variable.name} needs {variable.type}, this is {kind}",
+                       "an in-out takes a variable of exactly its own type")
+            return False
+        return self.checker.writable(self.expressions, value, f"be passed to the in-out {variable.name}")
+
+    def _output(self, argument: tree.Argument, kind: Type, name: str) -> bool:
+        value = argument.value
+        assert value is not None
+        target = self.expressions.infer(value)
+        if target is None:
+            return False
+        if not self.expressions.is_variable(value):
+            self.error("S0407", value, f"the output {name} needs a variable to go to")
+            return False
+        if argument.negated and base(kind) != BOOL:
+            self.error("S0405", value, f"NOT needs a BOOL output; {name} is {kind}")
+            return False
+        if not assignable(kind, target):
+            self.error("S0405", value, f"the output {name} is {kind} and does not fit {target}",
+                       conversion_hint(kind, target))
+            return False
+        return self.checker.writable(self.expressions, value, f"take the output {name}")
+
+
+def _described(variable: Variable) -> str:
+    return {"VAR_INPUT": "an input", "VAR_OUTPUT": "an output", "VAR_IN_OUT": "an in-out"}[variable.kind]
+
+
+def _shown(expr: tree.Expr) -> str:
+    return expr.text if isinstance(expr, tree.NameRef) else "this"
+
+
+

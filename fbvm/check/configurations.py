@@ -1,0 +1,132 @@
+"""Configurations: which program instances exist, and the tasks that run them (IEC 61131-3 ed. 3, tables 62 and 63)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import BOOL, TIME, UINT, Type, base, fold
+from fbvm.check.facts import Pou, TaskFact, Variable
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.checker import Checker
+
+LOWEST = 65536
+"""Priority of what runs without a task: below every task."""
+
+
+class Configurations:
+    """Finds the programs to run and makes their instances."""
+
+    def __init__(self, checker: Checker) -> None:
+        self.checker = checker
+        self.project = checker.project
+        self.report = checker.project.report
+
+    def resolve(self, program: str | None) -> None:
+        """Fill the checker's tasks: from the CONFIGURATION, or with the one program that there is or that is named."""
+        configurations = self.project.configurations
+        if program is None and configurations:
+            for extra, source in configurations[1:]:
+                self.report.add("S0801", source, extra.name, "there is a second CONFIGURATION",
+                                "a project has one", (configurations[0][1], configurations[0][0].name.start, "the first"))
+            self._configuration(*configurations[0])
+            return
+        programs = [p for p in self.project.pous.values() if p.kind == "PROGRAM" and not p.source.library]
+        if program is not None:
+            programs = [p for p in programs if fold(p.name) == fold(program)]
+        if len(programs) == 1 and programs[0].type is not None:
+            task = TaskFact("", LOWEST, 0)
+            self._instance(programs[0].name, programs[0], task, programs[0].source, programs[0].tree.name)
+            self.checker.tasks.append(task)
+
+    def _instance(self, name: str, pou: Pou, task: TaskFact, source: Source, node: tree.Node) -> None:
+        assert pou.type is not None
+        key = ("", fold(name))
+        if key in self.project.globals:
+            other = self.project.globals[key]
+            self.report.add("S0202", source, node, f"{name} is the name of a program and of a global variable", "",
+                            (other.source, other.node.start, "the variable"))
+            return
+        instance = Variable(name, pou.type, "PROGRAM", source, node, place="abs", initial=pou.initial)
+        self.checker.global_order.append(instance)
+        self.project.globals[key] = instance
+        task.programs.append((instance, pou))
+
+    def _configuration(self, configuration: tree.Configuration, source: Source) -> None:
+        for refused in configuration.refused:
+            self._refuse(refused, source)
+        for extra in configuration.resources[1:]:
+            self.report.add("S0901", source, extra.name or extra,
+                            "a second RESOURCE is understood but not executed by this version")
+        for resource in configuration.resources[:1]:
+            self._resource(resource, source)
+
+    def _resource(self, resource: tree.Resource, source: Source) -> None:
+        for refused in resource.refused:
+            self._refuse(refused, source)
+        tasks: dict[str, TaskFact] = {}
+        for declared in resource.tasks:
+            if fold(declared.name.text) in tasks:
+                self.report.add("S0801", source, declared.name, f"the task {declared.name.text} is declared twice")
+                continue
+            tasks[fold(declared.name.text)] = self._task(declared, source)
+        untasked = TaskFact("", LOWEST, 0)
+        for program in resource.programs:
+            task: TaskFact | None = untasked
+            if program.task is not None:
+                task = tasks.get(fold(program.task.text))
+                if task is None:
+                    self.report.add("S0801", source, program.task, f"there is no task {program.task.text}",
+                                    self.project.nearest(program.task.text, (t.name for t in tasks.values())))
+            self._program(program, task or untasked, source)
+        self.checker.tasks += [t for t in (*tasks.values(), untasked) if t.programs]
+
+    def _program(self, program: tree.ProgramInstance, task: TaskFact, source: Source) -> None:
+        for refused in program.refused:
+            self._refuse(refused, source)
+        if program.connections:
+            self.report.add("S0901", source, program.connections[0],
+                            "connections of a program are understood but not executed by this version",
+                            "let the program use the global variable")
+        pou = self.project.pou(program.type_name.text, source)
+        if pou is None or pou.kind != "PROGRAM":
+            names = [p.name for p in self.project.pous.values() if p.kind == "PROGRAM"]
+            self.report.add("S0204", source, program.type_name, f"there is no PROGRAM {program.type_name.text}",
+                            self.project.nearest(program.type_name.text, names))
+        elif pou.type is not None:
+            self._instance(program.name.text, pou, task, source, program.name)
+
+    def _task(self, declared: tree.Task, source: Source) -> TaskFact:
+        priority = self._constant(declared.priority, UINT, source) if declared.priority is not None else None
+        if declared.priority is None:
+            self.report.add("S0801", source, declared.name, f"the task {declared.name.text} has no PRIORITY",
+                            "write PRIORITY := 0 for the highest")
+        interval = self._constant(declared.interval, TIME, source) if declared.interval is not None else 0
+        if interval is not None and interval < 0:
+            assert declared.interval is not None
+            self.report.add("S0801", source, declared.interval, "an INTERVAL is not negative")
+        single = self._single(declared.single, source) if declared.single is not None else ""
+        return TaskFact(declared.name.text, priority or 0, interval or 0, single)
+
+    def _constant(self, expr: tree.Expr, kind: Type, source: Source) -> int | None:
+        expressions = self.checker.expressions(source, None)
+        if not expressions.fit(expr, kind, "S0801"):
+            return None
+        value = expressions.facts.constants.get(expr)
+        if not isinstance(value, int):
+            self.report.add("S0801", source, expr, "a task's data must be constant")
+            return None
+        return value
+
+    def _single(self, expr: tree.Expr, source: Source) -> str:
+        expressions = self.checker.expressions(source, None)
+        kind = expressions.infer(expr)
+        if kind is not None and (not isinstance(expr, tree.NameRef) or base(kind) != BOOL):
+            self.report.add("S0801", source, expr, "SINGLE needs a global BOOL variable")
+            return ""
+        return expr.text if isinstance(expr, tree.NameRef) and kind is not None else ""
+
+    def _refuse(self, refused: tree.Refused, source: Source) -> None:
+        self.report.add(refused.code, source, refused, f"{refused.what} is understood but not executed by this version")

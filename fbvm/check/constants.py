@@ -1,0 +1,153 @@
+"""Constants: folding of operators over known values, and values as bytes of memory."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, StringType, SubrangeType, Type, machine
+from fbvm.base.types import base as base_of
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
+
+_FORMATS = {"b": "<B", "i8": "<b", "u8": "<B", "i16": "<h", "u16": "<H", "i32": "<i", "u32": "<I", "i64": "<q",
+            "u64": "<Q", "f32": "<f", "f64": "<d"}
+
+
+class NotConstant(Exception):
+    """The operation has no constant result; the message says why."""
+
+
+def encode(kind: Type, value: Value) -> bytes:
+    """The bytes of `value` in memory as a `kind` (elementary, enumeration, subrange or STRING)."""
+    if isinstance(kind, StringType):
+        assert isinstance(value, bytes)
+        unit = 2 if kind.wide else 1
+        return value[:kind.capacity * unit].ljust(kind.size, b"\0")
+    form = machine(kind)
+    if form == "f32" and isinstance(value, float | int):
+        return struct.pack("<f", round_real(float(value)))
+    return struct.pack(_FORMATS[form], value)
+
+
+def round_real(value: float) -> float:
+    """The nearest value of 32 bits; infinity beyond its range."""
+    try:
+        return float(struct.unpack("<f", struct.pack("<f", value))[0])
+    except OverflowError:
+        return math.copysign(math.inf, value)
+
+
+def default(kind: Type) -> bytes:
+    """The bytes of a variable of `kind` that nobody initialises, for types without initial values of their own."""
+    if isinstance(kind, SubrangeType):
+        return encode(kind, kind.low)
+    if isinstance(kind, EnumType):
+        return encode(kind, next(iter(kind.members.values())))
+    if isinstance(kind, ArrayType):
+        return default(kind.element) * kind.count
+    return bytes(kind.size)
+
+
+def limits(kind: Type) -> tuple[int, int] | None:
+    """Least and greatest value of an integer-like type, or None."""
+    if isinstance(kind, SubrangeType):
+        return kind.low, kind.high
+    if isinstance(kind, EnumType):
+        return kind.base.low, kind.base.high
+    if isinstance(kind, Elementary) and kind.bits and kind.machine not in ("f32", "f64"):
+        return kind.low, kind.high
+    return None
+
+
+def wrap(kind: Type, value: int) -> int:
+    """`value` cut to the width of `kind`."""
+    span = limits(base_of(kind))
+    if span is None:
+        return value
+    low, high = span
+    return (value - low) % (high - low + 1) + low
+
+
+def divide(a: int, b: int) -> int:
+    """Quotient toward zero."""
+    if b == 0:
+        raise NotConstant("it divides by zero")
+    quotient = abs(a) // abs(b)
+    return quotient if (a < 0) == (b < 0) else -quotient
+
+
+def _power(a: float, b: float) -> float:
+    try:
+        result = float(a) ** float(b)
+    except (OverflowError, ZeroDivisionError) as error:
+        raise NotConstant("its power is not defined or too large") from error
+    if isinstance(result, complex):
+        raise NotConstant("its power is not defined")
+    return result
+
+
+def _real(op: str, a: float, b: float) -> float:
+    if op == "/" and b == 0:
+        raise NotConstant("it divides by zero")
+    result = a + b if op == "+" else a - b if op == "-" else a * b if op == "*" else a / b
+    if not math.isfinite(result):
+        raise NotConstant("its value is too large")
+    return result
+
+
+def _integer(op: str, a: int, b: int) -> int:
+    if op in ("/", "MOD"):
+        quotient = divide(a, b)
+        return quotient if op == "/" else a - quotient * b
+    return {"+": a + b, "-": a - b, "*": a * b}[op] if op in "+-*" else {"AND": a & b, "OR": a | b, "XOR": a ^ b}[op]
+
+
+_COMPARE = {"=": lambda a, b: a == b, "<>": lambda a, b: a != b, "<": lambda a, b: a < b, ">": lambda a, b: a > b,
+            "<=": lambda a, b: a <= b, ">=": lambda a, b: a >= b}
+_LOGIC = {"AND": "and", "OR": "or", "XOR": "xor", "AND_THEN": "and", "OR_ELSE": "or"}
+
+
+def binary(op: str, kind: Type, a: Value, b: Value) -> Value:
+    """The value of `a op b`, worked out in the type `kind` of both operands.  Raises NotConstant."""
+    if op in _COMPARE:
+        return bool(_COMPARE[op](a, b))
+    if op == "**":
+        assert not isinstance(a, bytes) and not isinstance(b, bytes)
+        return _finish(kind, _power(a, b))
+    if base_of(kind) == BOOL:
+        x, y = bool(a), bool(b)
+        return {"and": x and y, "or": x or y, "xor": x != y}[_LOGIC[op]]
+    assert not isinstance(a, bytes) and not isinstance(b, bytes)
+    if machine(kind) in ("f32", "f64") and kind is not UNTYPED_INT:
+        return _finish(kind, _real(op, float(a), float(b)))
+    if isinstance(b, float):  # a duration times or by a real: to the nearest ns, ties to even
+        return wrap(kind, round(_real(op, float(a), b)))
+    value = _integer(op, int(a), int(b))
+    return value if kind is UNTYPED_INT else wrap(kind, value)
+
+
+def _finish(kind: Type, value: float) -> float:
+    return round_real(value) if machine(kind) == "f32" and kind is not UNTYPED_REAL else value
+
+
+def unary(op: str, kind: Type, a: Value) -> Value:
+    """The value of `-a`, `+a` or `NOT a` in the type `kind`."""
+    if op == "+":
+        return a
+    if op == "NOT":
+        if base_of(kind) == BOOL:
+            return not a
+        assert isinstance(a, int)
+        return wrap(kind, ~a)
+    assert isinstance(a, int | float)
+    return -a if isinstance(a, float) or kind is UNTYPED_INT else wrap(kind, -a)
+
+
+def convert(value: Value, kind: Type) -> Value:
+    """A constant of one type as a constant of `kind`, to which it converts implicitly."""
+    form = machine(kind)
+    if form in ("f32", "f64") and isinstance(value, int | float):
+        return round_real(float(value)) if form == "f32" else float(value)
+    if form == "b":
+        return bool(value)
+    return value

@@ -1,0 +1,406 @@
+"""Types of expressions, names and operators; literals take the type that their context wants."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from fbvm.base.areas import AddressError, parse_address
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import (
+    BOOL,
+    BYTE,
+    DINT,
+    DWORD,
+    ELEMENTARY,
+    INT,
+    LINT,
+    LREAL,
+    LWORD,
+    NULL,
+    REAL,
+    ULINT,
+    WORD,
+    ArrayType,
+    Elementary,
+    EnumType,
+    StringType,
+    StructType,
+    SubrangeType,
+    Type,
+    base,
+    converts,
+    families,
+    fold,
+    string,
+)
+from fbvm.check.constants import convert, limits
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable
+from fbvm.check.operators import Operators
+from fbvm.check.values import is_any
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.checker import Checker
+
+PARTS = {"X": BOOL, "B": BYTE, "W": WORD, "D": DWORD, "L": LWORD}
+NOT_EXECUTED = "is understood but not executed by this version"
+
+
+def is_untyped(kind: Type | None) -> bool:
+    return kind is UNTYPED_INT or kind is UNTYPED_REAL
+
+
+class Expressions:
+    """Types the expressions of one POU (or of none: constants of declarations)."""
+
+    def __init__(self, checker: Checker, source: Source, pou: Pou | None) -> None:
+        self.checker = checker
+        self.project = checker.project
+        self.facts: Facts = checker.project.facts
+        self.source = source
+        self.pou = pou
+        self.operators = Operators(self)
+
+    def error(self, code: str, node: tree.Node, message: str, hint: str = "",
+              related: tuple[Source, int, str] | None = None) -> None:
+        self.project.report.add(code, self.source, node, message, hint, related)
+
+    # --- entry points -----------------------------------------------------------------------------------------------
+
+    def infer(self, expr: tree.Expr, want: Type | None = None) -> Type | None:
+        """The type of an expression, or None after a diagnostic.  `want` helps literals that meet nothing else."""
+        kind = _INFER[type(expr)](self, expr, want)
+        if kind is not None:
+            self.facts.types[expr] = kind
+        return kind
+
+    def settle(self, expr: tree.Expr, want: Type | None = None) -> Type | None:
+        """As `infer`, but a literal without a context takes its own smallest type."""
+        kind = self.infer(expr, want)
+        if kind is UNTYPED_INT:
+            value = self.facts.constants[expr]
+            assert isinstance(value, int)
+            for candidate in (INT, DINT, LINT, ULINT):
+                if candidate.low <= value <= candidate.high:
+                    return self.adopt(expr, candidate)
+            self.error("S0108", expr, f"{value} does not fit any integer type")
+            return None
+        return self.adopt(expr, LREAL) if kind is UNTYPED_REAL else kind
+
+    def fit(self, expr: tree.Expr, target: Type, code: str = "S0301", role: str = "") -> bool:
+        """Type `expr` for a place of type `target`; False after a diagnostic."""
+        kind = self.infer(expr, target)
+        if kind is None:
+            return False
+        if is_untyped(kind):
+            return self.adopt(expr, target, code) is not None
+        if assignable(kind, target):
+            value = self.facts.constants.get(expr)
+            if value is not None:
+                return self._in_range(expr, value, target)
+            return True
+        self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
+                   conversion_hint(kind, target))
+        return False
+
+    def _in_range(self, expr: tree.Expr, value: Value, target: Type) -> bool:
+        if isinstance(target, SubrangeType) and isinstance(value, int) and not target.low <= value <= target.high:
+            self.error("S0702", expr, f"{value} is outside {target.low}..{target.high} of {target}")
+            return False
+        return True
+
+    def condition(self, expr: tree.Expr, what: str) -> None:
+        """An expression that must be BOOL."""
+        kind = self.infer(expr, BOOL)
+        if is_untyped(kind):
+            kind = self.adopt(expr, BOOL, "S0303")
+        if kind is not None and base(kind) != BOOL:
+            self.error("S0303", expr, f"the condition of {what} is {kind}, not BOOL",
+                       "compare it, for example with <> 0" if is_any(kind, "ANY_NUM", "ANY_BIT") else "")
+
+    def adopt(self, expr: tree.Expr, target: Type, code: str = "S0301") -> Type | None:
+        """Give an expression of nothing but untyped literals the type `target`."""
+        value = self.facts.constants[expr]
+        kind = base(target)
+        untyped = self.facts.types[expr]
+        assert isinstance(value, int | float)
+        if untyped is UNTYPED_REAL and not is_any(kind, "ANY_REAL") or \
+                not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_REAL"):
+            self.error(code, expr, f"{untyped} does not fit {target}", literal_hint(value, kind))
+            return None
+        span = limits(target)
+        if span is not None and not span[0] <= value <= span[1]:
+            self.error("S0702", expr, f"{value} does not fit {target}, which holds {span[0]} to {span[1]}")
+            return None
+        self.facts.constants[expr] = convert(value, kind)
+        self.facts.types[expr] = target
+        return target
+
+    def note_call(self, pou: Pou, node: tree.Node) -> None:
+        """Remember who calls whom, for the check of recursion."""
+        if self.pou is not None:
+            self.pou.calls.setdefault(pou, node)
+
+    # --- literals and names -----------------------------------------------------------------------------------------
+
+    def _literal(self, expr: tree.Literal, want: Type | None) -> Type | None:
+        value: Value = expr.value if not isinstance(expr.value, str) else _text(expr.value)
+        self.facts.constants[expr] = value
+        if expr.kind in ("string", "wstring"):
+            return self._string_literal(expr)
+        if expr.type_name is None and expr.kind in ("int", "real"):
+            return UNTYPED_INT if expr.kind == "int" else UNTYPED_REAL
+        name = expr.type_name or {"bool": "BOOL", "time": "TIME"}.get(expr.kind, "")
+        kind = ELEMENTARY.get(name)
+        if kind is None:
+            declared = self.checker.specs.named_type(name, self.source)
+            if not isinstance(declared, Elementary | SubrangeType):
+                self.error("S0204", expr, f"there is no elementary type {name}")
+                return None
+            self.facts.types[expr] = UNTYPED_REAL if expr.kind == "real" else UNTYPED_INT
+            return self.adopt(expr, declared)
+        if is_any(kind, "ANY_REAL"):
+            assert isinstance(value, int | float)
+            self.facts.constants[expr] = convert(value, kind)
+        span = limits(kind)
+        if span and isinstance(value, int) and not span[0] <= value <= span[1]:
+            self.error("S0108", expr, f"{expr.text} is outside {kind}, which holds {span[0]} to {span[1]}")
+            return None
+        if expr.kind == "int" and kind == BOOL:
+            self.facts.constants[expr] = bool(value)
+        return kind
+
+    def _string_literal(self, expr: tree.Literal) -> Type | None:
+        if expr.kind == "wstring" or expr.type_name in ("WSTRING", "CHAR", "WCHAR"):
+            what = expr.type_name or "WSTRING"
+            self.error("S0901", expr, f"{what} {NOT_EXECUTED}", "a STRING literal stands in single quotes")
+            return None
+        value = self.facts.constants[expr]
+        assert isinstance(value, bytes)
+        self.facts.constants[expr] = value.split(b"\0")[0]
+        return string(max(1, len(value)))
+
+    def _enum_literal(self, expr: tree.EnumLiteral, want: Type | None) -> Type | None:
+        kind = self.checker.specs.named_type(expr.type_name.text, self.source)
+        if not isinstance(kind, EnumType):
+            self.error("S0204", expr.type_name, f"there is no enumeration {expr.type_name.text}")
+            return None
+        return self._enum_value(expr, kind, expr.member)
+
+    def _enum_value(self, expr: tree.Expr, kind: EnumType, member: tree.Name) -> Type | None:
+        value = kind.members.get(fold(member.text))
+        if value is None:
+            self.error("S0210", member, f"{kind} has no member {member.text}",
+                       self.project.nearest(member.text, kind.shown.values()))
+            return None
+        self.facts.constants[expr] = value
+        return kind
+
+    def variable(self, name: str) -> Variable | None:
+        """The variable that a name means here: the POU's own, else a global one."""
+        if self.pou is not None:
+            found = self.pou.variables.get(fold(name))
+            if found is not None:
+                return found
+        return self.project.global_variable(name, self.source)
+
+    def _name(self, expr: tree.NameRef, want: Type | None) -> Type | None:
+        variable = self.variable(expr.text)
+        if variable is not None:
+            self.facts.variables[expr] = variable
+            if variable.constant and variable.value is not None:
+                self.facts.constants[expr] = variable.value
+            return variable.type
+        members = self.project.enum_members.get(fold(expr.text), [])
+        wanted = [m for m in members if m[0] == want] or members
+        if len({kind.name for kind, _ in wanted}) == 1:
+            self.facts.constants[expr] = wanted[0][1]
+            return wanted[0][0]
+        if wanted:
+            self.error("S0201", expr, f"{expr.text} is a member of several enumerations",
+                       "write which: " + " or ".join(f"{kind}#{expr.text}" for kind, _ in wanted))
+            return None
+        self._unknown(expr)
+        return None
+
+    def _unknown(self, expr: tree.NameRef) -> None:
+        name = expr.text
+        if self.pou is not None and self.checker.is_damaged(self.pou, name):
+            return
+        try:
+            address = parse_address(name)
+            hint = f"for the address write %{name}, or declare a variable AT {address}"
+        except AddressError:
+            known = [v.name for v in self.pou.order] if self.pou else []
+            hint = self.project.nearest(name, [*known, *(v.name for v in self.project.globals.values())])
+        if self.project.pou(name, self.source):
+            message = f"{name} is a POU and has no value here"
+            hint = "call it with (), or declare an instance of it"
+        else:
+            message = f"{name} is not declared"
+        self.error("S0201", expr, message, hint)
+
+    def _direct(self, expr: tree.Direct, want: Type | None) -> Type | None:
+        try:
+            address = parse_address(expr.text)
+        except AddressError as error:
+            self.error("S0601", expr, str(error))
+            return None
+        self.facts.directs[expr] = address
+        self.checker.use_area(address.area)
+        if address.bit is not None or address.area in ("TF", "CF", "CNF"):
+            return BOOL
+        return {8: BYTE, 32: DWORD, 64: LWORD}.get(address.size_bits, WORD)
+
+    # --- parts of variables -----------------------------------------------------------------------------------------
+
+    def _member(self, expr: tree.Member, want: Type | None) -> Type | None:
+        if isinstance(expr.of, tree.NameRef) and self.variable(expr.of.text) is None:
+            named = self.checker.specs.named_type(expr.of.text, self.source)
+            if isinstance(named, EnumType):
+                return self._enum_value(expr, named, expr.name)
+        whole = self.infer(expr.of)
+        if whole is None:
+            return None
+        if not isinstance(whole, StructType):
+            self.error("S0304", expr.of, f"this is {whole} and has no members")
+            return None
+        member = whole.member(expr.name.text)
+        if member is None:
+            readable = [f.name for f in whole.fields.values() if not whole.block or f.kind in READABLE]
+            self.error("S0210", expr.name, f"{whole} has no {expr.name.text}",
+                       self.project.nearest(expr.name.text, readable))
+            return None
+        if whole.block and member.kind not in READABLE:
+            what = "an in-out of" if member.kind == "VAR_IN_OUT" else "internal to"
+            self.error("S0210", expr.name, f"{member.name} is {what} {whole} and cannot be reached from outside")
+            return None
+        self.facts.fields[expr] = member
+        return member.type
+
+    def _index(self, expr: tree.Index, want: Type | None) -> Type | None:
+        whole = self.infer(expr.of)
+        kinds = [self.settle(subscript) for subscript in expr.subscripts]
+        if whole is None or None in kinds:
+            return None
+        if not isinstance(whole, ArrayType):
+            self.error("S0304", expr.of, f"this is {whole}, not an array")
+            return None
+        if len(kinds) < len(whole.bounds):
+            self.error("S0305", expr, f"{whole} needs {len(whole.bounds)} subscripts, {len(kinds)} are written")
+            return None
+        element: Type = whole
+        rest = list(zip(expr.subscripts, kinds, strict=True))
+        while rest:
+            if not isinstance(element, ArrayType) or len(rest) < len(element.bounds):
+                self.error("S0305", expr, f"{whole} has fewer dimensions than subscripts are written")
+                return None
+            for (subscript, kind), (low, high) in zip(rest, element.bounds, strict=False):
+                if not self._subscript(subscript, kind, low, high, element):
+                    return None
+            rest = rest[len(element.bounds):]
+            element = element.element
+        return element
+
+    def _subscript(self, expr: tree.Expr, kind: Type | None, low: int, high: int, whole: Type) -> bool:
+        assert kind is not None
+        if not is_any(kind, "ANY_INT") and not isinstance(kind, EnumType):
+            self.error("S0305", expr, f"a subscript is an integer, not {kind}", conversion_hint(kind, DINT))
+            return False
+        value = self.facts.constants.get(expr)
+        if isinstance(value, int) and not low <= value <= high:
+            self.error("S0702", expr, f"subscript {value} is outside {low}..{high} of {whole}")
+            return False
+        return True
+
+    def _part(self, expr: tree.Part, want: Type | None) -> Type | None:
+        whole = self.infer(expr.of)
+        if whole is None:
+            return None
+        kind = base(whole)
+        bits = kind.bits if isinstance(kind, Elementary) and is_any(kind, "ANY_BIT", "ANY_INT") else 0
+        part = PARTS[expr.size]
+        if bits <= part.bits or (expr.index + 1) * part.bits > bits:
+            text = f".{expr.index}" if expr.size == "X" else f".%{expr.size}{expr.index}"
+            self.error("S0210", expr, f"{whole} has no part {text}")
+            return None
+        if not self._is_variable(expr.of):
+            self.error("S0407", expr.of, "a part can be taken of a variable only")
+            return None
+        return part
+
+    def _is_variable(self, expr: tree.Expr) -> bool:
+        while isinstance(expr, tree.Index | tree.Member | tree.Part):
+            expr = expr.of
+        return expr in self.facts.variables or expr in self.facts.directs
+
+    def is_variable(self, expr: tree.Expr) -> bool:
+        """True for an expression that names a place in memory."""
+        return expr not in self.facts.rewritten and self._is_variable(expr) and \
+            isinstance(expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part)
+
+    def _refused(self, expr: tree.Expr, want: Type | None) -> Type | None:
+        what = "a reference (^)" if isinstance(expr, tree.Deref) else "NULL"
+        self.error("S0901", expr, f"{what} {NOT_EXECUTED}")
+        return None
+
+    def _call(self, expr: tree.Call, want: Type | None) -> Type | None:
+        return self.checker.calls(self).value(expr, want)
+
+    def _unary(self, expr: tree.Unary, want: Type | None) -> Type | None:
+        return self.operators.unary(expr, want)
+
+    def _binary(self, expr: tree.Binary, want: Type | None) -> Type | None:
+        return self.operators.binary(expr, want)
+
+
+READABLE = ("", "VAR_INPUT", "VAR_OUTPUT")
+"""Kinds of members that may be named from outside."""
+
+_INFER: dict[type, Callable[..., Type | None]] = {
+    tree.Literal: Expressions._literal, tree.EnumLiteral: Expressions._enum_literal, tree.NameRef: Expressions._name,
+    tree.Direct: Expressions._direct, tree.Member: Expressions._member, tree.Index: Expressions._index,
+    tree.Part: Expressions._part, tree.Deref: Expressions._refused, tree.NullLiteral: Expressions._refused,
+    tree.Call: Expressions._call, tree.Unary: Expressions._unary, tree.Binary: Expressions._binary,
+}
+
+
+def _text(value: str) -> bytes:
+    return value.encode("latin-1", "replace")
+
+
+def assignable(kind: Type, target: Type) -> bool:
+    """True if a value of `kind` may be stored where `target` is declared, arrays and structures as a whole included."""
+    if isinstance(target, ArrayType) and isinstance(kind, ArrayType):
+        return kind.bounds == target.bounds and same(kind.element, target.element)
+    if isinstance(target, StructType) or isinstance(kind, StructType):
+        return kind == target and not (isinstance(target, StructType) and target.block)
+    return converts(kind, target)
+
+
+def same(kind: Type, other: Type) -> bool:
+    """True if two types are the same, as an in-out needs it."""
+    if isinstance(kind, ArrayType) and isinstance(other, ArrayType):
+        return kind.bounds == other.bounds and same(kind.element, other.element)
+    return kind == other
+
+
+def conversion_hint(kind: Type, target: Type) -> str:
+    """How to write the conversion, "" if there is none."""
+    source, wanted = base(kind), base(target)
+    names = [ "STRING" if isinstance(t, StringType) else t.name for t in (source, wanted)]
+    if all(isinstance(t, Elementary | StringType) for t in (source, wanted)):
+        return f"write {names[0]}_TO_{names[1]}(...)"
+    return ""
+
+
+def literal_hint(value: Value, kind: Type) -> str:
+    if "ANY_DURATION" in families(kind):
+        return "a duration is written T#500ms"
+    if isinstance(kind, StringType):
+        return "a text is written 'text'"
+    return "write TRUNC(...) or a literal without a point" if isinstance(value, float) else ""
+
+
+__all__ = ["NULL", "REAL", "Expressions", "assignable", "conversion_hint", "is_untyped", "same"]

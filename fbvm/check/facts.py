@@ -1,0 +1,172 @@
+"""What the checker finds out: variables, POUs, and side tables about the nodes of the trees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fbvm.base.areas import Address
+from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.types import Elementary, EnumType, Field, StructType, Type, fold
+from fbvm.syntax import tree
+from fbvm.syntax.tree import Node
+
+Value = int | float | bool | bytes
+"""A constant: bool for BOOL, int for integers, bits, times and enumerations, float for reals, bytes for STRING."""
+
+UNTYPED_INT = Elementary("an integer literal", 0, 1, "i64", frozenset())
+UNTYPED_REAL = Elementary("a real literal", 0, 1, "f64", frozenset())
+"""Types of literals (and of expressions of nothing but literals) that have not met a context yet."""
+
+
+@dataclass(eq=False)
+class Variable:
+    """One declared variable.  `kind` is its section's word, or RESULT for a function's result.
+
+    `place` says what `offset` counts from: "self" (the instance), "abs" (the buffer), "frame" (the frame of `owner`, whose
+    place is known after layout) or "area" (`location`, whose place is known after layout)."""
+
+    name: str
+    type: Type
+    kind: str
+    source: Source
+    node: tree.Node
+    owner: Pou | None = None
+    place: str = "self"
+    offset: int = 0
+    initial: bytes = b""
+    explicit: bool = False
+    """True if the declaration itself gives an initial value."""
+    value: Value | None = None
+    """The value of a CONSTANT of elementary type."""
+    constant: bool = False
+    retain: bool = False
+    reference: bool = False
+    location: Address | None = None
+    edge: str = ""
+    written: bool = False
+
+
+@dataclass(eq=False)
+class Pou:
+    """What is known about a POU: its tree and, once resolved, its variables and layout."""
+
+    name: str
+    kind: str
+    source: Source
+    tree: tree.Pou
+    variables: dict[str, Variable] = field(default_factory=dict)
+    order: list[Variable] = field(default_factory=list)
+    result: Variable | None = None
+    type: StructType | None = None
+    """The type of its instances (blocks and programs)."""
+    initial: bytes = b""
+    """Initial bytes of an instance, or of the frame of a function."""
+    frame_size: int = 0
+    frame_initial: bytes = b""
+    """VAR_TEMP of blocks and all variables of functions live in the frame; `frame_initial` its bytes at entry."""
+    frame_inputs: int = 0
+    """Bytes at the start of a function's frame that the caller writes."""
+    frame_offset: int = 0
+    number: int = -1
+    resolved: bool = False
+    calls: dict[Pou, Node] = field(default_factory=dict)
+    writes_eno: bool = False
+    damaged: set[str] = field(default_factory=set)
+    """Folded names whose declaration is wrong: using them is not complained about again."""
+    busy: bool = False
+    edges: list[Edge] = field(default_factory=list)
+
+    @property
+    def is_function(self) -> bool:
+        return self.kind == "FUNCTION"
+
+    def parameters(self, kind: str) -> list[Variable]:
+        return [v for v in self.order if v.kind == kind]
+
+
+@dataclass(frozen=True, eq=False)
+class Edge:
+    """An input declared R_EDGE or F_EDGE: what the caller writes, what the body reads, and the memory between calls."""
+
+    raw: Variable
+    hidden: Variable
+    memory: Variable
+    falling: bool
+
+
+@dataclass(eq=False)
+class PouCall:
+    """A call of a function or of an instance, with everything that lowering needs.
+
+    `instance` is the expression of the instance (None for a function); `inputs`, `in_outs` and `outputs` pair the
+    parameter with its argument; `enable` is the argument for EN; `enabled` the target of ENO if the POU declares none."""
+
+    pou: Pou
+    instance: tree.Expr | None
+    inputs: list[tuple[Variable, tree.Expr]] = field(default_factory=list)
+    in_outs: list[tuple[Variable, tree.Expr]] = field(default_factory=list)
+    outputs: list[tuple[Variable, tree.Expr, bool]] = field(default_factory=list)
+    enable: tree.Expr | None = None
+    enabled: list[tuple[tree.Expr, bool]] = field(default_factory=list)
+
+
+@dataclass(eq=False)
+class StandardCall:
+    """A call of a standard function: its lowering's key, arguments with the type each is wanted in, type variables."""
+
+    key: str
+    arguments: list[tuple[tree.Expr, Type]]
+    detail: tuple[Type, ...] = ()
+
+
+@dataclass
+class Facts:
+    """Side tables by node."""
+
+    types: dict[tree.Expr, Type] = field(default_factory=dict)
+    constants: dict[tree.Expr, Value] = field(default_factory=dict)
+    variables: dict[tree.Expr, Variable] = field(default_factory=dict)
+    fields: dict[tree.Expr, Field] = field(default_factory=dict)
+    directs: dict[tree.Expr, Address] = field(default_factory=dict)
+    operands: dict[tree.Expr, Type] = field(default_factory=dict)
+    """The type in which a binary operator works on its operands."""
+    calls: dict[tree.Call, PouCall | StandardCall] = field(default_factory=dict)
+    rewritten: dict[tree.Expr, tree.Expr] = field(default_factory=dict)
+    """Expressions that mean the same as another one (ADD(a, b) is a + b)."""
+    labels: dict[tree.CaseBranch, tuple[tuple[int, int], ...]] = field(default_factory=dict)
+    sources: dict[tree.Node, Source] = field(default_factory=dict)
+
+
+@dataclass
+class TaskFact:
+    """A task of the configuration, or the one task that runs everything."""
+
+    name: str
+    priority: int
+    interval_ns: int
+    single: str = ""
+    programs: list[tuple[Variable, Pou]] = field(default_factory=list)
+
+
+class Report:
+    """Collects diagnostics; the same place is not complained about twice with one code."""
+
+    def __init__(self) -> None:
+        self.diagnostics: list[Diagnostic] = []
+        self._seen: set[tuple[str, str, int]] = set()
+
+    def add(self, code: str, source: Source, node: tree.Node, message: str, hint: str = "",
+            related: tuple[Source, int, str] | None = None) -> None:
+        key = (code, source.name, node.start)
+        if key not in self._seen:
+            self._seen.add(key)
+            self.diagnostics.append(Diagnostic(code, source, node.start, node.end, message, hint, related))
+
+
+def is_block(kind: Type) -> bool:
+    """True for the type of a function block's or program's instances."""
+    return isinstance(kind, StructType) and kind.block
+
+
+def enum_member(kind: EnumType, name: str) -> int | None:
+    return kind.members.get(fold(name))

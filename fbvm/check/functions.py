@@ -1,0 +1,126 @@
+"""The standard functions: names, parameters, types.  What each does is lowered by `code.functions`, under the same key.
+
+Parameter types: a data type, a generic type, or `T`, a type variable bound to one type for all its places; `T` is limited
+to the generic types in `limits`.  A last parameter with `..` may repeat.  Sources: IEC 61131-3 ed. 3 tables 22 to 38.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from fbvm.base.types import ELEMENTARY, SHORT_NAMES
+
+
+@dataclass(frozen=True)
+class Signature:
+    """A standard function: key of its lowering, parameters (name, type), whether the last repeats, result type."""
+
+    key: str
+    parameters: tuple[tuple[str, str], ...]
+    repeats: bool
+    result: str
+    limits: tuple[str, ...] = ()
+
+
+_ROWS = """
+ABS                                    IN:T                         -> T      ANY_NUM
+SQRT LN LOG EXP SIN COS TAN ASIN ACOS ATAN  IN:T                    -> T      ANY_REAL
+ATAN2                                  Y:T X:T                      -> T      ANY_REAL
+MOVE                                   IN:T                         -> T      ANY
+SHL SHR ROL ROR                        IN:T N:ANY_INT               -> T      ANY_BIT ANY_INT
+SEL                                    G:BOOL IN0:T IN1:T           -> T      ANY
+MAX MIN                                IN1:T ..                     -> T      ANY_ELEMENTARY
+LIMIT                                  MN:T IN:T MX:T               -> T      ANY_ELEMENTARY
+MUX                                    K:ANY_INT IN0:T ..           -> T      ANY
+GT GE EQ LE LT                         IN1:T IN2:T ..               -> BOOL   ANY
+NE                                     IN1:T IN2:T                  -> BOOL   ANY
+LEN                                    IN:STRING                    -> INT
+LEFT RIGHT                             IN:STRING L:ANY_INT          -> STRING
+MID                                    IN:STRING L:ANY_INT P:ANY_INT -> STRING
+CONCAT                                 IN1:STRING IN2:STRING ..     -> STRING
+INSERT                                 IN1:STRING IN2:STRING P:ANY_INT -> STRING
+DELETE                                 IN:STRING L:ANY_INT P:ANY_INT -> STRING
+REPLACE                                IN1:STRING IN2:STRING L:ANY_INT P:ANY_INT -> STRING
+FIND                                   IN1:STRING IN2:STRING        -> INT
+TRUNC                                  IN:T                         -> DINT   ANY_REAL
+TIME                                                                -> TIME
+__DUE                                  AT:TIME                      ->
+"""
+
+OPERATORS = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/", "MOD": "MOD", "EXPT": "**", "AND": "AND", "OR": "OR",
+             "XOR": "XOR", "NOT": "NOT"}
+"""Functions that mean an operator; ADD, MUL, AND, OR and XOR take more than two inputs."""
+EXTENSIBLE_OPERATORS = frozenset(("ADD", "MUL", "AND", "OR", "XOR"))
+TIME_OPERATORS = {
+    f"{word}_{left}_{right}" if right else f"{word}_{left}": word
+    for word, left, right in (
+        ("ADD", "TIME", ""), ("SUB", "TIME", ""), ("ADD", "LTIME", ""), ("SUB", "LTIME", ""),
+        ("MUL", "TIME", ""), ("DIV", "TIME", ""), ("MUL", "LTIME", ""), ("DIV", "LTIME", ""),
+        ("ADD", "TOD", "TIME"), ("ADD", "DT", "TIME"), ("SUB", "TOD", "TIME"), ("SUB", "DT", "TIME"),
+        ("SUB", "DATE", "DATE"), ("SUB", "TOD", "TOD"), ("SUB", "DT", "DT"),
+    )
+} | {"MULTIME": "MUL", "DIVTIME": "DIV"}
+
+
+def _parse(rows: str) -> dict[str, Signature]:
+    table = {}
+    for line in rows.strip().splitlines():
+        head, _, tail = line.partition("->")
+        words = head.split()
+        parameters = [tuple(w.split(":")) for w in words if ":" in w]
+        result, *limits = tail.split() or [""]
+        for name in (w for w in words if ":" not in w and w != ".."):
+            table[name] = Signature(name, tuple((p[0], p[1]) for p in parameters), ".." in words, result, tuple(limits))
+    return table
+
+
+SIGNATURES = _parse(_ROWS)
+
+_CONVERSION = re.compile(r"(?:(?P<source>[A-Z_]+?)_)?(?P<form>TO|TRUNC|BCD_TO|TO_BCD)_(?P<target>[A-Z_]+)")
+_TYPED = re.compile(r"(?P<name>[A-Z0-9]+)_(?P<type>[A-Z_]+)")
+_CONVERTIBLE = set(ELEMENTARY) | {"STRING"} | {"TOD", "DT", "LTOD", "LDT"}
+
+
+def long_name(name: str) -> str:
+    """The long form of a type's name (TOD -> TIME_OF_DAY)."""
+    return SHORT_NAMES.get(name, name)
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """`X_TO_Y` and its relatives: source type ("" = the argument's), form (TO, TRUNC, BCD_TO, TO_BCD), target type."""
+
+    source: str
+    form: str
+    target: str
+
+
+def conversion(name: str) -> Conversion | None:
+    """The conversion that a folded function name means, between elementary types; None if it means none."""
+    if name in ("INT_TO_BCD", "UINT_TO_BCD"):
+        return Conversion(name[:-7], "TO_BCD", "WORD")
+    if name in ("BCD_TO_INT", "BCD_TO_DINT"):
+        return Conversion("", "BCD_TO", name[7:])
+    match = _CONVERSION.fullmatch(name)
+    if not match:
+        return None
+    source, form, target = match["source"] or "", match["form"], match["target"]
+    if source.endswith("_BCD") and form == "TO":
+        source, form = source[:-4], "BCD_TO"
+    if target not in _CONVERTIBLE or (source and source not in _CONVERTIBLE):
+        return None
+    return Conversion(long_name(source), form, long_name(target))
+
+
+def typed_name(name: str) -> tuple[str, str] | None:
+    """`ADD_INT` as ("ADD", "INT") if such a function exists in a typed form, else None."""
+    match = _TYPED.fullmatch(name)
+    if match and long_name(match["type"]) in ELEMENTARY and (match["name"] in SIGNATURES or match["name"] in OPERATORS):
+        return match["name"], long_name(match["type"])
+    return None
+
+
+def names() -> list[str]:
+    """All names of standard functions, for hints."""
+    return [*SIGNATURES, *OPERATORS, *(f"{a}_TO_{b}" for a in ELEMENTARY for b in ELEMENTARY if a != b)]

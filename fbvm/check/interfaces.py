@@ -1,0 +1,292 @@
+"""Declarations of variables: sections of a POU become its variables and the layout of its instances or frame.
+
+Instance of a block or program: an 8-byte header that begins with the type identifier, then its variables in order of
+writing, naturally aligned.  Frame of a function (one, fixed: POUs never recurse and tasks never preempt): inputs and
+in-outs first, which the caller writes; the rest gets its initial values at each entry.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.areas import AREAS, FLAG_AREAS, Address, AddressError, parse_address
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import BOOL, ArrayType, Field, StringType, StructType, Type, base, fold
+from fbvm.check.facts import Edge, Pou, Variable, is_block
+from fbvm.check.specs import MAX_SIZE
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.checker import Checker
+
+HEADER_BYTES = 8
+"""Type identifier (32 bits) and 32 bits in reserve at the start of each instance."""
+_SECTIONS = {
+    "FUNCTION": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL"),
+    "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL"),
+    "PROGRAM": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL"),
+}
+_QUALIFIERS = {
+    "VAR": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"), "VAR_INPUT": ("RETAIN", "NON_RETAIN"),
+    "VAR_OUTPUT": ("RETAIN", "NON_RETAIN"), "VAR_IN_OUT": (), "VAR_TEMP": (), "VAR_EXTERNAL": ("CONSTANT",),
+    "VAR_GLOBAL": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"),
+}
+_LATER = ("VAR_STAT", "VAR_INST", "VAR_ACCESS", "VAR_CONFIG")
+
+
+class Interfaces:
+    """Turns declarations into variables and layout."""
+
+    def __init__(self, checker: Checker) -> None:
+        self.checker = checker
+        self.project = checker.project
+        self.report = checker.project.report
+        self._identifiers = 0
+
+    def resolve(self, pou: Pou) -> None:
+        """Fill in the variables and the layout of a POU."""
+        for section in pou.tree.sections:
+            if self._section_allowed(section, pou):
+                self._section(section, pou)
+        if pou.tree.result is not None:
+            self._result(pou, pou.tree.result)
+        if pou.is_function:
+            self._frame(pou, [v for v in pou.order if v.place == "self"])
+        else:
+            self._frame(pou, pou.parameters("VAR_TEMP"))
+            self._instance(pou)
+
+    # --- sections ---------------------------------------------------------------------------------------------------
+
+    def _section_allowed(self, section: tree.VarSection, pou: Pou) -> bool:
+        if section.kind in _LATER:
+            self.report.add("S0901", pou.source, section, f"{section.kind} is understood but not executed by this version")
+        elif section.kind not in _SECTIONS[pou.kind]:
+            self.report.add("S0205", pou.source, section, f"{section.kind} has no place in a {pou.kind}")
+        else:
+            return self.qualified(section, pou.source, pou.kind)
+        for declared in section.variables:
+            pou.damaged.update(fold(name.text) for name in declared.names)
+        return False
+
+    def qualified(self, section: tree.VarSection, source: Source, pou_kind: str) -> bool:
+        """Complain about qualifiers that the section cannot have; True in any case, so that its names are known."""
+        words = [fold(q.text) for q in section.qualifiers]
+        for word, node in zip(words, section.qualifiers, strict=True):
+            if word not in _QUALIFIERS[section.kind] or (pou_kind == "FUNCTION" and word != "CONSTANT"):
+                self.report.add("S0206", source, node, f"{section.kind} of a {pou_kind} cannot be {word}")
+        if "CONSTANT" in words and len(words) > 1 or {"RETAIN", "NON_RETAIN"} <= set(words):
+            self.report.add("S0206", source, section.qualifiers[1], f"{' '.join(words)} exclude one another")
+        return True
+
+    def _section(self, section: tree.VarSection, pou: Pou) -> None:
+        for declared in section.variables:
+            if section.kind == "VAR_EXTERNAL":
+                self._external(declared, section, pou)
+                continue
+            resolved = self.typed(declared, pou.source, pou)
+            for name in declared.names:
+                if resolved is None:
+                    pou.damaged.add(fold(name.text))
+                    continue
+                variable = self.variable(declared, name, section, pou.source, resolved)
+                variable.owner = pou
+                self._place(variable, declared, pou)
+                self._register(variable, pou)
+
+    def typed(self, declared: tree.VarDecl, source: Source, pou: Pou | None) -> tuple[Type, bytes] | None:
+        resolved = self.checker.specs.resolve(declared.spec, source)
+        if resolved is None:
+            return None
+        kind, initial = resolved
+        if declared.initial is not None:
+            with self.checker.scope(pou):
+                initial = self.checker.values.initial(kind, declared.initial, source, initial)
+        return kind, initial
+
+    def variable(self, declared: tree.VarDecl, name: tree.Name, section: tree.VarSection, source: Source,
+                 resolved: tuple[Type, bytes]) -> Variable:
+        """A variable as declared, with its location but without a place."""
+        kind, initial = resolved
+        words = {fold(q.text) for q in section.qualifiers}
+        made = Variable(name.text, kind, section.kind, source, name, initial=initial, constant="CONSTANT" in words,
+                        retain=bool({"RETAIN", "PERSISTENT"} & words), explicit=declared.initial is not None)
+        if made.constant:
+            if declared.initial is None:
+                self.report.add("S0701", source, name, f"the constant {name.text} has no value", "write := and its value")
+            elif isinstance(declared.initial, tree.Expr):
+                made.value = self.project.facts.constants.get(declared.initial)
+            if is_block(kind):
+                self.report.add("S0206", source, name, "an instance cannot be CONSTANT")
+        if declared.location is not None:
+            made.location = self.location(declared, kind, source)
+        return made
+
+    def location(self, declared: tree.VarDecl, kind: Type, source: Source) -> Address | None:
+        """The address behind AT, checked against the type; None after a diagnostic."""
+        node = declared.location
+        assert node is not None
+        if node.text.rstrip().endswith("*"):
+            self.report.add("S0901", source, node, f"{node.text} is understood but not executed by this version",
+                            "write the whole address")
+            return None
+        try:
+            address = parse_address(node.text)
+        except AddressError as error:
+            self.report.add("S0601", source, node, str(error))
+            return None
+        if address.area in ("T", "C") and base(kind) == BOOL:
+            address = Address("TF" if address.area == "T" else "CNF", address.number)
+        if len(declared.names) > 1:
+            self.report.add("S0604", source, node, "one location cannot serve several names")
+            return None
+        return address if self._fits(address, kind, source, node) else None
+
+    def _fits(self, address: Address, kind: Type, source: Source, node: tree.Node) -> bool:
+        is_bit = address.bit is not None or address.area in FLAG_AREAS
+        if is_bit != (base(kind) == BOOL):
+            self.report.add("S0602", source, node,
+                            f"{address} is one bit and {kind} is not BOOL" if is_bit else
+                            f"{address} is a word and {kind} needs " + ("a bit" if base(kind) == BOOL else "more"),
+                            "name a bit, such as CIO 1519.03" if base(kind) == BOOL else "")
+            return False
+        if is_block(kind) or _holds_block(kind):
+            self.report.add("S0604", source, node, "instances of blocks have no location")
+            return False
+        self.checker.use_area(address.area)
+        size = AREAS[address.area].size_bytes if address.area in AREAS else 65536
+        if address.size_bits and not isinstance(kind, ArrayType | StructType | StringType) \
+                and kind.size * 8 != max(8, address.size_bits):
+            self.report.add("S0602", source, node, f"{address} has {address.size_bits} bits, {kind} {kind.size * 8}")
+            return False
+        if address.byte_offset() + kind.size > size:
+            self.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
+            return False
+        return True
+
+    def _place(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
+        variable.reference = variable.kind == "VAR_IN_OUT"
+        if variable.kind == "VAR_TEMP" or pou.is_function:
+            variable.place = "self" if pou.is_function else "frame"
+        if declared.location is not None:
+            if variable.kind != "VAR" or pou.is_function:
+                self.report.add("S0604", pou.source, declared.location,
+                                f"{variable.kind} of a {pou.kind} has no location", "declare it in a VAR section")
+            variable.place = "area"
+        if declared.edge:
+            self._edge(variable, declared, pou)
+        if fold(variable.name) == "EN" and variable.kind == "VAR_INPUT" and not variable.explicit:
+            variable.initial = b"\x01"  # EN is TRUE where nobody connects it
+
+    def _edge(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
+        if variable.kind != "VAR_INPUT" or base(variable.type) != BOOL or pou.is_function:
+            self.report.add("S0206", pou.source, variable.node,
+                            f"{declared.edge} belongs to a BOOL input of a block or program")
+            return
+        variable.edge = declared.edge
+
+    def _register(self, variable: Variable, pou: Pou) -> None:
+        other = pou.variables.get(fold(variable.name))
+        if other is None and fold(variable.name) == fold(pou.name) and pou.is_function:
+            self.report.add("S0202", pou.source, variable.node, f"{variable.name} is the name of the function itself")
+            return
+        if other is not None:
+            self.report.add("S0202", pou.source, variable.node, f"{variable.name} is declared twice in {pou.name}", "",
+                            (other.source, other.node.start, "first declared here"))
+            return
+        pou.variables[fold(variable.name)] = variable
+        pou.order.append(variable)
+        if variable.edge:
+            self._add_edge(variable, pou)
+
+    def _add_edge(self, raw: Variable, pou: Pou) -> None:
+        """The body reads a hidden variable instead of the pin; names with a space cannot be written in a program."""
+        memory = Variable(f"{raw.name} memory", BOOL, "VAR", raw.source, raw.node, pou, initial=b"\0")
+        hidden = Variable(f"{raw.name} edge", BOOL, "VAR", raw.source, raw.node, pou, initial=b"\0")
+        pou.order += [hidden, memory]
+        pou.variables[fold(raw.name)] = hidden
+        pou.edges.append(Edge(raw, hidden, memory, raw.edge == "F_EDGE"))
+
+    def _external(self, declared: tree.VarDecl, section: tree.VarSection, pou: Pou) -> None:
+        resolved = self.checker.specs.resolve(declared.spec, pou.source)
+        for name in declared.names:
+            pou.damaged.add(fold(name.text))
+            variable = self.project.global_variable(name.text, pou.source)
+            if variable is None:
+                self.report.add("S0208", pou.source, name, f"there is no VAR_GLOBAL {name.text}",
+                                self.project.nearest(name.text, (v.name for v in self.project.globals.values())))
+            elif resolved is not None and resolved[0] != variable.type:
+                self.report.add("S0208", pou.source, name, f"{name.text} is {resolved[0]} here and {variable.type} as global",
+                                "", (variable.source, variable.node.start, "the VAR_GLOBAL"))
+            elif variable.constant and not any(fold(q.text) == "CONSTANT" for q in section.qualifiers):
+                self.report.add("S0208", pou.source, name, f"the VAR_GLOBAL {name.text} is CONSTANT",
+                                "write VAR_EXTERNAL CONSTANT")
+            if fold(name.text) in pou.variables:
+                self.report.add("S0202", pou.source, name, f"{name.text} is declared twice in {pou.name}")
+            elif variable is not None:
+                pou.variables[fold(name.text)] = variable
+
+    def _result(self, pou: Pou, spec: tree.TypeSpec) -> None:
+        resolved = self.checker.specs.resolve(spec, pou.source)
+        if resolved is None:
+            pou.damaged.add(fold(pou.name))
+            return
+        if is_block(resolved[0]):
+            self.report.add("S0901", pou.source, spec, "an instance as a result is understood but not executed")
+            return
+        result = Variable(pou.name, resolved[0], "RESULT", pou.source, pou.tree.name, pou, initial=resolved[1])
+        pou.result = result
+        pou.variables.setdefault(fold(pou.name), result)
+        pou.order.append(result)
+
+    # --- layout -----------------------------------------------------------------------------------------------------
+
+    def _frame(self, pou: Pou, variables: list[Variable]) -> None:
+        passed = [v for v in variables if v.kind in ("VAR_INPUT", "VAR_IN_OUT")]
+        rest = [v for v in variables if v not in passed]
+        content = bytearray()
+        for variable in passed:
+            _append(content, variable)
+        pou.frame_inputs = len(content)
+        for variable in rest:
+            _append(content, variable)
+        for variable in variables:
+            variable.place = "frame"
+        pou.frame_size = len(content)
+        pou.frame_initial = bytes(content)
+        self._limit(pou, len(content))
+
+    def _instance(self, pou: Pou) -> None:
+        self._identifiers += 1
+        content = bytearray(self._identifiers.to_bytes(4, "little") + bytes(4))
+        for variable in pou.order:
+            if variable.place == "self":
+                _append(content, variable)
+        content += bytes(-len(content) % 8)
+        self._limit(pou, len(content))
+        fields = {fold(v.name): _field(v) for v in pou.order if v.place != "frame"}
+        pou.type = StructType(pou.name, len(content), 8, fields, block=True)
+        pou.initial = bytes(content)
+
+    def _limit(self, pou: Pou, size: int) -> None:
+        if size > MAX_SIZE:
+            self.report.add("S0603", pou.source, pou.tree.name, f"the variables of {pou.name} take more than {MAX_SIZE >> 20} MiB")
+
+
+def _append(content: bytearray, variable: Variable) -> None:
+    size, align = (8, 8) if variable.reference else (variable.type.size, variable.type.align)
+    content += bytes(-len(content) % align)
+    variable.offset = len(content)
+    content += bytes(size) if variable.reference else variable.initial
+
+
+def _field(variable: Variable) -> Field:
+    """The variable as a member of its block's type; a location is filled in when the layout is known."""
+    return Field(variable.name, variable.type, variable.offset, variable.kind, absolute=variable.place == "area",
+                 reference=variable.reference, constant=variable.constant)
+
+
+def _holds_block(kind: Type) -> bool:
+    if isinstance(kind, ArrayType):
+        return is_block(kind.element) or _holds_block(kind.element)
+    return isinstance(kind, StructType) and any(is_block(f.type) or _holds_block(f.type) for f in kind.fields.values())

@@ -1,0 +1,87 @@
+"""Libraries of blocks: folders with a `library.toml` and one POU a file, found by the file's name."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fbvm.base.data import data_folder
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import fold
+from fbvm.check.facts import Report
+from fbvm.syntax import tree
+from fbvm.syntax.parser import parse
+from fbvm.syntax.text import read
+
+
+@dataclass
+class Library:
+    """One folder: its name (path below the root), its files by folded stem, and the files that hold its globals."""
+
+    name: str
+    folder: Path
+    files: dict[str, Path]
+    globals: tuple[str, ...] = ()
+    loaded: set[str] = field(default_factory=set)
+
+
+class LibraryError(ValueError):
+    """A library folder is damaged; the message says where and how."""
+
+
+def _libraries_below(root: Path) -> Iterator[Library]:
+    folders = {path.parent for path in root.rglob("*.st")} | {path.parent for path in root.rglob("library.toml")}
+    for folder in sorted(folders):
+        described = folder / "library.toml"
+        table: dict[str, object] = {}
+        if described.is_file():
+            try:
+                table = tomllib.loads(described.read_text(encoding="utf-8"))
+            except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+                raise LibraryError(f"{described}: {error}") from error
+        listed = table.get("globals", [])
+        if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
+            raise LibraryError(f"{described}: globals must be a list of file names")
+        name = folder.relative_to(root).as_posix() if folder != root else root.name
+        yield Library(name, folder, {fold(p.stem): p for p in sorted(folder.glob("*.st"))}, tuple(listed))
+
+
+class Libraries:
+    """The shipped libraries and the user's own; own ones are asked first."""
+
+    def __init__(self, own: Sequence[Path] = (), shipped: bool = True) -> None:
+        roots: Iterable[Path] = [*own, *([data_folder("fblib")] if shipped else [])]
+        self._libraries: dict[str, Library] = {}
+        for root in roots:
+            for library in _libraries_below(Path(root)):
+                self._libraries.setdefault(library.name, library)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self._libraries)
+
+    def block_names(self) -> list[str]:
+        """The names under which files are found, as their files are named."""
+        return [path.stem for library in self._libraries.values() for path in library.files.values()]
+
+    def load(self, name: str, owner: str, report: Report) -> list[tuple[Source, tree.SourceText]]:
+        """Trees of the file that `owner` has for `name`, and of its globals; nothing if it is loaded or unknown."""
+        library = self._libraries.get(owner)
+        if library is None or fold(name) not in library.files:
+            return []
+        wanted = [library.files[fold(name)], *(library.folder / listed for listed in library.globals)]
+        return [loaded for path in wanted if (loaded := self._parse(library, path, report))]
+
+    def _parse(self, library: Library, path: Path, report: Report) -> tuple[Source, tree.SourceText] | None:
+        if path.name in library.loaded:
+            return None
+        library.loaded.add(path.name)
+        source = read(path, f"{library.name}/{path.name}", library.name)
+        if not isinstance(source, Source):
+            report.diagnostics.append(source)
+            return None
+        text, diagnostics = parse(source)
+        report.diagnostics.extend(diagnostics)
+        return source, text

@@ -1,0 +1,227 @@
+"""Operators: on which types each works, and in which type (IEC 61131-3 ed. 3, tables 28 to 33 and 71)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import (
+    BOOL,
+    DATE,
+    DT,
+    ELEMENTARY,
+    LINT,
+    LREAL,
+    REAL,
+    TIME,
+    TOD,
+    Elementary,
+    EnumType,
+    StringType,
+    StructType,
+    Type,
+    base,
+    common,
+    converts,
+)
+from fbvm.check import constants
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
+from fbvm.check.values import is_any
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.expressions import Expressions
+
+COMPARISONS = ("=", "<>", "<", ">", "<=", ">=")
+_FAMILY = {
+    "+": ("ANY_NUM",), "-": ("ANY_NUM",), "*": ("ANY_NUM",), "/": ("ANY_NUM",), "MOD": ("ANY_INT",),
+    "AND": ("ANY_BIT",), "OR": ("ANY_BIT",), "XOR": ("ANY_BIT",),
+}
+_L: dict[Type, Type] = {DATE: ELEMENTARY["LDATE"], TOD: ELEMENTARY["LTIME_OF_DAY"], DT: ELEMENTARY["LDATE_AND_TIME"],
+      TIME: ELEMENTARY["LTIME"]}
+
+
+def _time_rows() -> dict[tuple[str, Type, Type], Type]:
+    """What + and - mean on times and dates: (operator, left, right) -> result; the L types only among themselves."""
+    rows: dict[tuple[str, Type, Type], Type] = {}
+    for op in "+-":
+        for left in (TIME, TOD, DT):
+            rows[op, left, TIME] = left
+    for left in (DATE, TOD, DT):
+        rows["-", left, left] = TIME
+    return rows | {(op, _L[a], _L[b]): _L[r] for (op, a, b), r in rows.items()}
+
+
+TIMES = _time_rows()
+
+
+class Operators:
+    """The operators of the expressions of one POU."""
+
+    def __init__(self, expressions: Expressions) -> None:
+        self.expressions = expressions
+        self.facts = expressions.facts
+
+    # --- unary ------------------------------------------------------------------------------------------------------
+
+    def unary(self, expr: tree.Unary, want: Type | None) -> Type | None:
+        kind = self.expressions.infer(expr.operand, want)
+        if kind is None:
+            return None
+        if expr.op == "NOT":
+            if kind is UNTYPED_INT and want is not None and is_any(want, "ANY_BIT"):
+                kind = self.expressions.adopt(expr.operand, want)
+                if kind is None:
+                    return None
+            good = is_any(kind, "ANY_BIT")
+        else:
+            good = kind in (UNTYPED_INT, UNTYPED_REAL) or is_any(kind, "ANY_NUM", "ANY_DURATION")
+        if not good:
+            self.expressions.error("S0302", expr, f"{expr.op} is not defined for {kind}",
+                                   _bit_hint(kind) if expr.op == "NOT" else "")
+            return None
+        kind = base(kind)
+        value = self.facts.constants.get(expr.operand)
+        if value is not None:
+            self.facts.constants[expr] = constants.unary(expr.op, kind, value)
+        return kind
+
+    # --- binary -----------------------------------------------------------------------------------------------------
+
+    def binary(self, expr: tree.Binary, want: Type | None) -> Type | None:
+        hint = want if expr.op not in COMPARISONS else None
+        left = self.expressions.infer(expr.left, hint)
+        right = self.expressions.infer(expr.right, hint)
+        if left is None or right is None:
+            return None
+        left, right = base(left), base(right)
+        if expr.op == "**":
+            return self._power(expr, left, right, want)
+        timed = self._time(expr, left, right)
+        if timed is not None:
+            return self._folded(expr, timed, timed)
+        kind = self._operand_type(expr, left, right, want)
+        if kind is None or not self._defined(expr, kind):
+            self._undefined(expr, left, right)
+            return None
+        if kind not in (UNTYPED_INT, UNTYPED_REAL):
+            for side, side_kind in ((expr.left, left), (expr.right, right)):
+                if side_kind in (UNTYPED_INT, UNTYPED_REAL) and self.expressions.adopt(side, kind) is None:
+                    return None
+        return self._folded(expr, kind, BOOL if expr.op in COMPARISONS else kind)
+
+    def _operand_type(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
+        """The type in which both operands meet."""
+        untyped = (UNTYPED_INT, UNTYPED_REAL)
+        if left in untyped and right in untyped:
+            kind = left if left is UNTYPED_REAL else right
+            return BOOL if expr.op in ("AND_THEN", "OR_ELSE") else kind
+        for literal, other in ((left, right), (right, left)):
+            if literal is UNTYPED_INT:
+                return other
+            if literal is UNTYPED_REAL:
+                return self._meet_real(other, want)
+        if isinstance(left, EnumType) and left == right:
+            return left
+        return common(left, right)
+
+    def _meet_real(self, other: Type, want: Type | None) -> Type | None:
+        """The real type in which an untyped real literal meets `other`."""
+        if is_any(other, "ANY_REAL"):
+            return other
+        if want is not None and is_any(want, "ANY_REAL") and converts(other, base(want)):
+            return base(want)
+        return LREAL if converts(other, LREAL) else None
+
+    def _defined(self, expr: tree.Binary, kind: Type) -> bool:
+        op = expr.op
+        if op in ("AND_THEN", "OR_ELSE"):
+            return kind == BOOL
+        if op in COMPARISONS:
+            if isinstance(kind, EnumType):
+                return op in ("=", "<>")
+            return kind in (UNTYPED_INT, UNTYPED_REAL) or isinstance(kind, Elementary | StringType)
+        if kind is UNTYPED_INT:
+            return True
+        if kind is UNTYPED_REAL:
+            return _FAMILY[op] == ("ANY_NUM",)
+        return is_any(kind, *_FAMILY[op])
+
+    def _undefined(self, expr: tree.Binary, left: Type, right: Type) -> None:
+        hint = ""
+        if expr.op in ("AND", "OR", "XOR"):
+            hint = _bit_hint(left if not is_any(left, "ANY_BIT") else right)
+        elif isinstance(left, StructType) or isinstance(right, StructType):
+            hint = "compare or combine the members"
+        elif is_any(left, "ANY_BIT") != is_any(right, "ANY_BIT") or common(left, right) is None:
+            hint = _meeting_hint(left, right)
+        elif is_any(left, "ANY_BIT"):
+            hint = "bit strings have no arithmetic: convert with " + \
+                f"{left}_TO_U{'' if left.size == 2 else {1: 'S', 4: 'D', 8: 'L'}.get(left.size, '')}INT(...)"
+        self.expressions.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)
+
+    def _time(self, expr: tree.Binary, left: Type, right: Type) -> Type | None:
+        """The result of an operator on times and dates, or None if it is none of those."""
+        result = TIMES.get((expr.op, left, right))
+        if result is None and expr.op in "+-" and common(left, right) is not None:
+            met = common(left, right)
+            assert met is not None
+            result = TIMES.get((expr.op, met, met)) if is_any(left, "ANY_DURATION", "ANY_DATE") else None
+        if result is not None:
+            self.facts.operands[expr] = result
+            return result
+        if expr.op in "*/" and is_any(left, "ANY_DURATION") and \
+                (right in (UNTYPED_INT, UNTYPED_REAL) or is_any(right, "ANY_NUM")):
+            if right in (UNTYPED_INT, UNTYPED_REAL):
+                self.expressions.adopt(expr.right, LINT if right is UNTYPED_INT else LREAL)
+            self.facts.operands[expr] = left
+            return left
+        return None
+
+    def _power(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
+        """`a ** b`: a real base keeps its type, an integer one gives LREAL."""
+        if left in (UNTYPED_INT, UNTYPED_REAL) and right in (UNTYPED_INT, UNTYPED_REAL):
+            return self._folded(expr, UNTYPED_REAL, UNTYPED_REAL)
+        numeric = (UNTYPED_INT, UNTYPED_REAL)
+        if not all(k in numeric or is_any(k, "ANY_NUM") for k in (left, right)):
+            self._undefined(expr, left, right)
+            return None
+        kind: Type = left if is_any(left, "ANY_REAL") else LREAL
+        if left in numeric and want is not None and base(want) == REAL and right == REAL:
+            kind = REAL
+        for side, side_kind in ((expr.left, left), (expr.right, right)):
+            if side_kind in numeric and self.expressions.adopt(side, kind) is None:
+                return None
+        return self._folded(expr, kind, kind)
+
+    def _folded(self, expr: tree.Binary, operand: Type, result: Type) -> Type | None:
+        """Note the operand type; work out the value if both sides are constant."""
+        self.facts.operands.setdefault(expr, operand)
+        a, b = self.facts.constants.get(expr.left), self.facts.constants.get(expr.right)
+        if a is None or b is None:
+            if b == 0 and expr.op in ("/", "MOD") and is_any(operand, "ANY_INT"):
+                self.expressions.error("S0703", expr.right, "this divides by zero")
+                return None
+            return result
+        if isinstance(operand, Elementary | EnumType | StringType) or operand in (UNTYPED_INT, UNTYPED_REAL):
+            try:
+                if operand not in (UNTYPED_INT, UNTYPED_REAL) and not is_any(operand, "ANY_DURATION", "ANY_DATE"):
+                    a, b = constants.convert(a, operand), constants.convert(b, operand)
+                self.facts.constants[expr] = constants.binary(expr.op, operand, a, b)
+            except constants.NotConstant as error:
+                self.expressions.error("S0703", expr, f"the constant expression has no value: {error}")
+                return None
+        if operand is UNTYPED_INT and result is BOOL or operand is UNTYPED_REAL and result is BOOL:
+            self.facts.operands[expr] = LREAL if operand is UNTYPED_REAL else LINT
+        return result
+
+
+def _bit_hint(kind: Type) -> str:
+    names = {1: "BYTE", 2: "WORD", 4: "DWORD", 8: "LWORD"}
+    if kind is UNTYPED_INT:
+        return "write a typed literal such as WORD#16#FF"
+    return f"convert with {kind}_TO_{names[kind.size]}(...)" if is_any(kind, "ANY_INT") else ""
+
+
+def _meeting_hint(left: Type, right: Type) -> str:
+    named = all(isinstance(k, Elementary) and k.bits for k in (left, right))
+    return f"convert one side, for example with {right}_TO_{left}(...)" if named else ""

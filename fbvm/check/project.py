@@ -1,0 +1,132 @@
+"""All declarations of a program: the user's own, and those of libraries, which are read when a name asks for them.
+
+A user's own POU or type shadows a library's of the same name, but not inside that library."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TypeVar
+
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import EnumType, Type, fold
+from fbvm.check.facts import Facts, Pou, Report, Variable
+from fbvm.check.library import Libraries
+from fbvm.syntax import tree
+
+
+@dataclass(eq=False)
+class TypeEntry:
+    """A declared type; `resolved` is filled at its first use."""
+
+    tree: tree.TypeDecl
+    source: Source
+    resolved: tuple[Type, bytes] | None = None
+    busy: bool = False
+
+
+T = TypeVar("T")
+
+
+class Project:
+    """Names of all POUs, types and global variables."""
+
+    def __init__(self, libraries: Libraries, report: Report) -> None:
+        self.libraries = libraries
+        self.report = report
+        self.facts = Facts()
+        self.pous: dict[tuple[str, str], Pou] = {}
+        self.types: dict[tuple[str, str], TypeEntry] = {}
+        self.globals: dict[tuple[str, str], Variable] = {}
+        self.sections: list[tuple[tree.VarSection, Source]] = []
+        """VAR_GLOBAL sections that still have to be declared."""
+        self.configurations: list[tuple[tree.Configuration, Source]] = []
+        self.enum_members: dict[str, list[tuple[EnumType, int]]] = {}
+        self._loaded: set[str] = set()
+        self.new_pous: list[Pou] = []
+        """POUs that have been named but not checked yet."""
+
+    def collect(self, text: tree.SourceText, source: Source) -> None:
+        """Take the declarations of one text; complain about names declared twice."""
+        for declaration in text.declarations:
+            if isinstance(declaration, tree.Refused):
+                self.report.add(declaration.code, source, declaration, _refusal(declaration))
+            elif isinstance(declaration, tree.Pou):
+                self._add_pou(declaration, source)
+            elif isinstance(declaration, tree.TypeDecl):
+                key = (source.library, fold(declaration.name.text))
+                if not self._twice(key, declaration.name, source, "type"):
+                    self.types[key] = TypeEntry(declaration, source)
+            elif isinstance(declaration, tree.GlobalVars):
+                self.sections.append((declaration.section, source))
+            elif isinstance(declaration, tree.Configuration):
+                self.configurations.append((declaration, source))
+                self.sections += [(s, source) for s in declaration.sections]
+                self.sections += [(s, source) for r in declaration.resources for s in r.sections]
+
+    def _add_pou(self, declaration: tree.Pou, source: Source) -> None:
+        key = (source.library, fold(declaration.name.text))
+        for refused in declaration.refused:
+            self.report.add(refused.code, source, refused, _refusal(refused))
+        if not self._twice(key, declaration.name, source, "POU"):
+            self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
+            self.new_pous.append(pou)
+
+    def _twice(self, key: tuple[str, str], name: tree.Name, source: Source, what: str) -> bool:
+        other = self.pous.get(key) or self.types.get(key)
+        if other is None:
+            return False
+        self.report.add("S0203", source, name, f"{name.text} is declared twice",
+                        f"rename one of them: a {what} needs a name of its own",
+                        (other.source, other.tree.name.start, "first declared here"))
+        return True
+
+    # --- look-up ----------------------------------------------------------------------------------------------------
+
+    def _owners(self, source: Source) -> Iterable[str]:
+        if source.library:
+            yield source.library
+        yield ""
+        yield from (name for name in self.libraries.names if name != source.library)
+
+    def _load(self, name: str, owner: str) -> None:
+        for source, text in self.libraries.load(name, owner, self.report):
+            if source.name not in self._loaded:
+                self._loaded.add(source.name)
+                self.collect(text, source)
+
+    def pou(self, name: str, source: Source) -> Pou | None:
+        """The POU of that name as seen from `source`."""
+        return self._find(self.pous, name, source)
+
+    def type_entry(self, name: str, source: Source) -> TypeEntry | None:
+        return self._find(self.types, name, source)
+
+    def _find(self, table: dict[tuple[str, str], T], name: str, source: Source) -> T | None:
+        folded = fold(name)
+        for owner in self._owners(source):
+            if owner and (owner, folded) not in table:
+                self._load(folded, owner)
+            if (owner, folded) in table:
+                return table[owner, folded]
+        return None
+
+    def global_variable(self, name: str, source: Source) -> Variable | None:
+        folded = fold(name)
+        for owner in self._owners(source):
+            if (owner, folded) in self.globals:
+                return self.globals[owner, folded]
+        return None
+
+    def nearest(self, name: str, candidates: Iterable[str]) -> str:
+        """A hint that names the candidates most like a misspelt name, "" if none is."""
+        shown = {fold(c): c for c in candidates}
+        close = difflib.get_close_matches(fold(name), list(shown), n=3, cutoff=0.7)
+        return "did you mean " + " or ".join(shown[c] for c in close) + "?" if close else ""
+
+
+def _refusal(node: tree.Refused) -> str:
+    if node.code == "S0902":
+        return f"{node.what} is object-oriented text, which fbvm does not execute"
+    return f"{node.what} is understood but not executed by this version"

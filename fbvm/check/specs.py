@@ -1,0 +1,251 @@
+"""Type specifications: a spec of the tree in, a Type and the initial bytes of its variables out."""
+
+from __future__ import annotations
+
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import (
+    ELEMENTARY,
+    GENERIC,
+    INT,
+    SHORT_NAMES,
+    ArrayType,
+    Elementary,
+    EnumType,
+    Field,
+    StructType,
+    SubrangeType,
+    Type,
+    array,
+    fold,
+    string,
+)
+from fbvm.check.constants import default
+from fbvm.check.facts import Pou
+from fbvm.check.project import Project
+from fbvm.check.values import Values
+from fbvm.syntax import tree
+
+MAX_SIZE = 64 << 20
+"""Largest variable in bytes."""
+MAX_STRING = 65534
+Resolved = tuple[Type, bytes]
+
+
+class Specs:
+    """Resolves type specifications.  `interface` makes the type of a block's instances known (set by the checker)."""
+
+    def __init__(self, project: Project) -> None:
+        self.project = project
+        self.report = project.report
+        self.values: Values
+        self._anonymous = 0
+
+    def resolve(self, spec: tree.TypeSpec, source: Source, name: str = "") -> Resolved | None:
+        """Type and initial bytes, or None after a diagnostic.  `name` names a type declared with this spec."""
+        if isinstance(spec, tree.NamedType):
+            return self._named(spec, source)
+        if isinstance(spec, tree.StringSpec):
+            return self._string(spec, source)
+        if isinstance(spec, tree.SubrangeSpec):
+            return self._subrange(spec, source, name)
+        if isinstance(spec, tree.ArraySpec):
+            return self._array(spec, source)
+        if isinstance(spec, tree.EnumSpec):
+            return self._enumeration(spec, source, name)
+        if isinstance(spec, tree.StructSpec) and not spec.overlap:
+            return self._structure(spec, source, name)
+        what = {tree.RefSpec: getattr(spec, "kind", ""), tree.UnionSpec: "UNION", tree.StructSpec: "STRUCT OVERLAP"}
+        self.report.add("S0901", source, spec, f"{what[type(spec)]} is understood but not executed by this version")
+        return None
+
+    # --- names ------------------------------------------------------------------------------------------------------
+
+    def elementary(self, name: str) -> Type | None:
+        """The elementary type that a name stands for."""
+        folded = fold(name)
+        if folded in ("STRING", "WSTRING"):
+            return string(wide=folded == "WSTRING")
+        return ELEMENTARY.get(SHORT_NAMES.get(folded, folded) if folded not in ("T", "D", "LT", "LD") else folded)
+
+    def _named(self, spec: tree.NamedType, source: Source) -> Resolved | None:
+        folded = fold(spec.text)
+        entry = self.project.type_entry(folded, source)
+        if entry is not None:
+            return self._declared(entry.tree.name, folded, source)
+        pou = self.project.pou(folded, source)
+        if pou is not None:
+            return self._block(pou, spec, source)
+        kind = self.elementary(folded)
+        if kind is not None:
+            if folded == "WSTRING":
+                self.report.add("S0901", source, spec, "WSTRING is understood but not executed by this version")
+                return None
+            return kind, default(kind)
+        if folded in ("CHAR", "WCHAR") or folded in GENERIC:
+            self.report.add("S0901", source, spec, f"{folded} is understood but not executed by this version")
+            return None
+        hint = self.project.nearest(spec.text, [*ELEMENTARY, "STRING", *(n for _, n in self.project.types),
+                                                *(p.name for p in self.project.pous.values()),
+                                                *self.project.libraries.block_names()])
+        self.report.add("S0204", source, spec, f"there is no type or block {spec.text}", hint)
+        return None
+
+    def named_type(self, name: str, source: Source) -> Type | None:
+        """The type of that name, elementary or declared, without any complaint."""
+        entry = self.project.type_entry(name, source)
+        if entry is None:
+            return self.elementary(name)
+        resolved = self._declared(entry.tree.name, name, source)
+        return resolved[0] if resolved else None
+
+    def _declared(self, node: tree.Node, name: str, source: Source) -> Resolved | None:
+        entry = self.project.type_entry(name, source)
+        assert entry is not None
+        if entry.busy:
+            self.report.add("S0207", entry.source, entry.tree.name,
+                            f"{entry.tree.name.text} contains itself", "a type cannot hold a value of its own type")
+            return None
+        if entry.resolved is None:
+            entry.busy = True
+            declared = entry.tree
+            resolved = self.resolve(declared.spec, entry.source, declared.name.text)
+            if resolved and declared.initial is not None:
+                kind, initial = resolved
+                resolved = kind, self.values.initial(kind, declared.initial, entry.source, initial)
+            entry.busy = False
+            entry.resolved = resolved
+        return entry.resolved
+
+    def _block(self, pou: Pou, spec: tree.NamedType, source: Source) -> Resolved | None:
+        if pou.kind != "FUNCTION_BLOCK":
+            self.report.add("S0204", source, spec, f"{pou.name} is a {pou.kind}, not a type",
+                            "only function blocks have instances in variables")
+            return None
+        if not self.values.interface(pou, source, spec):
+            return None
+        assert pou.type is not None
+        return pou.type, pou.initial
+
+    # --- forms ------------------------------------------------------------------------------------------------------
+
+    def _string(self, spec: tree.StringSpec, source: Source) -> Resolved | None:
+        if spec.wide:
+            self.report.add("S0901", source, spec, "WSTRING is understood but not executed by this version")
+            return None
+        if spec.length is None:
+            kind: Type = string()
+        else:
+            length = self.values.integer(spec.length, source)
+            if length is None:
+                return None
+            if not 1 <= length <= MAX_STRING:
+                self.report.add("S0704", source, spec.length, f"a STRING has 1 to {MAX_STRING} characters, not {length}")
+                return None
+            kind = string(length)
+        return kind, default(kind)
+
+    def _subrange(self, spec: tree.SubrangeSpec, source: Source, name: str) -> Resolved | None:
+        resolved = self.resolve(spec.base, source)
+        low, high = self.values.integer(spec.low, source), self.values.integer(spec.high, source)
+        if resolved is None or low is None or high is None:
+            return None
+        kind = resolved[0]
+        if not isinstance(kind, Elementary) or "ANY_INT" not in kind.families:
+            self.report.add("S0704", source, spec.base, f"a subrange needs an integer type, not {kind}")
+            return None
+        if not kind.low <= low <= high <= kind.high:
+            self.report.add("S0704", source, spec, f"{low}..{high} is not a range within {kind}")
+            return None
+        made = SubrangeType(name or f"{kind} ({low}..{high})", kind.size, kind.align, kind, low, high)
+        return made, default(made)
+
+    def _array(self, spec: tree.ArraySpec, source: Source) -> Resolved | None:
+        bounds = []
+        for dimension in spec.dimensions:
+            if dimension is None:
+                self.report.add("S0901", source, spec, "ARRAY [*] is understood but not executed by this version")
+                return None
+            low, high = (self.values.integer(bound, source) for bound in dimension)
+            if low is None or high is None:
+                return None
+            if low > high:
+                self.report.add("S0704", source, dimension[0], f"the lower bound {low} is above the upper bound {high}")
+                return None
+            bounds.append((low, high))
+        element = self.resolve(spec.element, source)
+        if element is None:
+            return None
+        count = 1
+        for low, high in bounds:
+            count *= high - low + 1
+        if count * max(1, element[0].size) > MAX_SIZE:
+            self.report.add("S0603", source, spec, f"the array takes more than {MAX_SIZE >> 20} MiB")
+            return None
+        kind = array(tuple(bounds), element[0])
+        assert isinstance(kind, ArrayType)
+        return kind, element[1] * kind.count
+
+    def _enumeration(self, spec: tree.EnumSpec, source: Source, name: str) -> Resolved | None:
+        base = INT
+        if spec.base is not None:
+            resolved = self.resolve(spec.base, source)
+            if resolved is None:
+                return None
+            if not isinstance(resolved[0], Elementary) or not {"ANY_INT", "ANY_BIT"} & resolved[0].families:
+                self.report.add("S0704", source, spec.base, "an enumeration is based on an integer or bit string type")
+                return None
+            base = resolved[0]
+        members: dict[str, int] = {}
+        shown: dict[int, str] = {}
+        following = 0
+        for member, written in spec.members:
+            value = self.values.integer(written, source) if written is not None else following
+            if value is None:
+                return None
+            if fold(member.text) in members:
+                self.report.add("S0202", source, member, f"{member.text} stands twice in this enumeration")
+                continue
+            if not base.low <= value <= base.high:
+                self.report.add("S0702", source, written or member, f"{value} does not fit {base}")
+                return None
+            members[fold(member.text)] = value
+            shown.setdefault(value, member.text)
+            following = value + 1
+        if not name:
+            self._anonymous += 1
+            name = f"({', '.join(m.text for m, _ in spec.members)})"
+        made = EnumType(name, base.size, base.align, base, members, shown)
+        for member_name, value in members.items():
+            self.project.enum_members.setdefault(member_name, []).append((made, value))
+        return made, default(made)
+
+    def _structure(self, spec: tree.StructSpec, source: Source, name: str) -> Resolved | None:
+        fields: dict[str, Field] = {}
+        content = bytearray()
+        align = 1
+        complete = True
+        for declared in spec.members:
+            resolved = self.resolve(declared.spec, source)
+            if resolved is None:
+                complete = False
+                continue
+            kind, initial = resolved
+            if declared.initial is not None:
+                initial = self.values.initial(kind, declared.initial, source, initial)
+            if declared.location is not None:
+                self.report.add("S0604", source, declared.location, "a member of a structure has no location of its own")
+            align = max(align, kind.align)
+            for member in declared.names:
+                if fold(member.text) in fields:
+                    self.report.add("S0202", source, member, f"{member.text} stands twice in this structure")
+                    continue
+                content += bytes(-len(content) % kind.align)
+                fields[fold(member.text)] = Field(member.text, kind, len(content))
+                content += initial
+        if not complete:
+            return None
+        content += bytes(-len(content) % align)
+        if not name:
+            self._anonymous += 1
+            name = f"STRUCT {self._anonymous}"
+        return StructType(name, len(content), align, fields), bytes(content)

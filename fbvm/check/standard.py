@@ -1,0 +1,293 @@
+"""Calls of standard functions: which one, in which types."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import (
+    ELEMENTARY,
+    GENERIC,
+    LREAL,
+    Elementary,
+    EnumType,
+    StringType,
+    Type,
+    base,
+    common,
+    converts,
+    families,
+    fold,
+    string,
+)
+from fbvm.check import functions
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, StandardCall
+from fbvm.check.functions import Conversion, Signature
+from fbvm.check.values import is_any
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.expressions import Expressions
+
+RESULT_STRING = 255
+"""Characters that the result of a string function can have (as CODESYS)."""
+UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
+
+
+class StandardCalls:
+    """Calls of standard functions in one POU."""
+
+    def __init__(self, expressions: Expressions) -> None:
+        self.expressions = expressions
+        self.facts = expressions.facts
+        self.error = expressions.error
+
+    def call(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
+        """The result's type, "" for a call without result, None after a diagnostic."""
+        if name in functions.TIME_OPERATORS:
+            return self._operator(call, functions.TIME_OPERATORS[name], None, want)
+        if name in functions.OPERATORS:
+            return self._operator(call, name, None, want)
+        if name in functions.SIGNATURES:
+            return self._signature(call, functions.SIGNATURES[name], None, want)
+        conversion = functions.conversion(name) or self._enum_conversion(name)
+        if conversion is not None:
+            return self._conversion(call, conversion)
+        typed = functions.typed_name(name)
+        if typed is not None:
+            kind = ELEMENTARY[typed[1]]
+            if typed[0] in functions.OPERATORS:
+                return self._operator(call, typed[0], kind, want)
+            return self._signature(call, functions.SIGNATURES[typed[0]], kind, want)
+        for argument in call.arguments:
+            if argument.value is not None:
+                self.expressions.infer(argument.value)
+        project = self.expressions.project
+        known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]
+        self.error("S0401", call.callee, f"there is no function or instance {_name(call)}",
+                   project.nearest(_name(call), known))
+        return None
+
+    # --- arguments --------------------------------------------------------------------------------------------------
+
+    def _arguments(self, call: tree.Call, names: list[str], repeats: bool) -> list[tree.Expr] | None:
+        """Values in the order of the parameters, or None after a diagnostic."""
+        values: dict[int, tree.Expr] = {}
+        for position, argument in enumerate(call.arguments):
+            index: int | None = position
+            if argument.name is not None:
+                index = self._index(argument, names, repeats)
+            if index is None or argument.value is None:
+                return None
+            if index in values:
+                self.error("S0403", argument, f"{argument.name.text if argument.name else 'it'} is given twice")
+                return None
+            values[index] = argument.value
+        least = len(names)
+        if sorted(values) != list(range(len(values))) or len(values) < least or \
+                (len(values) > least and not repeats):
+            more = " or more" if repeats else ""
+            shown = ", ".join(names)
+            self.error("S0404" if len(values) < least else "S0402", call,
+                       f"{_name(call)} takes {least}{more} argument{'s' if least != 1 or repeats else ''} ({shown}), "
+                       f"{len(values)} given")
+            return None
+        return [values[i] for i in range(len(values))]
+
+    def _index(self, argument: tree.Argument, names: list[str], repeats: bool) -> int | None:
+        assert argument.name is not None
+        name = fold(argument.name.text)
+        if name in ("EN", "ENO"):
+            self.error("S0901", argument, f"{name} at a standard function is understood but not executed",
+                       "put the call into an IF")
+            return None
+        if argument.kind == ":=" and name in names:
+            return names.index(name)
+        stem = names[-1].rstrip("0123456789") if names else ""
+        if argument.kind == ":=" and repeats and name.startswith(stem) and name[len(stem):].isdigit():
+            return int(name[len(stem):]) - int(names[-1][len(stem):]) + len(names) - 1
+        self.error("S0402", argument.name, f"there is no parameter {argument.name.text} here",
+                   "the parameters are " + ", ".join(names))
+        return None
+
+    # --- kinds ------------------------------------------------------------------------------------------------------
+
+    def _operator(self, call: tree.Call, name: str, kind: Elementary | None, want: Type | None) -> Type | None:
+        """ADD(a, b, c) means a + b + c; NOT(a) means NOT a."""
+        op = functions.OPERATORS[name]
+        names = ["IN"] if name == "NOT" else ["IN1", "IN2"]
+        values = self._arguments(call, names, name in functions.EXTENSIBLE_OPERATORS)
+        if values is None:
+            return None
+        if name == "NOT":
+            meaning: tree.Expr = tree.Unary(call.start, call.end, "NOT", values[0])
+        else:
+            meaning = values[0]
+            for value in values[1:]:
+                meaning = tree.Binary(call.start, call.end, op, meaning, value, value.start)
+        result = self.expressions.infer(meaning, kind or want)
+        if result in UNTYPED and kind is not None:
+            result = self.expressions.adopt(meaning, kind)
+        if result is None:
+            return None
+        if kind is not None and not converts(result, kind):
+            self.error("S0405", call, f"the arguments are {result}, {_name(call)} takes {kind}")
+            return None
+        self.facts.rewritten[call] = meaning
+        if meaning in self.facts.constants:
+            self.facts.constants[call] = self.facts.constants[meaning]
+        return result
+
+    def _signature(self, call: tree.Call, row: Signature, fixed: Elementary | None, want: Type | None) -> Type | str | None:
+        values = self._arguments(call, [name for name, _ in row.parameters], row.repeats)
+        if values is None:
+            return None
+        wanted = [kind for _, kind in row.parameters]
+        wanted += [wanted[-1]] * (len(values) - len(wanted)) if wanted else []
+        variable: Type | None = fixed
+        if "T" in wanted and fixed is None:
+            places = [v for v, w in zip(values, wanted, strict=True) if w == "T"]
+            variable = self._bind(call, places, row, want if row.result == "T" else None)
+            if variable is None:
+                return None
+        arguments = []
+        for value, kind_name in zip(values, wanted, strict=True):
+            kind = variable if kind_name == "T" else self._parameter(value, kind_name)
+            if kind is None or not self.expressions.fit(value, kind, "S0405"):
+                return None
+            arguments.append((value, kind))
+        self.facts.calls[call] = StandardCall(row.key, arguments, (variable,) if variable else ())
+        if row.result == "STRING":
+            return string(RESULT_STRING)
+        if row.result == "T":
+            assert variable is not None
+            return string(RESULT_STRING) if isinstance(variable, StringType) else variable
+        return ELEMENTARY[row.result] if row.result else ""
+
+    def _parameter(self, value: tree.Expr, name: str) -> Type | None:
+        """The type in which an argument is wanted whose parameter has its own type."""
+        if name == "STRING":
+            return string(RESULT_STRING)
+        if name not in GENERIC:
+            return ELEMENTARY[name]
+        kind = self.expressions.settle(value)
+        if kind is not None and name not in families(kind):
+            self.error("S0405", value, f"{name[4:]} is needed here, this is {kind}")
+            return None
+        return base(kind) if kind is not None else None
+
+    def _bind(self, call: tree.Call, values: list[tree.Expr], row: Signature, want: Type | None) -> Type | None:
+        """The one type that all arguments of a type variable meet in."""
+        kinds = [self.expressions.infer(value, want) for value in values]
+        if None in kinds:
+            return None
+        bound: Type | None = None
+        for kind in kinds:
+            assert kind is not None
+            if kind in UNTYPED:
+                continue
+            met = base(kind) if bound is None else common(bound, kind)
+            if isinstance(kind, EnumType) or isinstance(bound, EnumType):
+                met = kind if bound in (None, kind) else None
+            if isinstance(met, StringType):
+                met = string(RESULT_STRING)
+            if met is None:
+                self.error("S0405", call, f"{bound} and {kind} have no type in common")
+                return None
+            bound = met
+        if UNTYPED_REAL in kinds and (bound is None or not is_any(bound, "ANY_REAL")):
+            bound = self._real(bound, want)
+        elif bound is None:
+            bound = self._integer(call, values, row, want)
+        return self._limited(call, bound, row) if bound is not None else None
+
+    def _real(self, bound: Type | None, want: Type | None) -> Type:
+        fits = want is not None and is_any(want, "ANY_REAL") and (bound is None or converts(bound, want))
+        return base(want) if fits and want is not None else LREAL
+
+    def _integer(self, call: tree.Call, values: list[tree.Expr], row: Signature, want: Type | None) -> Type | None:
+        """The type of a type variable that met only untyped integers."""
+        if row.limits == ("ANY_REAL",):
+            return base(want) if want is not None and is_any(want, "ANY_REAL") else LREAL
+        if want is not None and is_any(want, "ANY_NUM", "ANY_BIT") and set(row.limits) & families(want):
+            return base(want)
+        settled = [self.expressions.settle(value) for value in values]
+        bound: Type | None = settled[0]
+        for kind in settled[1:]:
+            bound = common(bound, kind) if bound is not None and kind is not None else None
+        return bound
+
+    def _limited(self, call: tree.Call, bound: Type, row: Signature) -> Type | None:
+        good = set(row.limits) & families(bound) or isinstance(bound, EnumType) and "ANY" in row.limits
+        if row.limits == ("ANY_REAL",) and not good and converts(bound, LREAL):
+            return LREAL
+        if not good or not isinstance(bound, Elementary | StringType | EnumType):
+            shown = " or ".join(limit for limit in row.limits if limit != "ANY") or "an elementary type"
+            self.error("S0405", call, f"{_name(call)} is defined for {shown}, not for {bound}")
+            return None
+        return bound
+
+    # --- conversions ------------------------------------------------------------------------------------------------
+
+    def _enum_conversion(self, name: str) -> Conversion | None:
+        """`INT_TO_Color` and the like, where Color is a declared enumeration."""
+        source, _, target = name.partition("_TO_")
+        named = self.expressions.checker.specs.named_type(target, self.expressions.source) if target else None
+        return Conversion(functions.long_name(source), "TO", target) \
+            if isinstance(named, EnumType) and source in ELEMENTARY else None
+
+    def _conversion(self, call: tree.Call, row: Conversion) -> Type | None:
+        values = self._arguments(call, ["IN"], False)
+        if values is None:
+            return None
+        value = values[0]
+        target = self._named(row.target)
+        source = self._named(row.source) if row.source else self.expressions.settle(value)
+        if source is None or target is None or not self.expressions.fit(value, source, "S0405"):
+            return None
+        if isinstance(source, StringType):
+            source = string(RESULT_STRING)
+        if not convertible(row.form, base(source), target):
+            self.error("S0405", call, f"{_name(call)} is not defined for {source}", "")
+            return None
+        self.facts.calls[call] = StandardCall(row.form, [(value, base(source))], (base(source), target))
+        return target
+
+    def _named(self, name: str) -> Type | None:
+        if name == "STRING":
+            return string(RESULT_STRING)
+        return ELEMENTARY.get(name) or self.expressions.checker.specs.named_type(name, self.expressions.source)
+
+
+_TIMES = ("ANY_DURATION", "ANY_DATE")
+_DATES = {
+    ("DATE_AND_TIME", "DATE"), ("DATE_AND_TIME", "TIME_OF_DAY"), ("LDATE_AND_TIME", "LDATE"),
+    ("LDATE_AND_TIME", "LTIME_OF_DAY"), ("LDATE_AND_TIME", "DATE"), ("LDATE_AND_TIME", "TIME_OF_DAY"),
+    ("DATE_AND_TIME", "LTIME_OF_DAY"), ("DATE_AND_TIME", "LDATE"),
+}
+
+
+def convertible(form: str, source: Type, target: Type) -> bool:
+    """True if the tables (22 to 27, and our additions) have the conversion."""
+    if form == "TRUNC":
+        return is_any(source, "ANY_REAL") and is_any(target, "ANY_INT")
+    if form == "BCD_TO":
+        return is_any(source, "ANY_BIT") and is_any(target, "ANY_INT") and source.name != "BOOL"
+    if form == "TO_BCD":
+        return is_any(source, "ANY_INT") and is_any(target, "ANY_BIT") and target.name != "BOOL"
+    if isinstance(source, EnumType) or isinstance(target, EnumType):
+        return is_any(source, "ANY_INT", "ANY_BIT", "ANY_STRING") or is_any(target, "ANY_INT", "ANY_BIT", "ANY_STRING")
+    if isinstance(source, StringType) or isinstance(target, StringType):
+        return True
+    timed = [is_any(kind, *_TIMES) for kind in (source, target)]
+    if all(timed):
+        short = [kind.name.removeprefix("L") for kind in (source, target)]
+        return short[0] == short[1] or (source.name, target.name) in _DATES
+    if any(timed):
+        return is_any(target if timed[0] else source, "ANY_NUM", "ANY_BIT")
+    if is_any(source, "ANY_REAL") and is_any(target, "ANY_BIT") or is_any(source, "ANY_BIT") and is_any(target, "ANY_REAL"):
+        return "BOOL" in (source.name, target.name) or source.size == target.size
+    return True
+
+
+def _name(call: tree.Call) -> str:
+    return call.callee.text if isinstance(call.callee, tree.NameRef) else "this"

@@ -1,0 +1,232 @@
+"""Rules of statements (IEC 61131-3 ed. 3, table 72)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import BOOL, EnumType, StringType, Type, base, fold
+from fbvm.check.expressions import assignable, conversion_hint
+from fbvm.check.facts import Pou, Variable
+from fbvm.check.values import is_any
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.checker import Checker
+
+
+class Statements:
+    """Checks the body of one POU."""
+
+    def __init__(self, checker: Checker, pou: Pou) -> None:
+        self.checker = checker
+        self.pou = pou
+        self.expressions = checker.expressions(pou.source, pou)
+        self.facts = self.expressions.facts
+        self.calls = checker.calls(self.expressions)
+        self.error = self.expressions.error
+        self._loops = 0
+        self._counting: list[Variable] = []
+
+    def block(self, statements: tree.Block) -> None:
+        for statement in statements:
+            _CHECK[type(statement)](self, statement)
+
+    # --- assignments and calls --------------------------------------------------------------------------------------
+
+    def target(self, expr: tree.Expr, purpose: str = "be written") -> Type | None:
+        """The type of a place that is written, or None after a diagnostic."""
+        kind = self.expressions.infer(expr)
+        if kind is None:
+            return None
+        if not self.expressions.is_variable(expr):
+            self.error("S0501", expr, f"this is a value of {kind} and cannot {purpose}",
+                       "only variables stand left of :=")
+            return None
+        if not self.checker.writable(self.expressions, expr, purpose):
+            return None
+        variable = self.facts.variables.get(expr)
+        if variable is not None and variable in self._counting:
+            self.error("S0590", expr, f"{variable.name} counts the FOR loop and is written inside it")
+        return kind
+
+    def _assign(self, node: tree.Assign) -> None:
+        if node.op in ("REF=", "?="):
+            self.error("S0901", node, f"{node.op} is understood but not executed by this version")
+            return
+        kinds = [self.target(target) for target in node.targets]
+        last = kinds[-1]
+        if node.op in ("S=", "R="):
+            self._set_or_reset(node, kinds)
+            return
+        if last is None:
+            self.expressions.infer(node.value)
+            return
+        self.expressions.fit(node.value, last)
+        for kind, value, value_kind in zip(kinds, node.targets[1:], kinds[1:], strict=False):
+            if kind is not None and value_kind is not None and not assignable(value_kind, kind):
+                self.error("S0301", value, f"the value is {value_kind}, but {kind} is needed here",
+                           conversion_hint(value_kind, kind))
+
+    def _set_or_reset(self, node: tree.Assign, kinds: list[Type | None]) -> None:
+        for target, kind in zip(node.targets, kinds, strict=True):
+            if kind is not None and base(kind) != BOOL:
+                self.error("S0301", target, f"{node.op} sets a BOOL; this is {kind}")
+        self.expressions.condition(node.value, node.op)
+
+    def _call(self, node: tree.CallStatement) -> None:
+        if isinstance(node.call, tree.Call):
+            self.calls.statement(node.call)
+            return
+        kind = self.expressions.infer(node.call)
+        if kind is not None:
+            self.error("S0401", node.call, "this is no statement: it does nothing",
+                       "write () behind an instance to call it, or := to assign")
+
+    # --- choices ----------------------------------------------------------------------------------------------------
+
+    def _if(self, node: tree.If) -> None:
+        for condition, body in node.branches:
+            self.expressions.condition(condition, "IF")
+            self.block(body)
+        self.block(node.otherwise or ())
+
+    def _case(self, node: tree.Case) -> None:
+        kind = self.expressions.settle(node.selector)
+        if kind is not None and not is_any(kind, "ANY_INT", "ANY_BIT") and not isinstance(kind, EnumType):
+            what = "texts are" if isinstance(kind, StringType) else f"{kind} is"
+            self.error("S0503", node.selector, f"CASE chooses by an integer, a bit string or an enumeration; {what} none")
+            kind = None
+        taken: list[tuple[int, int]] = []
+        for branch in node.branches:
+            if kind is not None:
+                self.facts.labels[branch] = tuple(
+                    span for label in branch.labels if (span := self._label(label, kind, taken)) is not None)
+            self.block(branch.body)
+        self.block(node.otherwise or ())
+
+    def _label(self, label: tuple[tree.Expr, tree.Expr | None], kind: Type,
+               taken: list[tuple[int, int]]) -> tuple[int, int] | None:
+        low = self._label_value(label[0], kind)
+        high = self._label_value(label[1], kind) if label[1] is not None else low
+        if low is None or high is None:
+            return None
+        if low > high:
+            self.error("S0503", label[0], f"the range {low}..{high} is empty")
+            return None
+        if any(low <= other_high and other_low <= high for other_low, other_high in taken):
+            if low == high or (low, high) in taken:
+                self.error("S0503", label[0], f"the label {low if low == high else f'{low}..{high}'} is taken by a branch "
+                                              "above", "the first branch that fits is executed")
+            return low, high
+        taken.append((low, high))
+        return low, high
+
+    def _label_value(self, expr: tree.Expr, kind: Type) -> int | None:
+        if not self.expressions.fit(expr, kind, "S0503", "the label"):
+            return None
+        value = self.facts.constants.get(expr)
+        if value is None or not isinstance(value, int):
+            self.error("S0503", expr, "a label must be known before the program runs",
+                       "write a literal or the name of a constant")
+            return None
+        return int(value)
+
+    # --- loops ------------------------------------------------------------------------------------------------------
+
+    def _for(self, node: tree.For) -> None:
+        kind = self.target(node.variable, "count a loop")
+        if kind is not None and not is_any(kind, "ANY_INT"):
+            self.error("S0504", node.variable, f"FOR counts with an integer, not with {kind}")
+            kind = None
+        for part, role in ((node.first, "the first value"), (node.last, "the last value"), (node.step, "the step")):
+            if part is None:
+                continue
+            if kind is None:
+                self.expressions.infer(part)
+            elif role == "the step":
+                self._step(part, kind)
+            else:
+                self.expressions.fit(part, base(kind), "S0504", role)
+        variable = self.facts.variables.get(node.variable)
+        if variable is not None:
+            self._counting.append(variable)
+        self._body(node.body)
+        if variable is not None:
+            self._counting.pop()
+
+    def _step(self, expr: tree.Expr, kind: Type) -> None:
+        """A step may be negative where the variable may not: it is then a literal, and worked out in LINT."""
+        if self.expressions.infer(expr) is None:
+            return
+        value = self.facts.constants.get(expr)
+        if value == 0:
+            self.error("S0504", expr, "a step of 0 never ends the loop")
+        elif isinstance(value, int) and value < 0 and not isinstance(value, bool):
+            self.expressions.settle(expr)
+        else:
+            self.expressions.fit(expr, base(kind), "S0504", "the step")
+
+    def _body(self, statements: tree.Block) -> None:
+        self._loops += 1
+        self.block(statements)
+        self._loops -= 1
+
+    def _while(self, node: tree.While) -> None:
+        self.expressions.condition(node.condition, "WHILE")
+        self._body(node.body)
+
+    def _repeat(self, node: tree.Repeat) -> None:
+        self._body(node.body)
+        self.expressions.condition(node.until, "UNTIL")
+
+    def _leave(self, node: tree.Exit | tree.Continue) -> None:
+        if not self._loops:
+            word = "EXIT" if isinstance(node, tree.Exit) else "CONTINUE"
+            self.error("S0502", node, f"{word} stands outside a loop", "RETURN leaves the POU")
+
+    def _return(self, node: tree.Return) -> None:
+        if node.value is None:
+            return
+        if self.pou.result is None:
+            self.error("S0409", node.value, f"{self.pou.name} has no result to return")
+            return
+        self.expressions.fit(node.value, self.pou.result.type)
+
+    def _empty(self, node: tree.Empty) -> None:
+        """Nothing is wrong with `;`."""
+
+    def _refused(self, node: tree.RefusedStatement) -> None:
+        ending = "is object-oriented text, which fbvm does not execute" if node.code == "S0902" else \
+            "is understood but not executed by this version"
+        self.error(node.code, node, f"{node.what} {ending}")
+
+
+_CHECK: dict[type, Callable[..., None]] = {
+    tree.Assign: Statements._assign, tree.CallStatement: Statements._call, tree.If: Statements._if,
+    tree.Case: Statements._case, tree.For: Statements._for, tree.While: Statements._while,
+    tree.Repeat: Statements._repeat, tree.Exit: Statements._leave, tree.Continue: Statements._leave,
+    tree.Return: Statements._return, tree.Empty: Statements._empty, tree.RefusedStatement: Statements._refused,
+}
+
+
+def assigns_to(statements: tree.Block, name: str) -> bool:
+    """True if a variable of that name is assigned anywhere in a body."""
+    for statement in statements:
+        if isinstance(statement, tree.Assign) and any(
+                isinstance(t, tree.NameRef) and fold(t.text) == name for t in statement.targets):
+            return True
+        if any(assigns_to(body, name) for body in bodies(statement)):
+            return True
+    return False
+
+
+def bodies(statement: tree.Statement) -> list[tree.Block]:
+    """The statement lists inside a statement."""
+    if isinstance(statement, tree.If):
+        return [body for _, body in statement.branches] + [statement.otherwise or ()]
+    if isinstance(statement, tree.Case):
+        return [branch.body for branch in statement.branches] + [statement.otherwise or ()]
+    if isinstance(statement, tree.For | tree.While | tree.Repeat):
+        return [statement.body]
+    return []
