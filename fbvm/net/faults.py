@@ -8,14 +8,10 @@ import random
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from fbvm.net.addresses import fits
 from fbvm.wire.link import Peer
 
 ANY = Peer("0.0.0.0", 0)
-
-
-def fits(pattern: Peer, peer: Peer) -> bool:
-    """True if `peer` is the pattern, where host 0.0.0.0 and port 0 of the pattern fit anything."""
-    return pattern.host in ("0.0.0.0", peer.host) and pattern.port in (0, peer.port)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,11 +11,12 @@ import random
 from collections.abc import Callable, Iterable
 from functools import partial
 
-from fbvm.net.channels import Bound, Channel, Door, Line
-from fbvm.net.faults import Fault, find, fits
+from fbvm.net.addresses import fits, impossible
+from fbvm.net.faults import Fault, find
+from fbvm.net.loop_channels import Bound, Door, Line, MemoryLink
 from fbvm.net.peers import Action, Actions, Conversation, Fin, Leave, Reset, Say, Station, Wake
 from fbvm.net.stream import End
-from fbvm.wire.link import Bind, Close, Closed, Connect, Event, Failed, Grant, Listen, Peer, Request, Send, SendTo
+from fbvm.wire.link import Bind, Connect, Failed, Listen, Peer, Request
 from fbvm.wire.tap import Happening, Tap, What
 
 CONNECT_TIMEOUT_NS = 75_000_000_000
@@ -152,57 +153,46 @@ class LoopNetwork:
                     self._carry(endpoint, sender, answer)
 
 
-class LoopLink:
+class LoopLink(MemoryLink):
     """One unit's place on a `LoopNetwork`."""
 
     def __init__(self, network: LoopNetwork, address: str) -> None:
-        self.address = address
+        super().__init__(address)
         self.network = network
-        self.told: list[Event] = []
-        """Events that wait to be fetched."""
-        self.tell = network.tell
-        self.post = network.post
-        self._channels: dict[int, Channel] = {}
         self._ends: dict[tuple[int, Peer], End] = {}
         self._next_port = FIRST_EPHEMERAL_PORT
 
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
-        """Take requests in order.  Raises ValueError if a unit opens a channel that is in use."""
         self.network.run(now_ns)
-        for request in requests:
-            there = self._channels.get(request.channel)
-            match request:
-                case Connect() | Listen() | Bind():
-                    self._open(request)
-                case Close(channel, reset):
-                    if there:
-                        there.close(reset, now_ns)
-                        del self._channels[channel]
-                    self.told.append(Closed(channel))
-                case Send(_, data):
-                    self._check(request, there.send(data, now_ns) if there else "ENOTCONN")
-                case SendTo(_, remote, data):
-                    self._check(request, there.send_to(remote, data) if there else "ENOTCONN")
-                case Grant(_, size):
-                    if there:
-                        there.granted = size
+        super().submit(requests, now_ns)
 
-    def events(self, now_ns: int) -> list[Event]:
-        """What happened up to `now_ns`, in order, each once."""
+    def serve(self, now_ns: int) -> None:
         self.network.run(now_ns)
-        told = self.told[:]
-        self.told.clear()
-        for there in self._channels.values():
-            told += there.fetch(now_ns)
-        return told
+
+    def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
+        channel = request.channel
+        self._ends = {where: end for where, end in self._ends.items() if not end.gone}
+        error = self._conflict(request)
+        if error:
+            self.told.append(Failed(channel, "open", error))
+            return
+        port = request.local_port or self._ephemeral_port()
+        if isinstance(request, Listen):
+            self.channels[channel] = Door(self, channel, port, request.remote)
+        elif isinstance(request, Bind):
+            self.channels[channel] = Bound(self, channel, port)
+        else:
+            line = self.channels[channel] = Line(self, channel, port)
+            self.network.dial(line, Peer(self.address, port), request.remote)
 
     # For the network and for the channels.
 
     def admit(self, caller: End, now_ns: int) -> End | None:
         """A connection from elsewhere: its end here, or None if no door is open to it."""
-        for channel, there in self._channels.items():
+        for channel, there in self.channels.items():
             if isinstance(there, Door) and there.port == caller.remote.port and fits(there.remote, caller.local):
-                line = self._channels[channel] = Line(self, channel, there.granted)
+                line = self.channels[channel] = Line(self, channel, there.port)
+                line.granted = there.granted
                 end = End(self.network, caller.remote, caller.local, self.address, line)
                 self.tell(end, What.SYN, False)
                 line.answered(end, "", False, now_ns)
@@ -211,64 +201,36 @@ class LoopLink:
 
     def drop_in(self, sender: Peer, port: int, data: bytes) -> None:
         """A datagram for this address has arrived; lost if nobody is bound to its port."""
-        for there in self._channels.values():
+        for there in self.channels.values():
             if isinstance(there, Bound) and there.port == port:
                 there.take_in(sender, data)
                 self.network.tell_unit(self.address, What.UDP, Peer(self.address, port), sender, False, data)
 
-    def free(self, channel: int, error: str) -> None:
-        """An open has failed: the channel may be used again."""
-        del self._channels[channel]
-        self.told.append(Failed(channel, "open", error))
-
     def remember(self, end: End) -> None:
-        """Keep an end of this link, so that its pair of endpoints is not used twice."""
         self._ends[end.local.port, end.remote] = end
 
-    # Requests.
+    def tell(self, end: End, what: What, out: bool) -> None:
+        self.network.tell(end, what, out)
 
-    def _check(self, request: Send | SendTo, error: str) -> None:
-        if error:
-            self.told.append(Failed(request.channel, "send", error))
-
-    def _open(self, request: Connect | Listen | Bind) -> None:
-        channel = request.channel
-        if channel in self._channels:
-            raise ValueError(f"channel {channel} of {self.address} is in use")
-        self._ends = {where: end for where, end in self._ends.items() if not end.gone}
-        error = self._conflict(request)
-        if error:
-            self.told.append(Failed(channel, "open", error))
-            return
-        port = request.local_port or self._ephemeral_port()
-        if isinstance(request, Listen):
-            self._channels[channel] = Door(self, channel, port, request.remote)
-        elif isinstance(request, Bind):
-            self._channels[channel] = Bound(self, channel, port)
-        else:
-            line = self._channels[channel] = Line(self, channel, 0)
-            line.port = port
-            self.network.dial(line, Peer(self.address, port), request.remote)
+    def post(self, port: int, receiver: Peer, data: bytes) -> None:
+        self.network.post(Peer(self.address, port), receiver, data)
 
     def _conflict(self, request: Connect | Listen | Bind) -> str:
         """The errno name of what cannot be opened, "" if it can."""
         kind = Bound if isinstance(request, Bind) else Door
         port = request.local_port
-        if port and any(isinstance(there, kind) and there.port == port for there in self._channels.values()):
+        if port and any(isinstance(there, kind) and there.port == port for there in self.channels.values()):
             return "EADDRINUSE"
         if not isinstance(request, Connect):
             return ""
-        remote = request.remote
-        if remote.port == 0 or remote.host == "0.0.0.0" or remote == Peer(self.address, port):
-            return "EADDRNOTAVAIL"
-        if remote.host == "255.255.255.255":
-            return "EACCES"
+        local, remote = Peer(self.address, port), request.remote
         if (port, remote) in self._ends:
             return "EADDRINUSE"
-        return self.network.fault(Peer(self.address, port), remote).error
+        return impossible(local, remote) or self.network.fault(local, remote).error
 
     def _ephemeral_port(self) -> int:
-        used = {port for port, _ in self._ends} | {there.port for there in self._channels.values()}
+        used = {port for port, _ in self._ends}
+        used |= {there.port for there in self.channels.values() if isinstance(there, Door | Line | Bound)}
         while True:
             port = self._next_port
             self._next_port = FIRST_EPHEMERAL_PORT if port == LAST_PORT else port + 1

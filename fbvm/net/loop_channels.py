@@ -1,0 +1,145 @@
+"""What a channel of a `LoopLink` can be: a TCP line, a door that waits for one caller, a bound UDP port."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections import deque
+
+from fbvm.net.channels import ANYBODY, MAX_DATAGRAM_BYTES, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink
+from fbvm.net.stream import End
+from fbvm.wire.link import Broken, Failed, Opened, Peer, PeerClosed, Received, Sent
+from fbvm.wire.tap import What
+
+
+class MemoryLink(ChannelLink):
+    """What these channels need of their link."""
+
+    @abstractmethod
+    def remember(self, end: End) -> None:
+        """Keep an end, so that its pair of endpoints is not used twice."""
+
+    @abstractmethod
+    def tell(self, end: End, what: What, out: bool) -> None:
+        """Pass a happening at an end on to the tap."""
+
+    @abstractmethod
+    def post(self, port: int, receiver: Peer, data: bytes) -> None:
+        """Carry a datagram."""
+
+
+class _Here(Channel):
+    link: MemoryLink
+
+    def __init__(self, link: MemoryLink, channel: int, port: int) -> None:
+        super().__init__(link, channel)
+        self.port = port
+        """Local port."""
+
+
+class Door(_Here):
+    """Waits on a port for one caller that fits `remote`."""
+
+    def __init__(self, link: MemoryLink, channel: int, port: int, remote: Peer) -> None:
+        super().__init__(link, channel, port)
+        self.remote = remote
+
+
+class Line(_Here):
+    """A TCP connection, or the wish for one while there is no end."""
+
+    _end: End | None = None
+    _closed = ""
+    _fin_told = _break_told = False
+
+    # The network's side.
+
+    def refused(self, error: str, now_ns: int) -> None:
+        """The open has failed."""
+        if not self._closed:
+            self.failed(error)
+
+    def answered(self, end: End, error: str, active: bool, now_ns: int) -> None:
+        """The other side has answered; without an `error` the connection is open."""
+        if error:
+            self.link.tell(end, What.RST, False)
+            self.refused(error, now_ns)
+            return
+        self.link.tell(end, What.OPEN, active)
+        if self._closed:
+            (end.reset if self._closed == "rst" else end.leave)(now_ns)
+            return
+        self._end = end
+        self.link.remember(end)
+        self.link.told.append(Opened(self.channel, end.local.port, end.remote))
+
+    def sent(self, size_bytes: int) -> None:
+        self.link.told.append(Sent(self.channel, size_bytes))
+
+    def readable(self, now_ns: int) -> None:
+        """Nothing to do: the unit fetches, as far as it has granted."""
+
+    def finished(self, now_ns: int) -> None:
+        """Nothing to do: told when everything before it has been fetched."""
+
+    def broken(self, error: str, unsent: int, now_ns: int) -> None:
+        self.link.told += [Failed(self.channel, "send", error)] * unsent
+
+    # The unit's side.
+
+    def close(self, reset: bool, now_ns: int) -> None:
+        self._closed = "rst" if reset else "fin"
+        if self._end:
+            (self._end.reset if reset else self._end.leave)(now_ns)
+
+    def send(self, data: bytes, now_ns: int) -> str:
+        if self._end is None:
+            return "ENOTCONN"
+        if self._end.error:
+            return "EPIPE"
+        if self._end.waiting_bytes + len(data) > SEND_BUFFER_BYTES:
+            return "ENOBUFS"
+        self._end.send(data, now_ns)
+        return ""
+
+    def fetch(self, now_ns: int) -> None:
+        end, told = self._end, self.link.told
+        if end is None:
+            return
+        if end.inbox and self.granted > 0:
+            data = end.take(self.granted, now_ns)
+            self.granted -= len(data)
+            told.append(Received(self.channel, data))
+        if end.fin_arrived and not end.inbox and not self._fin_told:
+            self._fin_told = True
+            told.append(PeerClosed(self.channel))
+        if end.error and not self._break_told:
+            self._break_told = True
+            end.inbox.clear()
+            told.append(Broken(self.channel, end.error))
+
+
+class Bound(_Here):
+    """A UDP port.  Datagrams are handed over whole and need no grant: what has no room is the unit's to drop."""
+
+    def __init__(self, link: MemoryLink, channel: int, port: int) -> None:
+        super().__init__(link, channel, port)
+        self._arrived: deque[Received] = deque()
+        link.told.append(Opened(channel, port, ANYBODY))
+
+    def take_in(self, sender: Peer, data: bytes) -> None:
+        """A datagram has arrived; beyond what can be kept it is lost, as UDP loses."""
+        if len(self._arrived) < MAX_DATAGRAMS:
+            self._arrived.append(Received(self.channel, data, sender))
+
+    def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
+        if remote.host == "0.0.0.0" or remote.port == 0:
+            return "EADDRNOTAVAIL"
+        if len(data) > MAX_DATAGRAM_BYTES:
+            return "EMSGSIZE"
+        self.link.post(self.port, remote, data)
+        self.link.told.append(Sent(self.channel, len(data)))
+        return ""
+
+    def fetch(self, now_ns: int) -> None:
+        self.link.told += self._arrived
+        self._arrived.clear()

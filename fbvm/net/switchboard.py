@@ -1,0 +1,149 @@
+"""What `TcpNetwork` keeps in mind: the links, who is where, which connections the host is ready for.
+
+No sockets in here; they pass through as things with a file number.
+"""
+
+from __future__ import annotations
+
+import errno
+import selectors
+from abc import ABC, abstractmethod
+from collections import deque
+from typing import Protocol
+
+from fbvm.net.addresses import AddressMap
+from fbvm.net.channels import ChannelLink
+from fbvm.wire.link import Peer
+from fbvm.wire.tap import Happening, Tap, What
+
+READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
+TCP, UDP = "tcp", "udp"
+MAX_ORPHANS = 64
+ORPHAN_LIMIT_NS = 10_000_000_000
+"""A closed connection gets so long to send its rest and to hear the peer's FIN, then it is reset."""
+
+
+def errno_name(error: OSError | int) -> str:
+    """The POSIX name of an error of the host."""
+    number = error if isinstance(error, int) else error.errno or errno.EIO
+    return errno.errorcode.get(number, "EIO").removeprefix("WSA")
+
+
+class HasFileno(Protocol):
+    """A socket, as far as a selector is concerned."""
+
+    def fileno(self) -> int:
+        """Its number on the host."""
+
+
+class Watcher(ABC):
+    """Somebody who is told when the host is ready, and who can let go of what the host lent."""
+
+    @abstractmethod
+    def ready(self, ready: int, now_ns: int) -> None:
+        """The host is ready for what was wanted (READ, WRITE)."""
+
+    @abstractmethod
+    def end(self) -> None:
+        """Give everything back to the host."""
+
+
+class Orphan(Watcher):
+    """A connection that its unit has closed, and that has not ended yet."""
+
+    @property
+    @abstractmethod
+    def done(self) -> bool:
+        """True when it has ended."""
+
+    @abstractmethod
+    def give_up(self, now_ns: int) -> None:
+        """End it by RST."""
+
+
+class Switchboard(ABC):
+    """One selector, the map of addresses, and the bookkeeping around them."""
+
+    def __init__(self, address_map: AddressMap) -> None:
+        self.tap: Tap | None = None
+        self.map = address_map
+        self.links: dict[str, ChannelLink] = {}
+        self._selector = selectors.DefaultSelector()
+        self._own: dict[tuple[str, Peer], Peer] = {}
+        self._orphans: deque[tuple[int, Orphan]] = deque()
+        self.closed = False
+
+    @abstractmethod
+    def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
+        """Where on the host a unit's own endpoint is."""
+
+    def wait(self, timeout_s: float) -> bool:
+        """Sleep until a connection wants attention or the time is over; True if there is something to fetch."""
+        if self.closed or any(link.told for link in self.links.values()):
+            return True
+        return bool(self._selector.select(max(timeout_s, 0.0)))
+
+    def serve(self, now_ns: int) -> None:
+        """Do everything that the host is ready for."""
+        if self.closed:
+            return
+        for key, ready in self._selector.select(0):
+            key.data.ready(ready, now_ns)
+        while self._orphans and (self._orphans[0][1].done or self._orphans[0][0] <= now_ns):
+            self._orphans.popleft()[1].give_up(now_ns)
+
+    def close(self) -> None:
+        """End all connections and free what the host lent."""
+        watched = [there for link in self.links.values() for there in link.channels.values()]
+        for there in [*watched, *(orphan for _, orphan in self._orphans)]:
+            if isinstance(there, Watcher):
+                there.end()
+        for link in self.links.values():
+            link.channels.clear()
+        self.links.clear()
+        self._orphans.clear()
+        self._selector.close()
+        self.closed = True
+
+    # For channels.
+
+    def watch(self, sock: HasFileno, wanted: int, channel: Watcher) -> None:
+        """Be told when the host is ready for what is wanted: READ, WRITE, both or nothing."""
+        known = self._selector.get_map().get(sock)
+        if not wanted:
+            if known:
+                self._selector.unregister(sock)
+        elif not known:
+            self._selector.register(sock, wanted, channel)
+        elif known.events != wanted:
+            self._selector.modify(sock, wanted, channel)
+
+    def adopt(self, orphan: Orphan, now_ns: int) -> None:
+        """Keep a closed connection until it has ended."""
+        self._orphans.append((now_ns + ORPHAN_LIMIT_NS, orphan))
+        if len(self._orphans) > MAX_ORPHANS:
+            self._orphans.popleft()[1].give_up(now_ns)
+
+    def own(self, transport: str, real: Peer, said: Peer | None) -> None:
+        """Note, or forget with None, that an endpoint of the host is a unit's."""
+        where = transport, Peer("127.0.0.1", real.port) if real.host == "0.0.0.0" else real
+        if said:
+            self._own[where] = said
+        else:
+            self._own.pop(where, None)
+
+    def outward(self, remote: Peer, transport: str = TCP) -> Peer:
+        """Where on the host the program's peer is."""
+        if remote.host not in self.links:
+            return self.map.outward(remote)
+        real = self.host_endpoint(remote, transport)
+        return Peer("127.0.0.1", real.port) if real.host == "0.0.0.0" else real
+
+    def inward(self, transport: str, real: Peer) -> Peer:
+        """What the program calls a peer that came by itself."""
+        return self._own.get((transport, real)) or self.map.inward(real, self.links)
+
+    def tell(self, now_ns: int, what: What, local: Peer, remote: Peer, out: bool, data: bytes = b"") -> None:
+        """Pass a happening on to the tap."""
+        if self.tap:
+            self.tap(now_ns, local.host, Happening(what, local, remote, out, data, remote.host in self.links))

@@ -1,0 +1,457 @@
+"""The host's own network: units talk to real devices and programs over real TCP and UDP, and nothing ever blocks.
+
+One selector for all connections.  Work is done when a link is asked for its events or given requests; `wait` lets a
+run sleep until there is some.  The only module of the project that uses sockets.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+import struct
+import sys
+from abc import abstractmethod
+from collections import deque
+from collections.abc import Mapping
+from contextlib import suppress
+
+from fbvm.net.addresses import AddressMap, fits, impossible
+from fbvm.net.channels import ANYBODY, MAX_DATAGRAM_BYTES, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink
+from fbvm.net.switchboard import READ, TCP, UDP, WRITE, Orphan, Switchboard, Watcher, errno_name
+from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
+from fbvm.wire.tap import What
+
+CHUNK_BYTES = 65_536
+KERNEL_BUFFER_BYTES = 65_536
+"""Small, so that a unit that grants nothing, or a peer that reads nothing, soon closes the TCP window."""
+_RST_ON_CLOSE = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
+
+
+def _share_port(sock: socket.socket) -> None:
+    """Let a port be listened on again while old connections of it linger (elsewhere than on Windows)."""
+    if os.name == "posix":
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+
+
+def _dotted(real: Peer) -> tuple[str, int]:
+    """An endpoint for the host.  Raises OSError for a name, which would have to be looked up and so could block."""
+    try:
+        socket.inet_pton(socket.AF_INET, real.host)
+    except OSError:
+        raise OSError(errno.EADDRNOTAVAIL, real.host) from None
+    return real.host, real.port
+
+
+class TcpNetwork(Switchboard):
+    """Real connections.  `address_map` says where on the host the program's endpoints are, see `AddressMap`.
+
+    Without a row a unit listens on address `bind`, under the port that it asked for.  Names of hosts in the map are
+    resolved here, once; raises OSError for one that cannot be."""
+
+    virtual_time = False
+
+    def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1") -> None:
+        rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
+        super().__init__(AddressMap(rows, bind))
+        self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
+
+    def attach(self, address: str) -> TcpLink:
+        """A place for one unit.  Raises ValueError if the address is taken."""
+        if address in self.links:
+            raise ValueError(f"{address} is attached already")
+        link = self.links[address] = TcpLink(self, address)
+        return link
+
+    def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
+        """Where on the host a unit's own endpoint is, or will be once it listens there.
+
+        A port that the system has to choose is chosen now, and stays.  Raises OSError if there is none."""
+        real = self.map.local(endpoint)
+        if real.port:
+            return real
+        if (transport, endpoint) not in self._reserved:
+            keeper = socket.socket(socket.AF_INET, socket.SOCK_STREAM if transport == TCP else socket.SOCK_DGRAM)
+            _share_port(keeper)
+            keeper.bind((real.host, 0))
+            # Linux lets others listen beside a socket that only keeps the port from being given away.
+            keeps = sys.platform == "linux" and transport == TCP
+            self._reserved[transport, endpoint] = Peer(*keeper.getsockname()), keeper if keeps else None
+            if not keeps:
+                keeper.close()
+        return self._reserved[transport, endpoint][0]
+
+    def close(self) -> None:
+        """End all connections and free what the host lent."""
+        super().close()
+        for _, keeper in self._reserved.values():
+            if keeper:
+                keeper.close()
+        self._reserved.clear()
+
+
+class TcpLink(ChannelLink):
+    """One unit's place on a `TcpNetwork`."""
+
+    def __init__(self, network: TcpNetwork, address: str) -> None:
+        super().__init__(address)
+        self.network = network
+
+    def serve(self, now_ns: int) -> None:
+        self.network.serve(now_ns)
+
+    def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
+        channel: _OnHost
+        match request:
+            case Connect():
+                channel = _Line(self, request)
+            case Listen():
+                channel = _Door(self, request)
+            case Bind():
+                channel = _Bound(self, request)
+        self.channels[request.channel] = channel
+        try:
+            if self.network.closed:
+                raise OSError(errno.ENETDOWN, "closed")
+            channel.open(now_ns)
+        except OSError as error:
+            channel.failed(errno_name(error))
+
+
+# --- channels ------------------------------------------------------------------------------------------------------
+
+
+class _OnHost(Channel, Watcher):
+    """A channel that has a socket of the host."""
+
+    def __init__(self, link: TcpLink, request: Connect | Listen | Bind) -> None:
+        super().__init__(link, request.channel)
+        self.place = link
+        self.network = link.network
+        self.sock: socket.socket | None = None
+        self.local = Peer(link.address, request.local_port)
+        """The unit's endpoint, as the program sees it."""
+
+    @abstractmethod
+    def open(self, now_ns: int) -> None:
+        """Do what the request asks.  Raises OSError."""
+
+    def end(self) -> None:
+        """Give the socket back to the host."""
+        if self.sock:
+            self.network.watch(self.sock, 0, self)
+            self.sock.close()
+            self.sock = None
+
+    def failed(self, error: str) -> None:
+        self.end()
+        super().failed(error)
+
+    def close(self, reset: bool, now_ns: int) -> None:
+        self.end()
+
+    def make(self, kind: int, bind: Peer | None) -> socket.socket:
+        """A socket that never blocks.  Raises OSError."""
+        self.sock = sock = socket.socket(socket.AF_INET, kind)
+        sock.setblocking(False)
+        if kind == socket.SOCK_STREAM:
+            _share_port(sock)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, KERNEL_BUFFER_BYTES)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, KERNEL_BUFFER_BYTES)
+        if bind:
+            sock.bind((bind.host, bind.port))
+        return sock
+
+
+class _Door(_OnHost):
+    """Waits for one caller that fits; others are reset."""
+
+    def __init__(self, link: TcpLink, request: Listen) -> None:
+        super().__init__(link, request)
+        self._request = request
+
+    def open(self, now_ns: int) -> None:
+        sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
+        sock.listen()
+        self.network.watch(sock, READ, self)
+
+    def ready(self, ready: int, now_ns: int) -> None:
+        while self.sock:
+            try:
+                conn, name = self.sock.accept()
+            except (BlockingIOError, ConnectionAbortedError):
+                return
+            except OSError as error:
+                self.failed(errno_name(error))
+                return
+            remote = self.network.inward(TCP, Peer(*name))
+            if fits(self._request.remote, remote):
+                self.end()
+                wish = Connect(self.channel, remote, self.local.port, self._request.keep_alive)
+                line = self.link.channels[self.channel] = _Line(self.place, wish)
+                line.granted = self.granted
+                line.admit(conn, now_ns)
+            else:
+                with suppress(OSError), conn:
+                    conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+
+
+class _Line(_OnHost, Orphan):
+    """A TCP connection, or the wish for one until it is `_connected`.
+
+    As an `_orphan` it has been closed by its unit: it sends what it has, then FIN, and waits for the peer's."""
+
+    _connected = _orphan = _readable = _stalled = _fin_sent = _fin_seen = False
+    _taken = 0
+
+    def __init__(self, link: TcpLink, request: Connect) -> None:
+        super().__init__(link, request)
+        self.remote = request.remote
+        self._keep_alive = request.keep_alive
+        self._outbox: deque[bytes] = deque()
+        self._real = ANYBODY
+
+    @property
+    def done(self) -> bool:
+        """True when the host has the socket back."""
+        return self.sock is None
+
+    # Opening.
+
+    def open(self, now_ns: int) -> None:
+        error = impossible(self.local, self.remote)
+        if error:
+            raise OSError(getattr(errno, error), error)
+        where = _dotted(self.network.outward(self.remote))
+        port = self.network.host_endpoint(self.local).port if self.local.port else 0
+        sock = self.make(socket.SOCK_STREAM, Peer("0.0.0.0", port) if port else None)
+        self._tune(sock)
+        code = sock.connect_ex(where)
+        self._real = Peer(*sock.getsockname())
+        self.local = Peer(self.local.host, self.local.port or self._real.port)
+        self.network.own(TCP, self._real, self.local)
+        self._tap(now_ns, What.SYN, True)
+        if code in (0, errno.EINPROGRESS, errno.EWOULDBLOCK):
+            self._watch()
+        else:
+            self._refused(code, now_ns)
+
+    def admit(self, conn: socket.socket, now_ns: int) -> None:
+        """Take over a connection that somebody else has opened."""
+        self.sock = conn
+        conn.setblocking(False)
+        self._tune(conn)
+        self._tap(now_ns, What.SYN, False)
+        self._opened(now_ns, False)
+
+    def _tune(self, sock: socket.socket) -> None:
+        with suppress(OSError):  # some hosts refuse once the peer has reset the connection
+            sock.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, self._keep_alive)
+
+    def _refused(self, code: int, now_ns: int) -> None:
+        if code == errno.ECONNREFUSED:
+            self._tap(now_ns, What.RST, False)
+        self.failed(errno_name(code))
+
+    def _opened(self, now_ns: int, active: bool) -> None:
+        self._connected = True
+        self._tap(now_ns, What.OPEN, active)
+        self._report(Opened(self.channel, self.local.port, self.remote))
+        self._watch()
+
+    def _answered(self, sock: socket.socket, now_ns: int) -> None:
+        code = sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+        with suppress(OSError):
+            # The host's TCP can connect a port of its own to itself while nobody listens there.
+            code = code or (errno.ECONNREFUSED if sock.getpeername() == sock.getsockname() else 0)
+        if code:
+            self._refused(code, now_ns)
+        else:
+            self._opened(now_ns, True)
+
+    # Working.
+
+    def ready(self, ready: int, now_ns: int) -> None:
+        if self.sock and not self._connected:
+            self._answered(self.sock, now_ns)
+            return
+        if ready & READ and self.sock:
+            if self._orphan:
+                self._receive(self.sock, now_ns)
+            else:
+                self._readable = True
+        if ready & WRITE and self.sock:
+            self._flush(self.sock, now_ns)
+
+    def grant(self, size_bytes: int) -> None:
+        self.granted = size_bytes
+        self._stalled = False
+        self._watch()
+
+    def fetch(self, now_ns: int) -> None:
+        """Read only now: until its unit asks, another unit's turn must not use up a grant that may yet be changed."""
+        if self.sock and self._readable:
+            self._readable = False
+            self._receive(self.sock, now_ns)
+        elif self.sock and (self._stalled or self._fin_seen):  # the selector would not tell that it broke
+            code = self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
+            if code:
+                self._broke(code, now_ns)
+
+    def send(self, data: bytes, now_ns: int) -> str:
+        if not self._connected:
+            return "ENOTCONN"
+        if self.sock is None:
+            return "EPIPE"
+        if sum(map(len, self._outbox)) + len(data) > SEND_BUFFER_BYTES:
+            return "ENOBUFS"
+        self._outbox.append(data)
+        self._flush(self.sock, now_ns)
+        return ""
+
+    def close(self, reset: bool, now_ns: int) -> None:
+        if not self._connected:
+            self.end()
+        elif reset:
+            self.give_up(now_ns)
+        elif self.sock:
+            self._orphan, self._stalled = True, False
+            with suppress(OSError):  # what the unit has not fetched is thrown away, so that FIN goes out and no RST
+                for _ in range(16):
+                    if not self.sock.recv(CHUNK_BYTES):
+                        break
+            self._flush(self.sock, now_ns)
+            if self.sock:
+                self.network.adopt(self, now_ns)
+
+    def give_up(self, now_ns: int) -> None:
+        """End by RST."""
+        if self.sock:
+            self._tap(now_ns, What.RST, True)
+            with suppress(OSError):
+                self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+            self.end()
+
+    def end(self) -> None:
+        if self.sock:
+            self.network.own(TCP, self._real, None)
+        super().end()
+
+    def _receive(self, sock: socket.socket, now_ns: int) -> None:
+        wanted = min(self.granted, CHUNK_BYTES)
+        try:
+            # Without a grant only look, whether FIN has come; data stay in the host.
+            data = sock.recv(wanted) if wanted > 0 else sock.recv(1, socket.MSG_PEEK)
+        except BlockingIOError:
+            return
+        except OSError as error:
+            self._broke(error, now_ns)
+            return
+        if not data:
+            self._fin_seen = True
+            self._tap(now_ns, What.FIN, False)
+            self._report(PeerClosed(self.channel))
+            self._finish(sock, now_ns)
+        elif self._orphan:
+            self.give_up(now_ns)
+        elif wanted <= 0:
+            self._stalled = True
+        else:
+            self.granted -= len(data)
+            self._tap(now_ns, What.DATA, False, data)
+            self._report(Received(self.channel, data))
+        self._watch()
+
+    def _flush(self, sock: socket.socket, now_ns: int) -> None:
+        try:
+            while self._outbox:
+                rest = self._outbox[0][self._taken :]
+                size = sock.send(rest) if rest else 0
+                if size:
+                    self._tap(now_ns, What.DATA, True, rest[:size])
+                self._taken += size
+                if size == len(rest):
+                    self._report(Sent(self.channel, len(self._outbox.popleft())))
+                    self._taken = 0
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            self._broke(error, now_ns)
+            return
+        self._finish(sock, now_ns)
+        self._watch()
+
+    def _finish(self, sock: socket.socket, now_ns: int) -> None:
+        """Do the next step of an orphan's end."""
+        if self._orphan and not self._outbox and not self._fin_sent:
+            self._fin_sent = True
+            self._tap(now_ns, What.FIN, True)
+            with suppress(OSError):
+                sock.shutdown(socket.SHUT_WR)
+        if self._fin_sent and self._fin_seen:
+            self.end()
+
+    def _broke(self, error: OSError | int, now_ns: int) -> None:
+        name = errno_name(error)
+        self._tap(now_ns, What.RST, False)
+        for _ in self._outbox:
+            self._report(Failed(self.channel, "send", name))
+        self._outbox.clear()
+        self._report(Broken(self.channel, "ECONNRESET" if name == "EPIPE" else name))
+        self.end()
+
+    def _watch(self) -> None:
+        if self.sock:
+            wanted = READ if self._connected and not self._fin_seen and not self._stalled else 0
+            self.network.watch(self.sock, wanted | (WRITE if self._outbox or not self._connected else 0), self)
+
+    def _report(self, event: Event) -> None:
+        if not self._orphan:
+            self.link.told.append(event)
+
+    def _tap(self, now_ns: int, what: What, out: bool, data: bytes = b"") -> None:
+        self.network.tell(now_ns, what, self.local, self.remote, out, data)
+
+
+class _Bound(_OnHost):
+    """A UDP port.  Datagrams are handed over whole and need no grant: what has no room is the unit's to drop."""
+
+    def open(self, now_ns: int) -> None:
+        sock = self.make(socket.SOCK_DGRAM, self.network.host_endpoint(self.local, UDP))
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self.local = Peer(self.local.host, self.local.port or sock.getsockname()[1])
+        self.network.own(UDP, Peer(*sock.getsockname()), self.local)
+        self.network.watch(sock, READ, self)
+        self.link.told.append(Opened(self.channel, self.local.port, ANYBODY))
+
+    def ready(self, ready: int, now_ns: int) -> None:
+        for _ in range(MAX_DATAGRAMS):
+            try:
+                data, name = self.sock.recvfrom(CHUNK_BYTES) if self.sock else (b"", ("", 0))
+            except OSError:
+                return
+            remote = self.network.inward(UDP, Peer(*name))
+            self.network.tell(now_ns, What.UDP, self.local, remote, False, data)
+            self.link.told.append(Received(self.channel, data, remote))
+
+    def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
+        if remote.host == "0.0.0.0" or remote.port == 0:
+            return "EADDRNOTAVAIL"
+        if len(data) > MAX_DATAGRAM_BYTES:
+            return "EMSGSIZE"
+        try:
+            if self.sock:
+                self.sock.sendto(data, _dotted(self.network.outward(remote, UDP)))
+        except BlockingIOError:
+            return "ENOBUFS"
+        except OSError as error:
+            return errno_name(error)
+        self.network.tell(now_ns, What.UDP, self.local, remote, True, data)
+        self.link.told.append(Sent(self.channel, len(data)))
+        return ""
+
+    def end(self) -> None:
+        if self.sock:
+            self.network.own(UDP, Peer(*self.sock.getsockname()), None)
+        super().end()

@@ -1,0 +1,501 @@
+"""Real connections on 127.0.0.1: nothing blocks, whatever the other side does."""
+
+from __future__ import annotations
+
+import socket
+import struct
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from fbvm.net.addresses import AddressMap
+from fbvm.net.switchboard import MAX_ORPHANS, ORPHAN_LIMIT_NS, UDP
+from fbvm.net.tcp import TcpLink, TcpNetwork
+from fbvm.wire.link import (
+    Bind,
+    Broken,
+    Close,
+    Closed,
+    Connect,
+    Event,
+    Failed,
+    Grant,
+    Listen,
+    Opened,
+    Peer,
+    PeerClosed,
+    Received,
+    Send,
+    SendTo,
+    Sent,
+)
+from fbvm.wire.tap import Happening, What
+
+BOUND_S = 10.0
+"""Nothing here takes so long; a test that waits in vain ends after it."""
+SERVER = Peer("192.168.250.1", 502)
+UNIT = "192.168.250.2"
+RST_ON_CLOSE = struct.pack("ii", 1, 0)
+
+
+now_ns = time.monotonic_ns
+
+
+class Device:
+    """The other side: a plain listening socket of the host, served by the test itself."""
+
+    def __init__(self, backlog: int = 5) -> None:
+        self.door = socket.create_server(("127.0.0.1", 0), backlog=backlog)
+        self.door.settimeout(BOUND_S)
+        self.port: int = self.door.getsockname()[1]
+        self.lines: list[socket.socket] = []
+
+    def accept(self) -> socket.socket:
+        line, _ = self.door.accept()
+        line.settimeout(BOUND_S)
+        self.lines.append(line)
+        return line
+
+    def close(self) -> None:
+        for sock in (self.door, *self.lines):
+            sock.close()
+
+
+@pytest.fixture
+def device() -> Iterator[Device]:
+    device = Device()
+    yield device
+    device.close()
+
+
+@pytest.fixture
+def network(device: Device) -> Iterator[TcpNetwork]:
+    network = TcpNetwork({SERVER: ("127.0.0.1", device.port), Peer("192.168.250.2", 0): ("127.0.0.1", 0)})
+    yield network
+    network.close()
+
+
+def until(link: TcpLink, enough: Callable[[list[Event]], bool]) -> list[Event]:
+    """Events until there are enough, sleeping in the selector only."""
+    events: list[Event] = []
+    end_s = time.monotonic() + BOUND_S
+    while not enough(events):
+        assert time.monotonic() < end_s, events
+        link.network.wait(0.05)
+        events += link.events(now_ns())
+    return events
+
+
+def until_last(link: TcpLink, kind: type) -> list[Event]:
+    return until(link, lambda events: bool(events) and isinstance(events[-1], kind))
+
+
+def opened(network: TcpNetwork, device: Device, grant: int = 4096) -> tuple[TcpLink, socket.socket]:
+    link = network.attach(UNIT)
+    link.submit([Connect(1, SERVER), Grant(1, grant)], now_ns())
+    [event] = until(link, bool)
+    assert isinstance(event, Opened)
+    assert event.remote == SERVER
+    line = device.accept()
+    assert line.getpeername() == ("127.0.0.1", event.local_port)
+    return link, line
+
+
+def data_of(events: list[Event]) -> bytes:
+    return b"".join(event.data for event in events if isinstance(event, Received))
+
+
+def is_reset(line: socket.socket) -> bool:
+    return line.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) != 0
+
+
+def test_bytes_go_both_ways(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    link.submit([Send(1, b"ping")], now_ns())
+    assert until(link, bool) == [Sent(1, 4)]
+    assert line.recv(100) == b"ping"
+    line.sendall(b"pong")
+    assert until(link, bool) == [Received(1, b"pong")]
+    line.shutdown(socket.SHUT_WR)
+    assert until(link, bool) == [PeerClosed(1)]
+    link.submit([Send(1, b"still"), Close(1)], now_ns())
+    assert until(link, bool) == [Sent(1, 5), Closed(1)]
+    assert line.recv(100) == b"still"
+    assert line.recv(100) == b""
+
+
+def test_nobody_listens(network: TcpNetwork, device: Device) -> None:
+    device.door.close()
+    link = network.attach(UNIT)
+    link.submit([Connect(1, SERVER)], now_ns())
+    assert until(link, bool) == [Failed(1, "open", "ECONNREFUSED")]
+
+
+@pytest.mark.parametrize(
+    ("remote", "error"),
+    [
+        (Peer("255.255.255.255", 502), "EACCES"),
+        (Peer("0.0.0.0", 502), "EADDRNOTAVAIL"),
+        (Peer("localhost", 502), "EADDRNOTAVAIL"),  # a name is never looked up
+        (Peer("127.0.0.1", 70000), "EADDRNOTAVAIL"),
+    ],
+)
+def test_endpoints_that_cannot_be(network: TcpNetwork, remote: Peer, error: str) -> None:
+    link = network.attach(UNIT)
+    link.submit([Connect(1, remote)], now_ns())
+    assert link.events(now_ns()) == [Failed(1, "open", error)]
+
+
+def test_never_more_than_granted(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device, grant=0)
+    line.sendall(b"abcdefgh")
+    line.shutdown(socket.SHUT_WR)
+    assert network.wait(BOUND_S)
+    assert link.events(now_ns()) == []
+    assert not network.wait(0)  # data without a grant do not keep the run awake
+    for size, expected in [(3, b"abc"), (2, b"de")]:
+        link.submit([Grant(1, 100), Grant(1, size)], now_ns())
+        assert until(link, bool) == [Received(1, expected)]
+    link.submit([Grant(1, 100)], now_ns())
+    assert until_last(link, PeerClosed) == [Received(1, b"fgh"), PeerClosed(1)]
+    assert not network.wait(0)
+
+
+def test_a_grant_may_shrink_while_others_are_served(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device, grant=100)
+    other = network.attach("192.168.250.3")
+    line.sendall(b"abcdefgh")
+    assert network.wait(BOUND_S)
+    assert other.events(now_ns()) == []
+    link.submit([Grant(1, 3)], now_ns())
+    assert link.events(now_ns()) == [Received(1, b"abc")]
+
+
+def test_a_fin_is_noticed_without_a_grant(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device, grant=0)
+    line.shutdown(socket.SHUT_WR)
+    assert until(link, bool) == [PeerClosed(1)]
+
+
+def test_reset_by_the_peer(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RST_ON_CLOSE)
+    line.close()
+    assert until(link, bool) == [Broken(1, "ECONNRESET")]
+    link.submit([Send(1, b"x"), Close(1), Connect(1, SERVER)], now_ns())
+    assert until_last(link, Opened)[:2] == [Failed(1, "send", "EPIPE"), Closed(1)]
+
+
+def test_reset_is_noticed_while_data_wait_for_a_grant(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device, grant=0)
+    line.sendall(b"data")
+    assert network.wait(BOUND_S)
+    assert link.events(now_ns()) == []
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RST_ON_CLOSE)
+    line.close()
+    assert until(link, bool) == [Broken(1, "ECONNRESET")]
+
+
+def test_sending_to_a_peer_that_left_ends_in_a_reset(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    line.close()
+    assert until(link, bool) == [PeerClosed(1)]
+    link.submit([Send(1, b"x")], now_ns())
+    assert until_last(link, Broken) == [Sent(1, 1), Broken(1, "ECONNRESET")]
+
+
+def test_close_by_fin_and_by_rst(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    link.submit([Close(1)], now_ns())
+    assert line.recv(10) == b""
+    link.submit([Connect(1, SERVER)], now_ns())
+    until_last(link, Opened)
+    line = device.accept()
+    link.submit([Close(1, reset=True)], now_ns())
+    with pytest.raises(ConnectionResetError):
+        line.recv(10)
+
+
+def test_unread_data_do_not_turn_the_fin_into_a_reset(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device, grant=0)
+    line.sendall(b"never fetched")
+    assert network.wait(BOUND_S)
+    link.submit([Close(1)], now_ns())
+    assert line.recv(10) == b""
+    line.sendall(b"too late")
+    assert until(link, lambda events: is_reset(line)) == [Closed(1)]
+
+
+def test_a_peer_that_never_reads(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    link.submit([Send(1, bytes(60_000))] * 200, now_ns())
+    events = link.events(now_ns())
+    assert events.count(Sent(1, 60_000)) >= 1
+    refused = events.count(Failed(1, "send", "ENOBUFS"))
+    assert refused > 100  # what waits here is bounded
+    link.submit([Close(1)], now_ns())
+    assert link.events(now_ns()) == [Closed(1)]
+    link.events(now_ns() + ORPHAN_LIMIT_NS)  # and it does not wait for ever
+    with pytest.raises(ConnectionResetError):
+        while line.recv(65536):
+            pass
+
+
+def test_a_large_send_is_taken_bit_by_bit(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    content = bytes(range(256)) * 900
+    link.submit([Send(1, content)], now_ns())
+    got = bytearray()
+    line.setblocking(False)
+    sent: list[Event] = []
+    end_s = time.monotonic() + BOUND_S
+    while len(got) < len(content) and time.monotonic() < end_s:
+        sent += link.events(now_ns())
+        try:
+            got += line.recv(65536)
+        except BlockingIOError:
+            network.wait(0.01)
+    assert bytes(got) == content
+    assert sent + link.events(now_ns()) == [Sent(1, len(content))]
+
+
+def test_what_waits_at_a_close_still_goes_out(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    content = bytes(250_000)
+    link.submit([Send(1, content), Close(1)], now_ns())
+    got = 0
+    line.setblocking(False)
+    end_s = time.monotonic() + BOUND_S
+    while time.monotonic() < end_s:
+        link.events(now_ns())
+        try:
+            part = line.recv(65536)
+        except BlockingIOError:
+            network.wait(0.01)
+            continue
+        got += len(part)
+        if not part:
+            break
+    assert got == len(content)
+
+
+def test_a_peer_that_never_accepts() -> None:
+    device = Device(backlog=0)
+    network = TcpNetwork({SERVER: ("127.0.0.1", device.port)})
+    link = network.attach(UNIT)
+    link.submit([Connect(channel, SERVER) for channel in range(1, 9)], now_ns())
+    events = link.events(now_ns())
+    link.submit([Close(channel) for channel in range(1, 9)], now_ns())
+    assert [event for event in link.events(now_ns()) if isinstance(event, Closed)] == [Closed(n) for n in range(1, 9)]
+    assert len(events) < 8  # some stay in the opening for ever, and nothing blocks
+    network.close()
+    device.close()
+
+
+def test_orphans_are_bounded(network: TcpNetwork, device: Device) -> None:
+    link = network.attach(UNIT)
+    for _ in range(MAX_ORPHANS + 2):
+        link.submit([Connect(1, SERVER)], now_ns())
+        until_last(link, Opened)
+        device.accept()
+        link.submit([Close(1)], now_ns())
+    assert device.lines[-1].recv(1) == b""
+    assert [is_reset(line) for line in device.lines] == [True, True] + [False] * MAX_ORPHANS
+
+
+# --- listening -----------------------------------------------------------------------------------------------------
+
+
+def call(network: TcpNetwork, endpoint: Peer) -> socket.socket:
+    real = network.host_endpoint(endpoint)
+    return socket.create_connection((real.host, real.port), timeout=BOUND_S)
+
+
+def test_listening_on_a_port_that_the_system_chose(network: TcpNetwork) -> None:
+    link = network.attach(UNIT)
+    here = Peer(UNIT, 502)
+    assert network.host_endpoint(here).port not in (0, 502)
+    with pytest.raises(ConnectionRefusedError):
+        call(network, here)
+    for _ in range(3):
+        link.submit([Listen(1, 502), Grant(1, 100)], now_ns())
+        with call(network, here) as caller:
+            [event] = until(link, bool)
+            assert event == Opened(1, 502, Peer(*caller.getsockname()))
+            with pytest.raises(ConnectionRefusedError):
+                call(network, here)
+            caller.sendall(b"hello")
+            assert until(link, bool) == [Received(1, b"hello")]
+            link.submit([Send(1, b"and back"), Close(1)], now_ns())
+            assert until(link, bool) == [Sent(1, 8), Closed(1)]
+            assert caller.recv(100) == b"and back"
+
+
+def test_a_withdrawn_door_is_shut(network: TcpNetwork) -> None:
+    link = network.attach(UNIT)
+    link.submit([Listen(1, 502), Listen(2, 502), Close(1)], now_ns())
+    assert link.events(now_ns()) == [Failed(2, "open", "EADDRINUSE"), Closed(1)]
+    with pytest.raises(ConnectionRefusedError):
+        call(network, Peer(UNIT, 502))
+
+
+def test_a_stranger_is_reset_and_the_door_stays_open(device: Device) -> None:
+    network = TcpNetwork({Peer(UNIT, 502): ("127.0.0.1", 0), Peer("10.0.0.7", 0): ("127.0.0.1", 0)})
+    link = network.attach(UNIT)
+    link.submit([Listen(1, 502, Peer("10.0.0.8", 0))], now_ns())
+    with call(network, Peer(UNIT, 502)) as stranger:
+        assert network.wait(BOUND_S)
+        assert link.events(now_ns()) == []
+        with pytest.raises(ConnectionResetError):
+            stranger.recv(1)
+    link.submit([Close(1), Listen(1, 502, Peer("10.0.0.7", 0))], now_ns())
+    with call(network, Peer(UNIT, 502)) as friend:
+        assert until_last(link, Opened)[-1] == Opened(1, 502, Peer("10.0.0.7", friend.getsockname()[1]))
+    network.close()
+
+
+def test_two_units_of_one_network(network: TcpNetwork) -> None:
+    server, client = network.attach(UNIT), network.attach("192.168.250.3")
+    heard: list[Happening] = []
+    network.tap = lambda now_ns, address, happening: heard.append(happening)
+    client.submit([Connect(1, Peer(UNIT, 502))], now_ns())
+    assert until(client, bool) == [Failed(1, "open", "ECONNREFUSED")]
+    server.submit([Listen(1, 502, Peer("192.168.250.3", 0))], now_ns())
+    client.submit([Connect(1, Peer(UNIT, 502))], now_ns())
+    [event] = until(client, bool)
+    assert isinstance(event, Opened)
+    assert until(server, bool) == [Opened(1, 502, Peer("192.168.250.3", event.local_port))]
+    assert all(happening.mirrored for happening in heard)
+    assert [happening.what for happening in heard if happening.out][-2:] == [What.SYN, What.OPEN]
+
+
+def test_a_local_port_of_the_clients_own(network: TcpNetwork, device: Device) -> None:
+    link = network.attach(UNIT)
+    link.submit([Connect(1, SERVER, local_port=502)], now_ns())
+    assert until(link, bool) == [Opened(1, 502, SERVER)]
+    assert device.accept().getpeername()[1] == network.host_endpoint(Peer(UNIT, 502)).port
+
+
+def test_a_port_without_a_row_is_used_as_it_is() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        network = TcpNetwork()
+        link = network.attach(UNIT)
+        link.submit([Listen(1, port)], now_ns())
+        assert link.events(now_ns()) == [Failed(1, "open", "EADDRINUSE")]
+        network.close()
+
+
+def test_a_connection_to_itself_is_refused() -> None:
+    network = TcpNetwork()
+    link = network.attach(UNIT)
+    with socket.create_server(("127.0.0.1", 0)) as probe:
+        port = probe.getsockname()[1]
+    link.submit([Connect(1, Peer("127.0.0.1", port), local_port=port)], now_ns())
+    assert until(link, bool) == [Failed(1, "open", "ECONNREFUSED")]
+    network.close()
+
+
+# --- datagrams, the map, the tap -----------------------------------------------------------------------------------
+
+
+def test_datagrams() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as device:
+        device.bind(("127.0.0.1", 0))
+        device.settimeout(BOUND_S)
+        there = Peer("192.168.250.9", 9600)
+        network = TcpNetwork({there: device.getsockname(), Peer(UNIT, 9600): ("127.0.0.1", 0)})
+        link = network.attach(UNIT)
+        sends = [SendTo(1, there, b"hello"), SendTo(1, there, bytes(70_000)), Send(1, b"")]
+        link.submit([Bind(1, 9600), *sends], now_ns())
+        assert link.events(now_ns()) == [
+            Opened(1, 9600, Peer("0.0.0.0", 0)),
+            Sent(1, 5),
+            Failed(1, "send", "EMSGSIZE"),
+            Failed(1, "send", "ENOTCONN"),
+        ]
+        data, sender = device.recvfrom(100)
+        assert (data, Peer(*sender)) == (b"hello", network.host_endpoint(Peer(UNIT, 9600), UDP))
+        device.sendto(b"one", sender)
+        device.sendto(b"two", sender)
+        assert until(link, lambda events: len(events) == 2) == [Received(1, b"one", there), Received(1, b"two", there)]
+        link.submit([SendTo(1, Peer("0.0.0.0", 1), b""), Close(1)], now_ns())
+        assert link.events(now_ns()) == [Failed(1, "send", "EADDRNOTAVAIL"), Closed(1)]
+        network.close()
+
+
+def test_datagrams_between_units() -> None:
+    network = TcpNetwork({Peer("10.0.0.1", 0): ("127.0.0.1", 0), Peer("10.0.0.2", 0): ("127.0.0.1", 0)})
+    one, two = network.attach("10.0.0.1"), network.attach("10.0.0.2")
+    one.submit([Bind(1, 9600)], now_ns())
+    two.submit([Bind(1, 9600), SendTo(1, Peer("10.0.0.1", 9600), b"hi")], now_ns())
+    assert until_last(one, Received)[-1] == Received(1, b"hi", Peer("10.0.0.2", 9600))
+    network.close()
+
+
+def test_the_map() -> None:
+    rows = {
+        Peer("10.0.0.1", 502): Peer("127.0.0.1", 1502),
+        Peer("10.0.0.2", 0): Peer("127.0.0.2", 0),
+        Peer("10.0.0.3", 0): Peer("127.0.0.3", 7),
+        Peer("10.0.0.9", 0): Peer("127.0.0.2", 0),
+    }
+    book = AddressMap(rows, "127.0.0.1")
+    assert book.outward(Peer("10.0.0.1", 502)) == Peer("127.0.0.1", 1502)
+    assert book.outward(Peer("10.0.0.1", 503)) == Peer("10.0.0.1", 503)
+    assert book.outward(Peer("10.0.0.2", 503)) == Peer("127.0.0.2", 503)
+    assert book.outward(Peer("10.0.0.3", 503)) == Peer("127.0.0.3", 7)
+    assert book.local(Peer("10.0.0.5", 502)) == Peer("127.0.0.1", 502)
+    assert book.local(Peer("10.0.0.9", 502)) == Peer("127.0.0.2", 0)
+    assert book.inward(Peer("127.0.0.1", 1502), ()) == Peer("10.0.0.1", 502)
+    assert book.inward(Peer("127.0.0.1", 4000), ()) == Peer("127.0.0.1", 4000)
+    assert book.inward(Peer("127.0.0.2", 4000), ()) == Peer("10.0.0.2", 4000)
+    assert book.inward(Peer("127.0.0.2", 4000), {"10.0.0.2"}) == Peer("10.0.0.9", 4000)
+
+
+def test_the_tap_hears_the_programs_addresses(network: TcpNetwork, device: Device) -> None:
+    heard: list[tuple[What, Peer, Peer, bool, bytes]] = []
+    network.tap = lambda now_ns, address, h: heard.append((h.what, h.local, h.remote, h.out, h.data))
+    link, line = opened(network, device)
+    link.submit([Send(1, b"\1\2")], now_ns())
+    line.sendall(b"\3")
+    assert data_of(until_last(link, Received)) == b"\3"
+    assert line.recv(2) == b"\1\2"
+    link.submit([Close(1)], now_ns())
+    line.close()
+    until(link, lambda events: len(heard) == 6)
+    here = Peer(UNIT, heard[0][1].port)
+    assert heard == [
+        (What.SYN, here, SERVER, True, b""),
+        (What.OPEN, here, SERVER, True, b""),
+        (What.DATA, here, SERVER, True, b"\1\2"),
+        (What.DATA, here, SERVER, False, b"\3"),
+        (What.FIN, here, SERVER, True, b""),
+        (What.FIN, here, SERVER, False, b""),
+    ]
+
+
+def test_wait(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    assert not network.wait(0)
+    assert not network.wait(-1)
+    line.sendall(b"x")
+    assert network.wait(BOUND_S)
+    link.submit([Close(1, reset=True)], now_ns())
+    assert network.wait(BOUND_S)  # an answer that waits to be fetched
+    assert link.events(now_ns()) == [Closed(1)]
+
+
+def test_wrong_use(network: TcpNetwork, device: Device) -> None:
+    link, _ = opened(network, device)
+    with pytest.raises(ValueError, match="channel 1"):
+        link.submit([Connect(1, SERVER)], now_ns())
+    with pytest.raises(ValueError, match="attached already"):
+        network.attach(UNIT)
+    network.close()
+    network.close()
+    assert network.wait(0)
+    link.submit([Send(1, b""), Close(1), Connect(1, SERVER)], now_ns())
+    assert link.events(now_ns()) == [Failed(1, "send", "ENOTCONN"), Closed(1), Failed(1, "open", "ENETDOWN")]
