@@ -51,10 +51,8 @@ class Watcher(ABC):
 class Orphan(Watcher):
     """A connection that its unit has closed, and that has not ended yet."""
 
-    @property
-    @abstractmethod
-    def done(self) -> bool:
-        """True when it has ended."""
+    sock: HasFileno | None = None
+    """None when it has ended."""
 
     @abstractmethod
     def give_up(self, now_ns: int) -> None:
@@ -87,9 +85,9 @@ class Switchboard(ABC):
         """Do everything that the host is ready for."""
         if self.closed:
             return
-        for key, ready in self._selector.select(0):
+        for key, ready in self._selector.select(0) if self._selector.get_map() else ():
             key.data.ready(ready, now_ns)
-        while self._orphans and (self._orphans[0][1].done or self._orphans[0][0] <= now_ns):
+        while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):
             self._orphans.popleft()[1].give_up(now_ns)
 
     def close(self) -> None:

@@ -22,9 +22,8 @@ from fbvm.net.switchboard import READ, TCP, UDP, WRITE, Orphan, Switchboard, Wat
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import What
 
-CHUNK_BYTES = 65_536
-KERNEL_BUFFER_BYTES = 65_536
-"""Small, so that a unit that grants nothing, or a peer that reads nothing, soon closes the TCP window."""
+BUFFER_BYTES = 65_536
+"""Of the host, for each connection and direction: small, so that a unit that grants nothing, or a peer that reads nothing, soon closes the TCP window."""
 _RST_ON_CLOSE = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 
 
@@ -124,11 +123,12 @@ class TcpLink(ChannelLink):
 class _OnHost(Channel, Watcher):
     """A channel that has a socket of the host."""
 
+    link: TcpLink
+    sock: socket.socket | None = None
+
     def __init__(self, link: TcpLink, request: Connect | Listen | Bind) -> None:
         super().__init__(link, request.channel)
-        self.place = link
         self.network = link.network
-        self.sock: socket.socket | None = None
         self.local = Peer(link.address, request.local_port)
         """The unit's endpoint, as the program sees it."""
 
@@ -156,8 +156,8 @@ class _OnHost(Channel, Watcher):
         sock.setblocking(False)
         if kind == socket.SOCK_STREAM:
             _share_port(sock)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, KERNEL_BUFFER_BYTES)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, KERNEL_BUFFER_BYTES)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
         if bind:
             sock.bind((bind.host, bind.port))
         return sock
@@ -188,7 +188,7 @@ class _Door(_OnHost):
             if fits(self._request.remote, remote):
                 self.end()
                 wish = Connect(self.channel, remote, self.local.port, self._request.keep_alive)
-                line = self.link.channels[self.channel] = _Line(self.place, wish)
+                line = self.link.channels[self.channel] = _Line(self.link, wish)
                 line.granted = self.granted
                 line.admit(conn, now_ns)
             else:
@@ -210,11 +210,6 @@ class _Line(_OnHost, Orphan):
         self._keep_alive = request.keep_alive
         self._outbox: deque[bytes] = deque()
         self._real = ANYBODY
-
-    @property
-    def done(self) -> bool:
-        """True when the host has the socket back."""
-        return self.sock is None
 
     # Opening.
 
@@ -262,8 +257,7 @@ class _Line(_OnHost, Orphan):
 
     def _answered(self, sock: socket.socket, now_ns: int) -> None:
         code = sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
-        with suppress(OSError):
-            # The host's TCP can connect a port of its own to itself while nobody listens there.
+        with suppress(OSError):  # a port of the host can be connected to itself while nobody listens there
             code = code or (errno.ECONNREFUSED if sock.getpeername() == sock.getsockname() else 0)
         if code:
             self._refused(code, now_ns)
@@ -319,7 +313,7 @@ class _Line(_OnHost, Orphan):
             self._orphan, self._stalled = True, False
             with suppress(OSError):  # what the unit has not fetched is thrown away, so that FIN goes out and no RST
                 for _ in range(16):
-                    if not self.sock.recv(CHUNK_BYTES):
+                    if not self.sock.recv(BUFFER_BYTES):
                         break
             self._flush(self.sock, now_ns)
             if self.sock:
@@ -339,7 +333,7 @@ class _Line(_OnHost, Orphan):
         super().end()
 
     def _receive(self, sock: socket.socket, now_ns: int) -> None:
-        wanted = min(self.granted, CHUNK_BYTES)
+        wanted = min(self.granted, BUFFER_BYTES)
         try:
             # Without a grant only look, whether FIN has come; data stay in the host.
             data = sock.recv(wanted) if wanted > 0 else sock.recv(1, socket.MSG_PEEK)
@@ -428,7 +422,7 @@ class _Bound(_OnHost):
     def ready(self, ready: int, now_ns: int) -> None:
         for _ in range(MAX_DATAGRAMS):
             try:
-                data, name = self.sock.recvfrom(CHUNK_BYTES) if self.sock else (b"", ("", 0))
+                data, name = self.sock.recvfrom(BUFFER_BYTES) if self.sock else (b"", ("", 0))
             except OSError:
                 return
             remote = self.network.inward(UDP, Peer(*name))
