@@ -48,15 +48,18 @@ class Watcher(ABC):
         """Give everything back to the host."""
 
 
-class Orphan(Watcher):
+class Orphan(Protocol):
     """A connection that its unit has closed, and that has not ended yet."""
 
-    sock: HasFileno | None = None
-    """None when it has ended."""
+    @property
+    def sock(self) -> HasFileno | None:
+        """None when it has ended."""
 
-    @abstractmethod
     def give_up(self, now_ns: int) -> None:
         """End it by RST."""
+
+    def end(self) -> None:
+        """Give everything back to the host."""
 
 
 class Switchboard(ABC):
@@ -92,12 +95,13 @@ class Switchboard(ABC):
 
     def close(self) -> None:
         """End all connections and free what the host lent."""
-        watched = [there for link in self.links.values() for there in link.channels.values()]
-        for there in [*watched, *(orphan for _, orphan in self._orphans)]:
-            if isinstance(there, Watcher):
-                there.end()
         for link in self.links.values():
+            for there in link.channels.values():
+                if isinstance(there, Watcher):
+                    there.end()
             link.channels.clear()
+        for _, orphan in self._orphans:
+            orphan.end()
         self.links.clear()
         self._orphans.clear()
         self._selector.close()

@@ -18,12 +18,12 @@ from contextlib import suppress
 
 from fbvm.net.addresses import AddressMap, fits, impossible
 from fbvm.net.channels import ANYBODY, MAX_DATAGRAM_BYTES, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink
-from fbvm.net.switchboard import READ, TCP, UDP, WRITE, Orphan, Switchboard, Watcher, errno_name
+from fbvm.net.switchboard import READ, TCP, UDP, WRITE, Switchboard, Watcher, errno_name
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import What
 
 BUFFER_BYTES = 65_536
-"""Of the host, for each connection and direction: small, so that a unit that grants nothing, or a peer that reads nothing, soon closes the TCP window."""
+"""Of the host for each connection: small, so that who grants or reads nothing soon closes the TCP window."""
 _RST_ON_CLOSE = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 
 
@@ -196,7 +196,7 @@ class _Door(_OnHost):
                     conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
 
 
-class _Line(_OnHost, Orphan):
+class _Line(_OnHost):
     """A TCP connection, or the wish for one until it is `_connected`.
 
     As an `_orphan` it has been closed by its unit: it sends what it has, then FIN, and waits for the peer's."""
