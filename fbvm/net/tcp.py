@@ -125,6 +125,9 @@ class _OnHost(Channel, Watcher):
 
     link: TcpLink
     sock: socket.socket | None = None
+    transport = TCP
+    real = ANYBODY
+    """Where on the host others meet it."""
 
     def __init__(self, link: TcpLink, request: Connect | Listen | Bind) -> None:
         super().__init__(link, request.channel)
@@ -139,6 +142,7 @@ class _OnHost(Channel, Watcher):
     def end(self) -> None:
         """Give the socket back to the host."""
         if self.sock:
+            self.network.own(self.transport, self.real, None)
             self.network.watch(self.sock, 0, self)
             self.sock.close()
             self.sock = None
@@ -209,7 +213,6 @@ class _Line(_OnHost):
         self.remote = request.remote
         self._keep_alive = request.keep_alive
         self._outbox: deque[bytes] = deque()
-        self._real = ANYBODY
 
     # Opening.
 
@@ -222,9 +225,9 @@ class _Line(_OnHost):
         sock = self.make(socket.SOCK_STREAM, Peer("0.0.0.0", port) if port else None)
         self._tune(sock)
         code = sock.connect_ex(where)
-        self._real = Peer(*sock.getsockname())
-        self.local = Peer(self.local.host, self.local.port or self._real.port)
-        self.network.own(TCP, self._real, self.local)
+        self.real = Peer(*sock.getsockname())
+        self.local = Peer(self.local.host, self.local.port or self.real.port)
+        self.network.own(TCP, self.real, self.local)
         self._tap(now_ns, What.SYN, True)
         if code in (0, errno.EINPROGRESS, errno.EWOULDBLOCK):
             self._watch()
@@ -327,11 +330,6 @@ class _Line(_OnHost):
                 self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
             self.end()
 
-    def end(self) -> None:
-        if self.sock:
-            self.network.own(TCP, self._real, None)
-        super().end()
-
     def _receive(self, sock: socket.socket, now_ns: int) -> None:
         wanted = min(self.granted, BUFFER_BYTES)
         try:
@@ -411,11 +409,14 @@ class _Line(_OnHost):
 class _Bound(_OnHost):
     """A UDP port.  Datagrams are handed over whole and need no grant: what has no room is the unit's to drop."""
 
+    transport = UDP
+
     def open(self, now_ns: int) -> None:
         sock = self.make(socket.SOCK_DGRAM, self.network.host_endpoint(self.local, UDP))
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        self.local = Peer(self.local.host, self.local.port or sock.getsockname()[1])
-        self.network.own(UDP, Peer(*sock.getsockname()), self.local)
+        self.real = Peer(*sock.getsockname())
+        self.local = Peer(self.local.host, self.local.port or self.real.port)
+        self.network.own(UDP, self.real, self.local)
         self.network.watch(sock, READ, self)
         self.link.told.append(Opened(self.channel, self.local.port, ANYBODY))
 
@@ -444,8 +445,3 @@ class _Bound(_OnHost):
         self.network.tell(now_ns, What.UDP, self.local, remote, True, data)
         self.link.told.append(Sent(self.channel, len(data)))
         return ""
-
-    def end(self) -> None:
-        if self.sock:
-            self.network.own(UDP, Peer(*self.sock.getsockname()), None)
-        super().end()
