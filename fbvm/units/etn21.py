@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from fbvm.units import etn21_map as at
-from fbvm.units.etn21_dispatch import NEVER_NS, Dispatch, Fault
+from fbvm.units.etn21_dispatch import NEVER_NS, Choices, Dispatch, Fault
 from fbvm.units.etn21_map import Layout
 from fbvm.units.etn21_timing import timing_of
 from fbvm.units.unit import AreaMemory
@@ -24,7 +24,8 @@ class Etn21:
 
     `timing` is "exact" (a switch is accepted by the next refresh and finished by the one after, all words together)
     or "real" (seeded delays and words out of step).  `time_wait_ns` is how long a fixed local TCP port is held after
-    a close from this side.  Raises ValueError for a wrong argument."""
+    a close from this side.  `odd_filler` is the low byte stored beside an odd last byte (00 is assumed); None keeps
+    what is there.  Raises ValueError for a wrong argument."""
 
     def __init__(
         self,
@@ -34,6 +35,7 @@ class Etn21:
         timing: str = "exact",
         seed: int = 0,
         time_wait_ns: int = TIME_WAIT_NS,
+        odd_filler: int | None = 0x00,
         faults: Iterable[Fault] = (),
     ) -> None:
         self.layout = Layout.of(unit_number)
@@ -45,7 +47,8 @@ class Etn21:
         """Whether n+17 says that the cable is plugged; what the network does is the network's affair."""
         self.error_status = 0
         """What n+18 shows."""
-        self._dispatch = Dispatch(self.layout, address, timing_of(timing, seed), time_wait_ns, self.faults)
+        choices = Choices(time_wait_ns, odd_filler)
+        self._dispatch = Dispatch(self.layout, address, timing_of(timing, seed), choices, self.faults)
         self._switches_at = slice(self.layout.n + at.SWITCHES, self.layout.n + at.FINS_TCP_STATUS)
         self._seen = [0, 0, 0, 0]
         self._wake_ns = NEVER_NS

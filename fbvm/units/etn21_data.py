@@ -51,12 +51,17 @@ def fetch(memory: AreaMemory, parameters: Parameters) -> bytes:
     return data.tobytes()[: parameters.count]
 
 
-def store(memory: AreaMemory, parameters: Parameters, data: bytes) -> None:
-    """Write received bytes; the low byte beside an odd last one becomes 00 (assumed), words after it stay."""
+def store(memory: AreaMemory, parameters: Parameters, data: bytes, odd_filler: int | None) -> None:
+    """Write received bytes; words after the last one stay.
+
+    The low byte beside an odd last byte becomes `odd_filler`, or stays if that is None."""
     if not data:
         return
-    words = array("H", data + b"\0" * (len(data) % 2))
+    there = memory.words(AREA_OF_CODE[parameters.area_code][0])
+    end = parameters.word + (len(data) + 1) // 2
+    if len(data) % 2:
+        data += bytes([there[end - 1] & 0xFF if odd_filler is None else odd_filler])
+    words = array("H", data)
     if byteorder == "little":
         words.byteswap()
-    area = AREA_OF_CODE[parameters.area_code][0]
-    memory.words(area)[parameters.word : parameters.word + len(words)] = memoryview(words)
+    there[parameters.word : end] = memoryview(words)

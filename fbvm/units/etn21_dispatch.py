@@ -40,6 +40,17 @@ class Fault:
     """None fits every socket number."""
 
 
+@dataclass(frozen=True, slots=True)
+class Choices:
+    """What the manuals leave open, or a test wants otherwise."""
+
+    time_wait_ns: int
+    """How long a fixed local port is held after a close from this side."""
+
+    odd_filler: int | None
+    """Low byte that is stored beside an odd last byte; None keeps what is there."""
+
+
 class Found(NamedTuple):
     """Switches of an area that belong to no request yet."""
 
@@ -52,11 +63,11 @@ class Found(NamedTuple):
 class Dispatch:
     """What runs in one unit."""
 
-    def __init__(self, layout: Layout, address: str, timing: Timing, time_wait_ns: int, faults: list[Fault]) -> None:
+    def __init__(self, layout: Layout, address: str, timing: Timing, choices: Choices, faults: list[Fault]) -> None:
         self._layout = layout
         self._address = address
         self._timing = timing
-        self._time_wait_ns = time_wait_ns
+        self._choices = choices
         self._faults = faults
         self._sockets = {number: Socket(number) for number in at.SOCKETS}
         self.forget()
@@ -153,7 +164,7 @@ class Dispatch:
     def _write_result(self, service: Service, area: Area, memory: AreaMemory) -> None:
         due = self.cycle if service.concluded_cycle is None else service.concluded_cycle
         if service.socket is not None and service.parameters is not None and service.flag & TRANSFERS:
-            store(memory, service.parameters, service.data)
+            store(memory, service.parameters, service.data, self._choices.odd_filler)
             service.results[at.COUNT] = service.count
         first = self._layout.parameters(area.number)
         for offset, value in service.results.items():
@@ -165,8 +176,8 @@ class Dispatch:
 
     def _hold_port(self, service: Service, socket: Socket, now_ns: int) -> None:
         """A fixed local port stays taken after a close from this side, unless it was by RST (W421 6-9-3 p156)."""
-        if service.switch is Switch.CLOSE and socket.holds_port and self._time_wait_ns:
-            self._held_ports[socket.local_port] = now_ns + self._time_wait_ns
+        if service.switch is Switch.CLOSE and socket.holds_port:
+            self._held_ports[socket.local_port] = now_ns + self._choices.time_wait_ns
 
     # --- 4. new requests ---------------------------------------------------------------------------------------------
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from common_unit_tests import answer, events
 from etn21_rig import CIO, D, Rig
 from hypothesis import given, settings
@@ -83,17 +82,3 @@ def settle(rig: Rig, asked: list[Request]) -> None:
             rig.cio[n] |= 1 << 2
         closes = [Closed(request.channel) for request in asked if isinstance(request, Close)]
         asked = rig.scan(*closes)
-
-
-@pytest.mark.parametrize("timing", ["exact", "real"])
-def test_a_channel_is_opened_only_when_it_is_free(timing: str) -> None:
-    """A network may refuse a second open of a channel, so the unit waits for `Closed`."""
-    rig = Rig(Etn21(timing=timing))
-    for _ in range(3):
-        rig.parameters(timeout=1, local_port=502)
-        rig.scan(Switch.PASSIVE_OPEN)
-        rig.cycle_ns = 1_000_000_000
-        requests = [request for _ in range(9) for request in rig.scan()]
-        assert [type(request).__name__ for request in requests][-1:] == ["Close"]
-        assert rig.code() == "0080"
-        assert rig.scan(Closed(1)) == []

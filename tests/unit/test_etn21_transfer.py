@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from etn21_rig import Rig
 
+from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21_map import Switch
 from fbvm.wire.link import Bind, Broken, Closed, Failed, Grant, Opened, Peer, PeerClosed, Received, Send, SendTo, Sent
 
@@ -120,6 +121,17 @@ def test_an_odd_receive_ends_with_00_assumed() -> None:
     rig.parameters(count=100)
     rig.ask(Switch.RECEIVE)
     assert got(rig, 3) == [0x6162, 0x6300, 3]
+
+
+@pytest.mark.parametrize(("filler", "last"), [(None, 0x63FE), (0xA5, 0x63A5)])
+def test_an_odd_receive_can_keep_or_spoil_the_low_byte(filler: int | None, last: int) -> None:
+    rig = Rig(Etn21(odd_filler=filler))
+    rig.open()
+    put(rig, 1, 0xFFFE, 3)
+    rig.scan(Received(1, b"abc"))
+    rig.parameters(count=100)
+    rig.ask(Switch.RECEIVE)
+    assert got(rig, 3) == [0x6162, last, 3]
 
 
 def test_bytes_that_are_not_taken_stay() -> None:
