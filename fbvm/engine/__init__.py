@@ -1,0 +1,1 @@
+"""Engines: an Image and a memory become running code."""

@@ -1,0 +1,435 @@
+"""Expressions of code as expressions of Python: one row of EMITTERS an operation.
+
+Integers stay Python's own inside a sum or product and are brought into their type once, at its end; a wrap that cannot
+happen is left out.  What is nested deeper than Python's parser allows moves into functions of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from fbvm.base.areas import NOW
+from fbvm.base.arithmetic import limits, width
+from fbvm.code.operations import INTEGERS, SIZES, Address, Node
+from fbvm.engine.ranges import fits, is_float, mask, may_trap, span
+
+DEEPEST = 24
+"""Levels of nodes in one Python expression: at most four parentheses each, where Python takes 200 in all."""
+SIGNS = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^",
+         "eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
+
+
+def bare(text: str) -> str:
+    """The same expression without the one pair of parentheses that holds it all."""
+    if not text.startswith("(") or not text.endswith(")") or "'" in text or '"' in text:
+        return text
+    depth = 0
+    for at, letter in enumerate(text):
+        depth += (letter == "(") - (letter == ")")
+        if depth == 0 and at < len(text) - 1:
+            return text
+    return text[1:-1]
+
+
+def plus(text: str, number: int) -> str:
+    """`text` and a constant more."""
+    if text.isdigit():
+        return str(int(text) + number)
+    return text if number == 0 else f"{text} + {number}" if number > 0 else f"{text} - {-number}"
+
+
+class Expressions:
+    """Writes the expressions of one body and notes what they need around them.
+
+    `bases` are the shifts of the instance's base that are used, `routines` functions that the body has to define,
+    `constants` objects by the name under which generated code finds them."""
+
+    def __init__(self, constants: dict[str, Any]) -> None:
+        self.constants = constants
+        self.bases: set[int] = set()
+        self.routines: list[list[str]] = []
+        self._depth = 0
+        self._names = 0
+
+    def name(self, letter: str) -> str:
+        """A local name that nothing else uses."""
+        self._names += 1
+        return f"{letter}{self._names}"
+
+    def constant(self, value: Any) -> str:
+        """The name of an object that is made once."""
+        name = f"K{len(self.constants) + 1}"
+        self.constants[name] = value
+        return name
+
+    # --- three ways to read an expression
+
+    def value(self, node: Node) -> str:
+        """Python for the very value; a BOOL is False or True."""
+        return self._descend(node, _value)
+
+    def loose(self, node: Node) -> str:
+        """Python for a number that becomes the value when it is brought into its type (low bits, or 32-bit float)."""
+        return self._descend(node, _loose)
+
+    def condition(self, node: Node) -> str:
+        """Python for something that is true if the BOOL is TRUE."""
+        return self._descend(node, _condition)
+
+    def _descend(self, node: Node, how: Callable[[Expressions, Node], str]) -> str:
+        outer = self._depth
+        deep = outer >= DEEPEST and node[0] not in ("const", "tmp")
+        self._depth = 0 if deep else outer + 1
+        text = how(self, node)
+        self._depth = outer
+        if not deep:
+            return text
+        name = self.name("e")
+        self.routines.append([f"def {name}():", f"    return {text}"])
+        return f"{name}()"
+
+    def bring(self, text: str, machine: str) -> str:
+        """Python for a number brought into its type."""
+        if machine == "f32":
+            return f"single({bare(text)})"
+        if machine == "b":
+            return f"({text} & 1 != 0)"
+        low, high = limits(machine)
+        if low == 0:
+            return f"({text} & {high})"
+        v = self.name("v")
+        return f"({v} if {low} <= ({v} := {bare(text)}) <= {high} else ({v} + {-low} & {high - low}) - {-low})"
+
+    def stored(self, machine: str, node: Node) -> tuple[str, str]:
+        """The type of the view and Python for what is stored there: cheaper than the value where the view rounds."""
+        if is_float(machine):
+            if (node[0] == "const" and node[2] == node[2]) or (node[0] == "convert" and not is_float(node[2])):
+                return machine, self.value(node)
+            v = self.name("v")
+            return machine, f"{v} if ({v} := {bare(self.loose(node))}) == {v} else NAN"
+        if machine in INTEGERS and node[0] in _ARITHMETIC and not fits(node):
+            return f"u{width(machine)}", f"{self.loose(node)} & {mask(machine)}"
+        return machine, bare(self.value(node))
+
+    # --- addresses
+
+    def place(self, address: Address, count: int) -> str:
+        """Python for the byte offset of an address whose `count` bytes are used."""
+        base, offset, terms = address
+        if isinstance(base, tuple):
+            _, reference, site = base
+            delta = self._sum("", offset, [(stride, term) for stride, term in terms])
+            return f"at({bare(self.value(reference))}, {delta}, {count}, {site})"
+        if base == "self":
+            self.bases.add(1)
+        return self._sum("b1" if base == "self" else "", offset, list(terms))
+
+    def index(self, address: Address, machine: str) -> str:
+        """Python for the index of an address without reference in the view of its type."""
+        base, offset, terms = address
+        size = SIZES[machine]
+        if offset % size or any(stride % size for stride, _ in terms):
+            return f"{self.place(address, size)} >> {size.bit_length() - 1}"
+        if base == "self":
+            self.bases.add(size)
+        return self._sum(f"b{size}" if base == "self" else "", offset // size, [(s // size, t) for s, t in terms])
+
+    def _sum(self, base: str, offset: int, terms: list[tuple[int, Node]]) -> str:
+        parts = [base] if base else []
+        for stride, term in terms:
+            text = self.value(term)
+            parts.append(text if stride == 1 else f"{text} * {stride}")
+        text = " + ".join(parts)
+        if not text:
+            return str(offset)
+        text = plus(text, offset)
+        return f"({text})" if " " in text else text
+
+
+# --- rows -----------------------------------------------------------------------------------------------------------
+
+_ARITHMETIC = ("add", "sub", "mul", "neg", "abs", "convert")
+
+
+def view(machine: str) -> str:
+    """The name of the view of a machine type in generated code."""
+    return "u1" if machine == "b" else machine
+
+
+def _value(e: Expressions, node: Node) -> str:
+    return EMITTERS[node[0]](e, *node[1:])
+
+
+def _loose(e: Expressions, node: Node) -> str:
+    name, machine = node[0], node[1]
+    if name in _LOOSE and (is_float(machine) or name in _ARITHMETIC):
+        return _LOOSE[name](e, node)
+    return _value(e, node)
+
+
+def _condition(e: Expressions, node: Node) -> str:
+    row = _CONDITIONS.get(node[0])
+    return row(e, node) if row else _value(e, node)
+
+
+def _brought(name: str) -> Callable[..., str]:
+    """The row of an operation that `loose` knows: its number brought into the type."""
+
+    def emit(e: Expressions, machine: str, *operands: Any) -> str:
+        node = (name, machine, *operands)
+        text = _LOOSE[name](e, node)
+        return text if machine == "f64" or (machine in INTEGERS and fits(node)) else e.bring(text, machine)
+
+    return emit
+
+
+def _binary(e: Expressions, node: Node) -> str:
+    read = e.value if is_float(node[1]) or fits(node) else e.loose
+    return f"({read(node[2])} {SIGNS[node[0]]} {read(node[3])})"
+
+
+def _negative(e: Expressions, node: Node) -> str:
+    read = e.value if is_float(node[1]) or fits(node) else e.loose
+    return f"(-{read(node[2])})"
+
+
+def _loose_convert(e: Expressions, node: Node) -> str:
+    _, machine, source, a = node
+    if is_float(machine):
+        return e.value(a) if is_float(source) else f"float({bare(e.value(a))})"
+    if source == "b":
+        return f"(1 if {e.condition(a)} else 0)"
+    return e.loose(a) if width(machine) <= width(source) and not fits(node) else e.value(a)
+
+
+def _convert(e: Expressions, machine: str, source: str, a: Node) -> str:
+    if machine == "f32" and not is_float(source):
+        low, high = span(a)
+        exact = low >= -(1 << 24) and high <= 1 << 24
+        return f"{'float' if exact else 'single_of_integer'}({bare(e.value(a))})"
+    if (is_float(source) and machine == "f64") or machine == source:
+        return e.value(a)
+    return _brought("convert")(e, machine, source, a)
+
+
+def _loose_divide(e: Expressions, node: Node) -> str:
+    a, b = node[2], node[3]
+    if b[0] == "const" and b[2]:
+        return f"({e.value(a)} / {e.value(b)})"
+    return f"divide({bare(e.value(a))}, {bare(e.value(b))})"
+
+
+def _divide(e: Expressions, machine: str, a: Node, b: Node, site: int) -> str:
+    node = ("div", machine, a, b, site)
+    if is_float(machine):
+        return _brought("div")(e, machine, a, b, site)
+    if b[0] == "const" and b[2] > 0 and span(a)[0] >= 0:
+        return f"({e.value(a)} // {b[2]})"
+    text = f"quotient({bare(e.value(a))}, {bare(e.value(b))}, {site})"
+    return text if fits(node) or (b[0] == "const" and b[2] != -1) else e.bring(text, machine)
+
+
+def _remainder(e: Expressions, machine: str, a: Node, b: Node, site: int) -> str:
+    if b[0] == "const" and b[2] > 0 and span(a)[0] >= 0:
+        return f"({e.value(a)} % {b[2]})"
+    return f"remainder({bare(e.value(a))}, {bare(e.value(b))}, {site})"
+
+
+def _function(e: Expressions, node: Node) -> str:
+    return f"math_{node[2]}({bare(e.value(node[3]))})"
+
+
+def _two(function: str) -> Callable[[Expressions, Node], str]:
+    return lambda e, node: f"{function}({bare(e.value(node[2]))}, {bare(e.value(node[3]))})"
+
+
+def _bitwise(name: str) -> Callable[..., str]:
+    """Both operands are evaluated; where that cannot be told, Python's shorter way does for BOOL."""
+
+    def emit(e: Expressions, machine: str, a: Node, b: Node) -> str:
+        if machine == "b":
+            word = {"and": "and", "or": "or"}.get(name)
+            if word and not may_trap(b):
+                return f"({e.value(a)} {word} {e.value(b)})"
+            return f"({e.value(a)} {'!=' if name == 'xor' else SIGNS[name]} {e.value(b)})"
+        reads = [e.value, e.value]
+        if name == "and" and "const" in (a[0], b[0]):
+            reads[0 if b[0] == "const" else 1] = e.loose  # the mask is within the width
+        return f"({reads[0](a)} {SIGNS[name]} {reads[1](b)})"
+
+    return emit
+
+
+def _lazy(word: str) -> Callable[..., str]:
+    return lambda e, machine, a, b: f"({e.value(a)} {word} {e.value(b)})"
+
+
+def _not(e: Expressions, machine: str, a: Node) -> str:
+    return f"(not {e.condition(a)})" if machine == "b" else f"({e.value(a)} ^ {mask(machine)})"
+
+
+def _compare(name: str) -> Callable[..., str]:
+    return lambda e, machine, kind, a, b: f"({e.value(a)} {SIGNS[name]} {e.value(b)})"
+
+
+def _shift(name: str) -> Callable[..., str]:
+    def emit(e: Expressions, machine: str, a: Node, n: Node, site: int) -> str:
+        if n[0] == "const" and 0 <= n[2] < width(machine):
+            if name == "shift_left":
+                return e.bring(f"({e.loose(a)} << {n[2]})", machine)
+            if name == "shift_right" and (n[2] == 0 or span(a)[0] >= 0):
+                return f"({e.value(a)} >> {n[2]})" if n[2] else e.value(a)
+        return f"{name}({bare(e.value(a))}, {bare(e.value(n))}, {machine!r}, {site})"
+
+    return emit
+
+
+def _call(function: str) -> Callable[..., str]:
+    """A function of the runtime over the operands as they stand: expressions evaluated, the rest as constants."""
+
+    def emit(e: Expressions, machine: str, *operands: Any) -> str:
+        texts = [bare(e.value(o)) if isinstance(o, tuple) else repr(o) for o in operands]
+        return f"{function}({', '.join(texts)})"
+
+    return emit
+
+
+def _to_integer(function: str) -> Callable[..., str]:
+    return lambda e, machine, kind, a, site: f"{function}({bare(e.value(a))}, {machine!r}, {site})"
+
+
+def _bits(e: Expressions, machine: str, source: str, a: Node) -> str:
+    if machine == source and not is_float(machine):
+        return e.value(a)
+    if is_float(machine) or is_float(source):
+        return f"bits({bare(e.value(a))}, {source!r}, {machine!r})"
+    return e.bring(e.value(a), machine)
+
+
+def _select(e: Expressions, machine: str, g: Node, a: Node, b: Node) -> str:
+    if may_trap(a) or may_trap(b):
+        return f"choose({bare(e.value(g))}, {bare(e.value(a))}, {bare(e.value(b))})"
+    return f"({e.value(b)} if {e.condition(g)} else {e.value(a)})"
+
+
+def _mux(e: Expressions, machine: str, k: Node, choices: tuple[Node, ...], site: int) -> str:
+    return f"mux({bare(e.value(k))}, ({''.join(bare(e.value(c)) + ', ' for c in choices)}), {site})"
+
+
+def _extreme(sign: str, function: str) -> Callable[..., str]:
+    def emit(e: Expressions, machine: str, a: Node, b: Node) -> str:
+        if is_float(machine):
+            return f"{function}({bare(e.value(a))}, {bare(e.value(b))})"
+        v, w = e.name("v"), e.name("v")
+        return f"({v} if ({v} := {bare(e.value(a))}) {sign} ({w} := {bare(e.value(b))}) else {w})"
+
+    return emit
+
+
+def _check(e: Expressions, machine: str, a: Node, low: int, high: int, code: str, site: int) -> str:
+    least, greatest = span(a)
+    if low <= least and greatest <= high:
+        return e.value(a)
+    v = e.name("v")
+    return f"({v} if {low} <= ({v} := {bare(e.value(a))}) <= {high} else stop({code!r}, {site}, {v}, {low}, {high}))"
+
+
+def _load(e: Expressions, machine: str, address: Address) -> str:
+    if isinstance(address[0], tuple):
+        return _load_raw(e, machine, address)
+    return f"{view(machine)}[{bare(e.index(address, machine))}]"
+
+
+def _load_raw(e: Expressions, machine: str, address: Address) -> str:
+    return f"get_{machine}(buffer, {bare(e.place(address, SIZES[machine]))})[0]"
+
+
+def _load_bit(e: Expressions, machine: str, address: Address, bit: int) -> str:
+    return f"(u8[{bare(e.place(address, 1))}] & {1 << bit} != 0)"
+
+
+def _load_flag(e: Expressions, machine: str, address: Address) -> str:
+    if not isinstance(address[0], tuple):
+        return _load(e, machine, address)
+    return f"get_flag({flag_operands(e, address)})"
+
+
+def flag_operands(e: Expressions, address: Address) -> str:
+    """Reference, distance and site of a BOOL behind a reference, as the runtime takes them."""
+    (_, reference, site), offset, terms = address
+    delta = bare(e.place(("abs", offset, terms), 1))
+    return f"{bare(e.value(reference))}, {delta}, {site}"
+
+
+def _load_text(e: Expressions, machine: str, address: Address, capacity: int) -> str:
+    return f"get_text({bare(e.place(address, capacity))}, {capacity})"
+
+
+def _reference(e: Expressions, machine: str, address: Address, bit: int) -> str:
+    place, rest = e.place(address, 1), (1 << 40) + bit
+    return str((int(place) << 8) + rest) if place.isdigit() else f"(({place} << 8) + {rest})"
+
+
+def _const(e: Expressions, machine: str, value: Any) -> str:
+    if machine == "b":
+        return repr(bool(value))
+    if is_float(machine):
+        return {"nan": "NAN", "inf": "INF", "-inf": "(-INF)"}.get(repr(float(value)), repr(float(value)))
+    return repr(value)
+
+
+def _enum_text(e: Expressions, machine: str, names: Any, a: Node) -> str:
+    return f"enum_text({e.constant(dict(names))}, {bare(e.value(a))})"
+
+
+_LOOSE: dict[str, Callable[[Expressions, Node], str]] = {
+    "add": _binary, "sub": _binary, "mul": _binary, "neg": _negative,
+    "abs": lambda e, node: f"abs({bare(e.value(node[2]))})",
+    "convert": _loose_convert, "div": _loose_divide, "math": _function, "pow": _two("power"),
+    "atan2": _two("arctangent"),
+}
+"""Operations whose number becomes the value when it is brought into the type (`div` here: of floats only)."""
+
+EMITTERS: dict[str, Callable[..., str]] = {
+    "const": _const,
+    "tmp": lambda e, machine, number: f"t{number}",
+    "load": _load, "load_raw": _load_raw, "load_bit": _load_bit, "load_flag": _load_flag, "load_text": _load_text,
+    **{name: _brought(name) for name in ("add", "sub", "mul", "neg", "abs", "pow", "math", "atan2")},
+    "div": _divide, "mod": _remainder,
+    "and": _bitwise("and"), "or": _bitwise("or"), "xor": _bitwise("xor"), "not": _not,
+    "and_then": _lazy("and"), "or_else": _lazy("or"),
+    "shl": _shift("shift_left"), "shr": _shift("shift_right"),
+    "rol": _shift("rotate_left"), "ror": _shift("rotate_right"),
+    **{name: _compare(name) for name in ("eq", "ne", "lt", "le", "gt", "ge")},
+    "convert": _convert, "nearest": _to_integer("nearest"), "truncate": _to_integer("truncate"), "bits": _bits,
+    "is_set": lambda e, machine, kind, a: f"({e.value(a)} != 0)",
+    "select": _select, "mux": _mux, "min": _extreme("<=", "lesser"), "max": _extreme(">=", "greater"),
+    "check": _check,
+    "floor_div": lambda e, machine, a, b: f"({e.value(a)} // {e.value(b)})",
+    "now": lambda e, machine: f"i64[{NOW // 8}]",
+    "from_bcd": _to_integer("from_bcd"), "to_bcd": _to_integer("to_bcd"),
+    "length": lambda e, machine, a: e.bring(f"len({bare(e.value(a))})", machine),
+    "left": _call("left"), "right": _call("right"), "mid": _call("mid"), "insert": _call("insert"),
+    "delete": _call("delete"), "replace": _call("replace"),
+    "concat": lambda e, machine, a, b: f"({e.value(a)} + {e.value(b)})",
+    "find": lambda e, machine, a, b: e.bring(f"find({bare(e.value(a))}, {bare(e.value(b))})", machine),
+    "to_text": _call("to_text"), "from_text": _call("from_text"), "enum_text": _enum_text,
+    "reference": _reference,
+}
+"""How each operation is written: called with the operands of its row."""
+
+_CONDITIONS: dict[str, Callable[[Expressions, Node], str]] = {
+    "load_bit": lambda e, node: f"u8[{bare(e.place(node[2], 1))}] & {1 << node[3]}",
+    "is_set": lambda e, node: e.value(node[3]),
+    "and": lambda e, node: _both("and", e, node),
+    "or": lambda e, node: _both("or", e, node),
+    "and_then": lambda e, node: f"({e.condition(node[2])} and {e.condition(node[3])})",
+    "or_else": lambda e, node: f"({e.condition(node[2])} or {e.condition(node[3])})",
+}
+"""Shorter forms where only the truth of a BOOL is wanted."""
+
+
+def _both(word: str, e: Expressions, node: Node) -> str:
+    if may_trap(node[3]):
+        return e.value(node)
+    return f"({e.condition(node[2])} {word} {e.condition(node[3])})"

@@ -1,0 +1,117 @@
+"""The Python engine, the reference: an Image becomes Python source over the flat memory, compiled by the host.
+
+It runs everywhere, and its observed build can stop at every statement, read and write.  It decides nothing: every
+meaning is in the table of operations."""
+
+from __future__ import annotations
+
+import linecache
+import sys
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, field
+from itertools import count
+from types import CodeType
+from typing import Any
+from weakref import WeakValueDictionary, finalize
+
+from fbvm.base.memory import Memory
+from fbvm.code.image import Image
+from fbvm.engine.runtime import Observation, environment
+from fbvm.engine.statements import BodyWriter, function_name
+from fbvm.engine.trap import Stop, Trap, trap
+
+_NUMBERS = count(1)
+FRAMES_TO_SPARE = 200
+"""Python frames that callers of an engine, and its own functions, may have besides the calls of the program."""
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """The Python code of an image, which any number of memories can share."""
+
+    image: Image
+    source: str
+    code: CodeType
+    constants: dict[str, Any] = field(repr=False)
+
+
+_programs: WeakValueDictionary[tuple[int, bool], Program] = WeakValueDictionary()
+
+
+def translate(image: Image, observed: bool = False) -> Program:
+    """The code of an image; the same object as long as somebody has it."""
+    known = _programs.get((id(image), observed))
+    if known is not None:
+        return known
+    constants: dict[str, Any] = {}
+    lines: list[str] = []
+    for number in range(len(image.bodies)):
+        lines += [*BodyWriter(image, constants, observed).write(number), ""]
+    source = "\n".join(lines)
+    name = f"<fbvm {'observed' if observed else 'plain'} {next(_NUMBERS)}>"
+    program = Program(image, source, compile(source, name, "exec"), constants)
+    linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
+    finalize(program, linecache.cache.pop, name, None)
+    _programs[id(image), observed] = program
+    return program
+
+
+class PythonEngine:
+    """Runs an image over a memory.
+
+    The caller sets time and budget in the system page before a run.  `source` is the Python text that runs, which
+    tracebacks show.  A program's mistakes come back as a Trap; memory is then what was stored before it."""
+
+    def __init__(self, image: Image, memory: Memory, observed: bool = False) -> None:
+        if memory.size < image.layout.size:
+            raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")
+        self.image, self.memory, self.observed = image, memory, observed
+        self._program = translate(image, observed)
+        names = environment(memory) | self._program.constants
+        exec(self._program.code, names)
+        self._bodies: list[Callable[[int], Any]] = [
+            names[function_name(number, body)] for number, body in enumerate(image.bodies)]
+        self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in image.tasks]
+        sys.setrecursionlimit(max(sys.getrecursionlimit(), _depth(image) + FRAMES_TO_SPARE))
+
+    @property
+    def source(self) -> str:
+        """The generated Python."""
+        return self._program.source
+
+    def run(self, task_index: int) -> Trap | None:
+        """Execute the programs of a task in their order, until the end or a trap.  Plain build only."""
+        if self.observed:
+            raise ValueError("an observed build is run by observe()")
+        try:
+            for body, base in self._tasks[task_index]:
+                body(base)
+        except Stop as stop:
+            return trap(self.image, stop.code, stop.site, stop.values)
+        return None
+
+    def call(self, body: int, base: int = 0) -> Trap | None:
+        """Execute one body for the instance at `base`.  Plain build only."""
+        if self.observed:
+            raise ValueError("an observed build is run by observe()")
+        try:
+            self._bodies[body](base)
+        except Stop as stop:
+            return trap(self.image, stop.code, stop.site, stop.values)
+        return None
+
+    def observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
+        """Execute a task step by step: yields every observation, returns like `run`.  Observed build only."""
+        if not self.observed:
+            raise ValueError("a plain build is run by run()")
+        try:
+            for body, base in self._tasks[task_index]:
+                yield from body(base)
+        except Stop as stop:
+            return trap(self.image, stop.code, stop.site, stop.values)
+        return None
+
+
+def _depth(image: Image) -> int:
+    """Python frames of the deepest chain of calls; a body takes one, and one more for each outlined block."""
+    return 4 * len(image.bodies)

@@ -1,0 +1,139 @@
+"""What is known of an expression before it runs: the range of an integer, and whether it can trap.
+
+With it a back end leaves out wraps that change nothing, and orders nothing that cannot be told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from fbvm.base.arithmetic import limits, quotient, width
+from fbvm.code.operations import EXPRESSIONS, INTEGERS, Node
+
+Range = tuple[int, int]
+
+
+def is_float(machine: str) -> bool:
+    return machine[0] == "f"
+
+
+def is_address(item: Any) -> bool:
+    """True for `(base, offset, terms)`; an expression has a machine type where an address has its offset."""
+    return isinstance(item, tuple) and len(item) == 3 and isinstance(item[1], int) and (
+        item[0] in ("abs", "self") or (isinstance(item[0], tuple) and item[0][:1] == ("ref",)))
+
+
+def may_trap(item: Any) -> bool:
+    """True if evaluating an operand (expression, address, tuple of them) could end the run."""
+    if not isinstance(item, tuple) or not item:
+        return False
+    if is_address(item):
+        return isinstance(item[0], tuple) or any(may_trap(term) for _, term in item[2])
+    if isinstance(item[0], str) and item[0] in EXPRESSIONS:
+        return _traps_itself(item) or any(may_trap(operand) for operand in item[2:])
+    return any(may_trap(part) for part in item)
+
+
+def _traps_itself(node: Node) -> bool:
+    name = node[0]
+    if name in ("div", "mod"):
+        return not is_float(node[1]) and not (node[3][0] == "const" and node[3][2])
+    if name in ("shl", "shr", "rol", "ror"):
+        return not (node[3][0] == "const" and node[3][2] >= 0)
+    if name == "load_flag":
+        return False  # by its address
+    return bool(EXPRESSIONS[name].traps)
+
+
+def reach(node: Node) -> Range:
+    """Least and greatest number that an integer operation can yield before it wraps."""
+    row = _REACH.get(node[0])
+    return row(node) if row and node[1] in INTEGERS else limits(node[1])
+
+
+def fits(node: Node) -> bool:
+    """True if an integer operation never has to wrap."""
+    (low, high), (least, greatest) = limits(node[1]), reach(node)
+    return low <= least and greatest <= high
+
+
+def span(node: Node) -> Range:
+    """Least and greatest value of an integer expression."""
+    return reach(node) if fits(node) else limits(node[1])
+
+
+def _product(node: Node) -> Range:
+    corners = [a * b for a in span(node[2]) for b in span(node[3])]
+    return min(corners), max(corners)
+
+
+def _quotient(node: Node) -> Range:
+    if node[3][0] == "const" and node[3][2] > 0:
+        low, high = span(node[2])
+        return quotient(low, node[3][2]), quotient(high, node[3][2])
+    low, high = limits(node[1])
+    return low, high + (low < 0)
+
+
+def _remainder(node: Node) -> Range:
+    low, high = span(node[2])
+    if node[3][0] == "const" and node[3][2]:
+        most = abs(node[3][2]) - 1
+        return (max(low, -most) if low < 0 else 0), (min(high, most) if high > 0 else 0)
+    return min(low, 0), max(high, 0)
+
+
+def _union(*nodes: Node) -> Range:
+    ranges = [span(node) for node in nodes]
+    return min(low for low, _ in ranges), max(high for _, high in ranges)
+
+
+def _bitwise(node: Node) -> Range:
+    high = max(span(node[2])[1], span(node[3])[1])
+    return 0, (1 << high.bit_length()) - 1
+
+
+def _shifted(node: Node) -> Range:
+    low, high = span(node[2])
+    if low >= 0 and node[3][0] == "const" and node[3][2] >= 0:
+        return 0, high >> min(node[3][2], 64)
+    return limits(node[1])
+
+
+def _converted(node: Node) -> Range:
+    return limits(node[1]) if is_float(node[2]) else span(node[3])
+
+
+def _checked(node: Node) -> Range:
+    low, high = span(node[2])
+    return max(low, node[3]), min(high, node[4])
+
+
+_REACH: dict[str, Callable[[Node], Range]] = {
+    "const": lambda node: (node[2], node[2]),
+    "add": lambda node: (span(node[2])[0] + span(node[3])[0], span(node[2])[1] + span(node[3])[1]),
+    "sub": lambda node: (span(node[2])[0] - span(node[3])[1], span(node[2])[1] - span(node[3])[0]),
+    "mul": _product,
+    "neg": lambda node: (-span(node[2])[1], -span(node[2])[0]),
+    "abs": lambda node: (0, max(map(abs, span(node[2])))),
+    "div": _quotient,
+    "mod": _remainder,
+    "and": lambda node: (0, min(span(node[2])[1], span(node[3])[1])),
+    "or": _bitwise,
+    "xor": _bitwise,
+    "shr": _shifted,
+    "convert": _converted,
+    "check": _checked,
+    "select": lambda node: _union(node[3], node[4]),
+    "mux": lambda node: _union(*node[3]),
+    "min": lambda node: _union(node[2], node[3]),
+    "max": lambda node: _union(node[2], node[3]),
+    "length": lambda node: (0, (1 << 31) - 1),
+    "find": lambda node: (0, (1 << 31) - 1),
+    "floor_div": lambda node: (span(node[2])[0] // node[3][2], span(node[2])[1] // node[3][2]),
+}
+
+
+def mask(machine: str) -> int:
+    """All bits of a type set."""
+    return (1 << width(machine)) - 1

@@ -1,0 +1,145 @@
+"""The names that generated code uses: typed views of one memory, and operations that are no expression of Python.
+
+A function that can trap takes the site last and raises Stop.  Numbers are worked on in `base.arithmetic`, strings in
+`base.strings`, literals in `texts`; here they only meet memory and sites."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple, TypeVar
+
+from fbvm.base import arithmetic, strings
+from fbvm.base.arithmetic import Undefined
+from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
+from fbvm.engine import texts
+from fbvm.engine.trap import Stop
+
+T = TypeVar("T")
+OBJECT_SHIFT, OFFSET_SHIFT, OFFSET_MASK, BIT_MASK = 40, 8, (1 << 32) - 1, 255
+BUFFER_OBJECT = 1
+"""Number of the object that is the whole buffer; 0 is null, every other object has ended."""
+
+
+class Observation(NamedTuple):
+    """What an observed run tells: `kind` and `site` as in `observe`, `detail` evaluated.
+
+    Of read and write it is (type, byte offset in the buffer, bit), of contact (element, BOOL)."""
+
+    kind: str
+    site: int
+    detail: Any
+
+
+def stop(code: str, site: int, *values: Any) -> Any:
+    """A trap as an expression."""
+    raise Stop(code, site, *values)
+
+
+def quotient(a: int, b: int, site: int) -> int:
+    if b == 0:
+        raise Stop("R0101", site, a, b)
+    return a // b if (a < 0) == (b < 0) else -(-a // b)
+
+
+def remainder(a: int, b: int, site: int) -> int:
+    if b == 0:
+        raise Stop("R0101", site, a, b)
+    return a - b * (a // b if (a < 0) == (b < 0) else -(-a // b))
+
+
+def choose(g: bool, a: T, b: T) -> T:
+    return b if g else a
+
+
+def mux(k: int, choices: tuple[T, ...], site: int) -> T:
+    if 0 <= k < len(choices):
+        return choices[k]
+    raise Stop("R0107", site, k, len(choices) - 1)
+
+
+def sited(function: Callable[..., T]) -> Callable[..., T]:
+    """A function of arithmetic with the site as one more argument, whose Undefined is a trap there."""
+
+    def answer(*operands: Any) -> T:
+        try:
+            return function(*operands[:-1])
+        except Undefined as undefined:
+            raise Stop(undefined.code, operands[-1], *undefined.values) from None
+
+    return answer
+
+
+def enum_text(names: Mapping[int, str], value: int) -> bytes:
+    name = names.get(value)
+    return str(int(value)).encode() if name is None else name.encode("latin-1", "replace")
+
+
+_PURE: dict[str, Any] = {
+    "Observation": Observation, "NAN": arithmetic.NAN, "INF": arithmetic.INF, "stop": stop, "bisect": bisect_right,
+    "quotient": quotient, "remainder": remainder, "divide": arithmetic.divide, "power": arithmetic.power,
+    "lesser": arithmetic.lesser, "greater": arithmetic.greater, "choose": choose, "mux": mux,
+    "single": arithmetic.single, "single_of_integer": arithmetic.single_of_integer, "bits": arithmetic.bits,
+    "arctangent": arithmetic.arctangent, "find": strings.find, "to_text": texts.to_text, "enum_text": enum_text,
+    **{function.__name__: sited(function) for function in (
+        arithmetic.nearest, arithmetic.truncate, arithmetic.from_bcd, arithmetic.to_bcd, arithmetic.shift_left,
+        arithmetic.shift_right, arithmetic.rotate_left, arithmetic.rotate_right, strings.left, strings.right,
+        strings.mid, strings.insert, strings.delete, strings.replace, texts.from_text)},
+    **{f"math_{name}": function for name, function in arithmetic.FUNCTIONS.items()},
+}
+
+
+def environment(memory: Memory) -> dict[str, Any]:
+    """The globals of generated code over a memory.
+
+    Views are named by machine type, `u1` is that of BOOL; `get_x` and `put_x` work at any offset of `buffer`."""
+    names: dict[str, Any] = dict(_PURE)
+    for machine, view in memory.views.items():
+        names["u1" if machine == "b" else machine] = view
+        names[f"get_{machine}"], names[f"put_{machine}"] = STRUCTS[machine].unpack_from, STRUCTS[machine].pack_into
+    names["buffer"] = memory.map
+    return names | _references(memory) | _texts(memory)
+
+
+def _references(memory: Memory) -> dict[str, Any]:
+    size, u8 = memory.size, memory.u8
+
+    def at(reference: int, delta: int, count: int, site: int) -> int:
+        """The offset of `count` bytes, `delta` bytes behind where the reference points."""
+        if reference >> OBJECT_SHIFT == BUFFER_OBJECT:
+            offset = (reference >> OFFSET_SHIFT & OFFSET_MASK) + delta
+            if 0 <= offset <= size - count:
+                return offset
+        raise Stop("R0110", site, reference)
+
+    def get_flag(reference: int, delta: int, site: int) -> bool:
+        byte, bit = u8[at(reference, delta, 1, site)], reference & BIT_MASK
+        return byte != 0 if bit == WHOLE_BYTES else byte >> (bit & 7) & 1 == 1
+
+    def put_flag(reference: int, delta: int, site: int, value: bool) -> None:
+        offset, bit = at(reference, delta, 1, site), reference & BIT_MASK
+        if bit == WHOLE_BYTES:
+            u8[offset] = bool(value)
+        else:
+            u8[offset] = u8[offset] & ~(1 << (bit & 7)) | bool(value) << (bit & 7)
+
+    return {"at": at, "get_flag": get_flag, "put_flag": put_flag}
+
+
+def _texts(memory: Memory) -> dict[str, Any]:
+    buffer, u8 = memory.map, memory.u8
+
+    def get_text(offset: int, capacity: int) -> bytes:
+        return buffer[offset:offset + capacity].partition(b"\0")[0]
+
+    def put_text(offset: int, capacity: int, text: bytes) -> None:
+        text = text[:capacity] + b"\0"
+        u8[offset:offset + len(text)] = text
+
+    def copy(to: int, source: int, count: int) -> None:
+        u8[to:to + count] = u8[source:source + count]
+
+    def fill(to: int, pattern: bytes) -> None:
+        u8[to:to + len(pattern)] = pattern
+
+    return {"get_text": get_text, "put_text": put_text, "copy": copy, "fill": fill}

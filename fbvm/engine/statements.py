@@ -1,0 +1,354 @@
+"""Statements of code as lines of Python: one row of EMITTERS an operation, and the function that a body becomes.
+
+`p3_Main(b1)` is the body of number 3 for the instance at byte b1.  In the observed build bodies are generators.  Loops
+and blocks nested deeper than Python allows become functions inside the body; what leaves them is a return code."""
+
+from __future__ import annotations
+
+import re
+from bisect import bisect_right
+from collections.abc import Callable
+from typing import Any
+
+from fbvm.base.areas import BUDGET, DUE
+from fbvm.base.memory import WHOLE_BYTES
+from fbvm.code.image import Body, Image
+from fbvm.code.operations import SIZES, Address, Block, Node
+from fbvm.engine.expressions import Expressions, bare, flag_operands, plus, view
+from fbvm.engine.ranges import may_trap
+
+MOST_LOOPS = 15
+"""Nested loops in one function of Python, which takes 20 blocks."""
+MOST_INDENTS = 60
+"""Levels of indentation in one function of Python, which takes 100."""
+CHAIN = 25
+"""Branches in one if/elif, which Python's compiler nests in each other."""
+FEW_ROWS = 5
+"""Rows up to which a case asks one row after the other."""
+EXIT, NEXT, RETURN = 1, 2, 3
+"""What an outlined block returns if it is left early."""
+
+
+def function_name(number: int, body: Body) -> str:
+    """The name of the Python function of a body."""
+    return f"p{number}_" + re.sub(r"\W", "_", body.name, flags=re.ASCII)
+
+
+class BodyWriter(Expressions):
+    """Writes one body.  `tail` is the tail of the innermost loop of the current function, None outside of any."""
+
+    def __init__(self, image: Image, constants: dict[str, Any], observed: bool) -> None:
+        super().__init__(constants)
+        self.image, self.observed = image, observed
+        self.out: list[str] = []
+        self.indent = 1
+        self.loops = 0
+        self.tail: Block | None = None
+        self.outlined = False
+        self.leaves: set[int] = set()
+        self.assigned: set[int] = set()
+        self.shared: set[int] = set()
+        self._line = 0
+
+    def write(self, number: int) -> list[str]:
+        """The lines of the Python function of the body of that number."""
+        body = self.image.bodies[number]
+        self.block(body.code)
+        lines = [f"def {function_name(number, body)}(b1):"]
+        lines += [f"    b{size} = b1 >> {size.bit_length() - 1}" for size in (2, 4, 8) if size in self.bases]
+        if self.shared:
+            lines.append("    " + "".join(f"t{number} = " for number in sorted(self.shared)) + "None")
+        for routine in self.routines:
+            lines += ["    " + line for line in routine]
+        return lines + self._ended(self.out)
+
+    def _ended(self, lines: list[str]) -> list[str]:
+        """The lines of a function: one at least, and in the observed build those of a generator."""
+        if self.observed:
+            return [*lines, "    yield from ()"]
+        return [*lines, "    pass"] if _empty(lines) else lines
+
+    # --- lines and blocks
+
+    def line(self, text: str) -> None:
+        self.out.append("    " * self.indent + text)
+
+    def block(self, block: Block) -> None:
+        for node in block:
+            EMITTERS[node[0]](self, *node[1:])
+
+    def suite(self, write: Callable[[], None]) -> None:
+        """What `write` writes, one level deeper."""
+        self.indent += 1
+        before = len(self.out)
+        if self.indent > MOST_INDENTS:
+            self.outline(write)
+        else:
+            write()
+        if _empty(self.out[before:]):
+            self.line("pass")
+        self.indent -= 1
+
+    def outline(self, write: Callable[[], None]) -> None:
+        """What `write` writes as a function inside the body, and its call."""
+        outer = (self.out, self.indent, self.loops, self.tail, self.outlined, self.leaves, self.assigned)
+        self.out, self.indent, self.loops, self.tail = [], 1, 0, None
+        self.outlined, self.leaves, self.assigned = True, set(), set()
+        write()
+        name, lines, leaves, assigned = self.name("o"), self.out, self.leaves, self.assigned
+        self.out, self.indent, self.loops, self.tail, self.outlined, self.leaves, self.assigned = outer
+        self.shared |= assigned
+        shared = [f"    nonlocal {', '.join(f't{number}' for number in sorted(assigned))}"] if assigned else []
+        self.routines.append([f"def {name}():", *shared, *self._ended(lines)])
+        call = f"yield from {name}()" if self.observed else f"{name}()"
+        if not leaves:
+            self.line(call)
+            return
+        self.line(f"r = {call}")
+        for code, leave in ((EXIT, _exit), (NEXT, _next), (RETURN, _return)):
+            if code in leaves:
+                self.line(f"if r == {code}:")
+                self.indent += 1
+                leave(self)
+                self.indent -= 1
+
+    def leave(self, code: int) -> None:
+        """Leave an outlined block: whoever called it goes on with the code."""
+        self.leaves.add(code)
+        self.line(f"return {code}")
+
+    def branches(self, tests: list[tuple[str, Block]], otherwise: Block) -> None:
+        """An if with its branches."""
+        word = "if"
+        for test, block in tests:
+            self.line(f"{word} {test}:")
+            self.suite(lambda block=block: self.block(block))  # type: ignore[misc]
+            word = "elif"
+        if otherwise:
+            self.line("else:")
+            self.suite(lambda: self.block(otherwise))
+
+
+def _empty(lines: list[str]) -> bool:
+    return all(line.lstrip().startswith("#") for line in lines)
+
+
+# --- stores ---------------------------------------------------------------------------------------------------------
+
+
+def _ordered(w: BodyWriter, address: Address, value: Node, text: str) -> str:
+    """The address evaluated before the value, as the table has it, where Python would do it after."""
+    if not may_trap(address) or not may_trap(value):
+        return text
+    name = w.name("v")
+    w.line(f"{name} = {text}")
+    return name
+
+
+def _store(w: BodyWriter, machine: str, address: Address, a: Node) -> None:
+    if isinstance(address[0], tuple):
+        _store_raw(w, machine, address, a)
+        return
+    index = bare(w.index(address, machine))
+    index = _ordered(w, address, a, index)
+    stored, text = w.stored(machine, a)
+    w.line(f"{view(stored)}[{index}] = {text}")
+
+
+def _store_raw(w: BodyWriter, machine: str, address: Address, a: Node) -> None:
+    place = bare(w.place(address, SIZES[machine]))
+    stored, text = w.stored(machine, a)
+    if machine == "f32":
+        text = f"single({text})"  # `struct` refuses what it would have to round to infinity
+    w.line(f"put_{stored}(buffer, {place}, {text})")
+
+
+def _store_bit(w: BodyWriter, address: Address, bit: int, a: Node) -> None:
+    place = bare(w.place(address, 1))
+    if not place.isdigit():
+        name = w.name("v")
+        w.line(f"{name} = {place}")
+        place = name
+    on, off = 1 << bit, 255 ^ 1 << bit
+    if a[0] == "const":
+        w.line(f"u8[{place}] |= {on}" if a[2] else f"u8[{place}] &= {off}")
+    else:
+        w.line(f"u8[{place}] = u8[{place}] | {on} if {w.condition(a)} else u8[{place}] & {off}")
+
+
+def _store_flag(w: BodyWriter, address: Address, a: Node) -> None:
+    if not isinstance(address[0], tuple):
+        _store(w, "b", address, a)
+        return
+    if may_trap(a):
+        w.line(w.place(address, 1))
+    w.line(f"put_flag({flag_operands(w, address)}, {bare(w.value(a))})")
+
+
+def _store_text(w: BodyWriter, address: Address, capacity: int, a: Node) -> None:
+    w.line(f"put_text({bare(w.place(address, capacity + 1))}, {capacity}, {bare(w.value(a))})")
+
+
+def _copy(w: BodyWriter, to: Address, source: Address, size: int) -> None:
+    target, origin = bare(w.place(to, size)), bare(w.place(source, size))
+    if target.isdigit() and origin.isdigit():
+        w.line(f"u8[{target}:{plus(target, size)}] = u8[{origin}:{plus(origin, size)}]")
+    else:
+        w.line(f"copy({target}, {origin}, {size})")
+
+
+def _fill(w: BodyWriter, address: Address, pattern: bytes) -> None:
+    w.line(f"fill({bare(w.place(address, len(pattern)))}, {pattern!r})")
+
+
+def _let(w: BodyWriter, number: int, machine: str, a: Node) -> None:
+    w.assigned.add(number)
+    w.line(f"t{number} = {bare(w.value(a))}")
+
+
+# --- control --------------------------------------------------------------------------------------------------------
+
+
+def _if(w: BodyWriter, rows: tuple[tuple[Node, Block], ...], otherwise: Block) -> None:
+    if len(rows) > CHAIN:
+        rest: Block = (("if", rows[CHAIN:], otherwise),)
+        w.branches([(bare(w.condition(c)), block) for c, block in rows[:CHAIN]], ())
+        w.line("else:")
+        w.suite(lambda: w.outline(lambda: w.block(rest)))
+        return
+    w.branches([(bare(w.condition(c)), block) for c, block in rows], otherwise)
+
+
+def _case(w: BodyWriter, machine: str, a: Node, rows: tuple[tuple[Any, Block], ...], otherwise: Block) -> None:
+    name = w.name("v")
+    w.line(f"{name} = {bare(w.value(a))}")
+    if len(rows) <= FEW_ROWS:
+        w.branches([(" or ".join(f"{name} == {low}" if low == high else f"{low} <= {name} <= {high}"
+                                 for low, high in labels), block) for labels, block in rows], otherwise)
+        return
+    blocks = [block for _, block in rows] + [otherwise]
+    starts, numbers = case_table([labels for labels, _ in rows])
+    table, find = w.constant(starts), w.constant(numbers)
+    w.line(f"{name} = {find}[bisect({table}, {name})]")
+
+    def choose(first: int, last: int) -> None:
+        if first == last:
+            w.block(blocks[first])
+            return
+        middle = (first + last + 1) // 2
+        w.line(f"if {name} < {middle}:")
+        w.suite(lambda: choose(first, middle - 1))
+        w.line("else:")
+        w.suite(lambda: choose(middle, last))
+
+    choose(0, len(rows))
+
+
+def case_table(rows: list[tuple[tuple[int, int], ...]]) -> tuple[list[int], list[int]]:
+    """Labels as (starts, numbers): a value belongs to row `numbers[bisect_right(starts, value)]`, the first that fits.
+
+    A value of no row has the number of rows."""
+    edges = sorted({edge for labels in rows for low, high in labels for edge in (low, high + 1)})
+    numbers = [len(rows)] * (len(edges) + 1)
+    for number in range(len(rows) - 1, -1, -1):
+        for low, high in rows[number]:
+            first, last = bisect_right(edges, low), bisect_right(edges, high)
+            numbers[first:last + 1] = [number] * (last + 1 - first)
+    return edges, numbers
+
+
+def _loop(w: BodyWriter, head: Block, body: Block, tail: Block) -> None:
+    if w.loops >= MOST_LOOPS:
+        w.outline(lambda: _loop(w, head, body, tail))
+        return
+    outer = w.tail
+    w.loops += 1
+    w.line("while True:")
+
+    def inside() -> None:
+        w.tail = tail
+        w.block(head + body)
+        w.tail = ()
+        w.block(tail)
+
+    w.suite(inside)
+    w.loops -= 1
+    w.tail = outer
+
+
+def _exit(w: BodyWriter) -> None:
+    if w.tail is None:
+        w.leave(EXIT)
+    else:
+        w.line("break")
+
+
+def _next(w: BodyWriter) -> None:
+    if w.tail is None:
+        w.leave(NEXT)
+        return
+    tail, w.tail = w.tail, ()
+    w.block(tail)
+    w.tail = tail
+    w.line("continue")
+
+
+def _return(w: BodyWriter) -> None:
+    if w.outlined:
+        w.leave(RETURN)
+    else:
+        w.line("return")
+
+
+def _call(w: BodyWriter, pou: int, address: Address | None) -> None:
+    body = w.image.bodies[pou]
+    place = bare(w.place(address, max(1, body.instance_size))) if address else "0"
+    w.line(f"{'yield from ' if w.observed else ''}{function_name(pou, body)}({place})")
+
+
+def _charge(w: BodyWriter, count: int, site: int) -> None:
+    w.line(f"i64[{BUDGET // 8}] = n = i64[{BUDGET // 8}] - {count}")
+    w.line(f"if n < 0: stop('R0104', {site})")
+
+
+def _due(w: BodyWriter, a: Node) -> None:
+    name = w.name("v")
+    w.line(f"if ({name} := {bare(w.value(a))}) < i64[{DUE // 8}]: i64[{DUE // 8}] = {name}")
+
+
+def _stop(w: BodyWriter, code: str, site: int) -> None:
+    w.line(f"stop({code!r}, {site})")
+
+
+# --- observations ---------------------------------------------------------------------------------------------------
+
+
+def _observe(w: BodyWriter, kind: str, site: int, detail: Any) -> None:
+    if kind == "statement" and w.image.sites[site].line != w._line:
+        w._line = w.image.sites[site].line
+        w.line(f"# {w.image.sites[site]}".replace("\n", " ").replace("\r", " "))
+    if w.observed:
+        shown = _DETAILS[kind](w, detail) if kind in _DETAILS else repr(detail)
+        w.line(f"yield Observation({kind!r}, {site}, {shown})")
+
+
+def _contact(w: BodyWriter, detail: tuple[Any, Node]) -> str:
+    return f"({detail[0]!r}, {bare(w.value(detail[1]))})"
+
+
+def _access(w: BodyWriter, detail: tuple[Any, Address, int]) -> str:
+    kind, address, bit = detail
+    if kind == "b" and isinstance(address[0], tuple) and bit == WHOLE_BYTES:
+        return f"('b', {bare(w.place(address, 1))}, {bare(w.value(address[0][1]))} & {WHOLE_BYTES})"
+    return f"({kind!r}, {bare(w.place(address, 1))}, {bit})"
+
+
+_DETAILS: dict[str, Callable[[BodyWriter, Any], str]] = {"contact": _contact, "read": _access, "write": _access}
+
+EMITTERS: dict[str, Callable[..., None]] = {
+    "store": _store, "store_raw": _store_raw, "store_bit": _store_bit, "store_flag": _store_flag,
+    "store_text": _store_text, "copy": _copy, "fill": _fill, "let": _let, "if": _if, "case": _case, "loop": _loop,
+    "exit": _exit, "next": _next, "return": _return, "call": _call, "charge": _charge, "due": _due, "stop": _stop,
+    "observe": _observe,
+}
+"""How each statement is written: called with the operands of its row."""

@@ -1,0 +1,101 @@
+"""Values of elementary types as text, readable as literals, and back: what `to_text` and `from_text` do.
+
+The standard leaves the form to the maker; ours: integers and bit strings decimal, REAL and LREAL the shortest text that
+reads back, times and dates with their short prefix (IEC 61131-3 ed. 3 tables 5, 8, 9)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from datetime import date, timedelta
+
+from fbvm.base.arithmetic import INF, NAN, Undefined, single
+from fbvm.base.types import DAY_NS, SHORT_NAMES
+from fbvm.syntax.literals import ELEMENTARY, UNITS_NS, Malformed, OutOfRange, typed
+
+_SECOND_NS = UNITS_NS["s"]
+_FLOATS = {"NAN": NAN, "INF": INF, "+INF": INF, "-INF": -INF}
+"""What no literal can say; written and read all the same."""
+
+
+def to_text(data_type: str, value: float) -> bytes:
+    """The text of a value of the elementary type of that name."""
+    return _WRITERS[SHORT_NAMES.get(data_type, data_type)](value).encode("ascii")
+
+
+def from_text(data_type: str, text: bytes) -> float:
+    """The value that a literal of the type names, with or without its prefix, spaces around it trimmed.
+
+    Raises Undefined: R0111 for text that is no literal of the type, R0105 for a value that the type cannot hold."""
+    wanted = SHORT_NAMES.get(data_type, data_type)
+    prefix, mark, rest = (literal := text.decode("latin-1").strip(" ")).partition("#")
+    prefix = prefix.upper()
+    if not mark or prefix not in ELEMENTARY:
+        prefix, rest = wanted, literal
+    if wanted in ("REAL", "LREAL") and prefix == wanted and rest.upper() in _FLOATS:
+        return _FLOATS[rest.upper()]
+    try:
+        _, value, kind = typed(prefix, rest)
+    except OutOfRange:
+        raise Undefined("R0105", text, data_type) from None
+    except Malformed:
+        raise Undefined("R0111", text, data_type) from None
+    if kind != wanted or isinstance(value, str):
+        raise Undefined("R0111", text, data_type)
+    return single(value) if wanted == "REAL" else value
+
+
+def _bool(value: float) -> str:
+    return "TRUE" if value else "FALSE"
+
+
+def _integer(value: float) -> str:
+    return str(int(value))
+
+
+def _lreal(value: float) -> str:
+    if not math.isfinite(value):
+        return "NaN" if value != value else "INF" if value > 0 else "-INF"
+    return repr(float(value)).upper()
+
+
+def _real(value: float) -> str:
+    """Fewest digits that round to the same 32 bits."""
+    for digits in range(1, 10):
+        shortest = float(f"{value:.{digits}g}")
+        if single(shortest) == value:
+            return _lreal(shortest)
+    return _lreal(value)
+
+
+def _duration(prefix: str) -> Callable[[float], str]:
+    def write(value: float) -> str:
+        parts, rest = [], abs(int(value))
+        for unit, size_ns in UNITS_NS.items():
+            count, rest = divmod(rest, size_ns)
+            if count:
+                parts.append(f"{count}{unit}")
+        return f"{prefix}#{'-' if value < 0 else ''}{''.join(parts) or '0s'}"
+
+    return write
+
+
+def _day(value: float) -> str:
+    return (date(1970, 1, 1) + timedelta(days=int(value) // DAY_NS)).isoformat()
+
+
+def _clock(value: float) -> str:
+    seconds, fraction_ns = divmod(int(value) % DAY_NS, _SECOND_NS)
+    fraction = f".{fraction_ns:09}".rstrip("0").rstrip(".")
+    return f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}{fraction}"
+
+
+_WRITERS: dict[str, Callable[[float], str]] = {
+    "BOOL": _bool, "REAL": _real, "LREAL": _lreal, "TIME": _duration("T"), "LTIME": _duration("LT"),
+    **dict.fromkeys(("SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD",
+                     "LWORD"), _integer),
+    "DATE": lambda value: f"D#{_day(value)}", "LDATE": lambda value: f"LD#{_day(value)}",
+    "TIME_OF_DAY": lambda value: f"TOD#{_clock(value)}", "LTIME_OF_DAY": lambda value: f"LTOD#{_clock(value)}",
+    "DATE_AND_TIME": lambda value: f"DT#{_day(value)}-{_clock(value)}",
+    "LDATE_AND_TIME": lambda value: f"LDT#{_day(value)}-{_clock(value)}",
+}

@@ -1,0 +1,59 @@
+"""What ends a run early: the trap that an engine returns, and its words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fbvm.base.codes import CODES
+from fbvm.code.image import Image, Site
+
+
+@dataclass(frozen=True)
+class Trap:
+    """A program was stopped: `code` (R01..), where, the values that caused it, and a message of one line."""
+
+    code: str
+    site: Site
+    values: tuple[Any, ...]
+    message: str
+
+    def __str__(self) -> str:
+        return self.message
+
+
+class Stop(Exception):
+    """Raised inside an engine and turned into a Trap at its surface; `site` is a number of Image.sites."""
+
+    def __init__(self, code: str, site: int, *values: Any) -> None:
+        super().__init__(code, site, *values)
+        self.code, self.site, self.values = code, site, values
+
+
+_WORDS = {
+    "R0101": "{0} divided by {1}",
+    "R0102": "index {0} outside {1}..{2}",
+    "R0103": "value {0} outside {1}..{2}",
+    "R0104": "step budget used up (watchdog)",
+    "R0106": "shift or rotate by {0}",
+    "R0107": "selector {0} of MUX outside 0..{1}",
+    "R0108": "string position or length {0} out of range",
+    "R0111": "text {0!r} cannot be converted to {1}",
+}
+
+
+def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = ()) -> Trap:
+    """The trap of that code at a site's number; a row without values says the title of its code."""
+    place = image.sites[site]
+    values = tuple(int(value) if isinstance(value, bool) else value for value in values)
+    if code == "R0105" and values:
+        words = f"{_shown(values[0])} does not fit " + ("{}..{}" if len(values) > 2 else "{}").format(*values[1:])
+    elif code in _WORDS and values:
+        words = _WORDS[code].format(*map(_shown, values))
+    else:
+        words = CODES[code].title if code in CODES else code
+    return Trap(code, place, values, f"{code} {place}: {words}")
+
+
+def _shown(value: Any) -> Any:
+    return value.decode("latin-1") if isinstance(value, bytes) else value
