@@ -16,6 +16,8 @@ from fbvm.units.etn21_timing import timing_of
 from fbvm.units.unit import AreaMemory
 from fbvm.wire.link import Event, Request
 
+__all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
+
 TIME_WAIT_NS = 60_000_000_000  # W421 6-9-3 p156
 
 

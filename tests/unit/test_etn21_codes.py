@@ -5,9 +5,8 @@ from __future__ import annotations
 import pytest
 from etn21_rig import CIO, E2, SERVER, A, D, H, Rig, W
 
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21 import Etn21, Fault
 from fbvm.units.etn21_codes import ERRNO, code_of, meaning_of
-from fbvm.units.etn21_dispatch import Fault
 from fbvm.units.etn21_map import Switch
 from fbvm.wire.link import Broken, Closed, Failed, Grant, Opened, Peer, Received, Sent
 

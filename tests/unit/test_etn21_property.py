@@ -7,8 +7,7 @@ from etn21_rig import CIO, D, Rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fbvm.units.etn21 import Etn21
-from fbvm.units.etn21_dispatch import Fault
+from fbvm.units.etn21 import Etn21, Fault
 from fbvm.units.etn21_map import Switch
 from fbvm.wire.link import Close, Closed, Event, Peer, Request
 
