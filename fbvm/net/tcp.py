@@ -386,7 +386,8 @@ class _Line(_OnHost):
 
     def _broke(self, error: OSError | int, now_ns: int) -> None:
         name = errno_name(error)
-        self._tap(now_ns, What.RST, False)
+        if name in ("ECONNRESET", "EPIPE"):
+            self._tap(now_ns, What.RST, False)
         for _ in self._outbox:
             self._report(Failed(self.channel, "send", name))
         self._outbox.clear()
