@@ -28,22 +28,22 @@ class Chart(str):
     __slots__ = ()
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, str) and _normal(self) == _normal(other)
+        return isinstance(other, str) and _plain(self) == _plain(other)
 
     def __ne__(self, other: object) -> bool:
         return not self == other
 
     def __hash__(self) -> int:
-        return hash(_normal(self))
+        return hash(_plain(self))
 
 
-def _normal(text: str) -> list[str]:
-    lines = [line.rstrip() for line in str(text).expandtabs().split("\n")]
+def _plain(text: str) -> str:
+    lines = [line.rstrip() for line in text.expandtabs().split("\n")]
     while lines and not lines[0]:
         del lines[0]
     while lines and not lines[-1]:
         del lines[-1]
-    return textwrap.dedent("\n".join(lines)).split("\n")
+    return textwrap.dedent("\n".join(lines))
 
 
 def chart(
@@ -98,8 +98,10 @@ def draw(
     blocks = []
     for start in range(0, len(columns), room):
         piece = columns[start : start + room]
-        rows = [_row(track, recorder.scans, piece, left, min(room, len(columns))) for track in tracks]
-        blocks.append("\n".join([*([" " * left + _ruler(piece)] if ruler else []), *rows]))
+        rows = [(track.signal.label, *_row(track, recorder.scans, piece)) for track in tracks]
+        wide = max(min(room, len(columns)), *(len(cells) for _, cells, _ in rows))
+        lines = [f"{label:<{left}}{cells:<{wide}}   {note}".rstrip() for label, cells, note in rows]
+        blocks.append("\n".join([*([" " * left + _ruler(piece)] if ruler else []), *lines]))
     return Chart("\n\n".join(blocks) + "\n")
 
 
@@ -115,7 +117,8 @@ def _columns(scans: range, tracks: Sequence[Track]) -> list[int | None]:
     return columns
 
 
-def _row(track: Track, scans: range, piece: Sequence[int | None], left: int, room: int) -> str:
+def _row(track: Track, scans: range, piece: Sequence[int | None]) -> tuple[str, str]:
+    """The cells of a signal in these scans, and what stands at their right."""
     values = list(track.values(scans))
     signal = track.signal
     note = signal.description
@@ -126,19 +129,21 @@ def _row(track: Track, scans: range, piece: Sequence[int | None], left: int, roo
         cells, complete = _numbers(texts)
         if not complete:
             note = f"{_sequence(track, piece)}   {note}".rstrip()
-    return f"{signal.label:<{left}}{cells:<{room}}{'   ' + note if note else ''}".rstrip()
+    return cells, note
 
 
 def _numbers(texts: Sequence[str | None]) -> tuple[str, bool]:
-    """A row of numbers, each from the column on in which it appears; and whether all found room."""
+    """A row of numbers, each from the column on in which it appears; and whether all found room.
+
+    The last one always does: nothing stands at its right."""
     cells, complete, at = [" "] * len(texts), True, 0
     while at < len(texts):
         end = at + 1
         while end < len(texts) and texts[end] in (texts[at], None):
             end += 1
         text = ("|" if at else "") + (texts[at] or "")
-        if len(text) > end - at:
-            text, complete = "|"[: end - at], False
+        if len(text) > end - at and end < len(texts):
+            text, complete = "|", False
         cells[at : at + len(text)] = text
         for place in range(at, end):
             if texts[place] is None and cells[place] == " ":

@@ -1,0 +1,45 @@
+"""The command `fbvm` and its verbs.
+
+Exit status: 0 good, 1 a check failed, 2 usage, 3 the program has errors, 4 running stopped, 5 the network could not be
+used, 130 ended by Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import importlib
+
+import click
+
+import fbvm
+
+VERBS = {
+    "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
+    "run": "Run a program, in virtual time or over real TCP.",
+    "check": "Say what is wrong with a program; silent when nothing is.",
+    "list": "Print the compiled program, readable.",
+    "explain": "Print the page of a diagnostic.",
+    "peer": "Start a Modbus TCP server to talk to.",
+}
+
+
+class _Verbs(click.Group):
+    """Loads the module of a verb when it is called, so that `fbvm check` starts quickly."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if cmd_name not in VERBS:
+            return None
+        command: click.Command = importlib.import_module(f"fbvm.cli.{cmd_name}").command
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(VERBS.items()))
+
+
+@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(fbvm.__version__, prog_name="fbvm")
+def main() -> None:
+    """Runs PLC function blocks off the PLC."""

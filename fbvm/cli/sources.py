@@ -1,0 +1,66 @@
+"""Sources from files to an Image, diagnostics to the terminal; what `check`, `list` and `run` begin with."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.cli import status
+from fbvm.code.compiler import Compilation, compile_files
+from fbvm.code.image import Image
+
+Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+
+
+def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
+    """FILE..., --program and --library, which all verbs on programs share."""
+    for decorate in (
+        click.option("--library", "libraries", multiple=True, metavar="DIR",
+                     type=click.Path(exists=True, file_okay=False, path_type=Path),
+                     help="A folder of libraries of your own, besides those that fbvm brings; may be repeated."),
+        click.option("--program", metavar="NAME", help="The PROGRAM to run where no CONFIGURATION says it."),
+        click.argument("files", nargs=-1, required=True, metavar="FILE...",
+                       type=click.Path(exists=True, dir_okay=False, path_type=Path)),
+    ):  # fmt: skip
+        function = decorate(function)
+    return function
+
+
+def compiled(
+    files: Sequence[Path], program: str | None, libraries: Sequence[Path], cycle_ns: int, as_json: bool = False
+) -> Image:
+    """The Image of the files.  Reports warnings; reports errors and ends with status 3 if there are any."""
+    compilation = compile_files(files, program=program, libraries=libraries, cycle_ns=cycle_ns)
+    if compilation.image is None:
+        report(compilation, as_json)
+        sys.exit(status.PROGRAM_ERRORS)
+    for diagnostic in compilation.diagnostics:
+        show(diagnostic)
+    return compilation.image
+
+
+def report(compilation: Compilation, as_json: bool) -> None:
+    """All diagnostics: to stderr as text with a last line that counts, or to stdout as one object."""
+    diagnostics = compilation.diagnostics
+    if as_json:
+        click.echo(json.dumps({"diagnostics": [diagnostic.as_dict() for diagnostic in diagnostics]}, indent=2))
+        return
+    for diagnostic in diagnostics:
+        show(diagnostic)
+    wrong = len(errors(diagnostics))
+    if wrong:
+        click.secho(f"{wrong} error{'s' * (wrong > 1)}; `fbvm explain CODE` says more about each", bold=True, err=True)
+
+
+def show(diagnostic: Diagnostic) -> None:
+    """One diagnostic on stderr, its first line in colour on a terminal."""
+    first, _, rest = diagnostic.render().partition("\n")
+    click.secho(first, fg="red" if diagnostic.severity == "error" else "yellow", err=True)
+    if rest:
+        click.echo(rest, err=True)

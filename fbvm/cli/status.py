@@ -1,0 +1,11 @@
+"""What the command tells whoever called it."""
+
+from __future__ import annotations
+
+GOOD = 0
+FAILED = 1
+USAGE = 2
+PROGRAM_ERRORS = 3
+STOPPED = 4
+NETWORK = 5
+INTERRUPTED = 130
