@@ -1,7 +1,6 @@
-"""Expressions of code as expressions of Python: one row of EMITTERS an operation.
+"""Expressions of code as expressions of Python: one row an operation.
 
-Integers stay Python's own inside a sum or product and are brought into their type once, at its end; a wrap that cannot
-happen is left out.  What is nested deeper than Python's parser allows moves into functions of its own."""
+A row decides nothing: what it writes means what the table of operations says."""
 
 from __future__ import annotations
 
@@ -9,167 +8,18 @@ from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.areas import NOW
-from fbvm.base.arithmetic import limits, width
+from fbvm.base.arithmetic import width
 from fbvm.code.operations import INTEGERS, SIZES, Address, Node
 from fbvm.engine.ranges import fits, is_float, mask, may_trap, span
+from fbvm.engine.writer import Expressions, Rows, bare
 
-DEEPEST = 24
-"""Levels of nodes in one Python expression: at most four parentheses each, where Python takes 200 in all."""
 SIGNS = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^",
          "eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
-
-
-def bare(text: str) -> str:
-    """The same expression without the one pair of parentheses that holds it all."""
-    if not text.startswith("(") or not text.endswith(")") or "'" in text or '"' in text:
-        return text
-    depth = 0
-    for at, letter in enumerate(text):
-        depth += (letter == "(") - (letter == ")")
-        if depth == 0 and at < len(text) - 1:
-            return text
-    return text[1:-1]
-
-
-def plus(text: str, number: int) -> str:
-    """`text` and a constant more."""
-    if text.isdigit():
-        return str(int(text) + number)
-    return text if number == 0 else f"{text} + {number}" if number > 0 else f"{text} - {-number}"
-
-
-class Expressions:
-    """Writes the expressions of one body and notes what they need around them.
-
-    `bases` are the shifts of the instance's base that are used, `routines` functions that the body has to define,
-    `constants` objects by the name under which generated code finds them."""
-
-    def __init__(self, constants: dict[str, Any]) -> None:
-        self.constants = constants
-        self.bases: set[int] = set()
-        self.routines: list[list[str]] = []
-        self._depth = 0
-        self._names = 0
-
-    def name(self, letter: str) -> str:
-        """A local name that nothing else uses."""
-        self._names += 1
-        return f"{letter}{self._names}"
-
-    def constant(self, value: Any) -> str:
-        """The name of an object that is made once."""
-        name = f"K{len(self.constants) + 1}"
-        self.constants[name] = value
-        return name
-
-    # --- three ways to read an expression
-
-    def value(self, node: Node) -> str:
-        """Python for the very value; a BOOL is False or True."""
-        return self._descend(node, _value)
-
-    def loose(self, node: Node) -> str:
-        """Python for a number that becomes the value when it is brought into its type (low bits, or 32-bit float)."""
-        return self._descend(node, _loose)
-
-    def condition(self, node: Node) -> str:
-        """Python for something that is true if the BOOL is TRUE."""
-        return self._descend(node, _condition)
-
-    def _descend(self, node: Node, how: Callable[[Expressions, Node], str]) -> str:
-        outer = self._depth
-        deep = outer >= DEEPEST and node[0] not in ("const", "tmp")
-        self._depth = 0 if deep else outer + 1
-        text = how(self, node)
-        self._depth = outer
-        if not deep:
-            return text
-        name = self.name("e")
-        self.routines.append([f"def {name}():", f"    return {text}"])
-        return f"{name}()"
-
-    def bring(self, text: str, machine: str) -> str:
-        """Python for a number brought into its type."""
-        if machine == "f32":
-            return f"single({bare(text)})"
-        if machine == "b":
-            return f"({text} & 1 != 0)"
-        low, high = limits(machine)
-        if low == 0:
-            return f"({text} & {high})"
-        v = self.name("v")
-        return f"({v} if {low} <= ({v} := {bare(text)}) <= {high} else ({v} + {-low} & {high - low}) - {-low})"
-
-    def stored(self, machine: str, node: Node) -> tuple[str, str]:
-        """The type of the view and Python for what is stored there: cheaper than the value where the view rounds."""
-        if is_float(machine):
-            if (node[0] == "const" and node[2] == node[2]) or (node[0] == "convert" and not is_float(node[2])):
-                return machine, self.value(node)
-            v = self.name("v")
-            return machine, f"{v} if ({v} := {bare(self.loose(node))}) == {v} else NAN"
-        if machine in INTEGERS and node[0] in _ARITHMETIC and not fits(node):
-            return f"u{width(machine)}", f"{self.loose(node)} & {mask(machine)}"
-        return machine, bare(self.value(node))
-
-    # --- addresses
-
-    def place(self, address: Address, count: int) -> str:
-        """Python for the byte offset of an address whose `count` bytes are used."""
-        base, offset, terms = address
-        if isinstance(base, tuple):
-            _, reference, site = base
-            delta = self._sum("", offset, [(stride, term) for stride, term in terms])
-            return f"at({bare(self.value(reference))}, {delta}, {count}, {site})"
-        if base == "self":
-            self.bases.add(1)
-        return self._sum("b1" if base == "self" else "", offset, list(terms))
-
-    def index(self, address: Address, machine: str) -> str:
-        """Python for the index of an address without reference in the view of its type."""
-        base, offset, terms = address
-        size = SIZES[machine]
-        if offset % size or any(stride % size for stride, _ in terms):
-            return f"{self.place(address, size)} >> {size.bit_length() - 1}"
-        if base == "self":
-            self.bases.add(size)
-        return self._sum(f"b{size}" if base == "self" else "", offset // size, [(s // size, t) for s, t in terms])
-
-    def _sum(self, base: str, offset: int, terms: list[tuple[int, Node]]) -> str:
-        parts = [base] if base else []
-        for stride, term in terms:
-            text = self.value(term)
-            parts.append(text if stride == 1 else f"{text} * {stride}")
-        text = " + ".join(parts)
-        if not text:
-            return str(offset)
-        text = plus(text, offset)
-        return f"({text})" if " " in text else text
-
-
-# --- rows -----------------------------------------------------------------------------------------------------------
-
-_ARITHMETIC = ("add", "sub", "mul", "neg", "abs", "convert")
 
 
 def view(machine: str) -> str:
     """The name of the view of a machine type in generated code."""
     return "u1" if machine == "b" else machine
-
-
-def _value(e: Expressions, node: Node) -> str:
-    return EMITTERS[node[0]](e, *node[1:])
-
-
-def _loose(e: Expressions, node: Node) -> str:
-    name, machine = node[0], node[1]
-    if name in _LOOSE and (is_float(machine) or name in _ARITHMETIC):
-        return _LOOSE[name](e, node)
-    return _value(e, node)
-
-
-def _condition(e: Expressions, node: Node) -> str:
-    row = _CONDITIONS.get(node[0])
-    return row(e, node) if row else _value(e, node)
 
 
 def _brought(name: str) -> Callable[..., str]:
@@ -382,6 +232,12 @@ def _enum_text(e: Expressions, machine: str, names: Any, a: Node) -> str:
     return f"enum_text({e.constant(dict(names))}, {bare(e.value(a))})"
 
 
+def _both(word: str, e: Expressions, node: Node) -> str:
+    if may_trap(node[3]):
+        return e.value(node)
+    return f"({e.condition(node[2])} {word} {e.condition(node[3])})"
+
+
 _LOOSE: dict[str, Callable[[Expressions, Node], str]] = {
     "add": _binary, "sub": _binary, "mul": _binary, "neg": _negative,
     "abs": lambda e, node: f"abs({bare(e.value(node[2]))})",
@@ -390,7 +246,7 @@ _LOOSE: dict[str, Callable[[Expressions, Node], str]] = {
 }
 """Operations whose number becomes the value when it is brought into the type (`div` here: of floats only)."""
 
-EMITTERS: dict[str, Callable[..., str]] = {
+VALUES: dict[str, Callable[..., str]] = {
     "const": _const,
     "tmp": lambda e, machine, number: f"t{number}",
     "load": _load, "load_raw": _load_raw, "load_bit": _load_bit, "load_flag": _load_flag, "load_text": _load_text,
@@ -428,8 +284,4 @@ _CONDITIONS: dict[str, Callable[[Expressions, Node], str]] = {
 }
 """Shorter forms where only the truth of a BOOL is wanted."""
 
-
-def _both(word: str, e: Expressions, node: Node) -> str:
-    if may_trap(node[3]):
-        return e.value(node)
-    return f"({e.condition(node[2])} {word} {e.condition(node[3])})"
+ROWS = Rows(VALUES, _LOOSE, _CONDITIONS)

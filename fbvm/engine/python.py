@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import linecache
 import sys
+from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
 from itertools import count
@@ -22,7 +23,7 @@ from fbvm.engine.trap import Stop, Trap, trap
 
 _NUMBERS = count(1)
 FRAMES_TO_SPARE = 200
-"""Python frames that callers of an engine, and its own functions, may have besides the calls of the program."""
+"""Python frames that callers of an engine, and its own functions, may need besides those of the program."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +34,8 @@ class Program:
     source: str
     code: CodeType
     constants: dict[str, Any] = field(repr=False)
+    frames: int
+    """Python frames that a run takes at most: every body once (there is no recursion), and every part outlined."""
 
 
 _programs: WeakValueDictionary[tuple[int, bool], Program] = WeakValueDictionary()
@@ -45,11 +48,14 @@ def translate(image: Image, observed: bool = False) -> Program:
         return known
     constants: dict[str, Any] = {}
     lines: list[str] = []
+    frames = 0
     for number in range(len(image.bodies)):
-        lines += [*BodyWriter(image, constants, observed).write(number), ""]
+        writer = BodyWriter(image, constants, observed)
+        lines += [*writer.write(number), ""]
+        frames += 1 + len(writer.routines)
     source = "\n".join(lines)
     name = f"<fbvm {'observed' if observed else 'plain'} {next(_NUMBERS)}>"
-    program = Program(image, source, compile(source, name, "exec"), constants)
+    program = Program(image, source, compile(source, name, "exec"), constants, frames)
     linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
     finalize(program, linecache.cache.pop, name, None)
     _programs[id(image), observed] = program
@@ -72,7 +78,7 @@ class PythonEngine:
         self._bodies: list[Callable[[int], Any]] = [
             names[function_name(number, body)] for number, body in enumerate(image.bodies)]
         self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in image.tasks]
-        sys.setrecursionlimit(max(sys.getrecursionlimit(), _depth(image) + FRAMES_TO_SPARE))
+        sys.setrecursionlimit(max(sys.getrecursionlimit(), self._program.frames + FRAMES_TO_SPARE))
 
     @property
     def source(self) -> str:
@@ -80,38 +86,38 @@ class PythonEngine:
         return self._program.source
 
     def run(self, task_index: int) -> Trap | None:
-        """Execute the programs of a task in their order, until the end or a trap.  Plain build only."""
-        if self.observed:
-            raise ValueError("an observed build is run by observe()")
-        try:
-            for body, base in self._tasks[task_index]:
-                body(base)
-        except Stop as stop:
-            return trap(self.image, stop.code, stop.site, stop.values)
-        return None
+        """Execute the programs of a task in their order, until the end or a trap.
+
+        An observed build runs to the end as well, with nobody looking."""
+        return self._run(self._tasks[task_index])
 
     def call(self, body: int, base: int = 0) -> Trap | None:
-        """Execute one body for the instance at `base`.  Plain build only."""
-        if self.observed:
-            raise ValueError("an observed build is run by observe()")
+        """Execute one body for the instance at `base`, as `run` does."""
+        return self._run([(self._bodies[body], base)])
+
+    def _run(self, calls: list[tuple[Callable[[int], Any], int]]) -> Trap | None:
         try:
-            self._bodies[body](base)
+            for body, base in calls:
+                steps = body(base)
+                if steps is not None:
+                    deque(steps, 0)
         except Stop as stop:
             return trap(self.image, stop.code, stop.site, stop.values)
         return None
 
     def observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
-        """Execute a task step by step: yields every observation, returns like `run`.  Observed build only."""
+        """Execute a task step by step: yields every observation, returns like `run`.
+
+        Raises ValueError for a plain build, which has none."""
         if not self.observed:
-            raise ValueError("a plain build is run by run()")
+            raise ValueError("a plain build has no observations")
+        return self._steps(self._tasks[task_index])
+
+    def _steps(self, calls: list[tuple[Callable[[int], Any], int]]) -> Generator[Observation, None, Trap | None]:
         try:
-            for body, base in self._tasks[task_index]:
+            for body, base in calls:
                 yield from body(base)
         except Stop as stop:
             return trap(self.image, stop.code, stop.site, stop.values)
         return None
 
-
-def _depth(image: Image) -> int:
-    """Python frames of the deepest chain of calls; a body takes one, and one more for each outlined block."""
-    return 4 * len(image.bodies)

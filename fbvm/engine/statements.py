@@ -14,8 +14,9 @@ from fbvm.base.areas import BUDGET, DUE
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.image import Body, Image
 from fbvm.code.operations import SIZES, Address, Block, Node
-from fbvm.engine.expressions import Expressions, bare, flag_operands, plus, view
+from fbvm.engine.expressions import ROWS, flag_operands, view
 from fbvm.engine.ranges import may_trap
+from fbvm.engine.writer import Expressions, bare, plus
 
 MOST_LOOPS = 15
 """Nested loops in one function of Python, which takes 20 blocks."""
@@ -38,7 +39,7 @@ class BodyWriter(Expressions):
     """Writes one body.  `tail` is the tail of the innermost loop of the current function, None outside of any."""
 
     def __init__(self, image: Image, constants: dict[str, Any], observed: bool) -> None:
-        super().__init__(constants)
+        super().__init__(ROWS, constants)
         self.image, self.observed = image, observed
         self.out: list[str] = []
         self.indent = 1

@@ -1,0 +1,168 @@
+"""What the rows of expressions write with: names, addresses, the three ways to read an operand.
+
+Integers stay Python's own inside a sum or product and are brought into their type once, at its end; a wrap that cannot
+happen is left out.  What is nested deeper than Python's parser allows moves into functions of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from fbvm.base.arithmetic import limits, width
+from fbvm.code.operations import INTEGERS, SIZES, Address, Node
+from fbvm.engine.ranges import fits, is_float, mask
+
+DEEPEST = 24
+"""Levels of nodes in one Python expression: at most four parentheses each, where Python takes 200 in all."""
+ARITHMETIC = ("add", "sub", "mul", "neg", "abs", "convert")
+"""Integer operations whose number is cut to the width at its end."""
+
+
+class Rows(NamedTuple):
+    """How operations are written: `values` by the operands of each row; the others, for the whole node, are shortcuts.
+
+    `loose` writes a number that has still to be brought into its type, `conditions` something true for TRUE."""
+
+    values: Mapping[str, Callable[..., str]]
+    loose: Mapping[str, Callable[[Expressions, Node], str]]
+    conditions: Mapping[str, Callable[[Expressions, Node], str]]
+
+
+def bare(text: str) -> str:
+    """The same expression without the one pair of parentheses that holds it all."""
+    if not text.startswith("(") or not text.endswith(")") or "'" in text or '"' in text:
+        return text
+    depth = 0
+    for at, letter in enumerate(text):
+        depth += (letter == "(") - (letter == ")")
+        if depth == 0 and at < len(text) - 1:
+            return text
+    return text[1:-1]
+
+
+def plus(text: str, number: int) -> str:
+    """`text` and a constant more."""
+    if text.isdigit():
+        return str(int(text) + number)
+    return text if number == 0 else f"{text} + {number}" if number > 0 else f"{text} - {-number}"
+
+
+class Expressions:
+    """Writes the expressions of one body and notes what they need around them.
+
+    `bases` are the sizes in which the instance's base is counted, `routines` functions that the body has to define,
+    `constants` objects by the name under which generated code finds them."""
+
+    def __init__(self, rows: Rows, constants: dict[str, Any]) -> None:
+        self.rows = rows
+        self.constants = constants
+        self.bases: set[int] = set()
+        self.routines: list[list[str]] = []
+        self._depth = 0
+        self._names = 0
+
+    def name(self, letter: str) -> str:
+        """A local name that nothing else uses."""
+        self._names += 1
+        return f"{letter}{self._names}"
+
+    def constant(self, value: Any) -> str:
+        """The name of an object that is made once."""
+        name = f"K{len(self.constants) + 1}"
+        self.constants[name] = value
+        return name
+
+    # --- three ways to read an expression
+
+    def value(self, node: Node) -> str:
+        """Python for the very value; a BOOL is False or True."""
+        return self._descend(node, self._value)
+
+    def loose(self, node: Node) -> str:
+        """Python for a number that becomes the value when it is brought into its type (low bits, or 32-bit float)."""
+        return self._descend(node, self._loose)
+
+    def condition(self, node: Node) -> str:
+        """Python for something that is true if the BOOL is TRUE."""
+        return self._descend(node, self._condition)
+
+    def _descend(self, node: Node, how: Callable[[Node], str]) -> str:
+        outer = self._depth
+        deep = outer >= DEEPEST and node[0] not in ("const", "tmp")
+        self._depth = 0 if deep else outer + 1
+        text = how(node)
+        self._depth = outer
+        if not deep:
+            return text
+        name = self.name("e")
+        self.routines.append([f"def {name}():", f"    return {text}"])
+        return f"{name}()"
+
+    def _value(self, node: Node) -> str:
+        return self.rows.values[node[0]](self, *node[1:])
+
+    def _loose(self, node: Node) -> str:
+        name, machine = node[0], node[1]
+        row = self.rows.loose.get(name) if is_float(machine) or name in ARITHMETIC else None
+        return row(self, node) if row else self._value(node)
+
+    def _condition(self, node: Node) -> str:
+        row = self.rows.conditions.get(node[0])
+        return row(self, node) if row else self._value(node)
+
+    def bring(self, text: str, machine: str) -> str:
+        """Python for a number brought into its type."""
+        if machine == "f32":
+            return f"single({bare(text)})"
+        if machine == "b":
+            return f"({text} & 1 != 0)"
+        low, high = limits(machine)
+        if low == 0:
+            return f"({text} & {high})"
+        v = self.name("v")
+        return f"({v} if {low} <= ({v} := {bare(text)}) <= {high} else ({v} + {-low} & {high - low}) - {-low})"
+
+    def stored(self, machine: str, node: Node) -> tuple[str, str]:
+        """The type of the view and Python for what is stored there: cheaper than the value where the view rounds."""
+        if is_float(machine):
+            if (node[0] == "const" and node[2] == node[2]) or (node[0] == "convert" and not is_float(node[2])):
+                return machine, self.value(node)
+            v = self.name("v")
+            return machine, f"{v} if ({v} := {bare(self.loose(node))}) == {v} else NAN"
+        if machine in INTEGERS and node[0] in ARITHMETIC and not fits(node):
+            return f"u{width(machine)}", f"{self.loose(node)} & {mask(machine)}"
+        return machine, bare(self.value(node))
+
+    # --- addresses
+
+    def place(self, address: Address, count: int) -> str:
+        """Python for the byte offset of an address whose `count` bytes are used."""
+        base, offset, terms = address
+        if isinstance(base, tuple):
+            _, reference, site = base
+            delta = self._sum("", offset, [(stride, term) for stride, term in terms])
+            return f"at({bare(self.value(reference))}, {delta}, {count}, {site})"
+        if base == "self":
+            self.bases.add(1)
+        return self._sum("b1" if base == "self" else "", offset, list(terms))
+
+    def index(self, address: Address, machine: str) -> str:
+        """Python for the index of an address without reference in the view of its type."""
+        base, offset, terms = address
+        size = SIZES[machine]
+        if offset % size or any(stride % size for stride, _ in terms):
+            return f"{self.place(address, size)} >> {size.bit_length() - 1}"
+        if base == "self":
+            self.bases.add(size)
+        return self._sum(f"b{size}" if base == "self" else "", offset // size, [(s // size, t) for s, t in terms])
+
+    def _sum(self, base: str, offset: int, terms: list[tuple[int, Node]]) -> str:
+        parts = [base] if base else []
+        for stride, term in terms:
+            text = self.value(term)
+            parts.append(text if stride == 1 else f"{text} * {stride}")
+        text = " + ".join(parts)
+        if not text:
+            return str(offset)
+        text = plus(text, offset)
+        return f"({text})" if " " in text else text
