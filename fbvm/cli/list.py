@@ -6,8 +6,7 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli.run import CYCLE_NS
-from fbvm.cli.sources import compiled, source_arguments
+from fbvm.cli.sources import CYCLE_NS, compiled, source_arguments
 from fbvm.code.listing import listing
 
 

@@ -4,58 +4,48 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import click
+from click import BadParameter
 
 from fbvm.watch.values import parse_time_ns
 from fbvm.wire.link import Peer
 
 
-class Time(click.ParamType):
+def time_ns(value: str | int) -> int:
     """`10ms`, `1.5s`, `T#10ms`: nanoseconds."""
-
-    name = "TIME"
-
-    def convert(self, value: str | int, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        if isinstance(value, int):
-            return value
-        try:
-            time_ns = parse_time_ns(value)
-        except ValueError as error:
-            self.fail(str(error), param, ctx)
-        if time_ns <= 0:
-            self.fail(f"{value} is not a time that can pass", param, ctx)
-        return time_ns
+    if isinstance(value, int):
+        return value
+    try:
+        passed_ns = parse_time_ns(value)
+    except ValueError as error:
+        raise BadParameter(str(error)) from None
+    if passed_ns <= 0:
+        raise BadParameter(f"{value} is not a time that can pass")
+    return passed_ns
 
 
 @dataclass(frozen=True)
 class Setting:
-    """NAME=VALUE@TIME as written; the value is read when the name's type is known."""
+    """NAME=VALUE@TIME as written; the value is read when the type of the name is known."""
 
     name: str
     value: str
     at_ns: int
 
 
-class Set(click.ParamType):
+def setting(value: str) -> Setting:
     """`NAME=VALUE` or `NAME=VALUE@TIME`."""
-
-    name = "NAME=VALUE[@TIME]"
-
-    def convert(self, value: str | Setting, param: click.Parameter | None, ctx: click.Context | None) -> Setting:
-        if isinstance(value, Setting):
-            return value
-        name, sign, text = value.partition("=")
-        if not sign or not name.strip() or not text.strip():
-            self.fail(f"{value!r} is not NAME=VALUE", param, ctx)
-        at_ns = 0
-        front, at, time = text.rpartition("@")
-        if at and not text.rstrip().endswith(("'", '"')):
-            try:
-                at_ns = parse_time_ns(time)
-            except ValueError as error:
-                self.fail(str(error), param, ctx)
-            text = front
-        return Setting(name.strip(), text.strip(), at_ns)
+    name, sign, text = value.partition("=")
+    if not sign or not name.strip() or not text.strip():
+        raise BadParameter(f"{value!r} is not NAME=VALUE")
+    at_ns = 0
+    front, at, time = text.rpartition("@")
+    if at and not text.rstrip().endswith(("'", '"')):
+        try:
+            at_ns = parse_time_ns(time)
+        except ValueError as error:
+            raise BadParameter(str(error)) from None
+        text = front
+    return Setting(name.strip(), text.strip(), at_ns)
 
 
 @dataclass(frozen=True)
@@ -67,34 +57,25 @@ class Mapping:
     port: int
 
 
-class Map(click.ParamType):
+def mapping(value: str) -> Mapping:
     """`IP:PORT=HOST:PORT` for real connections, `IP:PORT=peer` for a Modbus server in memory."""
-
-    name = "IP:PORT=HOST:PORT|peer"
-
-    def convert(self, value: str | Mapping, param: click.Parameter | None, ctx: click.Context | None) -> Mapping:
-        if isinstance(value, Mapping):
-            return value
-        said, sign, real = value.partition("=")
-        if not sign:
-            self.fail(f"{value!r} is not IP:PORT=HOST:PORT or IP:PORT=peer", param, ctx)
-        ip, port = self._endpoint(said, param, ctx)
-        parts = ip.split(".")
-        if len(parts) != 4 or not all(part.isdigit() and int(part) <= 255 for part in parts):
-            self.fail(f"{ip!r} is no IPv4 address; a program knows no names", param, ctx)
-        if real.strip() == "peer":
-            return Mapping(Peer(ip, port), None, 0)
-        host, host_port = self._endpoint(real, param, ctx)
-        return Mapping(Peer(ip, port), host, host_port)
-
-    def _endpoint(self, text: str, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, int]:
-        host, colon, port = text.strip().rpartition(":")
-        if not colon or not host or not port.isdigit() or not 0 <= int(port) <= 65535:
-            self.fail(f"{text!r} is not an address and a port such as 192.168.250.1:502", param, ctx)
-        return host, int(port)
+    said, sign, real = value.partition("=")
+    if not sign:
+        raise BadParameter(f"{value!r} is not IP:PORT=HOST:PORT or IP:PORT=peer")
+    ip, port = _endpoint(said)
+    parts = ip.split(".")
+    if len(parts) != 4 or not all(part.isdecimal() and int(part) <= 255 for part in parts):
+        raise BadParameter(f"{ip!r} is no IPv4 address; a program knows no names")
+    if real.strip() == "peer":
+        return Mapping(Peer(ip, port), None, 0)
+    return Mapping(Peer(ip, port), *_endpoint(real))
 
 
-TIME, SET, MAP = Time(), Set(), Map()
+def _endpoint(text: str) -> tuple[str, int]:
+    host, colon, port = text.strip().rpartition(":")
+    if not colon or not host or not port.isdecimal() or int(port) > 65535:
+        raise BadParameter(f"{text!r} is not an address and a port such as 192.168.250.1:502")
+    return host, int(port)
 
 
 def split_names(text: str) -> list[str]:

@@ -15,7 +15,8 @@ from fbvm.cli import status
 from fbvm.code.compiler import Compilation, compile_files
 from fbvm.code.image import Image
 
-Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
+CYCLE_NS = 10_000_000
+"""Cycle of programs without a TASK, unless somebody says another."""
 
 
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -105,3 +105,8 @@ class _Real:
 
     def _now_ns(self) -> int:
         return time.monotonic_ns() - self._zero_ns
+
+
+def epoch_ns() -> int:
+    """The date of this moment, in nanoseconds since 1970, for what is kept beyond a run."""
+    return time.time_ns()

@@ -1,0 +1,114 @@
+"""What a run prints: progress while it lasts, then charts and values, or one JSON object."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from dataclasses import dataclass
+from types import TracebackType
+
+import click
+from rich.console import Console
+from rich.live import Live
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+
+from fbvm.cli import status
+from fbvm.plc import Plc
+from fbvm.record.chart import draw
+from fbvm.record.recorder import Recorder
+from fbvm.watch.paths import Place, Span
+from fbvm.watch.values import Value, show, show_time
+
+PIPE_WIDTH = 100
+"""Width of charts that do not go to a terminal."""
+_STATUS = {"max": status.FAILED, "trap": status.STOPPED, "interrupted": status.INTERRUPTED}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a run ended and what was asked to be shown."""
+
+    plc: Plc
+    reason: str
+    places: dict[str, Place | Span]
+    recorder: Recorder | None
+    as_json: bool
+    until: str
+
+    @property
+    def status(self) -> int:
+        """The exit status of the command."""
+        return _STATUS.get(self.reason, status.GOOD)
+
+    def print(self) -> None:
+        """Values and charts on stdout, what stopped the run on stderr."""
+        if self.as_json:
+            click.echo(json.dumps(self._as_dict(), allow_nan=True))
+            return
+        if self.recorder:
+            click.echo(draw(self.recorder, width=chart_width(), ruler=True, compress=True), nl=False)
+        for text, place in self.places.items():
+            click.echo(f"{text} = {shown(place, self.plc.read(place))}")
+        if self.plc.trap:
+            click.secho(str(self.plc.trap), fg="red", err=True)
+        elif self.reason == "max":
+            click.secho(f"{self.until} did not hold in {show_time(self.plc.elapsed_ns)[2:]}", fg="yellow", err=True)
+
+    def _as_dict(self) -> dict[str, object]:
+        plc, trap = self.plc, self.plc.trap
+        site = trap.site if trap else None
+        return {
+            "scans": plc.scans,
+            "time_ms": plc.elapsed_ns // 1_000_000 if plc.elapsed_ns % 1_000_000 == 0 else plc.elapsed_ns / 1e6,
+            "stopped": self.reason,
+            "values": {text: plc.read(place) for text, place in self.places.items()},
+            "trap": trap and site and {
+                "code": trap.code, "file": site.file, "pou": site.pou, "line": site.line, "column": site.column,
+                "message": trap.message,
+            },
+        }  # fmt: skip
+
+
+def shown(place: Place | Span, value: Value) -> str:
+    """A value for people; words of addresses also in hexadecimal."""
+    if isinstance(place, Span) and isinstance(value, list):
+        return " ".join(show(part.type, item) for part, item in zip(place.places, value, strict=True))
+    if not isinstance(place, Place):
+        return ""
+    text = show(place.type, value)
+    return f"{text} ({show(place.type, value, hexadecimal=True)})" if place.area and isinstance(value, int) \
+        and not isinstance(value, bool) else text  # fmt: skip
+
+
+def chart_width() -> int:
+    """Columns for a chart: the terminal's, or a fixed number in a pipe."""
+    return shutil.get_terminal_size((PIPE_WIDTH, 24)).columns
+
+
+class Progress:
+    """A line on the terminal while a run lasts; nothing in a pipe, and nothing without a PLC."""
+
+    def __init__(self, plc: Plc | None, scans: int | None, for_ns: int | None) -> None:
+        console = Console(stderr=True)
+        self._live = Live(console=console, auto_refresh=False, transient=True) if plc and console.is_terminal else None
+        self._scans, self._for_ns = scans, for_ns
+
+    def __enter__(self) -> Progress:
+        if self._live:
+            self._live.start()
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        if self._live:
+            self._live.stop()
+
+    def update(self, plc: Plc) -> None:
+        """Shows how far the run is."""
+        if not self._live:
+            return
+        total, done = (self._scans, plc.scans) if self._scans else (self._for_ns, plc.elapsed_ns)
+        row = Table.grid(padding=(0, 1))
+        row.add_row(ProgressBar(total=total, completed=done, width=40, pulse=total is None),
+                    f"{plc.scans} scans, {plc.elapsed_ns / 1e9:.1f} s")  # fmt: skip
+        self._live.update(row, refresh=True)

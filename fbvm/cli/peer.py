@@ -1,0 +1,69 @@
+"""`fbvm peer`: a Modbus TCP server to talk to, by pymodbus."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import sys
+from typing import Any
+
+import click
+
+from fbvm.cli import registers, status
+
+LISTENING = "listening on "
+"""What the line begins with that names host and port."""
+
+
+@click.command("peer")
+@click.option("--port", type=click.IntRange(0, 65535), default=15020, show_default=True, help="0: any free port.")
+@click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 is all.")
+@click.option("--trace", is_flag=True, help="Print the frames that come and go.")
+def command(port: int, host: str, trace: bool) -> None:
+    """Serve Modbus TCP until Ctrl-C, for every unit id.
+
+    Holding register i holds 1000 + i, input register i 2000 + i, every second coil and every third discrete input is
+    ON.  Status 5 if the port cannot be used."""
+    try:
+        import pymodbus.server  # noqa: F401
+    except ImportError:
+        raise click.UsageError("pymodbus is missing: pip install 'fbvm[peer]'") from None
+    try:
+        asyncio.run(_serve(host, port, trace))
+    except KeyboardInterrupt:
+        sys.exit(status.GOOD)
+    except OSError as error:
+        click.echo(f"{host}:{port} cannot be used: {error}", err=True)
+        sys.exit(status.NETWORK)
+
+
+async def _serve(host: str, port: int, trace: bool) -> None:
+    from pymodbus.server import ModbusTcpServer
+
+    logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
+    server = ModbusTcpServer(device(), address=(host, port), trace_packet=_trace if trace else None)
+    if not await server.listen():
+        raise OSError("somebody else listens there, or it is not an address of this host")
+    transport: Any = server.transport
+    _, bound_port = transport.sockets[0].getsockname()[:2]
+    click.echo(f"{LISTENING}{host}:{bound_port}")
+    sys.stdout.flush()
+    await server.serving
+
+
+def device() -> Any:
+    """The contents as pymodbus takes them; device id 0 answers every unit id."""
+    from pymodbus.simulator import DataType, SimData, SimDevice
+
+    bits = [[SimData(0, values=values, datatype=DataType.BITS)]
+            for values in (registers.coils(), registers.discrete_inputs())]  # fmt: skip
+    words = [[SimData(0, values=values, datatype=DataType.REGISTERS)]
+             for values in (registers.holding_registers(), registers.input_registers())]  # fmt: skip
+    return SimDevice(0, simdata=(bits[0], bits[1], words[0], words[1]))
+
+
+def _trace(sending: bool, data: bytes) -> bytes:
+    if data:
+        click.echo(f"{'->' if sending else '<-'} {data.hex(' ').upper()}")
+        sys.stdout.flush()
+    return data

@@ -1,0 +1,39 @@
+"""What the servers hold that `fbvm peer`, `fbvm demo` and `--map IP:PORT=peer` start: values that tell their place."""
+
+from __future__ import annotations
+
+from array import array
+
+from fbvm.wire.modbus_server import ModbusServer
+
+COUNT = 65536
+
+
+def coils() -> list[bool]:
+    """Every second coil is ON, 0 first."""
+    return [number % 2 == 0 for number in range(COUNT)]
+
+
+def discrete_inputs() -> list[bool]:
+    """Every third discrete input is ON, 0 first."""
+    return [number % 3 == 0 for number in range(COUNT)]
+
+
+def holding_registers() -> list[int]:
+    """Holding register i holds 1000 + i, modulo 65536."""
+    return [1000 + number & 0xFFFF for number in range(COUNT)]
+
+
+def input_registers() -> list[int]:
+    """Input register i holds 2000 + i, modulo 65536."""
+    return [2000 + number & 0xFFFF for number in range(COUNT)]
+
+
+def server() -> ModbusServer:
+    """A server in memory with these contents."""
+    made = ModbusServer()
+    made.coils[:] = bytes(coils())
+    made.discrete_inputs[:] = bytes(discrete_inputs())
+    made.holding_registers[:] = array("H", holding_registers())
+    made.input_registers[:] = array("H", input_registers())
+    return made

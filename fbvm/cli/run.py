@@ -1,0 +1,145 @@
+"""`fbvm run`: a program, its unit and a network, for so long, and what came of it."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fbvm.cli import registers, status
+from fbvm.cli.options import Mapping, Setting, mapping, setting, split_names, time_ns
+from fbvm.cli.outcome import Outcome, Progress
+from fbvm.cli.sources import CYCLE_NS, compiled, source_arguments
+from fbvm.net.loop import LoopNetwork
+from fbvm.net.peers import ModbusPeer
+from fbvm.net.tcp import TcpNetwork
+from fbvm.plc import Plc
+from fbvm.record.pcapng import Capture
+from fbvm.record.recorder import Recorder
+from fbvm.run import loop
+from fbvm.run.loop import TimedWrite
+from fbvm.units.etn21 import Etn21
+from fbvm.watch.paths import Place
+from fbvm.watch.values import parse_value
+
+UNIT_ADDRESS = "192.168.250.21"
+"""IPv4 address of the ETN21 with unit number 0 that is on the backplane of every run."""
+
+
+@click.command("run")
+@source_arguments
+@click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
+              help="Cycle of programs without a TASK, and how often the PLC scans.")
+@click.option("--scans", type=click.IntRange(min=0), metavar="N", help="End after N scans.")
+@click.option("--for", "for_ns", type=time_ns, metavar="TIME", help="End after this time.")
+@click.option("--until", metavar="EXPRESSION", help="End when this holds after a scan: 'Main.done AND D200 > 5'.")
+@click.option("--max", "max_ns", type=time_ns, metavar="TIME",
+              help="With --until: give up after this time, with status 1.")
+@click.option("--set", "settings", type=setting, multiple=True, metavar="NAME=VALUE[@TIME]",
+              help="Write once, before the scan at that time.")
+@click.option("--show", "shown", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST", help="Print this at the end.")
+@click.option("--chart", "charted", multiple=True, metavar="NAME|ADDRESS,...", help="Draw these, a column a scan.")
+@click.option("--net", type=click.Choice(["loop", "tcp"]), default="loop", show_default=True,
+              help="loop: in memory, virtual time.  tcp: real connections, real time.")
+@click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=HOST:PORT|peer",
+              help="Where an endpoint that the program names really is.")
+@click.option("--pace", type=click.Choice([loop.CYCLIC, loop.EVENT]), default=loop.CYCLIC, show_default=True,
+              help="With tcp: keep the cycle, or scan again at once when something arrived.")
+@click.option("--pcap", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+              help="Write what passed the network, for Wireshark.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(
+    files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int, as_json: bool,
+    **options: Any,
+) -> None:  # fmt: skip
+    """Compile the files and run them, with an ETN21 (unit number 0) on the backplane.
+
+    End by one of --scans, --for and --until.  Status 1 if --max ended --until, 3 if the program has errors, 4 if a
+    trap stopped it, 5 if the network could not be used."""
+    _check_usage(**options)
+    plc = Plc(compiled(files, program, libraries, cycle_ns, as_json), cycle_ns)
+    with ExitStack() as stack:
+        network = build_network(options["net"], options["mappings"])
+        stack.callback(network.close)
+        if options["pcap"]:
+            network.tap = _capture(stack, options["pcap"], network).tap
+        plc.attach(Etn21(0, UNIT_ADDRESS), network)
+        outcome = _run(plc, as_json, **options)
+        outcome.print()
+    sys.exit(outcome.status)
+
+
+def _run(
+    plc: Plc, as_json: bool, *, settings: tuple[Setting, ...], shown: tuple[str, ...], charted: tuple[str, ...],
+    pace: str, scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, **_: Any,
+) -> Outcome:  # fmt: skip
+    """Runs to the end.  Names, values and conditions that do not fit the program are mistakes of usage."""
+    try:
+        writes = [_write(plc, given) for given in settings]
+        places = {text: plc.find(text) for text in shown}
+        names = [name for text in charted for name in split_names(text)]
+        recorder = Recorder(plc, names) if names else None
+        with Progress(None if as_json else plc, scans, for_ns or max_ns) as progress:
+            reason = loop.run(
+                plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes, pace=pace,
+                progress=progress.update,
+            )  # fmt: skip
+    except (LookupError, TypeError, ValueError) as error:
+        raise click.UsageError(str(error)) from None
+    return Outcome(plc, reason, places, recorder, as_json, until or "")
+
+
+def _write(plc: Plc, given: Setting) -> TimedWrite:
+    """A setting with its value read for the type of its place; a range takes values parted by commas."""
+    found = plc.find(given.name)
+    if isinstance(found, Place):
+        return TimedWrite(found, parse_value(found.type, given.value, given.name), given.at_ns)
+    texts = given.value.split(",")
+    if len(texts) != len(found.places):
+        raise ValueError(f"{given.name} takes {len(found.places)} values parted by commas, {len(texts)} given")
+    values = [parse_value(place.type, text.strip(), place.name)
+              for place, text in zip(found.places, texts, strict=True)]  # fmt: skip
+    return TimedWrite(found, values, given.at_ns)
+
+
+def build_network(net: str, mappings: tuple[Mapping, ...]) -> LoopNetwork | TcpNetwork:
+    """The network that the options describe.  Ends with status 5 if the host does not let it be."""
+    if net == "loop":
+        network = LoopNetwork()
+        for row in mappings:
+            network.place(row.said, ModbusPeer(registers.server()))
+        return network
+    try:
+        return TcpNetwork({row.said: (row.host or "", row.port) for row in mappings})
+    except OSError as error:
+        click.echo(f"the network cannot be used: {error}", err=True)
+        sys.exit(status.NETWORK)
+
+
+def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork) -> Capture:
+    try:
+        file = stack.enter_context(path.open("wb"))
+    except OSError as error:
+        raise click.UsageError(f"{path} cannot be written: {error.strerror}") from None
+    return Capture(file, 0 if network.virtual_time else loop.epoch_ns())
+
+
+def _check_usage(
+    *, net: str, mappings: tuple[Mapping, ...], pace: str, scans: int | None, for_ns: int | None, until: str | None,
+    max_ns: int | None, **_: Any,
+) -> None:  # fmt: skip
+    ends = sum(bound is not None for bound in (scans, for_ns, until))
+    if ends != 1:
+        raise click.UsageError(f"say when to end by one of --scans, --for and --until; {ends or 'none'} given")
+    if max_ns is not None and until is None:
+        raise click.UsageError("--max bounds --until, which is not given")
+    for row in mappings:
+        if net == "loop" and row.host is not None:
+            raise click.UsageError(f"--map {row.said}={row.host}:{row.port} leaves memory: add --net tcp")
+        if net == "tcp" and row.host is None:
+            raise click.UsageError(f"--map {row.said}=peer is in memory: leave out --net tcp, or use `fbvm peer`")
+    if pace == loop.EVENT and net == "loop":
+        raise click.UsageError("--pace event is for real time: add --net tcp")
