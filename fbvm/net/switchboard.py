@@ -6,9 +6,11 @@ No sockets in here; they pass through as things with a file number.
 from __future__ import annotations
 
 import errno
+import select
 import selectors
 from abc import ABC, abstractmethod
 from collections import deque
+from collections.abc import Callable
 from typing import Protocol
 
 from fbvm.net.addresses import AddressMap
@@ -18,6 +20,7 @@ from fbvm.wire.tap import Happening, Tap, What
 
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 TCP, UDP = "tcp", "udp"
+FD_SETSIZE = 1024
 MAX_ORPHANS = 64
 ORPHAN_LIMIT_NS = 10_000_000_000
 """A closed connection gets so long to send its rest and to hear the peer's FIN, then it is reset."""
@@ -27,6 +30,15 @@ def errno_name(error: OSError | int) -> str:
     """The POSIX name of an error of the host."""
     number = error if isinstance(error, int) else error.errno or errno.EIO
     return errno.errorcode.get(number, "EIO").removeprefix("WSA")
+
+
+def _number(selector: selectors.BaseSelector) -> int | None:
+    """File number by which a selector itself can be waited for; None if it has none, or one too high for select.
+
+    Worth it because epoll's own timeout is rounded up to milliseconds, which is long for a short cycle time."""
+    fileno: Callable[[], int] | None = getattr(selector, "fileno", None)
+    number = fileno() if fileno else -1
+    return number if 0 <= number < FD_SETSIZE else None
 
 
 class HasFileno(Protocol):
@@ -70,6 +82,7 @@ class Switchboard(ABC):
         self.map = address_map
         self.links: dict[str, ChannelLink] = {}
         self._selector = selectors.DefaultSelector()
+        self._number = _number(self._selector)
         self._own: dict[tuple[str, Peer], Peer] = {}
         self._orphans: deque[tuple[int, Orphan]] = deque()
         self.closed = False
@@ -82,7 +95,10 @@ class Switchboard(ABC):
         """Sleep until a connection wants attention or the time is over; True if there is something to fetch."""
         if self.closed or any(link.told for link in self.links.values()):
             return True
-        return bool(self._selector.select(max(timeout_s, 0.0)))
+        timeout_s = max(timeout_s, 0.0)
+        if self._number is not None:
+            return bool(select.select([self._number], [], [], timeout_s)[0])
+        return bool(self._selector.select(timeout_s))
 
     def serve(self, now_ns: int) -> None:
         """Do everything that the host is ready for."""
