@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 
+from fbvm.base import arithmetic
 from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, StringType, SubrangeType, Type, machine
 from fbvm.base.types import base as base_of
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
@@ -25,16 +26,8 @@ def encode(kind: Type, value: Value) -> bytes:
         return value[:kind.capacity * unit].ljust(kind.size, b"\0")
     form = machine(kind)
     if form == "f32" and isinstance(value, float | int):
-        return struct.pack("<f", round_real(float(value)))
+        return struct.pack("<f", arithmetic.single(float(value)))
     return struct.pack(_FORMATS[form], value)
-
-
-def round_real(value: float) -> float:
-    """The nearest value of 32 bits; infinity beyond its range."""
-    try:
-        return float(struct.unpack("<f", struct.pack("<f", value))[0])
-    except OverflowError:
-        return math.copysign(math.inf, value)
 
 
 def default(kind: Type) -> bytes:
@@ -61,28 +54,13 @@ def limits(kind: Type) -> tuple[int, int] | None:
 
 def wrap(kind: Type, value: int) -> int:
     """`value` cut to the width of `kind`."""
-    span = limits(base_of(kind))
-    if span is None:
-        return value
-    low, high = span
-    return (value - low) % (high - low + 1) + low
-
-
-def divide(a: int, b: int) -> int:
-    """Quotient toward zero."""
-    if b == 0:
-        raise NotConstant("it divides by zero")
-    quotient = abs(a) // abs(b)
-    return quotient if (a < 0) == (b < 0) else -quotient
+    return arithmetic.wrap(value, machine(kind))
 
 
 def _power(a: float, b: float) -> float:
-    try:
-        result = float(a) ** float(b)
-    except (OverflowError, ZeroDivisionError) as error:
-        raise NotConstant("its power is not defined or too large") from error
-    if isinstance(result, complex):
-        raise NotConstant("its power is not defined")
+    result = arithmetic.power(float(a), float(b))
+    if not math.isfinite(result):
+        raise NotConstant("its power is not defined or too large")
     return result
 
 
@@ -97,8 +75,9 @@ def _real(op: str, a: float, b: float) -> float:
 
 def _integer(op: str, a: int, b: int) -> int:
     if op in ("/", "MOD"):
-        quotient = divide(a, b)
-        return quotient if op == "/" else a - quotient * b
+        if b == 0:
+            raise NotConstant("it divides by zero")
+        return arithmetic.quotient(a, b) if op == "/" else arithmetic.remainder(a, b)
     return {"+": a + b, "-": a - b, "*": a * b}[op] if op in "+-*" else {"AND": a & b, "OR": a | b, "XOR": a ^ b}[op]
 
 
@@ -127,7 +106,7 @@ def binary(op: str, kind: Type, a: Value, b: Value) -> Value:
 
 
 def _finish(kind: Type, value: float) -> float:
-    return round_real(value) if machine(kind) == "f32" and kind is not UNTYPED_REAL else value
+    return arithmetic.single(value) if machine(kind) == "f32" and kind is not UNTYPED_REAL else value
 
 
 def unary(op: str, kind: Type, a: Value) -> Value:
@@ -147,7 +126,7 @@ def convert(value: Value, kind: Type) -> Value:
     """A constant of one type as a constant of `kind`, to which it converts implicitly."""
     form = machine(kind)
     if form in ("f32", "f64") and isinstance(value, int | float):
-        return round_real(float(value)) if form == "f32" else float(value)
+        return arithmetic.single(float(value)) if form == "f32" else float(value)
     if form == "b":
         return bool(value)
     return value

@@ -1,0 +1,152 @@
+"""The compiler: sources in; an Image, or diagnostics that say why there is none, out."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from fbvm.base.areas import Area
+from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.base.types import Field, StructType, Type, fold
+from fbvm.check.checker import Checker
+from fbvm.check.facts import Pou, Report, TaskFact
+from fbvm.check.library import Libraries
+from fbvm.check.project import Project
+from fbvm.code.image import Image, ProgramRun, Site, TaskRow
+from fbvm.code.layout import Placed, place
+from fbvm.code.lower import BodyLowering
+from fbvm.syntax import tree
+from fbvm.syntax.parser import parse
+from fbvm.syntax.text import read
+
+_FRAMES = 20_000
+"""Python frames that checking and lowering may use for the deepest tree that the parser lets through."""
+
+
+@dataclass(frozen=True)
+class Compilation:
+    """What became of some sources: the image (None if there are errors) and all messages in order of place."""
+
+    image: Image | None
+    diagnostics: list[Diagnostic]
+
+    @property
+    def errors(self) -> list[Diagnostic]:
+        return errors(self.diagnostics)
+
+
+class Program:
+    """What the lowering of all bodies shares: areas, sites, located members."""
+
+    def __init__(self, placed: Placed) -> None:
+        self.areas: dict[str, Area] = placed.layout.areas
+        self.sites: list[Site] = []
+        self._numbers: dict[tuple[str, str, int], int] = {}
+
+    def site(self, pou: Pou, node: tree.Node) -> int:
+        """The number of a place in the source."""
+        key = pou.source.name, pou.name, node.start
+        number = self._numbers.get(key)
+        if number is None:
+            number = self._numbers[key] = len(self.sites)
+            line, column = pou.source.place(node.start)
+            self.sites.append(Site(pou.source.name, pou.name, line, column))
+        return number
+
+    def located(self, member: Field, whole: Type) -> Field:
+        """A located member of a block with its final place."""
+        assert isinstance(whole, StructType)
+        return whole.fields[fold(member.name)]
+
+
+def compile_files(paths: Sequence[Path | str], program: str | None = None, libraries: Sequence[Path | str] = (),
+                  runnable: bool = False) -> Compilation:
+    """Compile source files.  `program` names the PROGRAM to run; `libraries` are folders asked before the shipped ones.
+
+    With `runnable` it is an error if there is not exactly one thing to run.  Never raises for what files contain;
+    a file that cannot be read gives a diagnostic."""
+    sources: list[Source] = []
+    unreadable: list[Diagnostic] = []
+    for path in paths:
+        source = read(Path(path), str(path))
+        if isinstance(source, Source):
+            sources.append(source)
+        else:
+            unreadable.append(source)
+    made = compile_sources(sources, program, libraries, runnable)
+    return Compilation(None, unreadable + made.diagnostics) if unreadable else made
+
+
+def compile_text(text: str, name: str = "text.st", program: str | None = None,
+                 libraries: Sequence[Path | str] = ()) -> Compilation:
+    """Compile one text."""
+    return compile_sources([Source(name, text)], program, libraries)
+
+
+def compile_sources(sources: Sequence[Source], program: str | None = None, libraries: Sequence[Path | str] = (),
+                    runnable: bool = False) -> Compilation:
+    """Compile texts; see `compile_files`."""
+    report = Report()
+    with _deep():
+        project = Project(Libraries([Path(folder) for folder in libraries]), report)
+        for source in sources:
+            text, diagnostics = parse(source)
+            report.diagnostics += diagnostics
+            project.collect(text, source)
+        checker = Checker(project)
+        if not errors(report.diagnostics):  # what could not be read would only give errors that follow from it
+            checker.check(program)
+            if runnable and not errors(report.diagnostics):
+                _demand_program(checker, program, sources, report)
+        diagnostics = sorted(report.diagnostics, key=Diagnostic.order)
+        image = None if errors(diagnostics) else _image(checker)
+    return Compilation(image, diagnostics)
+
+
+def _demand_program(checker: Checker, program: str | None, sources: Sequence[Source], report: Report) -> None:
+    if checker.tasks or not sources:
+        return
+    programs = [p for p in checker.project.pous.values() if p.kind == "PROGRAM" and not p.source.library]
+    node = programs[1].tree.name if len(programs) > 1 else tree.Node(0, 0)
+    source = programs[1].source if len(programs) > 1 else sources[0]
+    names = ", ".join(p.name for p in programs)
+    if program is not None:
+        message, hint = f"there is no PROGRAM {program}", f"there is {names}" if names else ""
+    elif programs:
+        message = f"there are several programs ({names}) and no CONFIGURATION says which to run"
+        hint = "choose one with --program NAME"
+    else:
+        message, hint = "there is no PROGRAM to run", "blocks and functions need a PROGRAM that calls them"
+    report.add("S0209", source, node, message, hint)
+
+
+@contextmanager
+def _deep() -> Iterator[None]:
+    """Room for deep trees; the parser limits how deep they get."""
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(before, _FRAMES))
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(before)
+
+
+def _image(checker: Checker) -> Image:
+    placed = place(checker)
+    program = Program(placed)
+    bodies = tuple(BodyLowering(program, checker, pou).body() for pou in checker.bodies)
+    tasks = sorted((_task(task) for task in checker.tasks), key=lambda row: row.priority)
+    types: dict[str, Type] = {fold(p.type.name): p.type for p in checker.bodies if p.type is not None}
+    for (_, name), entry in checker.project.types.items():
+        if entry.resolved is not None:
+            types.setdefault(name, entry.resolved[0])
+    return Image(placed.layout, bodies, tuple(tasks), placed.symbols, tuple(placed.initial), tuple(placed.retained),
+                 tuple(program.sites), types)
+
+
+def _task(task: TaskFact) -> TaskRow:
+    runs = tuple(ProgramRun(instance.name, pou.number, instance.offset) for instance, pou in task.programs)
+    return TaskRow(task.name, task.priority, task.interval_ns, task.single, runs)

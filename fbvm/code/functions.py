@@ -1,0 +1,207 @@
+"""What the standard functions do: one row each, from the key of its signature to operations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import DAY_NS, DINT, EnumType, StringType, Type, base, machine
+from fbvm.check.facts import StandardCall
+from fbvm.check.values import is_any
+from fbvm.code.operations import FLOATS, Node
+
+if TYPE_CHECKING:
+    from fbvm.code.lower import BodyLowering
+
+Lowering = Callable[["BodyLowering", list[Node], StandardCall, int], Node]
+_MATH = ("SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN")
+_COMPARE = {"GT": "gt", "GE": "ge", "EQ": "eq", "LE": "le", "LT": "lt", "NE": "ne"}
+_TEXT = {"LEFT": "left", "RIGHT": "right", "MID": "mid", "INSERT": "insert", "DELETE": "delete", "REPLACE": "replace"}
+
+
+def _form(call: StandardCall) -> str:
+    return machine(call.detail[0])
+
+
+def _abs(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+    return ("abs", _form(call), a[0])
+
+
+def _math(name: str) -> Lowering:
+    return lambda body, a, call, site: ("math", _form(call), name.lower(), a[0])
+
+
+def _shift(name: str) -> Lowering:
+    def lower(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+        form = _form(call)
+        count = as_count(a[1], call.arguments[1][1])
+        if form != "b":
+            return (name, form, a[0], count, site)
+        shifted = (name, "u8", ("convert", "u8", "b", a[0]), count, site)
+        if name in ("rol", "ror"):  # a single bit turns into itself, for any count that is legal
+            kept = body.keep(shifted)
+            return ("is_set", "b", "u8", kept)
+        return ("is_set", "b", "u8", ("and", "u8", shifted, ("const", "u8", 1)))
+    return lower
+
+
+def as_count(node: Node, kind: Type) -> Node:
+    """A length, count or position as i64; more than any text or word has stays more."""
+    form = machine(kind)
+    if form == "u64":
+        node = ("min", "u64", node, ("const", "u64", 1 << 32))
+    return node if form == "i64" else ("convert", "i64", form, node)
+
+
+def _chain(name: str) -> Lowering:
+    """min, max, concat: from left to right."""
+    def lower(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+        form = "s8" if name == "concat" else _form(call)
+        node = a[0]
+        for following in a[1:]:
+            node = body.measured((name, form, node, following))
+        return node
+    return lower
+
+
+def _compare(name: str) -> Lowering:
+    """GT(a, b, c) holds for every neighbour pair."""
+    def lower(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+        if len(a) > 2:
+            a = [body.keep(node) for node in a]
+        form = _form(call)
+        node: Node = (name, "b", form, a[0], a[1])
+        for left, right in zip(a[1:], a[2:], strict=False):
+            node = body.measured(("and", "b", node, (name, "b", form, left, right)))
+        return node
+    return lower
+
+
+def _limit(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+    form = _form(call)
+    return ("min", form, ("max", form, a[1], a[0]), a[2])
+
+
+def _select(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+    return ("select", _form(call), a[0], a[1], a[2])
+
+
+def _mux(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+    return ("mux", machine(call.arguments[1][1]), as_count(a[0], call.arguments[0][1]), tuple(a[1:]), site)
+
+
+def _text(name: str) -> Lowering:
+    def lower(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+        operands = [node if isinstance(kind, StringType) else as_count(node, kind)
+                    for node, (_, kind) in zip(a, call.arguments, strict=True)]
+        return (name, "s8", *operands, site)
+    return lower
+
+
+def _due(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+    body.out.append(("due", a[0]))
+    return ("const", "b", 0)
+
+
+# --- conversions ----------------------------------------------------------------------------------------------------
+
+_TICKS = {"TIME": 1_000_000, "TIME_OF_DAY": 1_000_000, "DATE": 1_000_000_000, "DATE_AND_TIME": 1_000_000_000}
+"""Nanoseconds of the unit in which a time or date meets numbers: ms for TIME and TOD, s for DATE and DT, ns for L types
+(as CODESYS; the standard has no such conversion)."""
+
+
+def _convert(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+    source, target = call.detail[0], base(call.detail[1])
+    node = a[0]
+    if isinstance(target, StringType):
+        return to_text(source, node)
+    if isinstance(source, StringType):
+        name = target.base.name if isinstance(target, EnumType) else target.name
+        return ("from_text", machine(target), name, node, site)
+    timed = is_any(source, "ANY_DURATION", "ANY_DATE"), is_any(target, "ANY_DURATION", "ANY_DATE")
+    if all(timed):
+        return _date_part(body, node, source, target)
+    if timed[0]:
+        return _from_time(node, source, target, site)
+    if timed[1]:
+        return _to_time(node, source, target, site)
+    return number(node, source, target, site)
+
+
+def to_text(source: Type, node: Node) -> Node:
+    """A value as text."""
+    if isinstance(source, StringType):
+        return node
+    if isinstance(source, EnumType):
+        return ("enum_text", "s8", tuple(sorted(source.shown.items())), ("convert", "i64", source.base.machine, node))
+    return ("to_text", "s8", source.name, node)
+
+
+def number(node: Node, source: Type, target: Type, site: int) -> Node:
+    """Among BOOL, integers, bit strings, enumerations and reals."""
+    a, b = machine(source), machine(target)
+    if a == b:
+        return node
+    if b == "b":
+        return ("is_set", "b", a, node)
+    if a in FLOATS and b not in FLOATS:
+        if is_any(target, "ANY_BIT"):
+            return ("bits", b, a, node)
+        return ("nearest", b, a, node, site)
+    if b in FLOATS and is_any(source, "ANY_BIT") and a != "b":
+        return ("bits", b, a, node)
+    return ("convert", b, a, node)
+
+
+def _from_time(node: Node, source: Type, target: Type, site: int) -> Node:
+    form, tick = machine(target), _TICKS.get(source.name, 1)
+    if form == "b":
+        return ("is_set", "b", "i64", node)
+    if form in FLOATS:
+        real = ("div", "f64", ("convert", "f64", "i64", node), ("const", "f64", float(tick)), site)
+        return real if form == "f64" else ("convert", "f32", "f64", real)
+    if tick != 1:
+        node = ("div", "i64", node, ("const", "i64", tick), site)
+    return node if form == "i64" else ("convert", form, "i64", node)
+
+
+def _to_time(node: Node, source: Type, target: Type, site: int) -> Node:
+    form, tick = machine(source), _TICKS.get(target.name, 1)
+    if form in FLOATS:
+        wide = node if form == "f64" else ("convert", "f64", "f32", node)
+        return ("nearest", "i64", "f64", ("mul", "f64", wide, ("const", "f64", float(tick))), site)
+    wide = node if form == "i64" else ("convert", "i64", form, node)
+    return wide if tick == 1 else ("mul", "i64", wide, ("const", "i64", tick))
+
+
+def _date_part(body: BodyLowering, node: Node, source: Type, target: Type) -> Node:
+    """Among times; a date or a time of day out of a date and time."""
+    if source.name.removeprefix("L") == target.name.removeprefix("L"):
+        return node
+    kept = body.keep(node)
+    midnight = ("mul", "i64", ("floor_div", "i64", kept, ("const", "i64", DAY_NS)), ("const", "i64", DAY_NS))
+    return midnight if target.name.endswith("DATE") else ("sub", "i64", kept, midnight)
+
+
+def _truncate(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+    target = call.detail[1] if len(call.detail) > 1 else DINT
+    return ("truncate", machine(target), machine(call.detail[0]), a[0], site)
+
+
+def _bcd(name: str) -> Lowering:
+    return lambda body, a, call, site: (name, machine(call.detail[1]), machine(call.detail[0]), a[0], site)
+
+
+FUNCTIONS: dict[str, Lowering] = {
+    "ABS": _abs, "ATAN2": lambda body, a, call, site: ("atan2", _form(call), a[0], a[1]),
+    "MOVE": lambda body, a, call, site: a[0], "SEL": _select, "MUX": _mux, "LIMIT": _limit,
+    "MAX": _chain("max"), "MIN": _chain("min"), "CONCAT": _chain("concat"),
+    "LEN": lambda body, a, call, site: ("length", "i16", a[0]),
+    "FIND": lambda body, a, call, site: ("find", "i16", a[0], a[1]),
+    "TIME": lambda body, a, call, site: ("now", "i64"), "__DUE": _due,
+    "TO": _convert, "TRUNC": _truncate, "BCD_TO": _bcd("from_bcd"), "TO_BCD": _bcd("to_bcd"),
+    **{name: _math(name) for name in _MATH},
+    **{name: _shift(name.lower()) for name in ("SHL", "SHR", "ROL", "ROR")},
+    **{name: _compare(op) for name, op in _COMPARE.items()},
+    **{name: _text(op) for name, op in _TEXT.items()},
+}

@@ -1,0 +1,116 @@
+"""Lowering of FOR, WHILE and REPEAT."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import BOOL, Elementary, SubrangeType, Type, base, machine
+from fbvm.code.operations import Block, Node
+from fbvm.code.places import Place
+from fbvm.code.weights import counted
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.code.lower import BodyLowering
+
+LEAVE: Block = (("exit",),)
+
+
+class LoopLowering:
+    """Lowers the loops of one body.  Each pass charges the step budget at its start."""
+
+    def __init__(self, body: BodyLowering) -> None:
+        self.body = body
+
+    def _charge(self, statements: tree.Block, site: int) -> Node:
+        return ("charge", counted(statements) + 1, site)
+
+    def _condition(self, condition: tree.Expr, leave_on: bool, site: int) -> Block:
+        """Statements that leave the loop if the condition is `leave_on`."""
+        reads, self.body.reads = self.body.reads, []
+        with self.body.block() as inner:
+            node = self.body.value(condition, BOOL)
+            node = node if leave_on else ("not", "b", node)
+            inner.append(("if", ((node, LEAVE),), ()))
+            self.body.observe_reads(0, site)
+        self.body.reads = reads
+        return tuple(inner)
+
+    def while_(self, node: tree.While, site: int) -> None:
+        head = (self._charge(node.body, site), *self._condition(node.condition, False, site))
+        self.body.out.append(("loop", head, self.body.lowered(node.body), ()))
+
+    def repeat(self, node: tree.Repeat, site: int) -> None:
+        tail = self._condition(node.until, True, self.body.site(node.until))
+        self.body.out.append(("loop", (self._charge(node.body, site),), self.body.lowered(node.body), tail))
+
+    # --- FOR --------------------------------------------------------------------------------------------------------
+
+    def for_(self, node: tree.For, site: int) -> None:
+        """Bounds and step are worked out once, in order of writing.  The variable ends beyond the last value, or at
+        the last one used where the next does not fit its type."""
+        body = self.body
+        place = body.places.fixed(body.places.of(node.variable))
+        kind = base(place.type)
+        wanted: list[tuple[tree.Expr, Type | None]] = [(node.first, kind), (node.last, kind)]
+        step: int | None = 1
+        if node.step is not None:
+            known = body.facts.constants.get(node.step)
+            step = int(known) if known is not None else None
+            if step is None:
+                wanted.append((node.step, kind))
+        first, last, *computed = body.values.operands(*wanted)
+        last = body.keep(last)
+        by = body.keep(computed[0]) if computed else None
+        if by is not None:
+            zero = ("const", by[1], 0)
+            body.out.append(("if", ((("eq", "b", by[1], by, zero), (("stop", "R0109", site),)),), ()))
+        body.write(place, first, site)
+        head, tail = self._known_step(place, last, step, site) if step is not None else \
+            self._computed_step(place, last, by or last, site)
+        head = (self._charge(node.body, site), *head)
+        body.out.append(("loop", head, body.lowered(node.body), (*tail, *self._observed(place, site))))
+
+    def _observed(self, place: Place, site: int) -> Block:
+        with self.body.block() as inner:
+            self.body.observe_write(place, site)
+        return tuple(inner)
+
+    def _known_step(self, place: Place, last: Node, step: int, site: int) -> tuple[Block, Block]:
+        """Test in front of a pass, and the step behind it, for a step known now."""
+        form = machine(place.type)
+        low, high = _span(place.type)
+        now = self.body.places.load(place)
+        up = step > 0
+        edge = high - step if up else low - step
+        size = ("const", form, abs(step))
+        head = (_leave_if("gt" if up else "lt", form, now, last),)
+        following = ("add" if up else "sub", form, now, size)
+        tail: list[Node] = []
+        if not low <= edge <= high:
+            return head, LEAVE  # one step leaves the type
+        if not (last[0] == "const" and (last[2] <= edge if up else last[2] >= edge)):
+            tail.append(_leave_if("gt" if up else "lt", form, now, ("const", form, edge)))
+        tail.append(self.body.places.store(place, following, site))
+        return head, tuple(tail)
+
+    def _computed_step(self, place: Place, last: Node, step: Node, site: int) -> tuple[Block, Block]:
+        """The same for a step that is known only when the loop begins."""
+        form = machine(place.type)
+        low, high = _span(place.type)
+        now = self.body.places.load(place)
+        forward = ("gt", "b", form, step, ("const", form, 0))
+        head = (("if", ((forward, (_leave_if("gt", form, now, last),)),), (_leave_if("lt", form, now, last),)),)
+        room_up = ("sub", form, ("const", form, high), step)
+        room_down = ("sub", form, ("const", form, low), step)
+        ends = ("if", ((forward, (_leave_if("gt", form, now, room_up),)),), (_leave_if("lt", form, now, room_down),))
+        return head, (ends, self.body.places.store(place, ("add", form, now, step), site))
+
+
+def _leave_if(name: str, form: str, left: Node, right: Node) -> Node:
+    return ("if", (((name, "b", form, left, right), LEAVE),), ())
+
+
+def _span(kind: Type) -> tuple[int, int]:
+    assert isinstance(kind, SubrangeType | Elementary)
+    return kind.low, kind.high

@@ -1,0 +1,284 @@
+"""Lowering of bodies: statements of the tree in, operations out.  Every meaning is decided here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import BOOL, Type, base, machine
+from fbvm.check.checker import Checker
+from fbvm.check.facts import Pou, PouCall
+from fbvm.code.image import Body
+from fbvm.code.loops import LoopLowering
+from fbvm.code.operations import Block, Node
+from fbvm.code.places import Place, Places, detail
+from fbvm.code.pou_calls import CallLowering
+from fbvm.code.values import DEEPEST, ValueLowering, is_aggregate
+from fbvm.code.weights import counted
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.code.compiler import Program
+
+
+class BodyLowering:
+    """Lowers the body of one POU.  `out` is the block that is being written."""
+
+    def __init__(self, program: Program, checker: Checker, pou: Pou) -> None:
+        self.program = program
+        self.checker = checker
+        self.facts = checker.project.facts
+        self.pou = pou
+        self.out: list[Node] = []
+        self.reads: list[Place] = []
+        self.places = Places(self)
+        self.values = ValueLowering(self)
+        self.calls = CallLowering(self)
+        self.loops = LoopLowering(self)
+        self.value = self.values.value
+        self.entry_site = self.site(pou.tree.name)
+        self._temporaries = 0
+        self._heights: dict[int, tuple[int, Node]] = {}
+
+    def body(self) -> Body:
+        """The code of the POU."""
+        count = counted(self.pou.tree.body)
+        self.out.append(("charge", count + 1, self.entry_site))
+        self._entry()
+        self.block_into(self.pou.tree.body)
+        size = self.pou.type.size if self.pou.type is not None else 0
+        return Body(self.pou.name, self.pou.kind, tuple(self.out), size, count)
+
+    def _entry(self) -> None:
+        """Initial values of the frame, and edges of inputs."""
+        start = self.pou.frame_inputs if self.pou.is_function else 0
+        fresh = self.pou.frame_initial[start:]
+        if fresh:
+            self.out.append(("fill", ("abs", self.pou.frame_offset + start, ()), fresh))
+        for edge in self.pou.edges:
+            raw, memory = self.places.slot(edge.raw), self.places.slot(edge.memory)
+            pin = self.places.load(raw)
+            before: Node = self.places.load(memory)
+            if edge.falling:
+                # the memory holds "the pin was low", which starts FALSE as in the standard's F_TRIG
+                seen: Node = ("and", "b", ("not", "b", pin), ("not", "b", before))
+                kept: Node = ("not", "b", pin)
+            else:
+                seen, kept = ("and", "b", pin, ("not", "b", before)), pin
+            self.out.append(self.places.store(self.places.slot(edge.hidden), seen, self.entry_site))
+            self.out.append(self.places.store(memory, kept, self.entry_site))
+
+    # --- what the parts share ---------------------------------------------------------------------------------------
+
+    def site(self, node: tree.Node) -> int:
+        return self.program.site(self.pou, node)
+
+    def temporary(self) -> int:
+        self._temporaries += 1
+        return self._temporaries
+
+    def keep(self, node: Node, always: bool = False) -> Node:
+        """The value of an operation in a temporary, worked out now."""
+        if node[0] in ("const", "tmp") and not always:
+            return node
+        number = self.temporary()
+        self.out.append(("let", number, node[1], node))
+        return ("tmp", node[1], number)
+
+    def keep_at(self, position: int, node: Node) -> Node:
+        """The value of an operation in a temporary, worked out where `position` of the block was."""
+        if node[0] in ("const", "tmp"):
+            return node
+        number = self.temporary()
+        self.out.insert(position, ("let", number, node[1], node))
+        return ("tmp", node[1], number)
+
+    def measured(self, node: Node) -> Node:
+        """The same operation, or a temporary for it if it is nested too deep."""
+        height = 1 + max((self._heights.get(id(part), (1, part))[0] for part in node[2:] if isinstance(part, tuple)),
+                         default=0)
+        if height > DEEPEST:
+            return self.keep(node)
+        self._heights[id(node)] = height, node
+        return node
+
+    def as_i64(self, expr: tree.Expr) -> Node:
+        """An integer expression as i64, for subscripts."""
+        kind = self.facts.types[expr]
+        node = self.value(expr)
+        form = machine(base(kind))
+        if form == "u64":
+            node = ("min", "u64", node, ("const", "u64", (1 << 63) - 1))
+        return node if form == "i64" else ("convert", "i64", form, node)
+
+    @contextmanager
+    def block(self) -> Iterator[list[Node]]:
+        """Collect statements of an inner block."""
+        outer, inner = self.out, []  # type: list[Node], list[Node]
+        self.out = inner
+        yield inner
+        self.out = outer
+
+    def lowered(self, statements: tree.Block) -> Block:
+        """An inner block."""
+        with self.block() as inner:
+            self.block_into(statements)
+        return tuple(inner)
+
+    def note_read(self, place: Place) -> None:
+        """Remember a variable that the statement reads, if its place is constant."""
+        if not place.address[2]:
+            self.reads.append(place)
+
+    def observe_reads(self, mark: int, site: int) -> None:
+        """Put the observations of what was read since `mark` of the block in front of it."""
+        seen = {detail(place): None for place in self.reads}
+        self.reads = []
+        self.out[mark:mark] = [("observe", "read", site, one) for one in seen]
+
+    def observe_write(self, place: Place, site: int) -> None:
+        self.out.append(("observe", "write", site, detail(place)))
+
+    # --- statements -------------------------------------------------------------------------------------------------
+
+    def block_into(self, statements: tree.Block) -> None:
+        """Lower statements into the present block."""
+        for statement in statements:
+            if isinstance(statement, tree.Empty):
+                continue
+            site = self.site(statement)
+            self.out.append(("observe", "statement", site, None))
+            mark = len(self.out)
+            _LOWER[type(statement)](self, statement, site)
+            if self.reads:
+                self.observe_reads(mark, site)
+
+    def _assign(self, node: tree.Assign, site: int) -> None:
+        if node.op in ("S=", "R="):
+            condition = self.value(node.value, BOOL)
+            with self.block() as inner:
+                for target in node.targets:
+                    self.write(self.places.of(target), ("const", "b", int(node.op == "S=")), site)
+            self.out.append(("if", ((condition, tuple(inner)),), ()))
+            return
+        value = node.value
+        for target in reversed(node.targets):
+            self.assign(target, value, site)
+            value = target
+
+    def assign(self, target: tree.Expr, value: tree.Expr, site: int) -> None:
+        """`target := value`: the subscripts of the target first, then the value."""
+        kind = self.facts.types[target]
+        if is_aggregate(kind):
+            to = self.places.fixed(self.places.of(target))
+            self.copy(to, self.aggregate(value), site)
+            return
+        place = self.places.fixed(self.places.of(target))
+        mark = len(self.out)
+        node = self.value(value, kind)
+        if len(self.out) > mark and isinstance(place.address[0], tuple):
+            place = self.places.fixed(place)
+        self.write(place, node, site)
+
+    def aggregate(self, expr: tree.Expr) -> Place:
+        """The place of an array or structure, also when it is a function's result."""
+        if isinstance(expr, tree.Call):
+            called = self.facts.calls[expr]
+            assert isinstance(called, PouCall)
+            return self.calls.aggregate(expr, called)
+        place = self.places.of(expr)
+        self.note_read(place)
+        return place
+
+    def copy(self, to: Place, source: Place, site: int) -> None:
+        self.out.append(("copy", to.address, source.address, to.type.size))
+        self.observe_write(to, site)
+
+    def write(self, place: Place, node: Node, site: int) -> None:
+        """Store a value and let it be observed."""
+        self.out.append(self.places.store(place, node, site))
+        self.observe_write(place, site)
+
+    def converted(self, node: Node, kind: Type, target: Type) -> Node:
+        return self.values.converted(node, kind, base(target))
+
+    def _call(self, node: tree.CallStatement, site: int) -> None:
+        call = node.call
+        assert isinstance(call, tree.Call)
+        called = self.facts.calls.get(call)
+        if isinstance(called, PouCall):
+            self.calls.statement(call, called)
+        elif called is not None:
+            self.discard(self.values.standard(called, call))
+        else:
+            self.discard(self.value(self.facts.rewritten[call]))
+
+    def discard(self, node: Node) -> None:
+        """Work a value out for its traps only."""
+        self.keep(node)
+
+    def _if(self, node: tree.If, site: int) -> None:
+        self._branches(list(node.branches), node.otherwise or (), site)
+
+    def _branches(self, branches: list[tuple[tree.Expr, tree.Block]], otherwise: tree.Block, site: int) -> None:
+        """One `if` as long as conditions need no statements of their own; a nested one from there on."""
+        rows: list[tuple[Node, Block]] = []
+        rest: Block | None = None
+        for position, (condition, body) in enumerate(branches):
+            with self.block() as before:
+                node = self.value(condition, BOOL)
+            if before and rows:
+                with self.block() as inner:
+                    self._branches(branches[position:], otherwise, site)
+                rest = tuple(inner)
+                break
+            self.out += before
+            rows.append((node, self._inner(body)))
+        self.out.append(("if", tuple(rows), self._inner(otherwise) if rest is None else rest))
+
+    def _inner(self, statements: tree.Block) -> Block:
+        """An inner block whose reads are its own."""
+        reads, self.reads = self.reads, []
+        made = self.lowered(statements)
+        self.reads = reads
+        return made
+
+    def _case(self, node: tree.Case, site: int) -> None:
+        form = machine(self.facts.types[node.selector])
+        selector = self.value(node.selector)
+        rows = tuple((self.facts.labels[branch], self._inner(branch.body)) for branch in node.branches)
+        self.out.append(("case", form, selector, rows, self._inner(node.otherwise or ())))
+
+    def _for(self, node: tree.For, site: int) -> None:
+        self.loops.for_(node, site)
+
+    def _while(self, node: tree.While, site: int) -> None:
+        self.loops.while_(node, site)
+
+    def _repeat(self, node: tree.Repeat, site: int) -> None:
+        self.loops.repeat(node, site)
+
+    def _exit(self, node: tree.Exit, site: int) -> None:
+        self.out.append(("exit",))
+
+    def _next(self, node: tree.Continue, site: int) -> None:
+        self.out.append(("next",))
+
+    def _return(self, node: tree.Return, site: int) -> None:
+        if node.value is not None:
+            assert self.pou.result is not None
+            place = self.places.slot(self.pou.result)
+            if is_aggregate(place.type):
+                self.copy(place, self.aggregate(node.value), site)
+            else:
+                self.write(place, self.value(node.value, place.type), site)
+        self.out.append(("return",))
+
+
+_LOWER: dict[type, Callable[..., None]] = {
+    tree.Assign: BodyLowering._assign, tree.CallStatement: BodyLowering._call, tree.If: BodyLowering._if,
+    tree.Case: BodyLowering._case, tree.For: BodyLowering._for, tree.While: BodyLowering._while,
+    tree.Repeat: BodyLowering._repeat, tree.Exit: BodyLowering._exit, tree.Continue: BodyLowering._next,
+    tree.Return: BodyLowering._return,
+}

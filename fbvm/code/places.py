@@ -1,0 +1,171 @@
+"""Places: where in memory an expression of the tree lies, and the loads and stores that reach it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from fbvm.base.areas import FLAG_AREAS
+from fbvm.base.types import ArrayType, StringType, SubrangeType, Type, base, machine
+from fbvm.check.facts import Variable
+from fbvm.code.layout import variable_bit
+from fbvm.code.operations import SIZES, WHOLE_BYTES, Address, Node
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.code.lower import BodyLowering
+
+
+@dataclass(frozen=True)
+class Place:
+    """An address with the type of what lies there; `bit` for a located BOOL or a bit of a word."""
+
+    address: Address
+    type: Type
+    bit: int | None = None
+
+    def moved(self, offset: int, kind: Type, bit: int | None = None) -> Place:
+        """A part of this place, `offset` bytes further on."""
+        start, at, terms = self.address
+        return Place((start, at + offset, terms), kind, bit)
+
+    @property
+    def is_reference(self) -> bool:
+        return isinstance(self.address[0], tuple)
+
+    def aligned(self, size: int) -> bool:
+        """True if a value of `size` bytes lies on a multiple of its size."""
+        start, offset, terms = self.address
+        return size == 1 or not isinstance(start, tuple) and offset % size == 0 and \
+            all(stride % size == 0 for stride, _ in terms)
+
+
+class Places:
+    """Finds places for the lowering of one body."""
+
+    def __init__(self, body: BodyLowering) -> None:
+        self.body = body
+        self.facts = body.facts
+
+    def of(self, expr: tree.Expr) -> Place:
+        """The place that an expression names."""
+        kind = self.facts.types[expr]
+        if isinstance(expr, tree.NameRef):
+            return self.variable(self.facts.variables[expr], expr)
+        if isinstance(expr, tree.Direct):
+            address = self.facts.directs[expr]
+            offset = self.body.program.areas[address.area].offset + address.byte_offset()
+            is_bit = address.bit is not None or address.area in FLAG_AREAS
+            return Place(("abs", offset, ()), kind, address.bit_in_byte() if is_bit else None)
+        if isinstance(expr, tree.Member):
+            member = self.facts.fields[expr]
+            if member.absolute:
+                of = self.body.program.located(member, self.facts.types[expr.of])
+                return Place(("abs", of.offset, ()), kind, of.bit)
+            return self.of(expr.of).moved(member.offset, kind)
+        if isinstance(expr, tree.Part):
+            return self._part(expr, kind)
+        assert isinstance(expr, tree.Index)
+        return self._index(expr, kind)
+
+    def variable(self, variable: Variable, expr: tree.Expr | None = None) -> Place:
+        """The place of a variable; for an in-out, what its reference points at."""
+        slot = self.slot(variable)
+        if not variable.reference:
+            return slot
+        site = self.body.site(expr) if expr is not None else self.body.entry_site
+        return Place((("ref", ("load", "ref", slot.address), site), 0, ()), variable.type)
+
+    def slot(self, variable: Variable) -> Place:
+        """The place of a variable itself (of the reference, for an in-out)."""
+        if variable.place == "self":
+            return Place(("self", variable.offset, ()), variable.type)
+        offset = variable.offset
+        if variable.place == "frame":
+            assert variable.owner is not None
+            offset += variable.owner.frame_offset
+        return Place(("abs", offset, ()), variable.type, variable_bit(variable))
+
+    def _part(self, expr: tree.Part, kind: Type) -> Place:
+        whole = self.of(expr.of)
+        if expr.size == "X":
+            return whole.moved(expr.index // 8, kind, expr.index % 8)
+        return whole.moved(expr.index * kind.size, kind)
+
+    def _index(self, expr: tree.Index, kind: Type) -> Place:
+        place = self.of(expr.of)
+        start, offset, terms = place.address
+        element: Type = place.type
+        rest = list(expr.subscripts)
+        while rest:
+            assert isinstance(element, ArrayType)
+            stride = element.size
+            for low, high in element.bounds:
+                subscript = rest.pop(0)
+                stride //= high - low + 1
+                constant = self.facts.constants.get(subscript)
+                offset -= low * stride
+                if constant is not None:
+                    offset += int(constant) * stride
+                else:
+                    index = self.body.as_i64(subscript)
+                    checked = ("check", "i64", index, low, high, "R0102", self.body.site(subscript))
+                    terms = (*terms, (stride, checked))
+            element = element.element
+        return Place((start, offset, terms), kind)
+
+    # --- access -----------------------------------------------------------------------------------------------------
+
+    def load(self, place: Place) -> Node:
+        """The value that lies at a place (not for arrays and structures)."""
+        kind = base(place.type)
+        if isinstance(kind, StringType):
+            return ("load_text", "s8", place.address, kind.capacity)
+        form = machine(kind)
+        if place.bit is not None:
+            return ("load_bit", "b", place.address, place.bit)
+        if form == "b" and place.is_reference:
+            return ("load_flag", "b", place.address)
+        return ("load" if place.aligned(SIZES[form]) else "load_raw", form, place.address)
+
+    def store(self, place: Place, value: Node, site: int) -> Node:
+        """The statement that stores a value of the place's machine type; a subrange is checked."""
+        kind = place.type
+        if isinstance(kind, SubrangeType) and not (value[0] == "const" and kind.low <= value[2] <= kind.high):
+            value = ("check", machine(kind), value, kind.low, kind.high, "R0103", site)
+        kind = base(kind)
+        if isinstance(kind, StringType):
+            return ("store_text", place.address, kind.capacity, value)
+        form = machine(kind)
+        if place.bit is not None:
+            return ("store_bit", place.address, place.bit, value)
+        if form == "b" and place.is_reference:
+            return ("store_flag", place.address, value)
+        return ("store" if place.aligned(SIZES[form]) else "store_raw", form, place.address, value)
+
+    def reference(self, place: Place) -> Node:
+        """A reference to a place."""
+        start, offset, terms = place.address
+        if isinstance(start, tuple) and not offset and not terms and place.bit is None:
+            pointer: Node = start[1]
+            return pointer
+        return ("reference", "ref", place.address, WHOLE_BYTES if place.bit is None else place.bit)
+
+    def fixed(self, place: Place) -> Place:
+        """The same place with computed subscripts kept in temporaries, so that it can be used twice."""
+        start, offset, terms = place.address
+        if isinstance(start, tuple) and start[1][0] != "tmp":
+            start = ("ref", self.body.keep(start[1]), start[2])
+        terms = tuple((stride, self.body.keep(index)) for stride, index in terms)
+        return replace(place, address=(start, offset, terms))
+
+
+def detail(place: Place) -> tuple[object, Address, int]:
+    """What an observation of this place carries."""
+    kind = base(place.type)
+    form: object = machine(kind)
+    if isinstance(kind, StringType):
+        form = ("s8", kind.capacity)
+    elif form == "":
+        form = ("", kind.size)
+    return form, place.address, WHOLE_BYTES if place.bit is None else place.bit

@@ -1,0 +1,156 @@
+"""Lowering of calls of POUs: inputs in, body, outputs out; EN and ENO."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import BOOL, machine
+from fbvm.check.constants import default
+from fbvm.check.facts import PouCall, Variable
+from fbvm.code.operations import Address, Block, Node
+from fbvm.code.places import Place
+from fbvm.code.values import is_aggregate
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.code.lower import BodyLowering
+
+TRUE: Node = ("const", "b", 1)
+FALSE: Node = ("const", "b", 0)
+
+
+class CallLowering:
+    """Lowers the calls of POUs in one body.
+
+    With EN FALSE nothing of the call happens but that EN and ENO become FALSE: inputs are neither worked out nor
+    passed, the body is not run, outputs keep their values, a function's result is the default of its type."""
+
+    def __init__(self, body: BodyLowering) -> None:
+        self.body = body
+
+    def statement(self, call: tree.Call, called: PouCall) -> None:
+        """A call whose result, if there is one, is thrown away."""
+        self._guarded(call, called, None)
+
+    def value(self, call: tree.Call, called: PouCall) -> Node:
+        """A call of a function for its result."""
+        result = called.pou.result
+        assert result is not None
+        number = self.body.temporary()
+        form = machine(result.type)
+        place = self._place(called, result, None)
+        after: Block = (("let", number, form, self.body.places.load(place)),)
+        if called.enable is not None:
+            empty = b"" if form == "s8" else int.from_bytes(default(result.type), "little")
+            self.body.out.append(("let", number, form, ("const", form, float(0) if form[0] == "f" else empty)))
+        self._guarded(call, called, after)
+        return ("tmp", form, number)
+
+    def aggregate(self, call: tree.Call, called: PouCall) -> Place:
+        """A call of a function whose result is an array or a structure: the place of the result."""
+        result = called.pou.result
+        assert result is not None
+        place = self._place(called, result, None)
+        if called.enable is not None:
+            self.body.out.append(("fill", place.address, result.initial))
+        self._guarded(call, called, None)
+        return place
+
+    # --- parts ------------------------------------------------------------------------------------------------------
+
+    def _guarded(self, call: tree.Call, called: PouCall, after: Block | None) -> None:
+        """The whole call, inside an IF where EN is given or declared."""
+        body = self.body
+        site = body.site(call)
+        instance = body.places.fixed(body.places.of(called.instance)) if called.instance is not None else None
+        own_en = self._parameter(called, "EN", "VAR_INPUT")
+        own_eno = self._parameter(called, "ENO", "VAR_OUTPUT")
+        enable = body.value(called.enable, BOOL) if called.enable is not None else None
+        if own_en is not None:
+            place = self._place(called, own_en, instance)
+            if enable is not None:
+                body.write(place, enable, site)
+            elif called.pou.is_function:
+                body.write(place, TRUE, site)
+            enable = body.places.load(place)
+        if enable is None:
+            self._run(call, called, instance, site, own_eno)
+            body.out += after or ()
+            self._report(called, TRUE, site)
+            return
+        enable = body.keep(enable)
+        with body.block() as inner:
+            self._run(call, called, instance, site, own_eno)
+            inner += after or ()
+        otherwise: Block = ()
+        if own_eno is not None and (instance is not None or called.outputs):
+            otherwise = (body.places.store(self._place(called, own_eno, instance), FALSE, site),)
+            with body.block() as falls:
+                self._outputs([o for o in called.outputs if o[0] is own_eno], called, instance, site)
+            otherwise += tuple(falls)
+        body.out.append(("if", ((enable, tuple(inner)),), otherwise))
+        self._report(called, enable, site)
+
+    def _report(self, called: PouCall, enable: Node, site: int) -> None:
+        """ENO of a POU that declares none: whether it was run."""
+        for target, negated in called.enabled:
+            node: Node = ("not", "b", enable) if negated else enable
+            self.body.write(self.body.places.of(target), node, site)
+
+    def _run(self, call: tree.Call, called: PouCall, instance: Place | None, site: int, eno: Variable | None) -> None:
+        self._inputs(called, instance, site)
+        if eno is not None and not called.pou.writes_eno:
+            self.body.out.append(self.body.places.store(self._place(called, eno, instance), TRUE, site))
+        address: Address | None = instance.address if instance is not None else None
+        self.body.out.append(("call", called.pou.number, address))
+        self._outputs(called.outputs, called, instance, site)
+
+    def _inputs(self, called: PouCall, instance: Place | None, site: int) -> None:
+        body = self.body
+        passed = sorted([*called.inputs, *called.in_outs], key=lambda pair: pair[1].start)
+        aggregates = [(v, e) for v, e in passed if v.kind == "VAR_INPUT" and is_aggregate(v.type)]
+        passed = [pair for pair in passed if pair not in aggregates]
+        nodes = body.values.sequence([lambda v=v, e=e: self._argument(v, e) for v, e in passed])  # type: ignore[misc]
+        for variable, expr in aggregates:
+            body.copy(self._place(called, variable, instance), body.aggregate(expr), site)
+        for (variable, _), node in zip(passed, nodes, strict=True):
+            place = self._place(called, variable, instance)
+            if variable.kind == "VAR_IN_OUT":
+                body.out.append(("store", "ref", place.address, node))
+            else:
+                body.write(place, node, site)
+        if called.pou.is_function:
+            given = {id(v) for v, _ in called.inputs}
+            for variable in called.pou.parameters("VAR_INPUT"):
+                if id(variable) not in given and variable.name.upper() != "EN":
+                    place = self._place(called, variable, instance)
+                    body.out.append(("fill", place.address, variable.initial))
+
+    def _argument(self, variable: Variable, expr: tree.Expr) -> Node:
+        if variable.kind == "VAR_IN_OUT":
+            return self.body.places.reference(self.body.places.of(expr))
+        return self.body.value(expr, variable.type)
+
+    def _outputs(self, outputs: list[tuple[Variable, tree.Expr, bool]], called: PouCall, instance: Place | None,
+                 site: int) -> None:
+        body = self.body
+        for variable, target, negated in outputs:
+            source = self._place(called, variable, instance)
+            place = body.places.of(target)
+            if is_aggregate(variable.type):
+                body.copy(place, source, site)
+                continue
+            node = body.places.load(source)
+            if negated:
+                node = ("not", "b", node)
+            body.write(place, body.converted(node, variable.type, place.type), site)
+
+    def _parameter(self, called: PouCall, name: str, kind: str) -> Variable | None:
+        return next((v for v in called.pou.parameters(kind) if v.name.upper() == name), None)
+
+    def _place(self, called: PouCall, variable: Variable, instance: Place | None) -> Place:
+        """The slot of a callee's variable."""
+        if instance is None or variable.place != "self":
+            return Place(self.body.places.slot(variable).address, variable.type)
+        start, offset, terms = instance.address
+        return Place((start, offset + variable.offset, terms), variable.type)

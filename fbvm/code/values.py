@@ -1,0 +1,185 @@
+"""Lowering of expressions: a tree's expression in, an operation out, in the machine type that is wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import (
+    BOOL,
+    DAY_NS,
+    LREAL,
+    EnumType,
+    StringType,
+    Type,
+    base,
+    machine,
+)
+from fbvm.check.constants import convert as convert_constant
+from fbvm.check.facts import PouCall, StandardCall, Value
+from fbvm.check.values import is_any
+from fbvm.code.functions import FUNCTIONS
+from fbvm.code.operations import FLOATS, Node
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.code.lower import BodyLowering
+
+DEEPEST = 40
+"""Operations nested deeper than this are cut by a temporary, so that no back end meets deep nesting."""
+_ARITHMETIC = {"+": "add", "-": "sub", "*": "mul", "/": "div", "MOD": "mod", "**": "pow",
+               "AND": "and", "OR": "or", "XOR": "xor"}
+_COMPARE = {"=": "eq", "<>": "ne", "<": "lt", ">": "gt", "<=": "le", ">=": "ge"}
+
+
+def constant(kind: Type, value: Value) -> Node:
+    """A constant of `kind` as an operation."""
+    form = machine(kind)
+    if form in FLOATS:
+        return ("const", form, float(value))
+    return ("const", form, int(value) if form != "s8" else value)
+
+
+class ValueLowering:
+    """Lowers the expressions of one body.  Calls and cuts become statements of the body in front."""
+
+    def __init__(self, body: BodyLowering) -> None:
+        self.body = body
+        self.facts = body.facts
+
+    # --- entry points -----------------------------------------------------------------------------------------------
+
+    def value(self, expr: tree.Expr, want: Type | None = None) -> Node:
+        """The value of `expr`, converted to `want` if that is given."""
+        kind = self.facts.types[expr]
+        target = base(want) if want is not None else base(kind)
+        known = self.facts.constants.get(expr)
+        if known is not None:
+            if machine(target) in FLOATS or machine(target) == "b":
+                known = convert_constant(known, target)
+            return constant(target, known)
+        return self.body.measured(self.converted(self._plain(expr), kind, target))
+
+    def converted(self, node: Node, kind: Type, target: Type) -> Node:
+        """A value of `kind` as one of `target`, to which it converts by itself."""
+        source, wanted = machine(kind), machine(target)
+        if source == wanted or wanted in ("s8", "ref", ""):
+            return node
+        return ("convert", wanted, source, node)
+
+    def sequence(self, thunks: list[Callable[[], Node]]) -> list[Node]:
+        """Operands in order; what was worked out before a call is kept in a temporary across it."""
+        nodes: list[Node] = []
+        for thunk in thunks:
+            mark = len(self.body.out)
+            node = thunk()
+            if len(self.body.out) > mark:
+                nodes = [self.body.keep_at(mark, earlier) for earlier in reversed(nodes)][::-1]
+            nodes.append(node)
+        return nodes
+
+    def operands(self, *wanted: tuple[tree.Expr, Type | None]) -> list[Node]:
+        """The values of several expressions, in order."""
+        return self.sequence([lambda e=e, t=t: self.value(e, t) for e, t in wanted])  # type: ignore[misc]
+
+    # --- kinds of expressions ---------------------------------------------------------------------------------------
+
+    def _plain(self, expr: tree.Expr) -> Node:
+        """The value of a non-constant expression in its own type."""
+        meaning = self.facts.rewritten.get(expr)
+        if meaning is not None:
+            return self.value(meaning)
+        if isinstance(expr, tree.Binary):
+            return self._binary(expr)
+        if isinstance(expr, tree.Unary):
+            return self._unary(expr)
+        if isinstance(expr, tree.Call):
+            return self._call(expr)
+        place = self.body.places.of(expr)
+        self.body.note_read(place)
+        return self.body.places.load(place)
+
+    def _unary(self, expr: tree.Unary) -> Node:
+        node = self.value(expr.operand)
+        form = machine(self.facts.types[expr])
+        if expr.op == "+":
+            return node
+        return ("not" if expr.op == "NOT" else "neg", form, node)
+
+    def _call(self, expr: tree.Call) -> Node:
+        called = self.facts.calls[expr]
+        if isinstance(called, PouCall):
+            return self.body.calls.value(expr, called)
+        return self.standard(called, expr)
+
+    def standard(self, called: StandardCall, expr: tree.Call) -> Node:
+        """A call of a standard function."""
+        arguments = self.operands(*called.arguments)
+        return FUNCTIONS[called.key](self.body, arguments, called, self.body.site(expr))
+
+    def _binary(self, expr: tree.Binary) -> Node:
+        if expr.op in ("AND_THEN", "OR_ELSE"):
+            return self._short(expr)
+        operand = base(self.facts.operands[expr])
+        left, right = base(self.facts.types[expr.left]), base(self.facts.types[expr.right])
+        if is_any(operand, "ANY_DURATION", "ANY_DATE") and expr.op not in _COMPARE:
+            return self._time(expr, left, right, operand)
+        if expr.op == "**":
+            exponent = operand if is_any(right, "ANY_REAL") else LREAL
+            a, b = self.operands((expr.left, None), (expr.right, None))
+            form = machine(operand)
+            return ("pow", form, self._to_float(a, left, form), self._to_float(b, right, machine(exponent), form))
+        a, b = self.operands((expr.left, operand), (expr.right, operand))
+        form = machine(operand)
+        if expr.op in _COMPARE:
+            return (_COMPARE[expr.op], "b", form, a, b)
+        name = _ARITHMETIC[expr.op]
+        return (name, form, a, b, self.body.site(expr)) if name in ("div", "mod") else (name, form, a, b)
+
+    def _to_float(self, node: Node, kind: Type, *forms: str) -> Node:
+        form = forms[-1]
+        source = machine(kind)
+        return node if source == form else ("convert", form, source, node)
+
+    def _short(self, expr: tree.Binary) -> Node:
+        """AND_THEN and OR_ELSE: the right side is worked out only if it matters."""
+        left = self.value(expr.left, BOOL)
+        with self.body.block() as inner:
+            right = self.value(expr.right, BOOL)
+        name = "and_then" if expr.op == "AND_THEN" else "or_else"
+        if not inner:
+            return (name, "b", left, right)
+        kept = self.body.keep(left, always=True)
+        inner.append(("let", kept[2], "b", right))
+        condition = kept if name == "and_then" else ("not", "b", kept)
+        self.body.out.append(("if", ((condition, tuple(inner)),), ()))
+        return kept
+
+    def _time(self, expr: tree.Binary, left: Type, right: Type, operand: Type) -> Node:
+        """Sums and differences of times and dates, products with numbers."""
+        if expr.op in "+-":
+            a, b = self.operands((expr.left, None), (expr.right, None))
+            node = (_ARITHMETIC[expr.op], "i64", a, b)
+            if operand.name.endswith("TIME_OF_DAY"):
+                return in_day(self.body, node)
+            return node
+        if not is_any(right, "ANY_REAL"):
+            a, b = self.operands((expr.left, None), (expr.right, None))
+            b = b if machine(right) == "i64" else ("convert", "i64", machine(right), b)
+            return ("mul", "i64", a, b) if expr.op == "*" else ("div", "i64", a, b, self.body.site(expr))
+        a, b = self.operands((expr.left, None), (expr.right, LREAL))
+        a = ("convert", "f64", "i64", a)
+        product = ("mul", "f64", a, b) if expr.op == "*" else ("div", "f64", a, b, self.body.site(expr))
+        return ("nearest", "i64", "f64", product, self.body.site(expr))
+
+
+def in_day(body: BodyLowering, node: Node) -> Node:
+    """A number of ns brought into 0 .. 24 h."""
+    kept = body.keep(node)
+    return ("sub", "i64", kept, ("mul", "i64", ("floor_div", "i64", kept, ("const", "i64", DAY_NS)),
+                                 ("const", "i64", DAY_NS)))
+
+
+def is_aggregate(kind: Type) -> bool:
+    """True for arrays and structures, which are copied as bytes."""
+    return machine(kind) == "" and not isinstance(kind, StringType | EnumType)

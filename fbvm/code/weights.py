@@ -1,0 +1,16 @@
+"""What a piece of a program charges to the step budget."""
+
+from __future__ import annotations
+
+from fbvm.check.statements import bodies
+from fbvm.syntax import tree
+
+
+def counted(statements: tree.Block) -> int:
+    """Statements of a block that are not inside a loop: what it charges to the step budget."""
+    total = 0
+    for statement in statements:
+        total += 1
+        if not isinstance(statement, tree.For | tree.While | tree.Repeat):
+            total += sum(counted(inner) for inner in bodies(statement))
+    return total
