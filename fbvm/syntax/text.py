@@ -1,0 +1,48 @@
+"""Files to text: encodings are recognised, and what is no text at all is refused with a diagnostic."""
+
+from __future__ import annotations
+
+import codecs
+from pathlib import Path
+
+from fbvm.base.diagnostics import Diagnostic, Source
+
+MAX_BYTES = 64 << 20
+_MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
+_CONTROLS = frozenset(range(32)) - frozenset(b"\t\n\r\f\v\x1a")
+
+
+def read(path: Path, name: str, library: str = "") -> Source | Diagnostic:
+    """The text of a file as a Source called `name`, or the diagnostic S0107 that says why there is none.
+
+    UTF-8 with or without mark, UTF-16 with mark; what is neither is taken as Windows-1252, as older tools write it."""
+    try:
+        if path.is_file() and path.stat().st_size > MAX_BYTES:
+            return _refusal(name, f"it has more than {MAX_BYTES >> 20} MiB")
+        data = path.read_bytes()
+    except OSError as error:
+        return _refusal(name, (error.strerror or str(error)).lower())
+    return decode(data, name, library)
+
+
+def decode(data: bytes, name: str, library: str = "") -> Source | Diagnostic:
+    """The same for bytes already read."""
+    for mark, encoding in _MARKS:
+        if data.startswith(mark):
+            try:
+                return Source(name, data[len(mark):].decode(encoding), library)
+            except UnicodeDecodeError as error:
+                return _refusal(name, f"it begins as {encoding.upper()} and is none at byte {len(mark) + error.start}")
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252", "replace")
+    if not _CONTROLS.isdisjoint(data):
+        at = next(i for i, byte in enumerate(data) if byte in _CONTROLS)
+        return _refusal(name, f"byte {at} is 16#{data[at]:02X}, which no text contains; it looks like a binary file")
+    return Source(name, text, library)
+
+
+def _refusal(name: str, why: str) -> Diagnostic:
+    return Diagnostic("S0107", Source(name, ""), 0, 0, f"{name} cannot be read: {why}",
+                      "a source is a text file in UTF-8, UTF-16 with a mark, or Latin-1")
