@@ -146,12 +146,12 @@ def truncate(value: float, machine: str) -> int:
 
 
 def _fit(value: float, how: Callable[[float], int], machine: str) -> int:
+    low, high = limits(machine)
     if math.isfinite(value):
-        low, high = limits(machine)
         number = how(value)
         if low <= number <= high:
             return number
-    raise Undefined("R0105", value, machine)
+    raise Undefined("R0105", value, low, high)
 
 
 def _guarded(function: Callable[[float], float]) -> Callable[[float], float]:
@@ -223,14 +223,14 @@ def from_bcd(a: int, machine: str) -> int:
     try:
         number = int(f"{a:x}")
     except ValueError:
-        raise Undefined("R0105", a, machine) from None
+        raise Undefined("R0105", a) from None
     if number > limits(machine)[1]:
-        raise Undefined("R0105", a, machine)
+        raise Undefined("R0105", a)
     return number
 
 
 def to_bcd(a: int, machine: str) -> int:
     """The decimal digits of a in nibbles of a bit string."""
     if a < 0 or a >= 10 ** (width(machine) // 4):
-        raise Undefined("R0105", a, machine)
+        raise Undefined("R0105", a)
     return int(str(int(a)), 16)

@@ -8,7 +8,8 @@ from __future__ import annotations
 import linecache
 import sys
 from collections import deque
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from itertools import count
 from types import CodeType
@@ -17,13 +18,16 @@ from weakref import WeakValueDictionary, finalize
 
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
+from fbvm.code.operations import Block
 from fbvm.engine.runtime import Observation, environment
 from fbvm.engine.statements import BodyWriter, function_name
 from fbvm.engine.trap import Stop, Trap, trap
 
 _NUMBERS = count(1)
-FRAMES_TO_SPARE = 200
+FRAMES_TO_SPARE = 400
 """Python frames that callers of an engine, and its own functions, may need besides those of the program."""
+FRAMES_A_LEVEL = 5
+"""Python frames that writing code takes for each level of tuples."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,17 +53,38 @@ def translate(image: Image, observed: bool = False) -> Program:
     constants: dict[str, Any] = {}
     lines: list[str] = []
     frames = 0
-    for number in range(len(image.bodies)):
-        writer = BodyWriter(image, constants, observed)
-        lines += [*writer.write(number), ""]
-        frames += 1 + len(writer.routines)
-    source = "\n".join(lines)
     name = f"<fbvm {'observed' if observed else 'plain'} {next(_NUMBERS)}>"
-    program = Program(image, source, compile(source, name, "exec"), constants, frames)
+    with _recursion(FRAMES_A_LEVEL * max((_height(body.code) for body in image.bodies), default=0)):
+        for number in range(len(image.bodies)):
+            writer = BodyWriter(image, constants, observed)
+            lines += [*writer.write(number), ""]
+            frames += 1 + len(writer.routines)
+        source = "\n".join(lines)
+        program = Program(image, source, compile(source, name, "exec"), constants, frames)
     linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
     finalize(program, linecache.cache.pop, name, None)
     _programs[id(image), observed] = program
     return program
+
+
+def _height(code: Block) -> int:
+    """Levels of tuples in each other."""
+    height, level = 0, [code]
+    while level:
+        height += 1
+        level = [part for item in level for part in item if isinstance(part, tuple)]
+    return height
+
+
+@contextmanager
+def _recursion(frames: int) -> Iterator[None]:
+    """Lets the host recurse that much deeper for a while."""
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(before + frames)
+    try:
+        yield
+    finally:
+        sys.setrecursionlimit(before)
 
 
 class PythonEngine:

@@ -53,17 +53,32 @@ def reach(node: Node) -> Range:
 
 def fits(node: Node) -> bool:
     """True if an integer operation never has to wrap."""
-    (low, high), (least, greatest) = limits(node[1]), reach(node)
-    return low <= least and greatest <= high
+    return _within(reach(node), limits(node[1]))
 
 
 def span(node: Node) -> Range:
     """Least and greatest value of an integer expression."""
-    return reach(node) if fits(node) else limits(node[1])
+    whole, range_ = limits(node[1]), reach(node)
+    return range_ if _within(range_, whole) else whole
+
+
+def _within(inner: Range, outer: Range) -> bool:
+    return outer[0] <= inner[0] and inner[1] <= outer[1]
+
+
+def _sum(node: Node) -> Range:
+    (low, high), (least, greatest) = span(node[2]), span(node[3])
+    return low + least, high + greatest
+
+
+def _difference(node: Node) -> Range:
+    (low, high), (least, greatest) = span(node[2]), span(node[3])
+    return low - greatest, high - least
 
 
 def _product(node: Node) -> Range:
-    corners = [a * b for a in span(node[2]) for b in span(node[3])]
+    left, right = span(node[2]), span(node[3])
+    corners = [a * b for a in left for b in right]
     return min(corners), max(corners)
 
 
@@ -81,6 +96,11 @@ def _remainder(node: Node) -> Range:
         most = abs(node[3][2]) - 1
         return (max(low, -most) if low < 0 else 0), (min(high, most) if high > 0 else 0)
     return min(low, 0), max(high, 0)
+
+
+def _negative(node: Node) -> Range:
+    low, high = span(node[2])
+    return -high, -low
 
 
 def _union(*nodes: Node) -> Range:
@@ -109,28 +129,22 @@ def _checked(node: Node) -> Range:
     return max(low, node[3]), min(high, node[4])
 
 
+def _floored(node: Node) -> Range:
+    low, high = span(node[2])
+    return (low // node[3][2], high // node[3][2]) if node[3][0] == "const" else limits(node[1])
+
+
+_LENGTH = (0, (1 << 31) - 1)
+
 _REACH: dict[str, Callable[[Node], Range]] = {
     "const": lambda node: (node[2], node[2]),
-    "add": lambda node: (span(node[2])[0] + span(node[3])[0], span(node[2])[1] + span(node[3])[1]),
-    "sub": lambda node: (span(node[2])[0] - span(node[3])[1], span(node[2])[1] - span(node[3])[0]),
-    "mul": _product,
-    "neg": lambda node: (-span(node[2])[1], -span(node[2])[0]),
+    "add": _sum, "sub": _difference, "mul": _product, "div": _quotient, "mod": _remainder, "neg": _negative,
     "abs": lambda node: (0, max(map(abs, span(node[2])))),
-    "div": _quotient,
-    "mod": _remainder,
     "and": lambda node: (0, min(span(node[2])[1], span(node[3])[1])),
-    "or": _bitwise,
-    "xor": _bitwise,
-    "shr": _shifted,
-    "convert": _converted,
-    "check": _checked,
-    "select": lambda node: _union(node[3], node[4]),
-    "mux": lambda node: _union(*node[3]),
-    "min": lambda node: _union(node[2], node[3]),
-    "max": lambda node: _union(node[2], node[3]),
-    "length": lambda node: (0, (1 << 31) - 1),
-    "find": lambda node: (0, (1 << 31) - 1),
-    "floor_div": lambda node: (span(node[2])[0] // node[3][2], span(node[2])[1] // node[3][2]),
+    "or": _bitwise, "xor": _bitwise, "shr": _shifted, "convert": _converted, "check": _checked,
+    "select": lambda node: _union(node[3], node[4]), "mux": lambda node: _union(*node[3]),
+    "min": lambda node: _union(node[2], node[3]), "max": lambda node: _union(node[2], node[3]),
+    "length": lambda node: _LENGTH, "find": lambda node: _LENGTH, "floor_div": _floored,
 }
 
 

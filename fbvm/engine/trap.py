@@ -40,6 +40,8 @@ _WORDS = {
     "R0108": "string position or length {0} out of range",
     "R0111": "text {0!r} cannot be converted to {1}",
 }
+_CONVERSION = {1: "{0} has no such form", 2: "{0!r} does not fit {1}", 3: "{0} outside {1}..{2}"}
+"""R0105 by the number of its values: BCD, text and data type, value and limits."""
 
 
 def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = ()) -> Trap:
@@ -47,7 +49,7 @@ def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = ()) -> Tr
     place = image.sites[site]
     values = tuple(int(value) if isinstance(value, bool) else value for value in values)
     if code == "R0105" and values:
-        words = f"{_shown(values[0])} does not fit " + ("{}..{}" if len(values) > 2 else "{}").format(*values[1:])
+        words = _CONVERSION[len(values)].format(*map(_shown, values))
     elif code in _WORDS and values:
         words = _WORDS[code].format(*map(_shown, values))
     else:

@@ -13,8 +13,6 @@ from fbvm.engine.python import PythonEngine
 from fbvm.engine.trap import Trap
 
 SLOTS_BYTES = 4096
-EXECUTED: set[str] = set()
-"""Names of the operations that hand-built images of this run of the tests held."""
 
 
 def at(offset: int, *terms: tuple[int, Node]) -> Any:
@@ -46,8 +44,6 @@ def store(machine: str, offset: int, value: Node) -> Node:
 
 def image(*codes: Block, size: int = 64) -> Image:
     """One body for each code, each the body of one program instance in one task; instances lie behind the slots."""
-    for code in codes:
-        _note(code)
     bodies = tuple(Body(f"Body{n}", "PROGRAM", code, size, len(code)) for n, code in enumerate(codes))
     runs = tuple(ProgramRun(body.name, n, SLOTS_OFFSET + SLOTS_BYTES + n * size) for n, body in enumerate(bodies))
     tasks = tuple(TaskRow(f"Task{n}", n, 0, "", (run,)) for n, run in enumerate(runs))
@@ -55,12 +51,12 @@ def image(*codes: Block, size: int = 64) -> Image:
     return Image(Layout(SLOTS_BYTES + size * len(codes)), bodies, tasks, {}, (), (), sites)
 
 
-def _note(item: Any) -> None:
-    if isinstance(item, tuple) and item:
-        if isinstance(item[0], str) and (item[0] in STATEMENTS or item[0] in EXPRESSIONS):
-            EXECUTED.add(item[0])
-        for part in item:
-            _note(part)
+def operations_in(item: Any) -> set[str]:
+    """Names of the operations that a piece of code holds."""
+    if not isinstance(item, tuple) or not item:
+        return set()
+    named = {item[0]} if isinstance(item[0], str) and (item[0] in STATEMENTS or item[0] in EXPRESSIONS) else set()
+    return named.union(*map(operations_in, item))
 
 
 @dataclass
@@ -115,9 +111,10 @@ def yields(machine: str, expression: Node, before: dict[int, bytes] | None = Non
     if machine == "s8":
         rig = execute((("store_text", at(100), 200, expression),), before=before)
         return rig.trap.code if rig.trap else rig.text(100, 200)
-    rig = execute((store(machine, 100, expression), ("let", 1, machine, expression), store(machine, 108, ("tmp", machine, 1)),
-                   ("store_raw", machine, at(117), expression)), before=before)
+    rig = execute((
+        store(machine, 104, expression), ("let", 1, machine, expression), store(machine, 112, ("tmp", machine, 1)),
+        ("store_raw", machine, at(121), expression)), before=before)
     if rig.trap:
         return rig.trap.code
-    assert repr(rig.slot(machine, 100)) == repr(rig.slot(machine, 108)) == repr(rig.slot(machine, 117)), expression
-    return rig.slot(machine, 100)
+    assert repr(rig.slot(machine, 104)) == repr(rig.slot(machine, 112)) == repr(rig.slot(machine, 121)), expression
+    return rig.slot(machine, 104)
