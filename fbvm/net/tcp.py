@@ -142,7 +142,8 @@ class _OnHost(Channel, Watcher):
     def end(self) -> None:
         """Give the socket back to the host."""
         if self.sock:
-            self.network.own(self.transport, self.real, None)
+            if self.transport == TCP:  # a datagram may still be under way, and the port stays this unit's
+                self.network.own(TCP, self.real, None)
             self.network.watch(self.sock, 0, self)
             self.sock.close()
             self.sock = None
