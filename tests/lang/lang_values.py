@@ -1,4 +1,4 @@
-"""What the expectations of the corpus write, as Python values: read here apart from the compiler, as a second opinion."""
+"""What expectations of the corpus write, as Python values: read apart from the compiler, as a second opinion."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def value(kind: Type, text: str) -> object:
     if isinstance(kind, ArrayType):
         if not (text.startswith("[") and text.endswith("]")):
             raise ValueError(f"{text} is no list")
-        return [value(kind.element, part.strip()) for part in _parts(text[1:-1])]
+        return [value(kind.element, part.strip()) for part in parts(text[1:-1])]
     if isinstance(kind, EnumType):
         return kind.members[text.upper()]
     if isinstance(kind, StringType):
@@ -46,7 +46,8 @@ def same(got: object, want: object) -> bool:
     return type(got) is type(want) and got == want
 
 
-def _parts(text: str) -> list[str]:
+def parts(text: str) -> list[str]:
+    """The items of a list."""
     return re.findall(r"'(?:\$.|[^'$])*'|[^,]+", text)
 
 

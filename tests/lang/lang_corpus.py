@@ -1,6 +1,6 @@
 """The language corpus: small programs that say in comments what is to come of them.
 
-A file holds programs one after the other, each begun by a line `// ---- what it shows`.  Expectations stand in comments:
+A file holds programs one after the other, each begun by a line `// ---- what it shows`.  Comments say what is expected:
 
     x := y;  // error S0301: part of the message     at the line that causes it; `warning` alike
     x := 1 / z;  // trap R0101                       at the line that stops the program
