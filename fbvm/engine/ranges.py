@@ -9,6 +9,7 @@ from typing import Any
 
 from fbvm.base.arithmetic import limits, quotient, width
 from fbvm.code.operations import EXPRESSIONS, INTEGERS, Node
+from fbvm.code.shapes import is_address, is_expression
 
 Range = tuple[int, int]
 
@@ -17,19 +18,13 @@ def is_float(machine: str) -> bool:
     return machine[0] == "f"
 
 
-def is_address(item: Any) -> bool:
-    """True for `(base, offset, terms)`; an expression has a machine type where an address has its offset."""
-    return isinstance(item, tuple) and len(item) == 3 and isinstance(item[1], int) and (
-        item[0] in ("abs", "self") or (isinstance(item[0], tuple) and item[0][:1] == ("ref",)))
-
-
 def may_trap(item: Any) -> bool:
     """True if evaluating an operand (expression, address, tuple of them) could end the run."""
     if not isinstance(item, tuple) or not item:
         return False
     if is_address(item):
         return isinstance(item[0], tuple) or any(may_trap(term) for _, term in item[2])
-    if isinstance(item[0], str) and item[0] in EXPRESSIONS:
+    if is_expression(item):
         return _traps_itself(item) or any(may_trap(operand) for operand in item[2:])
     return any(may_trap(part) for part in item)
 
