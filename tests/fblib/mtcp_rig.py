@@ -1,0 +1,174 @@
+"""A PLC with an ETN21, the MTCP_ETN blocks in one program, and a peer at the other end, all in virtual time.
+
+A rig is told its blocks as the program calls them, without the pins that it drives itself:
+
+    Rig(rd="Fn03(Register_Address := 1000, Register_Qty := 3, RespData_DM := 200)")
+
+gives the program an instance `rd` with EN from `conn.ENO AND rd_EN` and its command from `rd_Cmd`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from functools import cache
+from textwrap import dedent
+
+from fbvm.code.compiler import compile_text
+from fbvm.code.image import Image
+from fbvm.net.loop import LoopNetwork
+from fbvm.net.peers import Action, ModbusPeer, Say, Station
+from fbvm.plc import Plc
+from fbvm.record.chart import chart
+from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21_map import Layout
+from fbvm.units.etn21_names import descriptions
+from fbvm.wire.link import Peer
+
+SERVER = Peer("192.168.250.2", 502)
+CYCLE_NS = 10_000_000
+SECOND_NS = 1_000_000_000
+REQUEST, REPLY = range(32500, 32507), range(32510, 32643)
+"""The areas of the sheet."""
+WRITERS = ("05", "06", "0F", "10")
+
+CONNECT = ("IP_Address1 := Octet1, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 2, Connect := Connect")
+
+
+@cache
+def image_of(text: str) -> Image:
+    """The image of a program that has no errors."""
+    made = compile_text(text)
+    assert made.image is not None, "\n".join(str(message) for message in made.diagnostics)
+    return made.image
+
+
+def program(
+    blocks: dict[str, str], *, connect_last: bool = False, wired: bool = True, more: str = "", more_variables: str = ""
+) -> str:
+    """The text of a program with one `conn` and these blocks, in this order; `wired`: EN comes from `conn.ENO`."""
+    variables = ["conn : MTCP_ETN_Connect; conn_EN, Connect : BOOL := TRUE; Octet1 : UINT := 192;", more_variables]
+    calls = []
+    for name, call in blocks.items():
+        block, pins = re.fullmatch(r"(\w+)\((.*)\)", call).groups()  # type: ignore[union-attr]
+        command = "Cmd_Write" if block[2:] in WRITERS else "Cmd_Read"
+        enable = f"conn.ENO AND {name}_EN" if wired else f"{name}_EN"
+        variables.append(f"{name} : MTCP_ETN_{block}; {name}_EN : BOOL := TRUE; {name}_Cmd : BOOL;")
+        calls.append(f"{name}(EN := {enable}, {pins}, {command} := {name}_Cmd);")
+    connect = f"conn(EN := conn_EN, {CONNECT});"
+    body = [*calls, connect] if connect_last else [connect, *calls]
+    return "\n".join(["PROGRAM Main", "VAR", *variables, "END_VAR", *body, more, "END_PROGRAM"])
+
+
+class Rig:
+    """One PLC, one unit, one network, one peer at 192.168.250.2 port 502 (None: nobody)."""
+
+    def __init__(
+        self,
+        peer: Station | None = None,
+        *,
+        timing: str = "exact",
+        seed: int = 0,
+        text: str = "",
+        connect_last: bool = False,
+        wired: bool = True,
+        more: str = "",
+        more_variables: str = "",
+        refused: bool = False,
+        **blocks: str,
+    ) -> None:
+        made = text or program(
+            blocks, connect_last=connect_last, wired=wired, more=more, more_variables=more_variables
+        )
+        self.peer = peer if isinstance(peer, ModbusPeer) else ModbusPeer()
+        self.server = self.peer.server
+        self.network = LoopNetwork(seed)
+        if not refused:
+            self.network.place(SERVER, peer or self.peer)
+        self.unit = Etn21(0, "192.168.250.1", timing=timing, seed=seed)
+        self.plc = Plc(image_of(dedent(made)), CYCLE_NS)
+        self.plc.attach(self.unit, self.network)
+
+    # --- running ------------------------------------------------------------------------------------------------------
+
+    def scan(self, count: int = 1) -> None:
+        for _ in range(count):
+            assert self.plc.scan() is None
+
+    def run_until(self, condition: str, max_s: float = 60) -> float:
+        """Seconds that it took; fails if it took more than `max_s`."""
+        start_ns = self.plc.now_ns
+        reason = self.plc.run(until=condition, max_ns=start_ns + int(max_s * SECOND_NS))
+        assert reason == "until", f"{condition}: {reason} after {max_s} s"
+        return (self.plc.now_ns - start_ns) / SECOND_NS
+
+    def connect(self) -> Rig:
+        self.run_until("Main.conn.ENO")
+        return self
+
+    def command(self, *names: str, max_s: float = 60) -> None:
+        """Command blocks in the same scan and run until all have ended, one scan at least."""
+        for name in names:
+            self.set(f"{name}_Cmd", True)
+        self.scan()
+        busy = " OR ".join(f"Main.{name}.Exchange.State <> 0" for name in names)
+        self.run_until(f"NOT ({busy})", max_s)
+        for name in names:
+            self.set(f"{name}_Cmd", False)
+        self.scan()
+
+    def chart(self, scans: int, *signals: str) -> str:
+        """The signals at the end of each scan."""
+        return chart(self.plc, scans, [_named(signal) for signal in signals])
+
+    # --- values -------------------------------------------------------------------------------------------------------
+
+    def set(self, name: str, value: object) -> None:
+        self.plc.write(f"Main.{name}", value)
+
+    def get(self, name: str) -> object:
+        return self.plc.read(f"Main.{name}")
+
+    def words(self, first: int, count: int) -> list[int]:
+        """D words."""
+        return list(self.plc.memory.words("D")[first : first + count])
+
+    def fill(self, first: int, words: list[int]) -> None:
+        for offset, word in enumerate(words):
+            self.plc.memory.words("D")[first + offset] = word
+
+    def all_words(self) -> list[int]:
+        """All D words but those of the sheet and of the unit."""
+        words = list(self.plc.memory.words("D"))
+        for area in (REQUEST, REPLY, range(30000, 30100)):
+            words[area.start : area.stop] = [0] * len(area)
+        return words
+
+    def frame(self, first: int, size: int) -> str:
+        """Bytes from a D word on, as hexadecimal text."""
+        data = b"".join(word.to_bytes(2, "big") for word in self.words(first, (size + 1) // 2))
+        return data[:size].hex(" ").upper()
+
+    def result(self, name: str) -> tuple[object, str]:
+        """Rcv_Counter and Error_Code of a block; the code is "" where Error is FALSE."""
+        code = self.get(f"{name}.Error_Code")
+        assert isinstance(code, int)
+        assert bool(self.get(f"{name}.Error")) == (code != 0)
+        return self.get(f"{name}.Rcv_Counter"), f"{code:04X}" if code else ""
+
+
+NAMES = descriptions(Layout.of(0))
+
+
+def _named(signal: str) -> str | tuple[str, str]:
+    return (signal, NAMES.get(signal, "")) if re.match(r"CIO |D\d", signal) else f"Main.{signal}"
+
+
+def answering(reply: Callable[[bytes], list[Action]]) -> ModbusPeer:
+    """A Modbus server that does with its right replies what a function says."""
+    return ModbusPeer(None, reply)
+
+
+def saying(change: Callable[[bytes], bytes]) -> ModbusPeer:
+    """A Modbus server whose replies are changed."""
+    return ModbusPeer(None, lambda frame: [Say(change(frame))])
