@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli.sources import CYCLE_NS, compiled, source_arguments
+from fbvm.cli.sources import compiled, source_arguments
 from fbvm.code.listing import listing
 
 
@@ -14,4 +14,4 @@ from fbvm.code.listing import listing
 @source_arguments
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...]) -> None:
     """Print what the files compile to: tasks, layout, symbols and the code of each POU."""
-    click.echo(listing(compiled(files, program, libraries, CYCLE_NS)))
+    click.echo(listing(compiled(files, program, libraries, runnable=False)))

@@ -12,7 +12,7 @@ import click
 from fbvm.cli import registers, status
 from fbvm.cli.options import Mapping, Setting, mapping, setting, split_names, time_ns
 from fbvm.cli.outcome import Outcome, Progress
-from fbvm.cli.sources import CYCLE_NS, compiled, source_arguments
+from fbvm.cli.sources import compiled, source_arguments
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
@@ -25,6 +25,8 @@ from fbvm.units.etn21 import Etn21
 from fbvm.watch.paths import Place
 from fbvm.watch.values import parse_value
 
+CYCLE_NS = 10_000_000
+"""Cycle of programs without a TASK, unless somebody says another."""
 UNIT_ADDRESS = "192.168.250.21"
 """IPv4 address of the ETN21 with unit number 0 that is on the backplane of every run."""
 
@@ -60,7 +62,7 @@ def command(
     End by one of --scans, --for and --until.  Status 1 if --max ended --until, 3 if the program has errors, 4 if a
     trap stopped it, 5 if the network could not be used."""
     _check_usage(**options)
-    plc = Plc(compiled(files, program, libraries, cycle_ns, as_json), cycle_ns)
+    plc = Plc(compiled(files, program, libraries, runnable=True, as_json=as_json), cycle_ns)
     with ExitStack() as stack:
         network = build_network(options["net"], options["mappings"])
         stack.callback(network.close)

@@ -15,8 +15,6 @@ from fbvm.cli import status
 from fbvm.code.compiler import Compilation, compile_files
 from fbvm.code.image import Image
 
-CYCLE_NS = 10_000_000
-"""Cycle of programs without a TASK, unless somebody says another."""
 
 
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -34,10 +32,12 @@ def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def compiled(
-    files: Sequence[Path], program: str | None, libraries: Sequence[Path], cycle_ns: int, as_json: bool = False
+    files: Sequence[Path], program: str | None, libraries: Sequence[Path], *, runnable: bool, as_json: bool = False
 ) -> Image:
-    """The Image of the files.  Reports warnings; reports errors and ends with status 3 if there are any."""
-    compilation = compile_files(files, program=program, libraries=libraries, cycle_ns=cycle_ns)
+    """The Image of the files.  Reports warnings; reports errors and ends with status 3 if there are any.
+
+    With `runnable` it is an error, too, if nothing says which program to run."""
+    compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable)
     if compilation.image is None:
         report(compilation, as_json)
         sys.exit(status.PROGRAM_ERRORS)

@@ -8,10 +8,12 @@ these leave open, W343.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 
 from fbvm.units import etn21_map as at
 from fbvm.units.etn21_dispatch import NEVER_NS, Choices, Dispatch, Fault
 from fbvm.units.etn21_map import Layout
+from fbvm.units.etn21_names import descriptions
 from fbvm.units.etn21_timing import timing_of
 from fbvm.units.unit import AreaMemory
 from fbvm.wire.link import Event, Request
@@ -54,6 +56,11 @@ class Etn21:
         self._switches_at = slice(self.layout.n + at.SWITCHES, self.layout.n + at.FINS_TCP_STATUS)
         self._seen = [0, 0, 0, 0]
         self._wake_ns = NEVER_NS
+
+    @cached_property
+    def descriptions(self) -> dict[str, str]:
+        """What the unit's bits and words are called, by address as charts write it (`CIO 1519.02`, `D30001`)."""
+        return descriptions(self.layout)
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on or restart: the unit's own words and all switches 0, connections broken by RST."""

@@ -1,0 +1,181 @@
+"""The rules of the house: floors, what must stay absent, sizes, and that every table row has its page and its test."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from fbvm.base.codes import CODES
+from fbvm.code.operations import EXPRESSIONS, STATEMENTS
+
+HOUSE = Path(__file__).resolve().parent.parent
+PACKAGE = HOUSE / "fbvm"
+LONGEST_FILE, LONGEST_FUNCTION = 450, 60
+
+FLOORS = {
+    "base": 0, "syntax": 1, "check": 2, "code": 3, "engine": 4,
+    "wire": 1, "units": 2, "net": 2,
+    "watch": 4, "flags": 5, "goal": 5, "schedule": 5, "plc": 5,
+    "record": 6, "run": 6, "testing": 7, "cli": 7, "": 7, "__main__": 7,
+}  # fmt: skip
+"""A room may import from its own floor and from below."""
+STAIRS = {
+    "language": {"syntax", "check", "code", "engine"},
+    "machine": {"wire", "units", "net"},
+}
+"""Neither stairway knows the other; they meet in plc.py."""
+SEPARATE = {("units", "net"), ("net", "units"), ("units", "engine"), ("engine", "units"), ("watch", "engine"),
+            ("run", "record"), ("record", "run")}  # fmt: skip
+"""Neighbours that do not import each other."""
+ONLY_IN = {
+    "socket": {"net/tcp.py"},
+    "selectors": {"net"},
+    "time": {"run/loop.py"},
+    "threading": set(),
+    "concurrent": set(),
+    "multiprocessing": set(),
+    "_thread": set(),
+    "asyncio": {"cli/peer.py"},
+    "pymodbus": {"cli/peer.py", "cli/demo.py"},
+    "click": {"cli"},
+    "rich": {"cli"},
+    "lark": {"syntax"},
+}
+"""Modules that are used in these places only."""
+DATES = {"datetime", "date", "datetime.datetime", "datetime.date"}
+
+
+@cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+def modules() -> list[Path]:
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def name_of(path: Path) -> str:
+    return path.relative_to(PACKAGE).as_posix()
+
+
+def room_of(dotted: str) -> str:
+    """The room of `fbvm.units.etn21` is "units", that of `fbvm.plc` "plc"."""
+    parts = dotted.split(".")
+    return parts[1] if len(parts) > 1 else ""
+
+
+def imports(path: Path) -> Iterator[str]:
+    """Dotted names of all that a module imports, also within functions."""
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{name_of(path)}: relative import"
+            for alias in node.names:
+                is_module = (HOUSE / Path(*(node.module or "").split("."), f"{alias.name}.py")).exists()
+                is_room = node.module == "fbvm" and (PACKAGE / alias.name).is_dir()
+                yield f"{node.module}.{alias.name}" if is_module or is_room else node.module or ""
+
+
+every_module = pytest.mark.parametrize("path", modules(), ids=name_of)
+
+
+@every_module
+def test_imports_never_climb(path: Path) -> None:
+    dotted = ".".join(("fbvm", *path.relative_to(PACKAGE).with_suffix("").parts))
+    room = room_of(dotted.removesuffix(".__init__"))
+    wrong = []
+    for imported in imports(path):
+        if imported.split(".")[0] != "fbvm" or (imported == "fbvm" and room == "cli"):
+            continue
+        other = room_of(imported)
+        climbs = FLOORS[other] > FLOORS[room]
+        crosses = any(room in stair and other in others for stair in STAIRS.values()
+                      for others in STAIRS.values() if stair is not others)  # fmt: skip
+        typing_only = (path.name, imported) == ("goal.py", "fbvm.plc")
+        if (climbs or crosses or (room, other) in SEPARATE) and not typing_only:
+            wrong.append(imported)
+    assert not wrong, f"{name_of(path)} imports {wrong}"
+
+
+@every_module
+def test_what_must_stay_absent(path: Path) -> None:
+    here = {name_of(path), path.relative_to(PACKAGE).parts[0]}
+    wrong = [name for name in imports(path) if (top := name.split(".")[0]) in ONLY_IN and not here & ONLY_IN[top]]
+    assert not wrong, f"{name_of(path)} imports {wrong}"
+
+
+@every_module
+def test_files_and_functions_fit_on_a_desk(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE
+    long = [node.name for node in ast.walk(tree(path)) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+            and (node.end_lineno or 0) - node.lineno + 1 > LONGEST_FUNCTION]  # fmt: skip
+    assert not long
+
+
+@every_module
+def test_every_module_says_what_it_is_for(path: Path) -> None:
+    assert ast.get_docstring(tree(path))
+
+
+@every_module
+def test_nobody_asks_the_clock_for_a_date(path: Path) -> None:
+    asked = [node.attr for node in ast.walk(tree(path)) if isinstance(node, ast.Attribute)
+             and node.attr in ("now", "utcnow", "today") and ast.unparse(node.value) in DATES]  # fmt: skip
+    assert not asked
+
+
+@every_module
+def test_no_room_for_leftovers(path: Path) -> None:
+    assert not re.search(r"util|helper|manager|handler", path.stem)
+    text = path.read_text(encoding="utf-8")
+    assert not re.search(r"\b(TODO|FIXME|XXX|HACK)\b", text)
+    assert "NotImplementedError" not in text
+
+
+def test_fblib_and_grammar_hold_no_python() -> None:
+    assert not [*(HOUSE / "fblib").rglob("*.py"), *(HOUSE / "grammar").rglob("*.py")]
+
+
+# --- diagnostics ------------------------------------------------------------------------------------------------------
+
+
+@cache
+def all_tests() -> str:
+    """The text of all tests, and of the programs that they run."""
+    paths = [path for ending in ("*.py", "*.st", "*.txt", "*.md") for path in (HOUSE / "tests").rglob(ending)]
+    paths = [path for path in paths if path.name != "test_house.py"]
+    return "\n".join(path.read_text(encoding="utf-8", errors="replace") for path in paths)
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_code_has_a_page(code: str) -> None:
+    assert (PACKAGE / "base" / "pages" / f"{code}.md").is_file()
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_code_has_a_test(code: str) -> None:
+    assert code in all_tests()
+
+
+def test_every_page_belongs_to_a_code() -> None:
+    assert {path.stem for path in (PACKAGE / "base" / "pages").glob("*.md")} <= set(CODES)
+
+
+@pytest.mark.parametrize("code", CODES)
+def test_every_code_is_used(code: str) -> None:
+    used = any(f'"{code}"' in path.read_text(encoding="utf-8") for path in modules() if path.name != "codes.py")
+    assert used, f"nothing reports {code}"
+
+
+# --- operations -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [*EXPRESSIONS, *STATEMENTS])
+def test_every_operation_is_exercised(name: str) -> None:
+    assert re.search(rf"""["']{name}["']""", all_tests()), f"no test names {name}"
