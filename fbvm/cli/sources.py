@@ -16,7 +16,6 @@ from fbvm.code.compiler import Compilation, compile_files
 from fbvm.code.image import Image
 
 
-
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
     """FILE..., --program and --library, which all verbs on programs share."""
     for decorate in (

@@ -1,0 +1,228 @@
+"""`fbvm demo`: registers of a real Modbus TCP server arrive in D memory, over real sockets, and why.
+
+The server runs in a process of its own (`fbvm peer`); what it holds afterwards is asked by a client that has nothing
+to do with fbvm.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import click
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from fbvm.base.data import data_folder
+from fbvm.cli import status
+from fbvm.cli.outcome import chart_width
+from fbvm.cli.peer import LISTENING
+from fbvm.cli.run import UNIT_ADDRESS
+from fbvm.code.compiler import compile_files
+from fbvm.net.tcp import TcpNetwork
+from fbvm.plc import Plc
+from fbvm.record.chart import draw
+from fbvm.record.recorder import Recorder
+from fbvm.run import loop
+from fbvm.units.etn21 import Etn21
+from fbvm.wire.link import Peer
+
+SERVER = Peer("192.168.250.1", 502)
+"""What the program believes that it talks to."""
+CYCLE_NS = 10_000_000
+LIMIT_NS = 20_000_000_000
+SIGNALS = (
+    "CIO 1519.05", "CIO 1519.02", "CIO 1509.15", "CIO 1519.03", "CIO 1509.02", "CIO 1509.13", "CIO 1519.04", "D30001",
+    ("D32500", "Request, first word: transaction number"), ("D32510", "Reply, first word: transaction number"),
+    ("Main.Connection.ENO", "connected"), ("Main.Done", "all three exchanges are over"),
+)  # fmt: skip
+STEPS = ("connect to the server", "read holding registers (function 03)", "compute", "write registers (function 10)",
+         "write one register (function 06)")  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Words of the PLC beside the registers of the server that they must equal."""
+
+    what: str
+    places: list[str]
+    words: list[int]
+    first_register: int
+    registers: list[int]
+
+    @property
+    def equal(self) -> bool:
+        return self.words == self.registers and bool(self.words)
+
+
+@click.command("demo")
+def command() -> None:
+    """Run a client program against a real Modbus TCP server on this computer.
+
+    Needs no hardware, no root, no configuration.  Ends with 0 only if the data is equal on both sides."""
+    try:
+        import pymodbus.client  # noqa: F401
+    except ImportError:
+        raise click.UsageError("the demo's server needs pymodbus: pip install 'fbvm[peer]'") from None
+    console = Console(highlight=False)
+    program = data_folder("examples") / "demo.st"
+    try:
+        with modbus_server() as port:
+            console.print(f"A Modbus TCP server listens on 127.0.0.1:{port}; what the program calls {SERVER} is there.")
+            sys.exit(_show(console, program, port))
+    except OSError as error:
+        console.print(f"The network cannot be used: {error}", style="red")
+        sys.exit(status.NETWORK)
+
+
+def _show(console: Console, program: Path, port: int) -> int:
+    """Runs the program and prints everything; returns the exit status."""
+    image = compile_files([program], runnable=True).image
+    assert image is not None, "the demo's own program compiles"
+    plc = Plc(image, CYCLE_NS)
+    network = TcpNetwork({SERVER: ("127.0.0.1", port)})
+    try:
+        plc.attach(Etn21(0, UNIT_ADDRESS), network)
+        recorder = Recorder(plc, SIGNALS)
+        with Steps(console, plc) as steps:
+            plc.watchers.append(steps.watch)
+            reason = loop.run(plc, until="Main.Done OR Main.Error_Code <> 0", max_ns=LIMIT_NS)
+    finally:
+        network.close()
+    console.print("\nEach column is a scan of 10 ms: # is ON, . is OFF, | a word that changed, ~ a quiet stretch.\n")
+    console.print(draw(recorder, width=chart_width(), ruler=True, compress=True), markup=False, soft_wrap=True)
+    if reason != "until" or plc.read("Main.Done") is not True:
+        console.print(_failure(plc, reason), style="red")
+        return {"trap": status.STOPPED, "interrupted": status.INTERRUPTED}.get(reason, status.FAILED)
+    comparisons = compare(plc, port)
+    console.print(_table(comparisons))
+    if not all(comparison.equal for comparison in comparisons):
+        console.print("The data differs.", style="bold red")
+        return status.FAILED
+    console.print("Equal on both sides.", style="bold green")
+    console.print(_next(program, port), markup=False, soft_wrap=True)
+    return status.GOOD
+
+
+def _failure(plc: Plc, reason: str) -> str:
+    if plc.trap:
+        return str(plc.trap)
+    code = plc.read("Main.Error_Code") or plc.read("Main.Connection.Error_Code")
+    return f"The program did not get through ({reason}); error code {code:04X}"
+
+
+# --- the server -------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def modbus_server() -> Iterator[int]:
+    """A Modbus TCP server in a process of its own; its port.  Raises OSError if it does not start."""
+    arguments = [sys.executable, "-m", "fbvm", "peer", "--port", "0"]
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            if not line.startswith(LISTENING):
+                process.kill()
+                raise OSError(f"the server did not start: {process.communicate()[1].strip()}")
+            yield int(line.rpartition(":")[2])
+        finally:
+            process.terminate()
+            process.communicate()
+
+
+def compare(plc: Plc, port: int) -> list[Comparison]:
+    """What is in D memory beside what the server holds, which pymodbus's client asks over a connection of its own."""
+    from pymodbus.client import ModbusTcpClient
+
+    quantity, written, source, target, signature = (
+        int(str(plc.read(f"Main.{name}"))) for name in ("Quantity", "Written", "Source", "Target", "Signature")
+    )
+    client: Any = ModbusTcpClient("127.0.0.1", port=port)
+    try:
+        client.connect()
+        answers = [client.read_holding_registers(first, count=count).registers
+                   for first, count in ((source, quantity), (target, written), (signature, 1))]  # fmt: skip
+    finally:
+        client.close()
+    return [
+        Comparison("read by function 03", *_words(plc, 200, quantity), source, answers[0]),
+        Comparison("written by function 10", *_words(plc, 400, written), target, answers[1]),
+        Comparison("written by function 06", ["Main.Written"], [written], signature, answers[2]),
+    ]
+
+
+def _words(plc: Plc, first: int, count: int) -> tuple[list[str], list[int]]:
+    words = range(first, first + count)
+    return [f"D{word}" for word in words], [plc.memory.words("D")[word] for word in words]
+
+
+# --- what is shown ----------------------------------------------------------------------------------------------------
+
+
+class Steps:
+    """The steps of the program as they happen, on a terminal; in a pipe once, at the end."""
+
+    def __init__(self, console: Console, plc: Plc) -> None:
+        self._plc = plc
+        self._began_ms: dict[int, float] = {}
+        self._live = Live(self._view(), console=console, auto_refresh=False)
+
+    def __enter__(self) -> Steps:
+        self._live.start()
+        return self
+
+    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+        self._live.update(self._view(), refresh=True)
+        self._live.stop()
+
+    def watch(self, plc: Plc) -> None:
+        """Notes a new step and shows it."""
+        step = int(str(plc.read("Main.Step")))
+        if step not in self._began_ms:
+            self._began_ms[step] = plc.now_ns / 1e6
+            self._live.update(self._view(), refresh=self._live.console.is_terminal)
+
+    def _view(self) -> Group:
+        lines = []
+        for number, text in enumerate(STEPS):
+            ended = self._began_ms.get(number + 1)
+            began = self._began_ms.get(number)
+            mark, style = (" ", "dim") if began is None else (">", "yellow") if ended is None else ("+", "green")
+            time = "" if ended is None or began is None else f"{ended - began:8.1f} ms"
+            lines.append(Text(f"  {mark} {text:<40}{time}", style=style))
+        return Group(*lines)
+
+
+def _table(comparisons: list[Comparison]) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    for title in ("PLC", "holds", "", "server", "register", ""):
+        table.add_column(title, justify="right" if title in ("holds", "server", "register") else "left")
+    for comparison in comparisons:
+        rows = zip(comparison.places, comparison.words, comparison.registers, strict=False)
+        for number, (place, word, register) in enumerate(rows):
+            sign = "=" if word == register else "differs from"
+            where = str(comparison.first_register + number)
+            table.add_row(place, str(word), sign, str(register), where, comparison.what if number == 0 else "")
+    return table
+
+
+def _next(program: Path, port: int) -> str:
+    here = program.relative_to(Path.cwd()) if program.is_relative_to(Path.cwd()) else program
+    return f"""
+What to try next:
+  fbvm run {here} --until Main.Done --max 5s --map {SERVER}=peer --show D200..D209
+                                        the same in memory, in virtual time
+  fbvm peer --port 15020 --trace        a server to watch, and in another window:
+  fbvm run {here} --net tcp --map {SERVER}=127.0.0.1:15020 --until Main.Done --max 5s \\
+           --set Main.Quantity=125 --pcap demo.pcapng
+  fbvm list {here}                      what the program compiles to
+"""
