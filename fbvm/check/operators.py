@@ -152,11 +152,11 @@ class Operators:
             hint = _bit_hint(left if not is_any(left, "ANY_BIT") else right)
         elif isinstance(left, StructType) or isinstance(right, StructType):
             hint = "compare or combine the members"
-        elif is_any(left, "ANY_BIT") != is_any(right, "ANY_BIT") or common(left, right) is None:
+        elif expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
+            number = {"BYTE": "USINT", "WORD": "UINT", "DWORD": "UDINT", "LWORD": "ULINT"}.get(left.name, "INT")
+            hint = f"{left} has no arithmetic: convert with {left}_TO_{number}(...)"
+        elif common(left, right) is None:
             hint = _meeting_hint(left, right)
-        elif is_any(left, "ANY_BIT"):
-            hint = "bit strings have no arithmetic: convert with " + \
-                f"{left}_TO_U{'' if left.size == 2 else {1: 'S', 4: 'D', 8: 'L'}.get(left.size, '')}INT(...)"
         self.expressions.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)
 
     def _time(self, expr: tree.Binary, left: Type, right: Type) -> Type | None:

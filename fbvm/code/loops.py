@@ -38,11 +38,11 @@ class LoopLowering:
 
     def while_(self, node: tree.While, site: int) -> None:
         head = (self._charge(node.body, site), *self._condition(node.condition, False, site))
-        self.body.out.append(("loop", head, self.body.lowered(node.body), ()))
+        self.body.out.append(("loop", head, self.body.inner(node.body), ()))
 
     def repeat(self, node: tree.Repeat, site: int) -> None:
         tail = self._condition(node.until, True, self.body.site(node.until))
-        self.body.out.append(("loop", (self._charge(node.body, site),), self.body.lowered(node.body), tail))
+        self.body.out.append(("loop", (self._charge(node.body, site),), self.body.inner(node.body), tail))
 
     # --- FOR --------------------------------------------------------------------------------------------------------
 
@@ -69,7 +69,7 @@ class LoopLowering:
         head, tail = self._known_step(place, last, step, site) if step is not None else \
             self._computed_step(place, last, by or last, site)
         head = (self._charge(node.body, site), *head)
-        body.out.append(("loop", head, body.lowered(node.body), (*tail, *self._observed(place, site))))
+        body.out.append(("loop", head, body.inner(node.body), (*tail, *self._observed(place, site))))
 
     def _observed(self, place: Place, site: int) -> Block:
         with self.body.block() as inner:

@@ -234,10 +234,10 @@ class BodyLowering:
                 rest = tuple(inner)
                 break
             self.out += before
-            rows.append((node, self._inner(body)))
-        self.out.append(("if", tuple(rows), self._inner(otherwise) if rest is None else rest))
+            rows.append((node, self.inner(body)))
+        self.out.append(("if", tuple(rows), self.inner(otherwise) if rest is None else rest))
 
-    def _inner(self, statements: tree.Block) -> Block:
+    def inner(self, statements: tree.Block) -> Block:
         """An inner block whose reads are its own."""
         reads, self.reads = self.reads, []
         made = self.lowered(statements)
@@ -247,8 +247,8 @@ class BodyLowering:
     def _case(self, node: tree.Case, site: int) -> None:
         form = machine(self.facts.types[node.selector])
         selector = self.value(node.selector)
-        rows = tuple((self.facts.labels[branch], self._inner(branch.body)) for branch in node.branches)
-        self.out.append(("case", form, selector, rows, self._inner(node.otherwise or ())))
+        rows = tuple((self.facts.labels[branch], self.inner(branch.body)) for branch in node.branches)
+        self.out.append(("case", form, selector, rows, self.inner(node.otherwise or ())))
 
     def _for(self, node: tree.For, site: int) -> None:
         self.loops.for_(node, site)
