@@ -1,3 +1,67 @@
-"""fbvm runs PLC function blocks off the PLC."""
+"""fbvm runs PLC function blocks off the PLC.
+
+    from fbvm import Plc, compile_files
+    plc = Plc(compile_files(["pump.st"]).image)
+    plc.write("Main.start", True)
+    plc.run(until="Main.running", max_ns=5_000_000_000)
+
+Names are loaded when they are asked for.  `fbvm.run.run` runs a PLC in real time.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from fbvm.base.diagnostics import Diagnostic as Diagnostic
+    from fbvm.base.diagnostics import Source as Source
+    from fbvm.code.compiler import Compilation as Compilation
+    from fbvm.code.compiler import compile_files as compile_files
+    from fbvm.code.compiler import compile_sources as compile_sources
+    from fbvm.code.compiler import compile_text as compile_text
+    from fbvm.code.image import Image as Image
+    from fbvm.engine.trap import Trap as Trap
+    from fbvm.net.loop import LoopNetwork as LoopNetwork
+    from fbvm.net.peers import ModbusPeer as ModbusPeer
+    from fbvm.net.tcp import TcpNetwork as TcpNetwork
+    from fbvm.plc import Mode as Mode
+    from fbvm.plc import Plc as Plc
+    from fbvm.plc import Stopped as Stopped
+    from fbvm.record.chart import chart as chart
+    from fbvm.record.chart import draw as draw
+    from fbvm.record.pcapng import Capture as Capture
+    from fbvm.record.recorder import Recorder as Recorder
+    from fbvm.units.etn21 import Etn21 as Etn21
+    from fbvm.watch.paths import UnknownPlace as UnknownPlace
+    from fbvm.wire.link import Peer as Peer
+    from fbvm.wire.modbus_server import ModbusServer as ModbusServer
+
+_HOMES = {
+    "base.diagnostics": ("Diagnostic", "Source"),
+    "code.compiler": ("Compilation", "compile_files", "compile_sources", "compile_text"),
+    "code.image": ("Image",),
+    "engine.trap": ("Trap",),
+    "net.loop": ("LoopNetwork",),
+    "net.peers": ("ModbusPeer",),
+    "net.tcp": ("TcpNetwork",),
+    "plc": ("Mode", "Plc", "Stopped"),
+    "record.chart": ("chart", "draw"),
+    "record.pcapng": ("Capture",),
+    "record.recorder": ("Recorder",),
+    "units.etn21": ("Etn21",),
+    "watch.paths": ("UnknownPlace",),
+    "wire.link": ("Peer",),
+    "wire.modbus_server": ("ModbusServer",),
+}
+"""Where the public names live."""
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+__all__ = sorted([*_HOME_OF, "__version__"])
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'fbvm' has no attribute {name!r}")
+    return getattr(importlib.import_module(f"fbvm.{_HOME_OF[name]}"), name)
