@@ -28,8 +28,8 @@ from fbvm.wire.link import Peer
 SERVER = Peer("192.168.250.2", 502)
 CYCLE_NS = 10_000_000
 SECOND_NS = 1_000_000_000
-REQUEST, REPLY = range(32500, 32507), range(32510, 32643)
-"""The areas of the sheet."""
+OWN = (range(30000, 30100), range(32500, 32643))
+"""D words of the unit and of the blocks: the sheet's two areas, and the gap between them for long requests."""
 WRITERS = ("05", "06", "0F", "10")
 
 CONNECT = ("IP_Address1 := Octet1, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 2, Connect := Connect")
@@ -39,7 +39,7 @@ CONNECT = ("IP_Address1 := Octet1, IP_Address2 := 168, IP_Address3 := 250, IP_Ad
 def image_of(text: str) -> Image:
     """The image of a program that has no errors."""
     made = compile_text(text)
-    assert made.image is not None, "\n".join(str(message) for message in made.diagnostics)
+    assert made.image is not None, [message.message for message in made.diagnostics]
     return made.image
 
 
@@ -138,9 +138,9 @@ class Rig:
             self.plc.memory.words("D")[first + offset] = word
 
     def all_words(self) -> list[int]:
-        """All D words but those of the sheet and of the unit."""
+        """All D words, those of the unit and of the blocks as 0."""
         words = list(self.plc.memory.words("D"))
-        for area in (REQUEST, REPLY, range(30000, 30100)):
+        for area in OWN:
             words[area.start : area.stop] = [0] * len(area)
         return words
 

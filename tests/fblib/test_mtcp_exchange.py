@@ -99,11 +99,11 @@ def test_fn03_when_the_reply_comes_in_pieces() -> None:
         Main.rd_Cmd          ############
         Main.rd.Rcv_Counter  0        |1
         Main.rd.Error        ............
-        CIO1519.03           #...........   Send Request Switch
-        CIO1519.04           ....#..#....   Receive Request Switch
-        CIO1509.13           .###.##.....   TCP Data Received Flag
-        D30001               0|4|||||0      = 0, 4, 9, 0, 3, 9, 0   Number of Bytes Received
-        D30023               12  |6 |9      Number of Bytes to Send or Receive
+        CIO1519.03           #...........      Send Request Switch
+        CIO1519.04           ....#..#....      Receive Request Switch
+        CIO1509.13           .###.##.....      TCP Data Received Flag
+        D30001               0|4|||||0         = 0, 4, 9, 0, 3, 9, 0   Number of Bytes Received
+        D30023               12  |6 |9         Number of Bytes to Send or Receive
         D200                 0        |43794
     """
 
