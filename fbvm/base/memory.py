@@ -33,18 +33,20 @@ class Snapshot:
 
 
 class Memory:
-    """A buffer of `size` bytes, all zeros at first, and the areas in it.
+    """A buffer of `size` bytes (whole pages), all zeros at first, and the areas in it.
 
     `views` are writable memoryviews by machine type, each over the whole buffer (item i lies at i * its size).  Values
     are little-endian.  Reading and writing outside the buffer raises IndexError."""
 
     def __init__(self, size: int, areas: Mapping[str, Area]) -> None:
+        if size <= 0 or size % PAGE_BYTES:
+            raise ValueError(f"a memory has whole pages of {PAGE_BYTES} bytes; {size} bytes are none")
         self.size = size
         self.areas = dict(areas)
         self.map = _anonymous(size)
         self.u8 = memoryview(self.map)
-        self.views = {machine: self.u8.cast("B").cast(letter) if letter != "B" else self.u8  # type: ignore[call-overload]
-                      for machine, letter in FORMATS.items()}
+        self.views: dict[str, memoryview] = {
+            machine: self.u8.cast(letter) for machine, letter in FORMATS.items()}  # type: ignore[call-overload]
         self._words: dict[str, memoryview] = {}
         self._last: Snapshot | None = None
 
@@ -89,7 +91,7 @@ class Memory:
 
     def snapshot(self) -> Snapshot:
         """The contents now.  Pages that did not change are shared with the snapshot that was taken or restored last."""
-        last = self._last.pages if self._last else (None,) * (-(-self.size // PAGE_BYTES))
+        last = self._last.pages if self._last else (None,) * (self.size // PAGE_BYTES)
         pages: list[bytes | None] = []
         for number, known in enumerate(last):
             page = self.map[number * PAGE_BYTES:(number + 1) * PAGE_BYTES]
@@ -103,9 +105,8 @@ class Memory:
         for number, page in enumerate(snapshot.pages):
             page = page or _ZERO_PAGE
             at = slice(number * PAGE_BYTES, (number + 1) * PAGE_BYTES)
-            now = self.map[at]
-            if now != page[:len(now)]:
-                self.map[at] = page[:len(now)]
+            if self.map[at] != page:
+                self.map[at] = page
         self._last = snapshot
 
     def fork(self) -> Memory:

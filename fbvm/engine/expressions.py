@@ -73,15 +73,23 @@ def _divide(e: Expressions, machine: str, a: Node, b: Node, site: int) -> str:
     node = ("div", machine, a, b, site)
     if is_float(machine):
         return _brought("div")(e, machine, a, b, site)
-    if b[0] == "const" and b[2] > 0 and span(a)[0] >= 0:
-        return f"({e.value(a)} // {b[2]})"
+    if b[0] == "const" and b[2] > 0:
+        return _toward_zero("//", e, a, b[2])
     text = f"quotient({bare(e.value(a))}, {bare(e.value(b))}, {site})"
     return text if fits(node) or (b[0] == "const" and b[2] != -1) else e.bring(text, machine)
 
 
+def _toward_zero(sign: str, e: Expressions, a: Node, b: int) -> str:
+    """Quotient or remainder by a positive constant; Python's go toward minus infinity."""
+    if span(a)[0] >= 0:
+        return f"({e.value(a)} {sign} {b})"
+    v = e.name("v")
+    return f"({v} {sign} {b} if ({v} := {bare(e.value(a))}) >= 0 else -(-{v} {sign} {b}))"
+
+
 def _remainder(e: Expressions, machine: str, a: Node, b: Node, site: int) -> str:
-    if b[0] == "const" and b[2] > 0 and span(a)[0] >= 0:
-        return f"({e.value(a)} % {b[2]})"
+    if b[0] == "const" and b[2] > 0:
+        return _toward_zero("%", e, a, b[2])
     return f"remainder({bare(e.value(a))}, {bare(e.value(b))}, {site})"
 
 

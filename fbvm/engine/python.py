@@ -19,6 +19,7 @@ from weakref import WeakValueDictionary, finalize
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
 from fbvm.code.operations import Block
+from fbvm.engine.bases import fixed_bases
 from fbvm.engine.runtime import Observation, environment
 from fbvm.engine.statements import BodyWriter, function_name
 from fbvm.engine.trap import Stop, Trap, trap
@@ -38,32 +39,38 @@ class Program:
     source: str
     code: CodeType
     constants: dict[str, Any] = field(repr=False)
+    bases: dict[int, int]
+    """Where the bodies run that were written for one instance."""
     frames: int
     """Python frames that a run takes at most: every body once (there is no recursion), and every part outlined."""
 
 
-_programs: WeakValueDictionary[tuple[int, bool], Program] = WeakValueDictionary()
+_programs: WeakValueDictionary[tuple[int, bool, bool], Program] = WeakValueDictionary()
 
 
-def translate(image: Image, observed: bool = False) -> Program:
-    """The code of an image; the same object as long as somebody has it."""
-    known = _programs.get((id(image), observed))
+def translate(image: Image, observed: bool = False, anywhere: bool = False) -> Program:
+    """The code of an image; the same object as long as somebody has it.
+
+    Bodies that have one instance are written for it, unless they shall run `anywhere`."""
+    key = id(image), observed, anywhere
+    known = _programs.get(key)
     if known is not None:
         return known
+    bases = {} if anywhere else fixed_bases(image)
     constants: dict[str, Any] = {}
     lines: list[str] = []
     frames = 0
     name = f"<fbvm {'observed' if observed else 'plain'} {next(_NUMBERS)}>"
     with _recursion(FRAMES_A_LEVEL * max((_height(body.code) for body in image.bodies), default=0)):
         for number in range(len(image.bodies)):
-            writer = BodyWriter(image, constants, observed)
+            writer = BodyWriter(image, constants, observed, bases.get(number))
             lines += [*writer.write(number), ""]
             frames += 1 + len(writer.routines)
         source = "\n".join(lines)
-        program = Program(image, source, compile(source, name, "exec"), constants, frames)
+        program = Program(image, source, compile(source, name, "exec"), constants, bases, frames)
     linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
     finalize(program, linecache.cache.pop, name, None)
-    _programs[id(image), observed] = program
+    _programs[key] = program
     return program
 
 
@@ -98,12 +105,15 @@ class PythonEngine:
             raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")
         self.image, self.memory, self.observed = image, memory, observed
         self._program = translate(image, observed)
-        names = environment(memory) | self._program.constants
-        exec(self._program.code, names)
-        self._bodies: list[Callable[[int], Any]] = [
-            names[function_name(number, body)] for number, body in enumerate(image.bodies)]
+        self._bodies = self._bind(self._program)
         self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in image.tasks]
-        sys.setrecursionlimit(max(sys.getrecursionlimit(), self._program.frames + FRAMES_TO_SPARE))
+
+    def _bind(self, program: Program) -> list[Callable[[int], Any]]:
+        """The bodies of a program over this memory."""
+        names = environment(self.memory) | program.constants
+        exec(program.code, names)
+        sys.setrecursionlimit(max(sys.getrecursionlimit(), program.frames + FRAMES_TO_SPARE))
+        return [names[function_name(number, body)] for number, body in enumerate(self.image.bodies)]
 
     @property
     def source(self) -> str:
@@ -118,7 +128,10 @@ class PythonEngine:
 
     def call(self, body: int, base: int = 0) -> Trap | None:
         """Execute one body for the instance at `base`, as `run` does."""
-        return self._run([(self._bodies[body], base)])
+        bodies = self._bodies
+        if self._program.bases.get(body, base) != base:
+            bodies = self._bind(translate(self.image, self.observed, anywhere=True))
+        return self._run([(bodies[body], base)])
 
     def _run(self, calls: list[tuple[Callable[[int], Any], int]]) -> Trap | None:
         try:

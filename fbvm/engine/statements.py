@@ -38,8 +38,8 @@ def function_name(number: int, body: Body) -> str:
 class BodyWriter(Expressions):
     """Writes one body.  `tail` is the tail of the innermost loop of the current function, None outside of any."""
 
-    def __init__(self, image: Image, constants: dict[str, Any], observed: bool) -> None:
-        super().__init__(ROWS, constants)
+    def __init__(self, image: Image, constants: dict[str, Any], observed: bool, base: int | None) -> None:
+        super().__init__(ROWS, constants, base)
         self.image, self.observed = image, observed
         self.out: list[str] = []
         self.indent = 1

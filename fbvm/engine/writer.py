@@ -5,6 +5,7 @@ happen is left out.  What is nested deeper than Python's parser allows moves int
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -28,12 +29,15 @@ class Rows(NamedTuple):
     conditions: Mapping[str, Callable[[Expressions, Node], str]]
 
 
+_QUOTED = re.compile(r"'(?:[^'\\]|\\.)*'|\"(?:[^\"\\]|\\.)*\"")
+
+
 def bare(text: str) -> str:
     """The same expression without the one pair of parentheses that holds it all."""
-    if not text.startswith("(") or not text.endswith(")") or "'" in text or '"' in text:
+    if not text.startswith("(") or not text.endswith(")"):
         return text
     depth = 0
-    for at, letter in enumerate(text):
+    for at, letter in enumerate(_QUOTED.sub(lambda quoted: "_" * len(quoted[0]), text)):
         depth += (letter == "(") - (letter == ")")
         if depth == 0 and at < len(text) - 1:
             return text
@@ -51,11 +55,13 @@ class Expressions:
     """Writes the expressions of one body and notes what they need around them.
 
     `bases` are the sizes in which the instance's base is counted, `routines` functions that the body has to define,
-    `constants` objects by the name under which generated code finds them."""
+    `constants` objects by the name under which generated code finds them, `base` the place of the body's one
+    instance if it has just one."""
 
-    def __init__(self, rows: Rows, constants: dict[str, Any]) -> None:
+    def __init__(self, rows: Rows, constants: dict[str, Any], base: int | None) -> None:
         self.rows = rows
         self.constants = constants
+        self.base = base
         self.bases: set[int] = set()
         self.routines: list[list[str]] = []
         self._depth = 0
@@ -135,9 +141,14 @@ class Expressions:
 
     # --- addresses
 
+    def known(self, address: Address) -> Address:
+        """The address as one of the buffer if the body's instance is known."""
+        base, offset, terms = address
+        return ("abs", self.base + offset, terms) if base == "self" and self.base is not None else address
+
     def place(self, address: Address, count: int) -> str:
         """Python for the byte offset of an address whose `count` bytes are used."""
-        base, offset, terms = address
+        base, offset, terms = self.known(address)
         if isinstance(base, tuple):
             _, reference, site = base
             delta = self._sum("", offset, [(stride, term) for stride, term in terms])
@@ -148,7 +159,7 @@ class Expressions:
 
     def index(self, address: Address, machine: str) -> str:
         """Python for the index of an address without reference in the view of its type."""
-        base, offset, terms = address
+        base, offset, terms = self.known(address)
         size = SIZES[machine]
         if offset % size or any(stride % size for stride, _ in terms):
             return f"{self.place(address, size)} >> {size.bit_length() - 1}"

@@ -1,0 +1,49 @@
+"""Which bodies run for one instance only: their places are then known before they run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fbvm.code.image import Image
+from fbvm.code.operations import Block, Node
+
+
+def calls(code: Block) -> Iterator[Node]:
+    """The `call` statements of a piece of code."""
+    rest: list[tuple[object, ...]] = [code]
+    while rest:
+        item = rest.pop()
+        if item[:1] == ("call",):
+            yield item
+        rest += [part for part in item if isinstance(part, tuple)]
+
+
+def fixed_bases(image: Image) -> dict[int, int]:
+    """The base of each body that is always executed with the same one, by the body's number."""
+    callers: dict[int, list[tuple[int, Node]]] = {number: [] for number in range(len(image.bodies))}
+    for number, body in enumerate(image.bodies):
+        for call in calls(body.code):
+            callers[call[1]].append((number, call))
+    starts: dict[int, set[int | None]] = {number: set() for number in callers}
+    for task in image.tasks:
+        for run in task.programs:
+            starts[run.body].add(run.offset)
+    known: dict[int, int | None] = {}
+    waiting = list(callers)
+    while waiting:  # a body is looked at again once all that call it are known; there is no recursion
+        number = waiting.pop()
+        unknown = [caller for caller, _ in callers[number] if caller not in known]
+        if unknown:
+            waiting += [number, *unknown]
+        elif number not in known:
+            bases = starts[number] | {_base(known[caller], call) for caller, call in callers[number]}
+            known[number] = bases.pop() if len(bases) == 1 else None
+    return {number: base for number, base in known.items() if base is not None}
+
+
+def _base(caller: int | None, call: Node) -> int | None:
+    """The base that one call gives, where it is a constant."""
+    base, offset, terms = call[2] or ("abs", 0, ())
+    if terms or isinstance(base, tuple) or (base == "self" and caller is None):
+        return None
+    return int(offset) + (caller or 0 if base == "self" else 0)

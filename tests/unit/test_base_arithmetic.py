@@ -1,0 +1,54 @@
+"""Arithmetic of the operations by example, where the engine's tests do not reach."""
+
+from __future__ import annotations
+
+import math
+import struct
+
+import pytest
+
+from fbvm.base import arithmetic, strings
+from fbvm.base.arithmetic import NAN, Undefined
+
+
+def test_nan_is_the_canonical_one() -> None:
+    assert struct.pack("<d", NAN).hex() == "000000000000f87f"
+    assert struct.pack("<f", NAN).hex() == "0000c07f"
+
+
+@pytest.mark.parametrize(("machine", "low", "high"),
+ [("b", 0, 1), ("i8", -128, 127), ("u64", 0, 2**64 - 1), ("ref", 0, 2**64 - 1)])
+def test_limits(machine: str, low: int, high: int) -> None:
+    assert arithmetic.limits(machine) == (low, high)
+    assert arithmetic.wrap(high + 1, machine) == low
+    assert arithmetic.wrap(low - 1, machine) == high
+
+
+@pytest.mark.parametrize(("value", "rounded"), [
+    (2**24 + 1, 2.0**24), (2**24 + 3, 2.0**24 + 4), (2**53 + 2**29 + 1, 2.0**53 + 2**30), (2**53 + 2**29, 2.0**53),
+    (-(2**53) - 2**29 - 1, -(2.0**53) - 2**30), (2**64 - 1, 2.0**64), (0, 0.0), (2**63 - 1, 2.0**63),
+])
+def test_an_integer_becomes_the_nearest_real(value: int, rounded: float) -> None:
+    assert arithmetic.single_of_integer(value) == rounded
+
+
+def test_single_overflows_to_infinity_and_keeps_small_numbers() -> None:
+    assert arithmetic.single(3.5e38) == math.inf
+    assert arithmetic.single(-1e300) == -math.inf
+    assert arithmetic.single(1e-45) == 2.0**-149
+
+
+@pytest.mark.parametrize(("call", "code", "values"), [
+    (lambda: arithmetic.quotient(5, 0), "R0101", (5, 0)),
+    (lambda: arithmetic.remainder(5, 0), "R0101", (5, 0)),
+    (lambda: arithmetic.nearest(1e9, "i16"), "R0105", (1e9, -32768, 32767)),
+    (lambda: arithmetic.truncate(-1.0, "u8"), "R0105", (-1.0, 0, 255)),
+    (lambda: arithmetic.shift_left(1, -1, "u8"), "R0106", (-1,)),
+    (lambda: arithmetic.from_bcd(0x1A, "u8"), "R0105", (0x1A,)),
+    (lambda: arithmetic.to_bcd(100, "u8"), "R0105", (100,)),
+    (lambda: strings.mid(b"", 1, 0), "R0108", (0,)),
+])
+def test_no_answer_says_why(call, code: str, values: tuple[object, ...]) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(Undefined) as caught:
+        call()
+    assert (caught.value.code, caught.value.values) == (code, values)
