@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 from fbvm.syntax.builder import TooDeep
-from fbvm.syntax.lexer import Token, lexis
+from fbvm.syntax.lexer import MISSPELT, Token, lexis
+from fbvm.syntax.prospect import advance
 from fbvm.syntax.refused import whole
 from fbvm.syntax.tables import Tables, tables
 
@@ -19,6 +20,11 @@ STACK_LIMIT = 4000
 NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "STRUCT", "UNION", "ARRAY", "REF_TO", "POINTER",
                      "REFERENCE"))
 REFUSED = frozenset(("REFUSED_SECTION", "REFUSED_BLOCK"))
+DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT", "END_FUNCTION",
+                      "END_FUNCTION_BLOCK", "END_PROGRAM"))
+"""Words that end a list of statements.  The tables reduce the list for any of them and find out later that it was the wrong
+one; those who mend want to know before."""
+
 FUNCTION_OPERATORS = frozenset(("AND", "OR", "XOR", "MOD", "NOT"))
 """Reserved words that are names in front of `(`, as in `AND(a, b)`."""
 
@@ -39,14 +45,18 @@ class Automaton:
     def __init__(self, builder: Any, stream: Iterator[Token]) -> None:
         self.tables: Tables = tables()
         self.rows = self.tables.actions
-        self.actions = [r.action and getattr(builder, r.action) for r in self.tables.rules]
+        self.actions: list[Callable[..., Any] | None] = [
+            getattr(builder, r.action) if r.action else None for r in self.tables.rules]
         self.states: list[int] = [self.tables.start]
         self.values: list[Any] = []
         self.stream = stream
+        self.before = Token("", "", 0, 0)
+        """The last token that was taken."""
         self.ahead: list[Token] = []
         """Tokens that come before the stream's, the next one last."""
         lex = lexis()
         self.soft = frozenset(lex.words.values()) - lex.reserved
+        """Words that are names where they cannot be words."""
         self.text = ""
 
     def run(self, mender: Mender) -> Any:
@@ -54,13 +64,19 @@ class Automaton:
         while True:
             token = self.next()
             try:
-                refused = self.feed(token)
+                if token.type in DIVIDERS and advance(self.states, token.type) is None:
+                    refused: Token | None = token
+                else:
+                    refused = self.feed(token)
+                if refused is not None:
+                    self.settle()
+                    self.ahead.extend(reversed(mender.unexpected(refused)))
+                    continue
             except TooDeep:
-                self.ahead.extend(reversed(mender.too_deep(token, "operators in one expression")))
+                self.ahead.extend(reversed(mender.too_deep(token, "operators")))
                 continue
-            if refused is not None:
-                self.ahead.extend(reversed(mender.unexpected(refused)))
-            elif token.type in NESTING and len(self.states) > NESTING_LIMIT and self.nested_too_deep():
+            self.before = token
+            if token.type in NESTING and len(self.states) > NESTING_LIMIT and self.nested_too_deep():
                 self.ahead.extend(reversed(mender.too_deep(token, "levels")))
             elif token.type == "$END":
                 return self.values[-1]
@@ -88,6 +104,8 @@ class Automaton:
             act = rows[states[-1]].get(kind)
             if act is None:
                 if kind == "NAME" or not self.may_be_name(token):
+                    return token
+                if kind == "MISSPELT" and self.misspelt(token):
                     return token
                 token = Token("NAME", token.text, token.start, token.end)
                 kind = "NAME"
@@ -121,6 +139,35 @@ class Automaton:
             states.append(state)
             if state == self.tables.end:
                 return None
+
+    def settle(self) -> None:
+        """Reduce what is complete whatever follows; done at an error, so that the stacks show what has been read."""
+        while True:
+            acts = set(self.rows[self.states[-1]].values())
+            act = next(iter(acts))
+            if len(acts) != 1 or act >= 0:
+                return
+            self.reduce(act)
+
+    def reduce(self, act: int) -> None:
+        """One step of the grammar upwards."""
+        rule, action = self.tables.rules[~act], self.actions[~act]
+        at = len(self.values) - rule.size
+        children = self.values[at:]
+        del self.values[at:]
+        del self.states[at + 1:]
+        if rule.places is not None:
+            children = [None if p is None else children[p] for p in rule.places]
+        self.values.append(action(*children) if action else children[0])
+        self.states.append(self.rows[self.states[-1]][rule.origin])
+
+    def misspelt(self, token: Token) -> bool:
+        """Whether `ENDIF` and the like stand where the right word could, and not as somebody's name."""
+        behind = self.text[token.end:token.end + 20].lstrip()
+        if MISSPELT[token.text.upper()] == "EXIT" and not behind.startswith(";"):
+            return False
+        return not behind.startswith((":", "(", "[", ".", "^", "=")) and (
+            advance(self.states, MISSPELT[token.text.upper()]) is not None)
 
     def may_be_name(self, token: Token) -> bool:
         """Whether a word that the grammar cannot take here may be the user's name."""

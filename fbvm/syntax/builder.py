@@ -14,6 +14,14 @@ CHAIN_LIMIT = 1000
 """Deepest tree of one expression, in nodes; those who walk trees rely on it."""
 
 
+ERROR_LIMIT = 100
+"""Errors of one text after which the parser stops."""
+
+
+class Stop(Exception):
+    """The rest of the text is not looked at."""
+
+
 class TooDeep(Exception):
     """An expression grew deeper than CHAIN_LIMIT; the driver reports it and goes on behind the statement."""
 
@@ -24,13 +32,28 @@ class Builder:
     def __init__(self, source: Source) -> None:
         self.source = source
         self.diagnostics: list[Diagnostic] = []
+        self.errors = 0
+        self.cut_short = False
+        """Whether a comment or pragma without end has swallowed the rest of the text."""
+        self.full = False
+        """Whether so many errors were found that the rest is not worth looking at."""
         self.selves: list[Token] = []
         """THIS and SUPER seen since the last statement."""
         self.depths: dict[Expr, int] = {}
         """Depth of the expressions under construction, where it is not 1."""
 
     def report(self, code: str, start: int, end: int, message: str, hint: str = "") -> None:
-        self.diagnostics.append(Diagnostic(code, self.source, start, end, message, hint))
+        self.tell(Diagnostic(code, self.source, start, end, message, hint))
+
+    def tell(self, diagnostic: Diagnostic) -> None:
+        """Keep a message; of errors the first ERROR_LIMIT only."""
+        if diagnostic.severity == "error":
+            if self.full:
+                return
+            self.errors += 1
+            self.full = self.errors >= ERROR_LIMIT
+        self.cut_short |= diagnostic.code == "S0103"
+        self.diagnostics.append(diagnostic)
 
     def empty(self) -> list[Any]:
         return []

@@ -28,6 +28,21 @@ class Token(NamedTuple):
     end: int
 
 
+MISSPELT = {
+    "ELSEIF": "ELSIF", "ELIF": "ELSIF", "ENDIF": "END_IF", "ENDFOR": "END_FOR", "ENDWHILE": "END_WHILE",
+    "ENDCASE": "END_CASE", "ENDREPEAT": "END_REPEAT", "ENDVAR": "END_VAR", "ENDSTRUCT": "END_STRUCT", "ENDTYPE": "END_TYPE",
+    "ENDFUNCTION": "END_FUNCTION", "ENDFUNCTION_BLOCK": "END_FUNCTION_BLOCK", "ENDPROGRAM": "END_PROGRAM",
+    "SWITCH": "CASE", "BREAK": "EXIT"}
+"""Words of other languages, and ours without their `_`: of the type MISSPELT, and names where they fit as such."""
+
+_FOREIGN = {"==": ("EQUAL", "=", "`=` compares"), "!=": ("UNEQUAL", "<>", "write `<>`"), "&&": ("AND", "AND", "write AND"),
+            "||": ("OR", "OR", "write OR")}
+"""Operators of other languages -> our terminal, its text, and advice."""
+
+_MEANT = {"!": "write NOT, or `<>` for unequal", "%": "write MOD for the remainder; an address has letters and digits behind %",
+          "|": "write OR", "~": "write NOT", "#": "a type stands in front of `#`, and no space", "?": "there is no `? :` in ST",
+          "\\": "text in a string needs no `\\`; `$` is the escape"}
+_FOREIGN_WORD = re.compile(r"[^\W0-9]\w*")
 _WORDS = re.compile(r"\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?", re.DOTALL)
 _BY_HAND = {"LOCATION", "SET_ASSIGN"}
 """Terminals that only exist behind certain others."""
@@ -48,13 +63,15 @@ class Lexis:
     signs: dict[str, str]
     master: re.Pattern[str]
     location: re.Pattern[str]
+    unknown: re.Pattern[str]
+    """A run of characters that nothing begins with."""
     set_assign: re.Pattern[str]
 
 
 @cache
 def lexis() -> Lexis:
     """The lexis of the grammar in use."""
-    words: dict[str, str] = {}
+    words = dict.fromkeys(MISSPELT, "MISSPELT")
     conditions: dict[str, re.Pattern[str]] = {}
     reserved: set[str] = set()
     signs: dict[str, str] = {}
@@ -72,12 +89,15 @@ def lexis() -> Lexis:
         else:
             patterns[terminal.name] = _pattern(terminal)
     alternatives = [f"(?P<{name}>{patterns[name]})" for name in _ORDER]
+    alternatives.insert(1, r"(?P<FOREIGN>==|!=|&&|\|\||[-+*/]=)")
     alternatives.insert(1, r"(?P<COMMENT>//[^\n]*|\(\*|/\*)")
     alternatives.insert(2, "(?P<SIGN>" + "|".join(re.escape(s) for s in sorted(signs, key=len, reverse=True)) + ")")
     # `.` begins PART and `..`; a part is the longer word, a range is not one
     alternatives.insert(1, alternatives.pop(alternatives.index(f"(?P<PART>{patterns['PART']})")))
+    known = re.escape("".join(sorted(set("".join(signs) + "'\"{%"))))
     return Lexis(words, conditions, frozenset(reserved), signs, re.compile(r"\s*(?:" + "|".join(alternatives) + ")"),
-                 re.compile(r"\s*(" + patterns["LOCATION"] + ")"), re.compile(patterns["SET_ASSIGN"]))
+                 re.compile(r"\s*(" + patterns["LOCATION"] + ")"), re.compile(rf"[^\s\w{known}]+"),
+                 re.compile(patterns["SET_ASSIGN"]))
 
 
 def _pattern(terminal: Terminal) -> str:
@@ -101,7 +121,10 @@ class Lexer:
         while True:
             found = match(text, at)
             if found is None:
-                at = self._odd(at)
+                odd, at = self._odd(lex, at)
+                if odd:
+                    before = odd.type
+                    yield odd
                 if at >= length:
                     break
                 continue
@@ -123,6 +146,8 @@ class Lexer:
                 if word[:2] != "//":
                     at = self._comment(start)
                 continue
+            elif kind == "FOREIGN":
+                kind, word = self._foreign(word, start, at)
             elif before == "AT":
                 kind, at = self._special(lex, before, kind, start, at)
                 word = text[start:at]
@@ -136,23 +161,40 @@ class Lexer:
         found = pattern.match(self.text, start)
         return (name, found.end()) if found else (kind, end)
 
-    def _odd(self, at: int) -> int:
-        """Pass over what no terminal begins with: spaces at the end, pragmas, unknown characters.  Returns where to go on."""
+    def _odd(self, lex: Lexis, at: int) -> tuple[Token | None, int]:
+        """Pass over what no terminal begins with: spaces at the end, pragmas, unknown characters.  Returns what to read
+        in its place, if anything, and where to go on."""
         text = self.text
         while at < len(text) and text[at].isspace():
             at += 1
         if at >= len(text):
-            return at
+            return None, at
         character = text[at]
         if character == "{":
-            return self._pragma(at)
+            return None, self._pragma(at)
         if character in "'\"":
-            end = min((e for e in (text.find("\n", at), text.find("\r", at)) if e >= 0), default=len(text))
-            self.report("S0104", at, end, "string literal without end on its line",
-                        f"close it with {character}, and write $N for a line end inside")
-            return end
-        self.report("S0102", at, at + 1, f"unexpected character {character!a}", "")
-        return at + 1
+            return self._open_string(at)
+        if word := _FOREIGN_WORD.match(text, at):
+            self.report("S0102", at, word.end(), f"`{_short(word[0])}` is no name: of letters only A to Z can be part of one",
+                        "comments and strings may have any character")
+            return Token("NAME", word[0], at, word.end()), word.end()
+        run = lex.unknown.match(text, at + 1)
+        end = run.end() if run else at + 1
+        self.report("S0102", at, end, f"unexpected {_characters(text[at:end])}", _MEANT.get(character, ""))
+        return None, end
+
+    def _open_string(self, at: int) -> tuple[Token, int]:
+        quote = self.text[at]
+        end = min((e for e in (self.text.find("\n", at), self.text.find("\r", at)) if e >= 0), default=len(self.text))
+        self.report("S0104", at, end, "string literal without end on its line",
+                    f"close it with {quote}, and write $N for a line end inside")
+        return Token("STRING_LITERAL", quote * 2, at, end), end
+
+    def _foreign(self, word: str, start: int, end: int) -> tuple[str, str]:
+        """Our operator for one of other languages: terminal and text."""
+        kind, ours, advice = _FOREIGN.get(word, ("ASSIGN", ":=", f"write out `x := x {word[0]} ..`"))
+        self.report("S0101", start, end, f"`{word}` is no operator of Structured Text", advice)
+        return kind, ours
 
     def _pragma(self, start: int) -> int:
         end = self.text.find("}", start)
@@ -176,3 +218,14 @@ class Lexer:
             depth += 1 if found[0] == opener else -1
             at = found.end()
         return at
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def _characters(text: str) -> str:
+    """Unknown characters in a message, readable whatever they are."""
+    if len(text) == 1:
+        return f"character {text!r}" if text.isprintable() else f"character {text!a}"
+    return f"characters {_short(text)!a}"

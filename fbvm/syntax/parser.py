@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.automaton import Automaton
+from fbvm.syntax.builder import Stop
 from fbvm.syntax.lexer import Lexer
-from fbvm.syntax.recovery import Recovery, Stop
+from fbvm.syntax.recovery import Recovery
 from fbvm.syntax.tree import SourceText
 from fbvm.syntax.types import Types
 
@@ -20,8 +19,10 @@ def parse(source: Source) -> tuple[SourceText, list[Diagnostic]]:
     lexer = Lexer(source.text, builder.report)
     automaton = Automaton(builder, lexer.tokens())
     automaton.text = source.text
-    tree = SourceText(0, len(source.text), ())
-    with suppress(Stop):
-        tree = automaton.run(Recovery(automaton, builder))
+    try:
+        tree: SourceText = automaton.run(Recovery(automaton, builder))
+    except Stop:
+        read = automaton.values[0] if automaton.values else []
+        tree = SourceText(0, len(source.text), tuple(read))
     tree.pragmas = tuple(lexer.pragmas)
     return tree, sorted(builder.diagnostics, key=Diagnostic.order)

@@ -1,29 +1,257 @@
-"""Reports a syntax error."""
+"""Reports a syntax error and finds where to go on, so that one mistake hides nothing and is told once.
+
+First a small mend is tried (`mends`): one word put in, taken away or replaced, if the parse then goes on well.  Next comes
+what stands open: an END that is missing or has no beginning.  At last the statement or declaration is given up."""
 
 from __future__ import annotations
 
-from fbvm.syntax.automaton import Automaton
-from fbvm.syntax.builder import Builder
+from fbvm.base.diagnostics import Diagnostic
+from fbvm.syntax.automaton import NESTING_LIMIT, Automaton
+from fbvm.syntax.builder import CHAIN_LIMIT, Builder, Stop
+from fbvm.syntax.frames import (
+    ENDS,
+    HEADS,
+    OPENERS,
+    POUS,
+    STATEMENT_WORDS,
+    UNITS,
+    Frame,
+    anchor,
+    cut,
+    frames,
+    open_head,
+    reopen,
+)
+from fbvm.syntax.indentation import advice
 from fbvm.syntax.lexer import Token
+from fbvm.syntax.mends import Mend, best_mend
+from fbvm.syntax.phrases import found, hint, sign, unlike
+from fbvm.syntax.prospect import advance, expected
 
+LOOK = 4
+"""Tokens by which a mend is judged."""
 
-class Stop(Exception):
-    """The rest of the text is not looked at."""
+HOLES = {"IF": ("TRUE",), "ELSIF": ("TRUE",), "WHILE": ("TRUE",), "UNTIL": ("TRUE",), "CASE": ("NUMBER",),
+         "FOR": ("NAME", "ASSIGN", "NUMBER", "TO", "NUMBER")}
+"""What is read in the place of a head that cannot be understood, so that its block can."""
+
+HOLE_TEXTS = {"NUMBER": "0", "NAME": "i"}
 
 
 class Recovery:
-    """Reports the first error and stops."""
+    """Takes over from the automaton at an error, and hands it tokens to go on with."""
 
     def __init__(self, automaton: Automaton, builder: Builder) -> None:
         self.automaton, self.builder = automaton, builder
+        self.states, self.values = automaton.states, automaton.values
+        self.last = -1
+        """Where the last error was told; another one there or in front of it is its shadow."""
+        self.mute = False
+        """Whether the rest of the text was swallowed by a comment, so that its END words cannot be missed."""
+        self.seen: set[tuple[int, int]] = set()
+        """Places of the text, with the height of the stack, at which this token was refused."""
+
+    # --- what the automaton calls ---
 
     def unexpected(self, token: Token) -> list[Token]:
-        self.builder.report("S0101", token.start, token.end, f"unexpected `{token.text}`")
-        raise Stop
+        """`token` cannot stand here: say so, mend the stacks, return the tokens to feed instead of it."""
+        if self.builder.full:
+            raise Stop
+        if self.turns_in_circles(token):
+            return []
+        self.mute = token.type == "$END" and self.builder.cut_short
+        reopen(self.states, self.values)
+        mend = best_mend(self.automaton, token, self.peek(token))
+        if mend:
+            return self.mended(mend, token)
+        if token.type in OPENERS or token.type in UNITS or self.shows_end_of_section(token):
+            return self.closing(token)
+        self.tell(token)
+        return self.give_up(token)
+
+    def turns_in_circles(self, token: Token) -> bool:
+        """Whether the same token was refused at the same height before: then it must go, whatever it means."""
+        if token.type == "$END":
+            if len(self.states) == 1 or (token.start, len(self.states)) in self.seen:
+                raise Stop
+        elif (token.start, len(self.states)) in self.seen:
+            self.automaton.before = token
+            return True
+        if all(start != token.start for start, _ in self.seen):
+            self.seen.clear()
+        self.seen.add((token.start, len(self.states)))
+        return False
 
     def too_deep(self, token: Token, why: str) -> list[Token]:
-        self.builder.report("S0106", token.start, token.end, f"too many {why}")
-        raise Stop
+        """Give up the statement, or for blocks the whole declaration."""
+        if self.builder.full:
+            raise Stop
+        if why == "operators":
+            self.report("S0106", token.start, token.end, f"the expression is more than {CHAIN_LIMIT} operators deep",
+                        "split it into several statements")
+            cut(self.states, self.values, anchor(self.states))
+            return self.skip(token)
+        self.report("S0106", token.start, token.end,
+                    f"nested too deep: more than {NESTING_LIMIT} brackets, blocks or types inside one another",
+                    "move the inner part into a function or function block of its own")
+        outermost = next((f.at for f in frames(self.states, self.values)), 1)
+        cut(self.states, self.values, anchor(self.states, outermost))
+        while token.type not in UNITS:
+            token = self.following()
+        return [token]
 
-    def without_end(self, opener: Token, found: Token) -> None:
-        self.builder.report("S0101", opener.start, opener.end, f"{opener.text} has no END")
+    def without_end(self, opener: Token, end: Token) -> None:
+        self.report("S0101", opener.start, opener.end, f"{opener.text.upper()} has no end before {found(end)}", "")
+
+    # --- telling ---
+
+    def report(self, code: str, start: int, end: int, message: str, help_: str, opener: Token | None = None) -> None:
+        if start <= self.last or self.mute:
+            return
+        self.last = start
+        source = self.builder.source
+        related = (source, opener.start, f"{found(opener)} stands here") if opener else None
+        self.builder.tell(Diagnostic(code, source, start, end, message, help_, related))
+
+    def tell(self, token: Token) -> None:
+        """What is expected here, what was found."""
+        kinds = expected(self.states)
+        self.report("S0101", self.place(token), token.end, unlike(token, kinds), hint(token, kinds))
+
+    def place(self, token: Token) -> int:
+        """Where to point for a token: at its beginning; for the end of the text behind the last word."""
+        return self.automaton.before.end if token.type == "$END" else token.start
+
+    def mended(self, mend: Mend, token: Token) -> list[Token]:
+        """Do what `best_mend` found, and say it."""
+        self.report("S0101", mend.start, mend.end, mend.message, mend.hint, mend.opener)
+        self.last = max(self.last, mend.start)
+        if mend.cut:
+            cut(self.states, self.values, anchor(self.states))
+        return mend.tokens
+
+    # --- tokens ---
+
+    def peek(self, token: Token) -> list[Token]:
+        """The next tokens, `token` first; they stay where they are."""
+        tokens = [token]
+        while len(tokens) < LOOK and tokens[-1].type != "$END":
+            tokens.append(self.automaton.next())
+        self.automaton.ahead.extend(reversed(tokens[1:]))
+        return tokens
+
+    def following(self) -> Token:
+        """The next token, where one is given up."""
+        token = self.automaton.next()
+        if token.type != "$END":
+            self.automaton.before = token
+        return token
+
+    # --- ends that are missing or too many ---
+
+    def shows_end_of_section(self, token: Token) -> bool:
+        """Whether a token in a VAR section or TYPE shows that its END is missing."""
+        place = anchor(self.states)
+        return place.symbol in ("var_decls", "type_decls") and (token.type in STATEMENT_WORDS or token.type == "VAR")
+
+    def closing(self, token: Token) -> list[Token]:
+        """A word that ends something or begins something new: close what is still open inside, or drop the word."""
+        open_ = frames(self.states, self.values)
+        inner = open_
+        if token.type in OPENERS:
+            target = next((f for f in reversed(open_) if f.word.type in OPENERS[token.type]), None)
+            if target is None:
+                return self.no_opener(token)
+            inner = open_[open_.index(target) + 1:]
+        elif token.type not in UNITS:
+            inner = open_[-1:]
+        if inner:
+            return self.close(inner, token)
+        self.tell(token)
+        return self.give_up(token)
+
+    def no_opener(self, token: Token) -> list[Token]:
+        words = " or ".join(sorted(OPENERS[token.type]))
+        self.report("S0101", token.start, token.end, f"{found(token)} without {words}", "")
+        following = self.following()
+        return [] if following.type == "SEMICOLON" else [following]
+
+    def close(self, inner: list[Frame], token: Token) -> list[Token]:
+        """End the open blocks, innermost first, and tell of each."""
+        for frame in reversed(inner):
+            self.tell_open(frame, token)
+            place = anchor(self.states)
+            end = ENDS[frame.word.type]
+            states = list(self.states)
+            cut(states, [None] * len(states), place)
+            if place.size > frame.at and advance(states, end):
+                cut(self.states, self.values, place)
+                self.automaton.feed(Token(end, end, token.start, token.start))
+                self.automaton.settle()
+            else:
+                cut(self.states, self.values, anchor(self.states, frame.at))
+        self.last = token.start
+        return [token]
+
+    def tell_open(self, frame: Frame, token: Token) -> None:
+        word, source = frame.word, self.builder.source
+        line = source.place(word.start)[0]
+        head = self.values[frame.at] if word.type in POUS and len(self.values) > frame.at else None
+        name = f" `{head[0].text}`" if isinstance(head, tuple) else ""
+        self.last = min(self.last, self.place(token) - 1)
+        self.report("S0101", self.place(token), token.end,
+                    f"{ENDS[word.type]} expected before {found(token)}: "
+                    f"the {word.text.upper()}{name} of line {line} is still open", advice(source, word, token), word)
+
+    # --- giving up a part ---
+
+    def give_up(self, token: Token) -> list[Token]:
+        """Leave the statement or declaration; keep its block if only the block's head is wrong."""
+        head = open_head(self.states, self.values)
+        if head:
+            return self.skip_head(head, token)
+        place = anchor(self.states)
+        cut(self.states, self.values, place)
+        if token.type in ("VAR", "VAR_GLOBAL") and place.symbol == "ended_list":
+            while token.type not in ("END_VAR", "$END") and token.type not in POUS:
+                token = self.following()
+            return [] if token.type == "END_VAR" else [token]
+        return self.skip(token)
+
+    def skip_head(self, head: Frame, token: Token) -> list[Token]:
+        """Go on behind THEN, DO or OF, as if a good head had stood in front of it."""
+        word = head.word.type
+        divider = HEADS[word]
+        while token.type not in (divider, "SEMICOLON") and not self.stops(token):
+            token = self.following()
+        if token.type in UNITS or (word == "UNTIL" and token.type != divider):
+            cut(self.states, self.values, anchor(self.states, head.at))
+            return self.skip(token)
+        del self.states[head.at + 1:]
+        del self.values[head.at:]
+        kinds = HOLES[word] if word == "UNTIL" else (*HOLES[word], divider)
+        tokens = [Token(kind, HOLE_TEXTS.get(kind, sign(kind)), token.start, token.start) for kind in kinds]
+        if token.type == "SEMICOLON" or (token.type == divider and word != "UNTIL"):
+            return tokens
+        return [*tokens, token]
+
+    def stops(self, token: Token) -> bool:
+        return token.type in OPENERS or token.type in UNITS or token.type in STATEMENT_WORDS
+
+    def skip(self, token: Token) -> list[Token]:
+        """Pass over tokens to the next `;` or to a word that begins or ends something."""
+        symbol = anchor(self.states).symbol
+        while True:
+            kind = token.type
+            if kind in UNITS or kind.startswith("REFUSED"):
+                return [token]
+            if symbol != "declarations":
+                if kind == "SEMICOLON":
+                    return []
+                if kind in OPENERS:
+                    return [token]
+                if symbol == "ended_list" and (kind in STATEMENT_WORDS or kind == "VAR"):
+                    return [token]
+                if symbol == "var_decls" and kind == "VAR":
+                    return [token]
+            token = self.following()

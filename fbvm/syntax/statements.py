@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 from fbvm.syntax.expressions import Expressions
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
@@ -139,7 +141,7 @@ class Statements(Expressions):
             first = items[0]
             self.report("S0101", first.start, first.end, "a statement in CASE stands behind a label, none is in front of this one",
                         "write `value:` in front of it")
-        branches = tuple(self._branch(items[at:until]) for at, until in zip(starts, [*starts[1:], len(items)], strict=True))
+        branches = tuple(self._branch(items[at:until]) for at, until in pairwise([*starts, len(items)]))
         rest = None if otherwise is None else self.block(otherwise)
         return self.checked(Case(word.start, end.end, selector, branches, rest))
 

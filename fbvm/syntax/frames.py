@@ -1,0 +1,116 @@
+"""What is open at a place of the parse: blocks without their END yet, and the lists in which one can go on.
+
+Read off the stack of states alone; each state is reached by one grammar symbol."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from fbvm.syntax.lexer import Token
+from fbvm.syntax.prospect import State, symbols
+from fbvm.syntax.tables import tables
+from fbvm.syntax.tree import Binary, EnumLiteral, Literal, NullLiteral, Unary
+
+ENDS = {
+    "IF": "END_IF", "CASE": "END_CASE", "FOR": "END_FOR", "WHILE": "END_WHILE", "REPEAT": "END_REPEAT", "VAR": "END_VAR",
+    "VAR_GLOBAL": "END_VAR", "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE", "FUNCTION": "END_FUNCTION",
+    "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "PROGRAM": "END_PROGRAM", "CONFIGURATION": "END_CONFIGURATION",
+    "RESOURCE": "END_RESOURCE"}
+"""Word that opens -> word that ends it."""
+
+OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL": {"REPEAT"}}
+"""Word that ends or divides -> those which it can belong to."""
+for _opener, _end in ENDS.items():
+    OPENERS.setdefault(_end, set()).add(_opener)
+
+UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "$END"}
+"""Words that begin something new at the outermost level."""
+
+POUS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM"}
+STATEMENT_WORDS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
+HEADS = {"IF": "THEN", "ELSIF": "THEN", "WHILE": "DO", "FOR": "DO", "CASE": "OF", "UNTIL": "END_REPEAT"}
+"""Words behind which a head stands, and the word that ends the head."""
+
+LISTS = ("ended_list", "var_decls", "type_decls", "declarations", "config_items", "resource_items")
+STATEMENT_LISTS = {"ended_list", "open_list", "statement_list"}
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """A place where a list can go on: `size` states of the stack remain, `symbol` names the list."""
+
+    size: int
+    symbol: str
+
+
+def anchor(states: State, below: int | None = None) -> Anchor:
+    """The innermost list of the stack, or of its first `below` states."""
+    names, actions = symbols(), tables().actions
+    for at in range((len(states) if below is None else below) - 1, -1, -1):
+        row = actions[states[at]]
+        for symbol in LISTS:
+            if symbol in row:
+                follows = at + 1 < len(states) and names[states[at + 1]]
+                has = follows == symbol or (symbol == "ended_list" and follows in STATEMENT_LISTS)
+                return Anchor(at + 2 if has else at + 1, symbol)
+    return Anchor(1, "declarations")
+
+
+LEVELS = {"OR": "expression", "OR_ELSE": "expression", "XOR": "xor_expr", "AND": "and_expr", "AND_THEN": "and_expr",
+          "=": "compare_expr", "<>": "compare_expr", "<": "equ_expr", ">": "equ_expr", "<=": "equ_expr",
+          ">=": "equ_expr", "+": "add_expr", "-": "add_expr", "*": "term", "/": "term", "MOD": "term",
+          "**": "power_expr"}
+"""Operator -> production of an expression that ends with it."""
+
+OPERANDS = set(LEVELS.values()) | {"unary_expr", "primary_expr", "variable"}
+
+
+def reopen(states: State, values: list[Any]) -> None:
+    """Let an expression on top of the stack go on, in place: the wrong token behind it has closed it too early."""
+    if symbols()[states[-1]] not in OPERANDS:
+        return
+    value = values[-1]
+    if isinstance(value, Binary):
+        level = LEVELS[value.op]
+    elif isinstance(value, (Literal, EnumLiteral, NullLiteral)):
+        level = "primary_expr"
+    else:
+        level = "unary_expr" if isinstance(value, Unary) else "variable"
+    states[-1] = tables().actions[states[-2]].get(level, states[-1])
+
+
+def cut(states: State, values: list[Any], place: Anchor) -> None:
+    """Give up what stands behind an anchor, in place; its list stays and is open again."""
+    del states[place.size:]
+    del values[place.size - 1:]
+    if symbols()[states[-1]] in STATEMENT_LISTS:
+        states[-1] = tables().actions[states[-2]]["ended_list"]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A word that waits for its END; it is number `at` of the states."""
+
+    at: int
+    word: Token
+
+
+def frames(states: State, values: list[Any]) -> list[Frame]:
+    """Everything that is open, outermost first."""
+    names = symbols()
+    return [Frame(at, values[at - 1]) for at in range(1, len(states))
+            if names[states[at]] in ENDS and isinstance(values[at - 1], Token)
+            and not (names[states[at]] == "PROGRAM" and names[states[at - 1]] in ("config_items", "resource_items"))]
+
+
+def open_head(states: State, values: list[Any]) -> Frame | None:
+    """The IF, WHILE, FOR, CASE, ELSIF or UNTIL whose head is being read."""
+    names = symbols()
+    for at in range(len(states) - 1, 0, -1):
+        name = names[states[at]]
+        if name in HEADS:
+            return Frame(at, values[at - 1])
+        if name in LISTS or name in STATEMENT_LISTS or name in ("THEN", "DO", "OF", "ELSE", "REPEAT"):
+            return None
+    return None

@@ -1,0 +1,115 @@
+"""The words of syntax errors: what is expected at a place, what was found, and what helps."""
+
+from __future__ import annotations
+
+from fbvm.syntax.lexer import Token, lexis
+from fbvm.syntax.tables import tables
+
+GROUPS = (
+    ("a declaration (FUNCTION, FUNCTION_BLOCK, PROGRAM, TYPE, VAR_GLOBAL, CONFIGURATION)", {"FUNCTION", "TYPE"}, {
+        "FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "REFUSED_SECTION",
+        "REFUSED_BLOCK", "$END"}),
+    ("a statement", {"IF", "FOR", "SEMICOLON"}, {
+        "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "REFUSED_BLOCK", "NAME",
+        "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS", "MINUS",
+        "NOT", "DIRECT", "SELF"}),
+    ("an expression", {"NAME", "NUMBER", "LPAR"}, {
+        "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS",
+        "MINUS", "NOT", "DIRECT", "SELF"}),
+    ("a type", {"NAME", "ARRAY"}, {
+        "NAME", "ARRAY", "STRING", "WSTRING", "STRUCT", "UNION", "REF_TO", "POINTER", "REFERENCE", "LPAR"}),
+    ("a name", {"NAME"}, {"NAME", "POU_MODIFIER", "QUALIFIER", "AT"}),
+    ("an address such as D100, CIO 1519.03 or %MW10", {"LOCATION"}, {"LOCATION"}),
+)
+"""Phrase, the terminals that give it away, and all those that it stands for."""
+
+CONTINUATIONS = {
+    "PLUS", "MINUS", "STAR", "SLASH", "MOD", "POWER", "AND", "AMPERSAND", "AND_THEN", "OR", "OR_ELSE", "XOR", "EQUAL",
+    "UNEQUAL", "LESS", "GREATER", "LESS_EQUAL", "GREATER_EQUAL", "DOT", "PART", "CARET", "LSQB"}
+"""What may always follow an operand, and is nobody's news."""
+
+LABEL_SIGNS = {"COLON", "COMMA", "RANGE", "SET_ASSIGN", "ATTEMPT"}
+"""What may follow a name at the start of a statement, beside `:=`, `(` and `;`."""
+
+UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "INHERITANCE", "POU_MODIFIER", "SELF", "JMP", "QUALIFIER", "EDGE", "OVERLAP"}
+"""What may stand there and would be refused, or is seldom meant."""
+
+FIRST = ("SEMICOLON", "THEN", "DO", "OF", "TO", "ASSIGN", "COLON", "COMMA", "RPAR", "RSQB")
+"""Order of the signs in a message; others follow by their names."""
+
+SHOWN = 4
+
+MEANT = {"STEP": ("BY", "the step of a loop stands behind BY"), "DOWNTO": ("TO", "write TO, and BY -1")}
+"""Words of other languages -> ours, and advice."""
+
+
+def sign(kind: str) -> str:
+    """How a terminal is written."""
+    for terminal in tables().terminals:
+        if terminal.name == kind:
+            return terminal.pattern if terminal.literal else kind
+    return "the end of the text" if kind == "$END" else kind
+
+
+def quoted(kind: str) -> str:
+    """A terminal in a message."""
+    return sign(kind) if kind == "$END" else f"`{sign(kind)}`"
+
+
+def wanted(kinds: set[str]) -> str:
+    """What is expected, in the user's words; "" if everything is."""
+    rest = set(kinds) - UNSAID
+    if {"SEMICOLON", "ASSIGN"} <= rest:
+        rest -= LABEL_SIGNS
+    elif rest - CONTINUATIONS - {"LPAR"}:
+        rest -= CONTINUATIONS
+        if not {"NAME", "ARRAY"} & rest:
+            rest -= {"LPAR"}
+    rest -= CONTINUATIONS
+    parts = []
+    for phrase, marks, members in GROUPS:
+        if marks <= rest:
+            parts.append(phrase)
+            rest -= members
+            break
+    signs = [kind for kind in FIRST if kind in rest] + sorted(rest - set(FIRST))
+    if "VAR" in rest:
+        signs = ["VAR", *(kind for kind in signs if not kind.startswith("VAR"))]
+    parts += ["a VAR section" if kind == "VAR" else quoted(kind) for kind in signs]
+    if len(parts) > SHOWN:
+        parts = parts[:SHOWN]
+    return " or ".join(parts) if len(parts) < 3 else ", ".join(parts[:-1]) + " or " + parts[-1]
+
+
+def found(token: Token) -> str:
+    """The token that stands there."""
+    if token.type == "$END":
+        return "the end of the text"
+    text = token.text if len(token.text) <= 40 else token.text[:37] + "..."
+    return f"`{text}`"
+
+
+def unlike(token: Token, kinds: set[str]) -> str:
+    """The message for a token where `kinds` are expected."""
+    want = wanted(kinds)
+    return f"{want} expected, but {found(token)} found" if want else f"unexpected {found(token)}"
+
+
+def hint(token: Token, kinds: set[str]) -> str:
+    """Advice for a token in a place where `kinds` are expected; "" if there is none."""
+    ours, advice = MEANT.get(token.text.upper(), ("", ""))
+    if ours in kinds:
+        return advice
+    if token.type == "TO" and "ASSIGN" in kinds:
+        return "the variable of a loop takes its first value with `:=`"
+    if token.type == "EQUAL" and "ASSIGN" in kinds:
+        return "`:=` assigns and gives initial values, `=` compares"
+    if token.type == "ASSIGN" and "EQUAL" in kinds:
+        return "`=` compares, `:=` assigns"
+    if token.type in lexis().reserved and "NAME" in kinds and "NUMBER" not in kinds:
+        return f"{token.text} is a reserved word and cannot be a name"
+    if token.type == "VAR" and "SEMICOLON" in kinds:
+        return "VAR sections stand in front of the first statement"
+    if token.type == "PART" and "NUMBER" in kinds:
+        return "a number has digits in front of its point, as 0.5"
+    return ""

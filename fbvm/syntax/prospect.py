@@ -1,0 +1,51 @@
+"""What the tables would do: looks ahead on a copy of the stack of states, without building anything."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from fbvm.syntax.tables import tables
+
+State = list[int]
+
+
+@cache
+def symbols() -> tuple[str, ...]:
+    """For each state the grammar symbol by which it is reached; "" for the start."""
+    names = [""] * len(tables().actions)
+    for row in tables().actions:
+        for symbol, act in row.items():
+            if act >= 0:
+                names[act] = symbol
+    return tuple(names)
+
+
+@cache
+def terminal_names() -> tuple[str, ...]:
+    """All terminals, the end of the text included."""
+    return (*(t.name for t in tables().terminals), "$END")
+
+
+def advance(states: State, kind: str) -> State | None:
+    """The stack after a terminal, or None where it cannot stand.  `states` is not changed."""
+    grammar = tables()
+    stack = list(states)
+    while True:
+        act = grammar.actions[stack[-1]].get(kind)
+        if act is None:
+            return None
+        if act >= 0:
+            stack.append(act)
+            return stack
+        rule = grammar.rules[~act]
+        if rule.size:
+            del stack[-rule.size:]
+        stack.append(grammar.actions[stack[-1]][rule.origin])
+        if stack[-1] == grammar.end:
+            return stack
+
+
+def expected(states: State) -> set[str]:
+    """Every terminal that can stand here."""
+    here = tables().actions[states[-1]]
+    return {kind for kind in terminal_names() if kind in here and advance(states, kind)}
