@@ -1,0 +1,62 @@
+"""What the README shows is what happens."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fbvm.cli.main import main
+from fbvm.code.compiler import compile_text
+from fbvm.plc import Plc
+from fbvm.record.chart import chart
+
+HOUSE = Path(__file__).resolve().parent.parent
+README = (HOUSE / "README.md").read_text(encoding="utf-8")
+
+
+def block(language: str, number: int = 0) -> str:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.M | re.S)[number]
+
+
+def test_the_first_program_draws_that_chart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("pump.st").write_text(block("iecst"), encoding="utf-8")
+    text, _, shown = block("console").removeprefix("$ fbvm ").replace("\\\n", "").partition("\n")
+    result = CliRunner().invoke(main, shlex.split(text))
+    assert result.output == shown
+
+
+def test_the_python_example_prints_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(HOUSE)
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
+        exec(block("python"), {})
+    assert "CIO1519.02  ..#" in output.getvalue()
+    assert output.getvalue().endswith("[7, 0]\n")
+
+
+def test_the_test_example_passes() -> None:
+    names: dict[str, object] = {"chart": chart}
+    exec(block("python", 1), names)
+    plc = Plc(compile_text(block("iecst")).image)  # type: ignore[arg-type]
+    names["test_the_pump_waits"](plc)  # type: ignore[operator]
+    assert plc.scans == 8
+
+
+def test_words_are_read_and_written_by_number() -> None:
+    text = f"PROGRAM Main\n{block('iecst', 1)}END_PROGRAM\n"
+    plc = Plc(compile_text(text).image)  # type: ignore[arg-type]
+    plc.write("D201", 5)
+    plc.run(scans=1)
+    assert plc.read("D200") == 5
+
+
+def test_every_verb_is_named() -> None:
+    for verb in main.list_commands(None):  # type: ignore[arg-type]
+        assert f"`fbvm {verb}" in README

@@ -1,0 +1,295 @@
+"""The command line: what it prints, and the status with which it ends."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from fbvm.base.codes import CODES
+from fbvm.cli.main import VERBS, main
+from fbvm.cli.options import split_names
+from fbvm.record.chart import Chart
+
+HOUSE = Path(__file__).resolve().parents[2]
+DEMO = str(HOUSE / "examples" / "demo.st")
+COUNTER = """
+TYPE Colour : (Red, Green); END_TYPE
+PROGRAM Main
+VAR
+    n : INT;
+    step : INT := 1;
+    wait : TIME;
+    r : REAL := 0.5;
+    name : STRING := 'ab';
+    colour : Colour;
+    done : BOOL;
+    divisor : INT := 1;
+    list : ARRAY[1..2, 0..1] OF INT;
+END_VAR
+    n := n + step / divisor;
+    done := n >= 5;
+END_PROGRAM
+"""
+
+
+@pytest.fixture
+def counter(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    Path("counter.st").write_text(COUNTER, encoding="utf-8")
+    return "counter.st"
+
+
+def fbvm(*arguments: str) -> Result:
+    result = CliRunner().invoke(main, arguments)
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+def run(*arguments: str) -> Result:
+    return fbvm("run", "counter.st", *arguments)
+
+
+def values(*arguments: str) -> dict[str, object]:
+    result = run(*arguments, "--json")
+    data: dict[str, object] = json.loads(result.stdout)
+    return data
+
+
+# --- run: how it ends -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("arguments", "stopped", "scans", "status"), [
+    (["--scans", "7"], "scans", 7, 0),
+    (["--for", "1s"], "time", 100, 0),
+    (["--for", "T#95ms", "--cycle", "20ms"], "time", 5, 0),
+    (["--until", "Main.done"], "until", 5, 0),
+    (["--until", "Main.done", "--max", "1s"], "until", 5, 0),
+    (["--until", "Main.n < 0", "--max", "50ms"], "max", 5, 1),
+    (["--scans", "5", "--set", "Main.divisor=0@20ms"], "trap", 3, 4),
+])
+def test_a_run_ends(counter: str, arguments: list[str], stopped: str, scans: int, status: int) -> None:
+    result = run(*arguments, "--json")
+    data = json.loads(result.stdout)
+    assert (data["stopped"], data["scans"], result.exit_code) == (stopped, scans, status)
+
+
+def test_a_trap_names_its_place(counter: str) -> None:
+    result = run("--scans", "1", "--set", "Main.divisor=0")
+    assert "R0101 counter.st:15:" in result.stderr
+    trap = values("--scans", "1", "--set", "Main.divisor=0")["trap"]
+    assert isinstance(trap, dict)
+    assert (trap["code"], trap["file"], trap["pou"], trap["line"]) == ("R0101", "counter.st", "Main", 15)
+
+
+def test_json_values_are_what_they_are(counter: str) -> None:
+    names = ["Main.n", "Main.wait", "Main.r", "Main.name", "Main.colour", "Main.done", "Main.list", "D5..D7", "CIO 5.00"]
+    data = values("--scans", "3", "--set", "Main.wait=1.5s", *[part for name in names for part in ("--show", name)])
+    assert data == {
+        "scans": 3, "time_ms": 30, "stopped": "scans", "trap": None,
+        "values": {"Main.n": 3, "Main.wait": 1_500_000_000, "Main.r": 0.5, "Main.name": "ab", "Main.colour": 0,
+                   "Main.done": False, "Main.list": [0, 0, 0, 0], "D5..D7": [0, 0, 0], "CIO 5.00": False},
+    }  # fmt: skip
+
+
+def test_times_below_a_millisecond_are_told(counter: str) -> None:
+    assert values("--scans", "3", "--cycle", "500us")["time_ms"] == 1.5
+
+
+def test_values_are_shown(counter: str) -> None:
+    names = ["Main.n", "Main.wait", "Main.name", "Main.colour", "Main.done", "D5", "D5..D7", "Main.list"]
+    result = run("--scans", "3", "--set", "D5=255", *[part for name in names for part in ("--show", name)])
+    assert result.stdout == (
+        "Main.n = 3\nMain.wait = T#0s\nMain.name = 'ab'\nMain.colour = Red (0)\nMain.done = FALSE\n"
+        "D5 = 255 (16#00FF)\nD5..D7 = 255 0 0\nMain.list = [0, 0, 0, 0]\n"
+    )
+
+
+@pytest.mark.parametrize(("setting", "name", "value"), [
+    ("Main.step=-2", "Main.n", -6),
+    ("Main.step=10@20ms", "Main.n", 12),
+    ("Main.step=10@25ms", "Main.n", 3),
+    ("Main.name='a@b'", "Main.name", "a@b"),
+    ("Main.name=x y@20ms", "Main.name", "x y"),
+    ("Main.colour=Green", "Main.colour", 1),
+    ("Main.list[2,0]=7", "Main.list", [0, 0, 7, 0]),
+    ("D5..D7=1,16#10,3", "D5..D7", [1, 16, 3]),
+    ("CIO 5.01=TRUE", "CIO 5", 2),
+])
+def test_a_setting_is_written_once_before_its_scan(counter: str, setting: str, name: str, value: object) -> None:
+    data = values("--scans", "3", "--set", setting, "--show", name)
+    assert data["values"] == {name: value}
+
+
+def test_a_chart_is_drawn(counter: str) -> None:
+    result = run("--scans", "7", "--chart", "Main.done,A200.11", "--chart", "Main.list[1,0]")
+    assert Chart(result.stdout) == """
+                         0
+        Main.done        ....###
+        A200.11          #......
+        Main.list[1, 0]  0
+    """
+
+
+def test_quiet_in_a_pipe(counter: str) -> None:
+    assert run("--scans", "5000").output == ""
+
+
+# --- run: wrong usage -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    ([], "say when to end by one of --scans, --for and --until; none given"),
+    (["--scans", "1", "--for", "1s"], "one of --scans, --for and --until; 2 given"),
+    (["--scans", "1", "--max", "1s"], "--max bounds --until, which is not given"),
+    (["--for", "10"], "'10' is no time; write 10ms, 1.5s or T#1m30s"),
+    (["--for", "0s"], "0s is not a time that can pass"),
+    (["--scans", "-1"], "-1 is not in the range"),
+    (["--until", "Main.n"], "is no condition"),
+    (["--until", "Main.m > 1"], "Main has no m; it has n, step"),
+    (["--scans", "1", "--set", "Main.n"], "'Main.n' is not NAME=VALUE"),
+    (["--scans", "1", "--set", "Main.n=40000"], "Main.n: 40000 is out of range of INT, which holds -32768..32767"),
+    (["--scans", "1", "--set", "Main.n=1@now"], "'now' is no time"),
+    (["--scans", "1", "--set", "Main.wait=5"], "Main.wait is TIME and takes a time such as 10ms, not 5"),
+    (["--scans", "1", "--set", "D5..D7=1"], "D5..D7 takes 3 values parted by commas, 1 given"),
+    (["--scans", "1", "--show", "n"], "did you mean Main.n?"),
+    (["--scans", "1", "--show", "D99999"], "D ends at 32767; 99999 does not exist"),
+    (["--scans", "1", "--chart", "Main.list"], "a chart shows single values"),
+    (["--scans", "1", "--map", "1.2.3.4:502"], "is not IP:PORT=HOST:PORT or IP:PORT=peer"),
+    (["--scans", "1", "--map", "server:502=peer"], "'server' is no IPv4 address"),
+    (["--scans", "1", "--map", "1.2.3.4:502=host"], "'host' is not an address and a port"),
+    (["--scans", "1", "--map", "1.2.3.4:502=localhost:1502"], "leaves memory: add --net tcp"),
+    (["--scans", "1", "--net", "tcp", "--map", "1.2.3.4:502=peer"], "is in memory: leave out --net tcp"),
+    (["--scans", "1", "--pace", "event"], "--pace event is for real time"),
+    (["--scans", "1", "--pcap", "no/such/folder.pcapng"], "cannot be written"),
+])
+def test_wrong_usage_is_said_in_a_sentence(counter: str, arguments: list[str], message: str) -> None:
+    result = run(*arguments)
+    assert result.exit_code == 2
+    assert message in " ".join(result.stderr.split())
+
+
+def test_a_network_that_cannot_be_is_status_5(counter: str) -> None:
+    result = run("--scans", "1", "--net", "tcp", "--map", "1.2.3.4:502=no.such.host.invalid:502")
+    assert result.exit_code == 5
+    assert "the network cannot be used" in result.stderr
+
+
+def test_which_of_several_programs(counter: str) -> None:
+    text = "".join(f"PROGRAM {name}\nVAR x : INT; END_VAR\n x := {n};\nEND_PROGRAM\n" for n, name in enumerate("AB"))
+    Path("two.st").write_text(text, encoding="utf-8")
+    result = fbvm("run", "two.st", "--scans", "1")
+    assert (result.exit_code, "--program" in result.stderr) == (3, True)
+    assert fbvm("run", "two.st", "--program", "B", "--scans", "1", "--show", "B.x").stdout == "B.x = 1\n"
+
+
+# --- run: networks ----------------------------------------------------------------------------------------------------
+
+
+def test_the_example_runs_against_a_peer_in_memory(tmp_path: Path) -> None:
+    capture = tmp_path / "demo.pcapng"
+    result = fbvm("run", DEMO, "--until", "Main.Done", "--max", "5s", "--map", "192.168.250.1:502=peer", "--json",
+                  "--show", "D200..D209", "--show", "Main.Connection.ENO", "--pcap", str(capture))  # fmt: skip
+    data = json.loads(result.stdout)
+    assert (result.exit_code, data["stopped"]) == (0, "until")
+    assert data["values"] == {"D200..D209": list(range(1000, 1010)), "Main.Connection.ENO": True}
+    assert capture.read_bytes()[:4] == b"\x0a\x0d\x0d\x0a"
+
+
+def test_without_a_server_the_example_goes_on_trying() -> None:
+    result = fbvm("run", DEMO, "--until", "Main.Done", "--max", "3s", "--json", "--show", "Main.Connection.Error_Code")
+    data = json.loads(result.stdout)
+    assert (result.exit_code, data["stopped"]) == (1, "max")
+    assert data["values"]["Main.Connection.Error_Code"] != 0
+
+
+# --- check, list, explain ---------------------------------------------------------------------------------------------
+
+
+def test_check_is_silent_when_nothing_is_wrong(counter: str) -> None:
+    result = fbvm("check", counter)
+    assert (result.exit_code, result.output) == (0, "")
+    assert json.loads(fbvm("check", counter, "--json").stdout) == {"diagnostics": []}
+
+
+def test_check_says_what_is_wrong(counter: str) -> None:
+    Path("wrong.st").write_text("PROGRAM Main\nVAR n : INT; END_VAR\n    n := m;\nEND_PROGRAM\n", encoding="utf-8")
+    result = fbvm("check", "wrong.st")
+    assert result.exit_code == 3
+    assert "wrong.st:3:10: error S0201" in result.stderr
+    assert "^" in result.stderr
+    assert "1 error;" in result.stderr
+    rows = json.loads(fbvm("check", "wrong.st", "--json").stdout)["diagnostics"]
+    assert [(row["code"], row["line"], row["column"]) for row in rows] == [("S0201", 3, 10)]
+    assert fbvm("run", "wrong.st", "--scans", "1").exit_code == 3
+    assert json.loads(fbvm("run", "wrong.st", "--scans", "1", "--json").stdout)["diagnostics"][0]["code"] == "S0201"
+
+
+def test_a_missing_file_is_wrong_usage() -> None:
+    result = fbvm("check", "no_such_file.st")
+    assert (result.exit_code, "does not exist" in result.stderr) == (2, True)
+
+
+def test_a_file_that_is_no_text_is_said(counter: str) -> None:
+    Path("junk.st").write_bytes(bytes(range(256)) * 4)
+    assert fbvm("check", "junk.st").exit_code == 3
+
+
+def test_own_libraries_are_found(counter: str) -> None:
+    Path("own/tools").mkdir(parents=True)
+    Path("own/tools/Twice.st").write_text(
+        "FUNCTION Twice : INT\nVAR_INPUT x : INT; END_VAR\n Twice := 2 * x;\nEND_FUNCTION\n", encoding="utf-8")
+    Path("user.st").write_text("PROGRAM Main\nVAR n : INT; END_VAR\n n := Twice(21);\nEND_PROGRAM\n", encoding="utf-8")
+    assert fbvm("run", "user.st", "--scans", "1").exit_code == 3
+    result = fbvm("run", "user.st", "--scans", "1", "--library", "own", "--show", "Main.n")
+    assert (result.exit_code, result.stdout) == (0, "Main.n = 42\n")
+
+
+def test_list_prints_the_image(counter: str) -> None:
+    result = fbvm("list", counter)
+    assert result.exit_code == 0
+    assert "Main" in result.stdout
+    assert "store" in result.stdout
+
+
+def test_explain_lists_all_codes() -> None:
+    lines = fbvm("explain").stdout.splitlines()
+    assert [line[:5] for line in lines] == list(CODES)
+
+
+def test_explain_of_no_code_is_wrong_usage() -> None:
+    result = fbvm("explain", "S0999")
+    assert (result.exit_code, "there is no diagnostic S0999; there are S0901 to S0902" in result.stderr) == (2, True)
+    assert "`fbvm explain` alone lists all" in fbvm("explain", "X").stderr
+
+
+def test_explain_prints_the_page() -> None:
+    assert "S0201" in fbvm("explain", "s0201").stdout
+
+
+# --- the command itself -----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_help(verb: str) -> None:
+    result = fbvm(verb, "--help")
+    assert result.exit_code == 0
+    assert result.stdout.startswith(f"Usage: main {verb}")
+
+
+def test_help_names_every_verb() -> None:
+    output = fbvm("--help").stdout
+    assert all(verb in output for verb in VERBS)
+
+
+def test_an_unknown_verb_is_wrong_usage() -> None:
+    assert fbvm("fly").exit_code == 2
+
+
+@pytest.mark.parametrize(("text", "names"), [
+    ("Main.a,D5", ["Main.a", "D5"]), ("a[1,2], b", ["a[1,2]", "b"]), ("", []), (",x,", ["x"]),
+])  # fmt: skip
+def test_names_are_parted_outside_brackets(text: str, names: list[str]) -> None:
+    assert split_names(text) == names
