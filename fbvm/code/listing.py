@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 from fbvm.base.areas import SLOTS_OFFSET, Area
+from fbvm.base.areas import Address as AreaAddress
 from fbvm.base.types import Field, StructType
 from fbvm.code.image import Body, Image, TaskRow
 from fbvm.code.operations import WHOLE_BYTES, Address, Block, Node
@@ -79,8 +80,8 @@ def _absolute(offset: int, areas: dict[str, Area]) -> str:
     for area in areas.values():
         if area.offset <= offset < area.offset + area.size_bytes and area.unit_bits > 1:
             number, odd = divmod(offset - area.offset, area.unit_bits // 8)
-            shown = f"%{area.name}B{number}" if area.unit_bits == 8 else f"{area.name}{number}"
-            return shown + ("+1" if odd else "")
+            word = str(AreaAddress(area.name, number, None, 8 if area.unit_bits == 8 else 0))
+            return word + ("+1" if odd else "")
     return str(offset)
 
 

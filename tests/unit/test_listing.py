@@ -1,0 +1,140 @@
+"""The Image as text for people."""
+
+from __future__ import annotations
+
+from textwrap import dedent
+
+import pytest
+from hand_image import at, behind, const, image, load, own, store
+from images import counter_image, task
+from test_engine_expressions import NUMBERS, RUNS, STRINGS
+from test_engine_statements import OBSERVED, PROGRAMS
+
+from fbvm.base.areas import AREAS
+from fbvm.code.image import Image, Layout
+from fbvm.code.listing import listing
+from fbvm.code.operations import EXPRESSIONS, Block
+
+
+def code_of(program: Image, observations: bool = False) -> str:
+    """The lines of the first body without its heading and the margin's width."""
+    lines = listing(program, observations).split("\n")
+    first = next(number for number, line in enumerate(lines) if line.startswith("body 0"))
+    rest = lines[first + 1:]
+    return "\n".join(rest[:rest.index("")] if "" in rest else rest)
+
+
+def test_all_around_the_code() -> None:
+    program = counter_image(task("Fast", 1, 10_000_000), task("Edge", 2, 0, "Go"), task("Main"))
+    shown = listing(program)
+    assert shown.startswith(dedent("""\
+        layout    184320 bytes: 4096 of slots from 180224
+        task      Fast: priority 1, every 10 ms
+                  Main at 180224: body 0 Counter
+        task      Edge: priority 2, when Go rises
+                  Main at 180224: body 0 Counter
+        task      Main: priority 0, every cycle
+                  Main at 180224: body 0 Counter
+        symbol    180224       Main : Counter
+        symbol    180232       Main.n : INT
+        symbol    180234       Main.done : BOOL
+        symbol    180236       Main.kept : INT
+        symbol    180238       Main.step : INT
+        symbol    180240       Main.started : TIME
+        symbol    180248       Main.limit : INT
+        symbol    180324       Go : BOOL
+        initial   180238       01 00
+        initial   180248       05 00
+        retained  180236       Main.kept, 2 bytes
+
+        body 0  PROGRAM Counter, instance of 32 bytes, counter.st
+                  charge 4 @4:5
+                  store i16 self+8 <- add i16 (load i16 self+8) (load i16 self+14)
+        """))
+    assert "          store u16 D200 <- add u16 (load u16 D200) 1\n" in shown
+
+
+def test_e_banks_are_named() -> None:
+    program = image()
+    shown = listing(Image(Layout(10, ("E0", "E1")), (), (), {}, ((184320, b"\1"), (184323, bytes(50))), (),
+        program.sites))
+    assert shown.split("\n") == [
+        "layout    315392 bytes: 10 of slots from 180224, E banks E0 E1",
+        "initial   E0_0         01",
+        "initial   E0_1+1       " + "00 " * 32 + "... 50 bytes",
+    ]
+
+
+def test_statements_stand_beside_their_lines() -> None:
+    t1 = ("tmp", "i16", 1)
+    code: Block = (
+        ("observe", "statement", 3, None),
+        ("let", 1, "i16", ("neg", "i16", load("i16", 2))),
+        ("observe", "statement", 4, None),
+        ("if", ((load("b", 8), (("observe", "statement", 5, None), ("return",))),
+                (("not", "b", load("b", 9)), (("call", 0, own(8)), ("call", 0, None)))), (("stop", "R0109", 12),)),
+        ("case", "i16", t1, ((((1, 1), (3, 5)), (("copy", at(0), at(8), 4),)),), (("fill", at(0), b"\1\2"),)),
+        ("loop", (("if", ((("gt", "b", "i16", t1, const("i16", 9)), (("exit",),)),), ()),), (("next",),), ()),
+        ("store", "i16", behind(load("ref", 16), 4, (2, load("u8", 3))), ("div", "i16", t1, const("i16", -3), 7)),
+        ("store_bit", ("abs", AREAS["CIO"].offset + 20, ()), 3, const("b", 1)),
+        ("store_text", at(64), 20, ("concat", "s8", const("s8", b"it's"), ("to_text", "s8", "INT", t1))),
+        ("charge", 3, 9), ("due", ("now", "i64")),
+        ("store", "u8", ("abs", -5, ((1, load("i64", 0)),)), ("mux", "u8", const("i64", 1), (t1, load("u8", 1)), 8)),
+    )
+    assert code_of(image(code)) == dedent("""\
+        3:5       t1 i16 <- neg i16 (load i16 180226)
+        4:5       if load b 180232
+        5:5         return
+                  elsif not b (load b 180233)
+                    call Body0 of self+8
+                    call Body0
+                  else
+                    stop R0109 @12:5
+                  end
+                  case i16 t1
+                  1, 3..5:
+                    copy 180224 <- 180232 4 bytes
+                  else
+                    fill 180224 01 02
+                  end
+                  loop
+                    if gt b i16 t1 9
+                      exit
+                    end
+                  body
+                    next
+                  end
+                  store i16 ref (load ref 180240)+4+2*(load u8 180227) <- div i16 t1 -3 @7:5
+                  store_bit CIO 10 bit 3 <- TRUE
+                  store_text 180288 20 <- concat s8 "it's" (to_text s8 INT t1)
+                  charge 3 @9:5
+                  due (now i64)
+                  store u8 0-5+1*(load i64 180224) <- mux u8 1 (t1, load u8 180225) @8:5""")
+
+
+def test_observations_are_shown_if_asked_for() -> None:
+    assert "observe" not in listing(image(OBSERVED))
+    assert code_of(image(OBSERVED), observations=True) == dedent("""\
+        3:5       observe read i16 self+2+2*(load i64 180224)
+                  store_bit 180233 bit 4 <- TRUE
+                  observe write b 180233.4
+                  observe rung 17
+                  observe contact (1, 'x') load_bit b 180233 bit 4
+                  observe write b ref (load ref 180240)
+                  observe write ('s8', 20) ref (load ref 180240)+8""")
+
+
+@pytest.mark.parametrize("code", [code for _, code, _, _ in PROGRAMS], ids=[name for name, *_ in PROGRAMS])
+def test_every_statement_can_be_listed(code: Block) -> None:
+    helpers: tuple[Block, ...] = ((), ())
+    assert listing(image(code, *helpers), observations=True).count("\n") >= len(code)
+
+
+def test_every_expression_can_be_listed() -> None:
+    nodes = [row[1] for row in RUNS] + [row[0] for row in STRINGS]
+    for name, machine, a, b, _ in NUMBERS:
+        site = (3,) if "site" in EXPRESSIONS[name].operands.split() else ()
+        nodes.append((name, machine, const(machine, a), const(machine, b), *site))
+    for node in nodes:
+        shown = code_of(image((store(node[1], 0, node),)))
+        assert f"<- {node[0]} {node[1]}" in shown
