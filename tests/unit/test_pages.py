@@ -1,0 +1,176 @@
+"""Every code has its page, and the programs on it do what the page says."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+from fbvm.base.codes import CODES
+from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.pages import UnknownCode, near, page
+from fbvm.code.compiler import Compilation, compile_sources
+from fbvm.plc import Plc
+from fbvm.syntax.text import decode
+
+SCANS = 3
+BUDGET = 100_000
+"""Statements that a program of a page may execute in one scan: endless ones end soon."""
+ROWS = 12
+"""Lines of a program that still fit on a page; a reader sees the difference between two such programs."""
+
+PAGE = re.compile(
+    r"# (?P<title>[^\n]+)\n\n(?P<reason>.+?)\n\n"
+    r"## Wrong\n\n```(?P<language>st|sh)\n(?P<wrong>.+?)```\n\n"
+    r"## Right\n\n```(?P=language)\n(?P<right>.+?)```"
+    r"(?:\n\n## See also\n(?P<neighbours>(?:\n- [^\n]+)+))?",
+    re.DOTALL,
+)
+
+every_code = pytest.mark.parametrize("code", CODES)
+program_codes = [code for code in CODES if code != "S0107"]
+"""All but that of a file which is no text, and which a page cannot show."""
+source_codes = [code for code in program_codes if code.startswith("S")]
+trap_codes = [code for code in program_codes if code.startswith("R")]
+
+
+@cache
+def parts(code: str) -> dict[str, str]:
+    """What stands under each heading of a page."""
+    found = PAGE.fullmatch(page(code))
+    assert found, f"the page of {code} has another form"
+    return found.groupdict(default="")
+
+
+def compiled(text: str) -> Compilation:
+    return compile_sources([Source("page.st", text)], runnable=True)
+
+
+def shown(compilation: Compilation) -> str:
+    return "\n".join(diagnostic.render() for diagnostic in compilation.diagnostics)
+
+
+def trap_of(compilation: Compilation) -> str:
+    """The code of the trap that ends the first scans, "" if none does."""
+    assert compilation.image is not None, shown(compilation)
+    plc = Plc(compilation.image, budget=BUDGET)
+    plc.run(scans=SCANS)
+    return plc.trap.code if plc.trap else ""
+
+
+# --- the form of a page -----------------------------------------------------------------------------------------------
+
+
+@every_code
+def test_the_title_is_that_of_the_table(code: str) -> None:
+    assert parts(code)["title"] == f"{code} {CODES[code].title}"
+
+
+@every_code
+def test_the_reason_is_one_paragraph(code: str) -> None:
+    assert "\n\n" not in parts(code)["reason"]
+
+
+@every_code
+def test_a_page_fits_on_a_screen(code: str) -> None:
+    assert max(map(len, page(code).splitlines())) <= 120
+    assert all(len(parts(code)[half].splitlines()) <= ROWS for half in ("wrong", "right"))
+
+
+@every_code
+def test_neighbours_are_other_codes_with_their_titles(code: str) -> None:
+    neighbours = re.findall(r"^- (.+)$", parts(code)["neighbours"], re.MULTILINE)
+    rows = [f"{row.code} {row.title}" for row in CODES.values() if row.code != code]
+    assert len(set(neighbours)) == len(neighbours)
+    assert set(neighbours) <= set(rows)
+
+
+def test_no_page_is_left_over() -> None:
+    import fbvm.base.pages as module
+
+    assert {path.stem for path in Path(module.__file__).with_suffix("").iterdir()} == set(CODES)
+
+
+# --- what its programs do ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("code", source_codes)
+def test_the_wrong_program_gives_this_diagnostic_and_no_other(code: str) -> None:
+    compilation = compiled(parts(code)["wrong"])
+    assert [diagnostic.code for diagnostic in compilation.diagnostics] == [code], shown(compilation)
+
+
+@pytest.mark.parametrize("code", [code for code in source_codes if CODES[code].severity == "warning"])
+def test_a_program_with_a_warning_runs(code: str) -> None:
+    assert trap_of(compiled(parts(code)["wrong"])) == ""
+
+
+@pytest.mark.parametrize("code", trap_codes)
+def test_the_wrong_program_compiles_and_traps(code: str) -> None:
+    compilation = compiled(parts(code)["wrong"])
+    assert not compilation.diagnostics, shown(compilation)
+    assert trap_of(compilation) == code
+
+
+@pytest.mark.parametrize("code", program_codes)
+def test_the_right_program_compiles_without_a_word_and_runs(code: str) -> None:
+    compilation = compiled(parts(code)["right"])
+    assert not compilation.diagnostics, shown(compilation)
+    assert trap_of(compilation) == ""
+
+
+@pytest.mark.parametrize("code", program_codes)
+def test_both_programs_are_nearly_the_same(code: str) -> None:
+    wrong, right = (set(parts(code)[half].splitlines()) for half in ("wrong", "right"))
+    assert wrong & right, "nothing of the wrong program is left"
+    assert wrong != right
+
+
+def test_a_file_that_is_no_text_has_a_page_for_the_shell() -> None:
+    text = "PROGRAM Main END_PROGRAM"
+    assert text in parts("S0107")["wrong"]
+    refused = decode(text.encode("utf-16-le"), "pump.st")
+    assert isinstance(refused, Diagnostic)
+    assert refused.code == "S0107"
+    assert refused.render().splitlines()[0] in parts("S0107")["wrong"].splitlines()
+    mended = decode(text.encode("utf-8"), "pump8.st")
+    assert isinstance(mended, Source)
+    assert compile_sources([mended]).diagnostics == []
+
+
+# --- finding a page ---------------------------------------------------------------------------------------------------
+
+
+def test_case_and_spaces_do_not_matter() -> None:
+    assert page(" s0203 ") == page("S0203")
+
+
+@pytest.mark.parametrize(("misspelt", "meant"), [
+    ("S203", "S0203"), ("S02003", "S0203"), ("SO203", "S0203"), ("0203", "S0203"), ("R0112", "R0111"),
+    ("s0299", "S0209"), ("watchdog", "R0104"), ("Division", "R0101"),
+])
+def test_a_misspelt_code_lists_those_near_it(misspelt: str, meant: str) -> None:
+    assert CODES[meant] in near(misspelt)
+    with pytest.raises(UnknownCode, match=f"there is no diagnostic {misspelt}; near it are") as raised:
+        page(misspelt)
+    assert f"{meant}  {CODES[meant].title}" in str(raised.value)
+
+
+@pytest.mark.parametrize("nonsense", ["", "   ", "x1y2", "../codes"])
+def test_nonsense_lists_nothing(nonsense: str) -> None:
+    with pytest.raises(UnknownCode) as raised:
+        page(nonsense)
+    assert (raised.value.near, str(raised.value)) == ([], f"there is no diagnostic {nonsense}")
+
+
+@pytest.mark.slow
+def test_the_wheel_holds_every_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from hatchling.build import build_wheel
+
+    monkeypatch.chdir(Path(__file__).resolve().parents[2])
+    with ZipFile(tmp_path / build_wheel(str(tmp_path))) as wheel:
+        held = {name for name in wheel.namelist() if name.startswith("fbvm/base/pages/")}
+    assert held == {f"fbvm/base/pages/{code}.md" for code in CODES}
