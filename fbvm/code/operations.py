@@ -3,7 +3,7 @@
 Code is plain data: nested tuples whose first item names the operation.  *Expressions* are `(name, type, *operands)` and
 have no effect but a trap; *statements* are `(name, *operands)`.  `type` is a machine type:
 
-    b            BOOL, 0 or 1                     f32 f64   REAL, LREAL (NaN is stored canonical)
+    b            BOOL, 0 or 1 (a byte <> 0 is 1)  f32 f64   REAL, LREAL (NaN is stored canonical)
     i8 .. i64    signed, two's complement         s8        STRING: bytes without the ending 0
     u8 .. u64    unsigned, bit strings            ref       a reference (64 bits: object << 40 | offset << 8 | bit)
 
@@ -12,11 +12,13 @@ a tuple of `(stride, expression i64)` to be added.  `base` is
 
     "abs"                          offset counts from the start of the buffer
     "self"                         from the start of the instance that is executed
-    ("ref", expression, site)      from where a reference points (R0110 if it is null or its object has ended)
+    ("ref", expression, site)      from where a reference points (R0110 if it is null or its object has ended, or if
+                                   not all bytes of the access lie in the buffer; found when the terms are evaluated)
 
 A reference's offset is one of the buffer; its object number selects a row of the extents; its bit is 0 to 7 for a located
 BOOL and 255 for a value that fills bytes.  `site` is the number of a place in the source (Image.sites), for traps.
-Operands are evaluated from left to right.  `let` temporaries belong to one execution of one body.
+Operands are evaluated from left to right, an address where it stands.  `let` temporaries belong to one execution of one
+body.  `math`, `pow` and `atan2` of f32 are worked out in 64 bits and rounded once.
 Meaning: IEC 61131-3 ed. 3 with the decisions on edges that are stated beside each row.
 """
 
@@ -25,6 +27,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from fbvm.base.arithmetic import limits as limits
+from fbvm.base.memory import WHOLE_BYTES as WHOLE_BYTES
+
 Node = tuple[Any, ...]
 """An operation with its operands."""
 Address = tuple[Any, int, tuple[tuple[int, Node], ...]]
@@ -32,18 +37,8 @@ Block = tuple[Node, ...]
 
 INTEGERS = ("i8", "i16", "i32", "i64", "u8", "u16", "u32", "u64")
 FLOATS = ("f32", "f64")
-WHOLE_BYTES = 255
-"""Bit field of a reference to a value that fills bytes."""
 SIZES = {"b": 1, "i8": 1, "u8": 1, "i16": 2, "u16": 2, "i32": 4, "u32": 4, "i64": 8, "u64": 8, "f32": 4, "f64": 8,
          "ref": 8}
-
-
-def limits(machine: str) -> tuple[int, int]:
-    """Smallest and greatest value of an integer machine type ("b" counts as one bit)."""
-    if machine == "b":
-        return 0, 1
-    bits = int(machine[1:])
-    return (0, (1 << bits) - 1) if machine[0] == "u" else (-(1 << bits - 1), (1 << bits - 1) - 1)
 
 
 @dataclass(frozen=True)
@@ -96,8 +91,8 @@ bits       | from a                 | any    |             | the same bits read 
 is_set     | from a                 | b      |             | a <> 0 (NaN is)
 select     | g a b                  | any    |             | a if g is FALSE, b if TRUE; both are evaluated
 mux        | k (a, ...) site        | any    | R0107       | k is i64; all are evaluated
-min        | a b                    | not ref|             | the lesser; NaN if one is NaN
-max        | a b                    | not ref|             | the greater; NaN if one is NaN
+min        | a b                    | not ref|             | the lesser, a if equal; NaN if one is NaN
+max        | a b                    | not ref|             | the greater, a if equal; NaN if one is NaN
 check      | a low high code site   | integer| code        | a itself; trap `code` (R0102, R0103, R0105) outside low..high
 math       | function a             | float  |             | sqrt ln log exp sin cos tan asin acos atan; NaN outside the domain
 atan2      | y x                    | float  |             | angle; both 0 give 0
@@ -136,7 +131,7 @@ exit       |                        |        |             | leaves the innermos
 next       |                        |        |             | to the tail of the innermost loop
 return     |                        |        |             | leaves the body
 call       | pou address            |        |             | executes the body of that number; address of its instance, or None
-charge     | count site             |        | R0104       | takes count from the step budget; below 0 traps
+charge     | count site             |        | R0104       | takes count from the step budget and stores it; below 0 traps
 due        | a                      |        |             | notes time a (ns) if it is earlier than what is noted
 stop       | code site              |        | code        | traps
 observe    | kind site detail       |        |             | statement, rung, contact, read or write; a plain build drops it
