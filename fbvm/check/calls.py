@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import BOOL, StructType, Type, base, fold
 from fbvm.check import functions
 from fbvm.check.expressions import assignable, conversion_hint, same
-from fbvm.check.facts import Pou, PouCall, Variable
+from fbvm.check.facts import Pou, PouCall, Variable, is_block
 from fbvm.check.standard import StandardCalls
 from fbvm.syntax import tree
 
@@ -40,12 +40,15 @@ class Calls:
 
     def statement(self, call: tree.Call) -> None:
         """A call as a statement; a result is thrown away."""
-        self._resolve(call, None, as_value=False)
+        result = self._resolve(call, None, as_value=False)
+        if isinstance(result, Type):
+            self.facts.types[call] = result
 
     def _resolve(self, call: tree.Call, want: Type | None, as_value: bool) -> Type | str | None:
         """The result's type, "" for a call without result, None after a diagnostic."""
         callee = call.callee
-        if not isinstance(callee, tree.NameRef) or self.expressions.variable(callee.text) is not None:
+        variable = self.expressions.variable(callee.text) if isinstance(callee, tree.NameRef) else None
+        if not isinstance(callee, tree.NameRef) or variable is not None and variable.kind != "RESULT":
             return self._instance(call, as_value)
         name = callee.text
         pou = self.project.pou(name, self.expressions.source)
@@ -122,7 +125,8 @@ class Calls:
         for argument, variable in zip(arguments, parameters, strict=False):
             assert argument.value is not None
             given[fold(variable.name)] = argument
-            self._pass(argument, variable, bound)
+            if variable.kind != "VAR_INPUT" or not is_block(variable.type):
+                self._pass(argument, variable, bound)
         open_inputs = [v.name for v in parameters[len(arguments):] if v.kind == "VAR_INPUT"]
         if open_inputs:
             self.error("S0404", call, f"{pou.name} needs {' and '.join(open_inputs)} too",
@@ -142,6 +146,8 @@ class Calls:
             arrow = "=>" if variable.kind == "VAR_OUTPUT" else ":="
             self.error("S0402", argument, f"{variable.name} is {_described(variable)}: write {variable.name} {arrow} ...")
         elif argument.value is not None:
+            if variable.kind == "VAR_INPUT" and is_block(variable.type):
+                return  # refused where it is declared
             self._pass(argument, variable, bound)
 
     def _implicit(self, argument: tree.Argument, name: str, pou: Pou, bound: PouCall) -> None:
@@ -151,7 +157,7 @@ class Calls:
             if argument.value is not None and self.expressions.fit(argument.value, BOOL, "S0405", "EN"):
                 bound.enable = argument.value
         elif name == "ENO" and argument.kind == "=>":
-            if argument.value is not None and self._output(argument, BOOL, "ENO"):
+            if argument.value is not None and self.output(argument, BOOL, "ENO"):
                 bound.enabled.append((argument.value, argument.negated))
         elif name not in pou.damaged:
             known = [v.name for v in pou.order if v.kind in PARAMETER_KINDS]
@@ -172,7 +178,7 @@ class Calls:
         elif variable.kind == "VAR_IN_OUT":
             if self._in_out(value, variable):
                 bound.in_outs.append((variable, value))
-        elif self._output(argument, variable.type, variable.name):
+        elif self.output(argument, variable.type, variable.name):
             bound.outputs.append((variable, value, argument.negated))
 
     def _in_out(self, value: tree.Expr, variable: Variable) -> bool:
@@ -188,7 +194,8 @@ class Calls:
             return False
         return self.checker.writable(self.expressions, value, f"be passed to the in-out {variable.name}")
 
-    def _output(self, argument: tree.Argument, kind: Type, name: str) -> bool:
+    def output(self, argument: tree.Argument, kind: Type, name: str) -> bool:
+        """True if the target of `name => target` takes an output of `kind`; else a diagnostic."""
         value = argument.value
         assert value is not None
         target = self.expressions.infer(value)

@@ -42,6 +42,9 @@ class Checker:
 
     def check(self, program: str | None = None) -> None:
         """Check everything that the user wrote and what it uses of libraries; choose what the tasks run."""
+        for entry in list(self.project.types.values()):
+            if not entry.source.library:
+                self.specs.declared(entry.tree.name.text, entry.source)
         self._declare_globals()
         while self.project.new_pous:
             pou = self.project.new_pous.pop(0)

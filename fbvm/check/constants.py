@@ -6,7 +6,7 @@ import math
 import struct
 
 from fbvm.base import arithmetic
-from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, StringType, SubrangeType, Type, machine
+from fbvm.base.types import BOOL, DAY_NS, ArrayType, Elementary, EnumType, StringType, SubrangeType, Type, machine
 from fbvm.base.types import base as base_of
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
 
@@ -100,8 +100,13 @@ def binary(op: str, kind: Type, a: Value, b: Value) -> Value:
     if machine(kind) in ("f32", "f64") and kind is not UNTYPED_INT:
         return _finish(kind, _real(op, float(a), float(b)))
     if isinstance(b, float):  # a duration times or by a real: to the nearest ns, ties to even
-        return wrap(kind, round(_real(op, float(a), b)))
+        product = round(_real(op, float(a), b))
+        if wrap(kind, product) != product:
+            raise NotConstant("its value is too large")
+        return product
     value = _integer(op, int(a), int(b))
+    if base_of(kind).name.endswith("TIME_OF_DAY"):
+        return value % DAY_NS
     return value if kind is UNTYPED_INT else wrap(kind, value)
 
 

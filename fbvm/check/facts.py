@@ -71,6 +71,8 @@ class Pou:
     resolved: bool = False
     calls: dict[Pou, Node] = field(default_factory=dict)
     writes_eno: bool = False
+    enables_itself: bool = False
+    """True if the body writes ENO without declaring it: ENO is TRUE at each start then."""
     damaged: set[str] = field(default_factory=set)
     """Folded names whose declaration is wrong: using them is not complained about again."""
     busy: bool = False
@@ -119,6 +121,14 @@ class StandardCall:
     detail: tuple[Type, ...] = ()
 
 
+@dataclass(eq=False)
+class Guard:
+    """EN and ENO of a call of a standard function."""
+
+    enable: tree.Expr | None = None
+    enabled: list[tuple[tree.Expr, bool]] = field(default_factory=list)
+
+
 @dataclass
 class Facts:
     """Side tables by node."""
@@ -133,6 +143,7 @@ class Facts:
     calls: dict[tree.Call, PouCall | StandardCall] = field(default_factory=dict)
     rewritten: dict[tree.Expr, tree.Expr] = field(default_factory=dict)
     """Expressions that mean the same as another one (ADD(a, b) is a + b)."""
+    guards: dict[tree.Call, Guard] = field(default_factory=dict)
     labels: dict[tree.CaseBranch, tuple[tuple[int, int], ...]] = field(default_factory=dict)
     sources: dict[tree.Node, Source] = field(default_factory=dict)
 

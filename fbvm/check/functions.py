@@ -45,6 +45,7 @@ REPLACE                                IN1:STRING IN2:STRING L:ANY_INT P:ANY_INT
 FIND                                   IN1:STRING IN2:STRING        -> INT
 TRUNC                                  IN:T                         -> DINT   ANY_REAL
 TIME                                                                -> TIME
+IS_VALID                               IN:T                         -> BOOL   ANY_REAL
 __DUE                                  AT:TIME                      ->
 """
 
@@ -77,7 +78,7 @@ def _parse(rows: str) -> dict[str, Signature]:
 
 SIGNATURES = _parse(_ROWS)
 
-_CONVERSION = re.compile(r"(?:(?P<source>[A-Z_]+?)_)?(?P<form>TO|TRUNC|BCD_TO|TO_BCD)_(?P<target>[A-Z_]+)")
+_CONVERSION = re.compile(r"(?:(?P<source>[A-Z_]+?)_)?(?P<form>TO_BCD|BCD_TO|TRUNC|TO)_(?P<target>[A-Z_]+)")
 _TYPED = re.compile(r"(?P<name>[A-Z0-9]+)_(?P<type>[A-Z_]+)")
 _CONVERTIBLE = set(ELEMENTARY) | {"STRING"} | {"TOD", "DT", "LTOD", "LDT"}
 
@@ -98,16 +99,14 @@ class Conversion:
 
 def conversion(name: str) -> Conversion | None:
     """The conversion that a folded function name means, between elementary types; None if it means none."""
-    if name in ("INT_TO_BCD", "UINT_TO_BCD"):
+    if name in ("INT_TO_BCD", "UINT_TO_BCD"):  # as CODESYS spells them
         return Conversion(name[:-7], "TO_BCD", "WORD")
-    if name in ("BCD_TO_INT", "BCD_TO_DINT"):
-        return Conversion("", "BCD_TO", name[7:])
     match = _CONVERSION.fullmatch(name)
     if not match:
         return None
     source, form, target = match["source"] or "", match["form"], match["target"]
-    if source.endswith("_BCD") and form == "TO":
-        source, form = source[:-4], "BCD_TO"
+    if (source == "BCD" or source.endswith("_BCD")) and form == "TO":
+        source, form = source.removesuffix("BCD").rstrip("_"), "BCD_TO"
     if target not in _CONVERTIBLE or (source and source not in _CONVERTIBLE):
         return None
     return Conversion(long_name(source), form, long_name(target))
@@ -116,7 +115,10 @@ def conversion(name: str) -> Conversion | None:
 def typed_name(name: str) -> tuple[str, str] | None:
     """`ADD_INT` as ("ADD", "INT") if such a function exists in a typed form, else None."""
     match = _TYPED.fullmatch(name)
-    if match and long_name(match["type"]) in ELEMENTARY and (match["name"] in SIGNATURES or match["name"] in OPERATORS):
+    if match is None or long_name(match["type"]) not in ELEMENTARY:
+        return None
+    row = SIGNATURES.get(match["name"])
+    if match["name"] in OPERATORS or row is not None and row.limits:
         return match["name"], long_name(match["type"])
     return None
 

@@ -14,6 +14,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, ArrayType, Field, StringType, StructType, Type, base, fold
 from fbvm.check.facts import Edge, Pou, Variable, is_block
 from fbvm.check.specs import MAX_SIZE
+from fbvm.check.statements import assigns_to
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -50,6 +51,10 @@ class Interfaces:
                 self._section(section, pou)
         if pou.tree.result is not None:
             self._result(pou, pou.tree.result)
+        if "ENO" not in pou.variables and assigns_to(pou.tree.body, "ENO"):
+            eno = Variable("ENO", BOOL, "VAR_OUTPUT", pou.source, pou.tree.name, pou, initial=b"\x01")
+            self._register(eno, pou)
+            pou.enables_itself = True
         if pou.is_function:
             self._frame(pou, [v for v in pou.order if v.place == "self"])
         else:
@@ -91,6 +96,9 @@ class Interfaces:
                     continue
                 variable = self.variable(declared, name, section, pou.source, resolved)
                 variable.owner = pou
+                if is_block(variable.type) and variable.kind in ("VAR_INPUT", "VAR_OUTPUT"):
+                    self.report.add("S0901", pou.source, name, f"an instance as {section.kind} is understood but not "
+                                    "executed by this version", "pass it as VAR_IN_OUT")
                 self._place(variable, declared, pou)
                 self._register(variable, pou)
 
@@ -111,13 +119,13 @@ class Interfaces:
         words = {fold(q.text) for q in section.qualifiers}
         made = Variable(name.text, kind, section.kind, source, name, initial=initial, constant="CONSTANT" in words,
                         retain=bool({"RETAIN", "PERSISTENT"} & words), explicit=declared.initial is not None)
-        if made.constant:
+        if made.constant and is_block(kind):
+            self.report.add("S0206", source, name, "an instance cannot be CONSTANT")
+        elif made.constant:
             if declared.initial is None:
                 self.report.add("S0701", source, name, f"the constant {name.text} has no value", "write := and its value")
             elif isinstance(declared.initial, tree.Expr):
                 made.value = self.project.facts.constants.get(declared.initial)
-            if is_block(kind):
-                self.report.add("S0206", source, name, "an instance cannot be CONSTANT")
         if declared.location is not None:
             made.location = self.location(declared, kind, source)
         return made

@@ -71,7 +71,7 @@ class Specs:
         folded = fold(spec.text)
         entry = self.project.type_entry(folded, source)
         if entry is not None:
-            return self._declared(entry.tree.name, folded, source)
+            return self.declared(folded, source)
         pou = self.project.pou(folded, source)
         if pou is not None:
             return self._block(pou, spec, source)
@@ -95,10 +95,11 @@ class Specs:
         entry = self.project.type_entry(name, source)
         if entry is None:
             return self.elementary(name)
-        resolved = self._declared(entry.tree.name, name, source)
+        resolved = self.declared(name, source)
         return resolved[0] if resolved else None
 
-    def _declared(self, node: tree.Node, name: str, source: Source) -> Resolved | None:
+    def declared(self, name: str, source: Source) -> Resolved | None:
+        """A declared type as seen from `source`; its mistakes are reported at the first call."""
         entry = self.project.type_entry(name, source)
         assert entry is not None
         if entry.busy:

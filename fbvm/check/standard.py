@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import (
+    BOOL,
     ELEMENTARY,
     GENERIC,
     LREAL,
@@ -20,7 +21,7 @@ from fbvm.base.types import (
     string,
 )
 from fbvm.check import functions
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, StandardCall
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Guard, StandardCall
 from fbvm.check.functions import Conversion, Signature
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
@@ -72,7 +73,8 @@ class StandardCalls:
     def _arguments(self, call: tree.Call, names: list[str], repeats: bool) -> list[tree.Expr] | None:
         """Values in the order of the parameters, or None after a diagnostic."""
         values: dict[int, tree.Expr] = {}
-        for position, argument in enumerate(call.arguments):
+        arguments = [a for a in call.arguments if not self._guard(call, a)]
+        for position, argument in enumerate(arguments):
             index: int | None = position
             if argument.name is not None:
                 index = self._index(argument, names, repeats)
@@ -93,13 +95,22 @@ class StandardCalls:
             return None
         return [values[i] for i in range(len(values))]
 
+    def _guard(self, call: tree.Call, argument: tree.Argument) -> bool:
+        """True for EN and ENO, which every function has."""
+        name = fold(argument.name.text) if argument.name is not None else ""
+        if (name, argument.kind) not in (("EN", ":="), ("ENO", "=>")) or argument.value is None:
+            return False
+        guard = self.facts.guards.setdefault(call, Guard())
+        if name == "EN":
+            if self.expressions.fit(argument.value, BOOL, "S0405", "EN"):
+                guard.enable = argument.value
+        elif self.expressions.checker.calls(self.expressions).output(argument, BOOL, "ENO"):
+            guard.enabled.append((argument.value, argument.negated))
+        return True
+
     def _index(self, argument: tree.Argument, names: list[str], repeats: bool) -> int | None:
         assert argument.name is not None
         name = fold(argument.name.text)
-        if name in ("EN", "ENO"):
-            self.error("S0901", argument, f"{name} at a standard function is understood but not executed",
-                       "put the call into an IF")
-            return None
         if argument.kind == ":=" and name in names:
             return names.index(name)
         stem = names[-1].rstrip("0123456789") if names else ""
@@ -127,13 +138,15 @@ class StandardCalls:
         result = self.expressions.infer(meaning, kind or want)
         if result in UNTYPED and kind is not None:
             result = self.expressions.adopt(meaning, kind)
+        elif result in UNTYPED and call in self.facts.guards:
+            result = self.expressions.settle(meaning, want)
         if result is None:
             return None
         if kind is not None and not converts(result, kind):
             self.error("S0405", call, f"the arguments are {result}, {_name(call)} takes {kind}")
             return None
         self.facts.rewritten[call] = meaning
-        if meaning in self.facts.constants:
+        if meaning in self.facts.constants and call not in self.facts.guards:
             self.facts.constants[call] = self.facts.constants[meaning]
         return result
 
@@ -274,6 +287,8 @@ def convertible(form: str, source: Type, target: Type) -> bool:
         return is_any(source, "ANY_BIT") and is_any(target, "ANY_INT") and source.name != "BOOL"
     if form == "TO_BCD":
         return is_any(source, "ANY_INT") and is_any(target, "ANY_BIT") and target.name != "BOOL"
+    if not isinstance(source, Elementary | StringType | EnumType):
+        return False
     if isinstance(source, EnumType) or isinstance(target, EnumType):
         return is_any(source, "ANY_INT", "ANY_BIT", "ANY_STRING") or is_any(target, "ANY_INT", "ANY_BIT", "ANY_STRING")
     if isinstance(source, StringType) or isinstance(target, StringType):

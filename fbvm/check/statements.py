@@ -115,10 +115,8 @@ class Statements:
             self.error("S0503", label[0], f"the range {low}..{high} is empty")
             return None
         if any(low <= other_high and other_low <= high for other_low, other_high in taken):
-            if low == high or (low, high) in taken:
-                self.error("S0503", label[0], f"the label {low if low == high else f'{low}..{high}'} is taken by a branch "
-                                              "above", "the first branch that fits is executed")
-            return low, high
+            shown = f"{low}" if low == high else f"{low}..{high}"
+            self.error("S0503", label[0], f"the label {shown} is taken by a label above")
         taken.append((low, high))
         return low, high
 

@@ -98,6 +98,12 @@ def _text(name: str) -> Lowering:
     return lower
 
 
+def _finite(body: BodyLowering, a: Node, form: str) -> Node:
+    """Neither NaN nor infinite: then only is x - x zero."""
+    kept = body.keep(a)
+    return ("eq", "b", form, ("sub", form, kept, kept), ("const", form, 0.0))
+
+
 def _due(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
     body.out.append(("due", a[0]))
     return ("const", "b", 0)
@@ -199,6 +205,7 @@ FUNCTIONS: dict[str, Lowering] = {
     "LEN": lambda body, a, call, site: ("length", "i16", a[0]),
     "FIND": lambda body, a, call, site: ("find", "i16", a[0], a[1]),
     "TIME": lambda body, a, call, site: ("now", "i64"), "__DUE": _due,
+    "IS_VALID": lambda body, a, call, site: _finite(body, a[0], _form(call)),
     "TO": _convert, "TRUNC": _truncate, "BCD_TO": _bcd("from_bcd"), "TO_BCD": _bcd("to_bcd"),
     **{name: _math(name) for name in _MATH},
     **{name: _shift(name.lower()) for name in ("SHL", "SHR", "ROL", "ROR")},

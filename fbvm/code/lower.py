@@ -209,10 +209,10 @@ class BodyLowering:
         called = self.facts.calls.get(call)
         if isinstance(called, PouCall):
             self.calls.statement(call, called)
-        elif called is not None:
-            self.discard(self.values.standard(called, call))
+        elif called is not None and call not in self.facts.types:
+            self.values.standard(called, call)
         else:
-            self.discard(self.value(self.facts.rewritten[call]))
+            self.discard(self.value(call))
 
     def discard(self, node: Node) -> None:
         """Work a value out for its traps only."""

@@ -65,6 +65,8 @@ class Places:
             return self.of(expr.of).moved(member.offset, kind)
         if isinstance(expr, tree.Part):
             return self._part(expr, kind)
+        if isinstance(expr, tree.Call):
+            return self.body.aggregate(expr)
         assert isinstance(expr, tree.Index)
         return self._index(expr, kind)
 

@@ -99,7 +99,7 @@ class CallLowering:
 
     def _run(self, call: tree.Call, called: PouCall, instance: Place | None, site: int, eno: Variable | None) -> None:
         self._inputs(called, instance, site)
-        if eno is not None and not called.pou.writes_eno:
+        if eno is not None and (called.pou.enables_itself or not called.pou.writes_eno):
             self.body.out.append(self.body.places.store(self._place(called, eno, instance), TRUE, site))
         address: Address | None = instance.address if instance is not None else None
         self.body.out.append(("call", called.pou.number, address))

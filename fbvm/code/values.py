@@ -16,7 +16,7 @@ from fbvm.base.types import (
     machine,
 )
 from fbvm.check.constants import convert as convert_constant
-from fbvm.check.facts import PouCall, StandardCall, Value
+from fbvm.check.facts import Guard, PouCall, StandardCall, Value
 from fbvm.check.values import is_any
 from fbvm.code.functions import FUNCTIONS
 from fbvm.code.operations import FLOATS, Node
@@ -86,6 +86,26 @@ class ValueLowering:
 
     def _plain(self, expr: tree.Expr) -> Node:
         """The value of a non-constant expression in its own type."""
+        guard = self.facts.guards.get(expr) if isinstance(expr, tree.Call) else None
+        if guard is not None and isinstance(expr, tree.Call):
+            return self._guarded(expr, guard)
+        return self._unguarded(expr)
+
+    def _guarded(self, call: tree.Call, guard: Guard) -> Node:
+        """A standard function with EN or ENO: with EN FALSE the result is the default of its type."""
+        body = self.body
+        enable = body.keep(self.value(guard.enable, BOOL)) if guard.enable is not None else ("const", "b", 1)
+        form = machine(self.facts.types[call])
+        empty: Node = ("const", form, b"" if form == "s8" else float(0) if form in FLOATS else 0)
+        kept = body.keep(empty, always=True)
+        with body.block() as inner:
+            inner.append(("let", kept[2], form, self._unguarded(call)))
+        body.out.append(("if", ((enable, tuple(inner)),), ()))
+        for target, negated in guard.enabled:
+            body.write(body.places.of(target), ("not", "b", enable) if negated else enable, body.site(call))
+        return kept
+
+    def _unguarded(self, expr: tree.Expr) -> Node:
         meaning = self.facts.rewritten.get(expr)
         if meaning is not None:
             return self.value(meaning)
