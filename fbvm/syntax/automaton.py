@@ -50,6 +50,7 @@ class Automaton:
         self.states: list[int] = [self.tables.start]
         self.values: list[Any] = []
         self.stream = stream
+        self.mender: Mender | None = None
         self.before = Token("", "", 0, 0)
         """The last token that was taken."""
         self.ahead: list[Token] = []
@@ -59,32 +60,46 @@ class Automaton:
         """Words that are names where they cannot be words."""
         self.text = ""
 
-    def run(self, mender: Mender) -> Any:
-        """Feed every token; the value of the start symbol."""
+    def run(self, mender: Callable[[Automaton], Mender]) -> Any:
+        """Feed every token; the value of the start symbol.  The mender is made at the first error."""
+        ahead, stream, special = self.ahead, self.stream, DIVIDERS | NESTING | REFUSED | {"$END"}
         while True:
-            token = self.next()
+            token = ahead.pop() if ahead else next(stream)
             try:
-                if token.type in DIVIDERS and advance(self.states, token.type) is None:
-                    refused: Token | None = token
+                if token.type not in special:
+                    refused = self.feed(token)
+                elif token.type in DIVIDERS and advance(self.states, token.type) is None:
+                    refused = token
                 else:
                     refused = self.feed(token)
-                if refused is not None:
-                    self.settle()
-                    self.ahead.extend(reversed(mender.unexpected(refused)))
+                    if refused is None and self.ended(token, mender):
+                        return self.values[-1]
+                if refused is None:
+                    self.before = token
                     continue
+                self.settle()
+                tokens = self.mended_by(mender).unexpected(refused)
             except TooDeep:
-                self.ahead.extend(reversed(mender.too_deep(token, "operators")))
-                continue
-            self.before = token
-            if token.type in NESTING and len(self.states) > NESTING_LIMIT and self.nested_too_deep():
-                self.ahead.extend(reversed(mender.too_deep(token, "levels")))
-            elif token.type == "$END":
-                return self.values[-1]
-            elif token.type in REFUSED and self.values[-1] is token:
-                self.values[-1], missed = whole(token, self.text, self.next)
-                if missed:
-                    mender.without_end(token, missed)
-                    self.ahead.append(missed)
+                tokens = self.mended_by(mender).too_deep(token, "operators")
+            ahead.extend(reversed(tokens))
+
+    def mended_by(self, mender: Callable[[Automaton], Mender]) -> Mender:
+        if self.mender is None:
+            self.mender = mender(self)
+        return self.mender
+
+    def ended(self, token: Token, mender: Callable[[Automaton], Mender]) -> bool:
+        """What is to do behind some tokens; whether it was the end of the text."""
+        if token.type == "$END":
+            return True
+        if token.type in NESTING and len(self.states) > NESTING_LIMIT and self.nested_too_deep():
+            self.ahead.extend(reversed(self.mended_by(mender).too_deep(token, "levels")))
+        elif token.type in REFUSED and self.values[-1] is token:
+            self.values[-1], missed = whole(token, self.text, self.next)
+            if missed:
+                self.mended_by(mender).without_end(token, missed)
+                self.ahead.append(missed)
+        return False
 
     def next(self) -> Token:
         return self.ahead.pop() if self.ahead else next(self.stream)
@@ -98,7 +113,8 @@ class Automaton:
     def feed(self, token: Token) -> Token | None:
         """Take one token: reduce as it demands, then shift it.  Returns the token if it cannot stand here; nothing is
         undone then, since reducing more cannot do harm."""
-        rows, rules, states, values = self.rows, self.tables.rules, self.states, self.values
+        rows, rules, actions, states, values = self.rows, self.tables.rules, self.actions, self.states, self.values
+        end = self.tables.end
         kind = token.type
         while True:
             act = rows[states[-1]].get(kind)
@@ -114,30 +130,28 @@ class Automaton:
                 states.append(act)
                 values.append(token)
                 return None
-            rule = rules[~act]
+            rule, action = rules[~act], actions[~act]
             size = rule.size
-            children: list[Any]
-            if size:
-                children = values[-size:]
-                del values[-size:]
-                del states[-size:]
-            else:
-                children = []
-            action = self.actions[~act]
             if action is None:
-                values.append(children[0])
-            elif rule.places is None:
-                values.append(action(*children))
+                del states[-1]
+            elif size == 1 and rule.places is None:
+                values[-1] = action(values[-1])
+                del states[-1]
             else:
-                values.append(action(*[None if p is None else children[p] for p in rule.places]))
+                at = len(values) - size
+                children = values[at:]
+                del values[at:], states[at + 1:]
+                if rule.places is not None:
+                    children = [None if p is None else children[p] for p in rule.places]
+                values.append(action(*children))
             row = rows[states[-1]]
             state = row[rule.origin]
             act = rows[state].get(kind)
-            while act is not None and act < 0 and self.actions[~act] is None:
+            while act is not None and act < 0 and actions[~act] is None:
                 state = row[rules[~act].origin]
                 act = rows[state].get(kind)
             states.append(state)
-            if state == self.tables.end:
+            if state == end:
                 return None
 
     def settle(self) -> None:

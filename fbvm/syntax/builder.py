@@ -104,10 +104,12 @@ class Builder:
         items.append(self.refused(token))
         return items
 
-    def deepen(self, node: Expr, *parts: Expr) -> None:
-        """Note the depth of a new node over its parts."""
+    def deepen(self, node: Expr, left: Expr, right: Expr | None = None) -> None:
+        """Note the depth of a new node over one or two parts."""
         depths = self.depths
-        depth = 1 + max(depths.pop(part, 1) for part in parts)
-        if depth > CHAIN_LIMIT:
+        depth = depths.pop(left, 1)
+        if right is not None:
+            depth = max(depth, depths.pop(right, 1))
+        if depth >= CHAIN_LIMIT:
             raise TooDeep
-        depths[node] = depth
+        depths[node] = depth + 1

@@ -100,7 +100,7 @@ class Expressions(Builder):
 
     def index(self, of: Expr, opener: Token, subscripts: list[Expr], closer: Token) -> Index:
         node = Index(of.start, closer.end, of, tuple(subscripts))
-        self.deepen(node, of, *subscripts)
+        self.deepen(node, of, max(subscripts, key=self.depth))
         return node
 
     def deref(self, of: Expr, caret: Token) -> Deref:
@@ -110,7 +110,8 @@ class Expressions(Builder):
 
     def call(self, callee: Expr, opener: Token, arguments: list[Argument] | None, closer: Token) -> Call:
         node = Call(callee.start, closer.end, callee, tuple(arguments or ()))
-        self.deepen(node, callee, *(a.value for a in node.arguments if a.value is not None))
+        values = [a.value for a in node.arguments if a.value is not None]
+        self.deepen(node, callee, max(values, key=self.depth, default=None))
         return node
 
     def argument_positional(self, value: Expr) -> Argument:
@@ -121,6 +122,10 @@ class Expressions(Builder):
 
     def argument_negated(self, word: Token, token: Token, sign: Token, value: Expr | None) -> Argument:
         return Argument(word.start, value.end if value else sign.end, sign.text, self.name(token), value, True)
+
+    def depth(self, node: Expr) -> int:
+        """Depth of an expression under construction."""
+        return self.depths.get(node, 1)
 
     # --- operators ---
 

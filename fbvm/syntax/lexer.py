@@ -117,7 +117,7 @@ class Lexer:
         text, at, lex = self.text, 0, lexis()
         match, signs, words, conditions = lex.master.match, lex.signs, lex.words, lex.conditions
         known: dict[str, str] = {}
-        before, length = "", len(text)
+        before, length, new = "", len(text), tuple.__new__
         while True:
             found = match(text, at)
             if found is None:
@@ -151,7 +151,7 @@ class Lexer:
             elif before == "AT":
                 kind, at = self._special(lex, before, kind, start, at)
                 word = text[start:at]
-            yield Token(kind, word, start, at)
+            yield new(Token, (kind, word, start, at))
             before = kind
         yield Token("$END", "", length, length)
 

@@ -7,8 +7,6 @@ tables: units d h m s ms us ns in this order, a fraction only in the last; dates
 from __future__ import annotations
 
 import re
-from datetime import date
-from fractions import Fraction
 
 Value = int | float | bool | str
 Decoded = tuple[str, Value, str | None]
@@ -39,6 +37,9 @@ ELEMENTARY = {"BOOL", *SIGNED, *UNSIGNED, *REALS, *TEXTS, *TIMES, *DATES, *CLOCK
 SECOND_NS = 1_000_000_000
 DAY_NS = 86_400 * SECOND_NS
 UNITS_NS = {"d": DAY_NS, "h": 3600 * SECOND_NS, "m": 60 * SECOND_NS, "s": SECOND_NS, "ms": 1_000_000, "us": 1000, "ns": 1}
+DAYS_1970 = 719_163
+"""Number of the day 1970-01-01, counted from 0001-01-01 as 1."""
+
 NS_MAX = 2**63 - 1
 INTEGER_MAX = 2**64 - 1
 LONGEST = 400
@@ -199,30 +200,37 @@ def duration(text: str) -> int:
     """`1d2h3.5s` or `-5us300ns` as whole nanoseconds; a rest below one nanosecond is an error, not rounded away."""
     negative = text.startswith("-")
     rest = text[1:] if text[:1] in ("-", "+") else text
-    units, at, total, last = list(UNITS_NS), 0, Fraction(0), -1
+    units, at, total, last = list(UNITS_NS), 0, 0, -1
     if not rest:
         raise Malformed("a duration needs a number and a unit, as in `T#1s500ms`", "")
     while at < len(rest):
         part = _DURATION_PART.match(rest, at)
         if not part or len(part[0]) > LONGEST:
-            raise Malformed(f"`{_short(rest[at:])}` is no part of a duration", "units are d h m s ms us ns, as in `T#1d2h3m4s5ms`")
+            raise Malformed(f"`{_short(rest[at:])}` is no part of a duration",
+                            "units are d h m s ms us ns, as in `T#1d2h3m4s5ms`")
         unit = units.index(part[3].lower())
         if unit <= last:
             raise Malformed(f"unit `{part[3]}` stands too late or twice in the duration", "the order is d h m s ms us ns")
         if part[2] and part.end() != len(rest):
             raise Malformed("only the last unit of a duration may have a fraction", "")
-        digits = part[1] + "." + (part[2] or "0")
-        total += Fraction(digits.replace("_", "")) * UNITS_NS[units[unit]]
+        total += _scaled(part[1], part[2] or "", UNITS_NS[units[unit]], text)
         last, at = unit, part.end()
-    return _whole_ns(-total if negative else total, text)
-
-
-def _whole_ns(total: Fraction, text: str) -> int:
-    if total.denominator != 1:
-        raise OutOfRange(f"`{_short(text)}` is finer than one nanosecond", "")
+    total = -total if negative else total
     if not -NS_MAX - 1 <= total <= NS_MAX:
         raise OutOfRange(f"`{_short(text)}` does not fit 64 bits of nanoseconds, about 292 years", "")
-    return int(total)
+    return total
+
+
+def _scaled(whole: str, fraction: str, unit_ns: int, text: str) -> int:
+    """`whole.fraction` units as nanoseconds, exactly."""
+    fraction = fraction.replace("_", "")
+    value, rest = divmod(int(whole.replace("_", "") + fraction) * unit_ns, 10 ** len(fraction))
+    if rest:
+        raise OutOfRange(f"`{_short(text)}` is finer than one nanosecond", "")
+    return value
+
+
+MONTH_DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 
 
 def _day(text: str) -> int:
@@ -230,10 +238,13 @@ def _day(text: str) -> int:
     found = _DATE.fullmatch(text)
     if not found:
         raise Malformed(f"`{_short(text)}` is no date", "write it as 2024-05-31")
-    try:
-        days = date(int(found[1]), int(found[2]), int(found[3])).toordinal() - date(1970, 1, 1).toordinal()
-    except ValueError:
-        raise Malformed(f"there is no date {text}", "") from None
+    year, month, day = int(found[1]), int(found[2]), int(found[3])
+    leap = year % 4 == 0 and (year % 100 != 0 or year % 400 == 0)
+    if not 1 <= month <= 12 or not 1 <= day <= MONTH_DAYS[month - 1] + (leap and month == 2):
+        raise Malformed(f"there is no date {text}", "")
+    before = year - 1
+    days = before * 365 + before // 4 - before // 100 + before // 400 + sum(MONTH_DAYS[:month - 1]) + (leap and month > 2) + day
+    days -= DAYS_1970
     if not -NS_MAX <= days * DAY_NS <= NS_MAX:
         raise OutOfRange(f"the date {text} is outside 1677-09-22 to 2262-04-11", "")
     return days
@@ -244,11 +255,10 @@ def _clock(text: str) -> int:
     found = _CLOCK.fullmatch(text)
     if not found or len(text) > LONGEST:
         raise Malformed(f"`{_short(text)}` is no time of day", "write it as 13:45:30 or 13:45:30.250")
-    hour, minute, second = int(found[1]), int(found[2]), int(found[3] or 0)
-    if hour > 23 or minute > 59 or second > 59:
+    hour, minute, second = int(found[1]), int(found[2]), found[3] or "0"
+    if hour > 23 or minute > 59 or int(second) > 59:
         raise Malformed(f"there is no time of day {_short(text)}", "")
-    fraction = Fraction("0." + (found[4] or "0").replace("_", ""))
-    return _whole_ns((hour * 3600 + minute * 60 + second + fraction) * SECOND_NS, text)
+    return (hour * 3600 + minute * 60) * SECOND_NS + _scaled(second, found[4] or "", SECOND_NS, text)
 
 
 def _moment(text: str) -> int:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.syntax.automaton import Automaton
+from fbvm.syntax.automaton import Automaton, Mender
 from fbvm.syntax.builder import Stop
 from fbvm.syntax.lexer import Lexer
-from fbvm.syntax.recovery import Recovery
 from fbvm.syntax.tree import SourceText
 from fbvm.syntax.types import Types
 
@@ -20,9 +19,16 @@ def parse(source: Source) -> tuple[SourceText, list[Diagnostic]]:
     automaton = Automaton(builder, lexer.tokens())
     automaton.text = source.text
     try:
-        tree: SourceText = automaton.run(Recovery(automaton, builder))
+        tree: SourceText = automaton.run(lambda stuck: _recovery(stuck, builder))
     except Stop:
         read = automaton.values[0] if automaton.values else []
         tree = SourceText(0, len(source.text), tuple(read))
     tree.pragmas = tuple(lexer.pragmas)
     return tree, sorted(builder.diagnostics, key=Diagnostic.order)
+
+
+def _recovery(automaton: Automaton, builder: Types) -> Mender:
+    """Who mends; loaded when there is something to mend."""
+    from fbvm.syntax.recovery import Recovery
+
+    return Recovery(automaton, builder)

@@ -5,14 +5,12 @@ lark is only imported when no valid cache file is found.  The driver that runs t
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import sys
-import tempfile
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -62,23 +60,34 @@ class Tables:
 def tables() -> Tables:
     """The tables of the grammar, from the cache if it holds them."""
     text = "\n".join((data_folder("grammar") / name).read_text(encoding="utf-8") for name in FILES)
-    key = f"{FORMAT} {version('lark')} {sys.version_info[:2]} {text}"
-    path = cache_folder() / f"grammar-{hashlib.sha256(key.encode()).hexdigest()[:32]}.json"
+    key = [FORMAT, sys.version, _lark_identity(), text]
+    path = cache_folder() / f"grammar-{sys.version_info[0]}.{sys.version_info[1]}.json"
     try:
-        return _from_plain(json.loads(path.read_bytes()))
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        plain = compile_grammar(text)
-    _store(path, plain)
+        stored = json.loads(path.read_bytes())
+        if stored["key"] == key:
+            return _from_plain(stored["tables"])
+    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError):
+        pass
+    plain = compile_grammar(text)
+    _store(path, {"key": key, "tables": plain})
     return _from_plain(plain)
 
 
-def _store(path: Path, plain: dict[str, Any]) -> None:
+def _lark_identity() -> str:
+    """Which lark is installed, without importing it."""
+    spec = find_spec("lark")
+    if spec is None or spec.origin is None:
+        return ""
+    status = os.stat(spec.origin)
+    return f"{spec.origin} {status.st_size} {status.st_mtime_ns}"
+
+
+def _store(path: Path, content: dict[str, Any]) -> None:
     """Write through a file of its own, so that nobody reads half of it.  A folder that cannot be written does no harm."""
+    part = path.with_suffix(f".{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, part = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".part")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump(plain, file, separators=(",", ":"))
+        part.write_text(json.dumps(content, separators=(",", ":")), encoding="utf-8")
         os.replace(part, path)
     except OSError:
         return

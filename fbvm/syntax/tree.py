@@ -1,27 +1,14 @@
 """The tree of a source text, named as the productions of IEC 61131-3 Annex A.
 
-A tree is a value: it never changes after parsing and holds no facts about names or types.  Nodes compare by identity, so
-that facts can be kept about each in side tables.  `start` and `end` are character offsets in the source.
+A tree is a value: it never changes after parsing and holds no facts about names or types.  Nodes compare by identity,
+so that facts can be kept about each in side tables.  `start` and `end` are character offsets in the source.
 Names are kept as written; comparing them without case is the checker's work.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TypeVar, dataclass_transform
-
-_T = TypeVar("_T")
-
-
-@dataclass_transform(eq_default=False, field_specifiers=(field,))
-def _node(cls: type[_T]) -> type[_T]:
-    return dataclass(eq=False, slots=True)(cls)
-
-
-@_node
-class Node:
-    start: int
-    end: int
+from fbvm.syntax.node import Node as Node
+from fbvm.syntax.node import node as _node
 
 
 @_node
@@ -459,4 +446,4 @@ class SourceText(Node):
     """All declarations of one source text in the order of writing."""
 
     declarations: tuple[Declaration, ...]
-    pragmas: tuple[Pragma, ...] = field(default=())
+    pragmas: tuple[Pragma, ...] = ()
