@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache
 
 
 def fold(name: str) -> str:
@@ -167,7 +167,7 @@ DATE, TOD, DT = (ELEMENTARY[n] for n in ("DATE", "TIME_OF_DAY", "DATE_AND_TIME")
 NULL = RefType("NULL", 8, 8, None)
 
 
-@lru_cache(maxsize=None)
+@cache
 def string(capacity: int = DEFAULT_STRING, wide: bool = False) -> StringType:
     """STRING[capacity] or WSTRING[capacity]."""
     unit = 2 if wide else 1

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, StructType, Type, base, fold
-from fbvm.check import functions
 from fbvm.check.expressions import assignable, conversion_hint, same
 from fbvm.check.facts import Pou, PouCall, Variable, is_block
 from fbvm.check.standard import StandardCalls

@@ -278,7 +278,8 @@ class Interfaces:
 
     def _limit(self, pou: Pou, size: int) -> None:
         if size > MAX_SIZE:
-            self.report.add("S0603", pou.source, pou.tree.name, f"the variables of {pou.name} take more than {MAX_SIZE >> 20} MiB")
+            self.report.add("S0603", pou.source, pou.tree.name,
+                            f"the variables of {pou.name} take more than {MAX_SIZE >> 20} MiB")
 
 
 def _append(content: bytearray, variable: Variable) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import DAY_NS, DINT, EnumType, StringType, Type, base, machine
@@ -71,7 +72,7 @@ def _compare(name: str) -> Lowering:
             a = [body.keep(node) for node in a]
         form = _form(call)
         node: Node = (name, "b", form, a[0], a[1])
-        for left, right in zip(a[1:], a[2:], strict=False):
+        for left, right in pairwise(a[1:]):
             node = body.measured(("and", "b", node, (name, "b", form, left, right)))
         return node
     return lower
