@@ -32,7 +32,7 @@ OWN = (range(30000, 30100), range(32500, 32643))
 """D words of the unit and of the blocks: the sheet's two areas, and the gap between them for long requests."""
 WRITERS = ("05", "06", "0F", "10")
 
-CONNECT = ("IP_Address1 := Octet1, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 2, Connect := Connect")
+CONNECT = "IP_Address1 := Octet1, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 2, Connect := Connect"
 
 
 @cache
@@ -77,9 +77,7 @@ class Rig:
         refused: bool = False,
         **blocks: str,
     ) -> None:
-        made = text or program(
-            blocks, connect_last=connect_last, wired=wired, more=more, more_variables=more_variables
-        )
+        made = text or program(blocks, connect_last=connect_last, wired=wired, more=more, more_variables=more_variables)
         self.peer = peer if isinstance(peer, ModbusPeer) else ModbusPeer()
         self.server = self.peer.server
         self.network = LoopNetwork(seed)
@@ -149,12 +147,21 @@ class Rig:
         data = b"".join(word.to_bytes(2, "big") for word in self.words(first, (size + 1) // 2))
         return data[:size].hex(" ").upper()
 
-    def result(self, name: str) -> tuple[object, str]:
-        """Rcv_Counter and Error_Code of a block; the code is "" where Error is FALSE."""
-        code = self.get(f"{name}.Error_Code")
-        assert isinstance(code, int)
+    def number(self, name: str) -> int:
+        """A whole number."""
+        value = self.get(name)
+        assert isinstance(value, int)
+        return value
+
+    def code(self, name: str) -> str:
+        """Error_Code of a block in hexadecimal, "" where Error is FALSE."""
+        code = self.number(f"{name}.Error_Code")
         assert bool(self.get(f"{name}.Error")) == (code != 0)
-        return self.get(f"{name}.Rcv_Counter"), f"{code:04X}" if code else ""
+        return f"{code:04X}" if code else ""
+
+    def result(self, name: str) -> tuple[int, str]:
+        """Rcv_Counter and Error_Code of a block."""
+        return self.number(f"{name}.Rcv_Counter"), self.code(name)
 
 
 NAMES = descriptions(Layout.of(0))

@@ -13,15 +13,10 @@ PINS = ("Connect", "conn.ENO", "conn.Waiting_Server", "conn.Error")
 WORDS = ("CIO 1519.02", "CIO 1519.05", "CIO 1509.15", "D30009")
 
 
-def code(rig: Rig, name: str = "conn") -> str:
-    """Error_Code, "" without Error."""
-    number = rig.get(f"{name}.Error_Code")
-    assert isinstance(number, int)
-    return f"{number:04X}" if rig.get(f"{name}.Error") else ""
-
-
 def test_each_try_closes_the_socket_and_opens_it() -> None:
-    assert Rig().chart(7, *PINS, *WORDS) == """
+    assert (
+        Rig().chart(7, *PINS, *WORDS)
+        == """
         Main.Connect              #######
         Main.conn.ENO             ....###
         Main.conn.Waiting_Server  ####...
@@ -31,6 +26,7 @@ def test_each_try_closes_the_socket_and_opens_it() -> None:
         CIO1509.15                ...####   TCP Open Flag
         D30009                    0 ||4     = 0, 2, 4   TCP Connection State
     """
+    )
 
 
 def test_the_request_to_open_in_the_parameter_area() -> None:
@@ -45,7 +41,9 @@ def test_connect_falls() -> None:
     """One scan lies between the end of use and the close, because another block may have requested a service."""
     rig = Rig().connect()
     rig.set("Connect", False)
-    assert rig.chart(5, *PINS, *WORDS) == """
+    assert (
+        rig.chart(5, *PINS, *WORDS)
+        == """
         Main.Connect              .....
         Main.conn.ENO             .....
         Main.conn.Waiting_Server  .....
@@ -55,6 +53,7 @@ def test_connect_falls() -> None:
         CIO1509.15                ##...   TCP Open Flag
         D30009                    4||10   = 4, 6, 10   TCP Connection State
     """
+    )
 
 
 def test_connect_falls_while_the_socket_opens() -> None:
@@ -62,7 +61,9 @@ def test_connect_falls_while_the_socket_opens() -> None:
     rig.network.faults.append(Fault(silent=True))
     rig.scan(4)
     rig.set("Connect", False)
-    assert rig.chart(5, *PINS, *WORDS, "D30027") == """
+    assert (
+        rig.chart(5, *PINS, *WORDS, "D30027")
+        == """
         Main.Connect              .....
         Main.conn.ENO             .....
         Main.conn.Waiting_Server  .....
@@ -73,6 +74,7 @@ def test_connect_falls_while_the_socket_opens() -> None:
         D30009                    0       TCP Connection State
         D30027                    |||0    = 8720, 129, 0   Response Code
     """
+    )
 
 
 def test_connect_returns_without_a_pause() -> None:
@@ -85,7 +87,9 @@ def test_connect_returns_without_a_pause() -> None:
 
 def test_a_refused_connection_is_tried_again_after_a_second() -> None:
     rig = Rig(refused=True)
-    assert rig.chart(8, *PINS, *WORDS) == """
+    assert (
+        rig.chart(8, *PINS, *WORDS)
+        == """
         Main.Connect              ########
         Main.conn.ENO             ........
         Main.conn.Waiting_Server  ########
@@ -95,7 +99,8 @@ def test_a_refused_connection_is_tried_again_after_a_second() -> None:
         CIO1509.15                ........   TCP Open Flag
         D30009                    0 ||0      = 0, 2, 0   TCP Connection State
     """
-    assert code(rig) == "004A"
+    )
+    assert rig.code("conn") == "004A"
     assert rig.run_until("CIO 1519.02", 2) == pytest.approx(1.0)
 
 
@@ -103,10 +108,10 @@ def test_error_and_code_hold_until_the_next_success() -> None:
     rig = Rig(refused=True)
     rig.run_until("Main.conn.Error")
     rig.scan(50)
-    assert code(rig) == "004A"
+    assert rig.code("conn") == "004A"
     rig.network.place(SERVER, rig.peer)
     rig.connect()
-    assert (code(rig), rig.get("conn.Error_Code")) == ("", 0)
+    assert (rig.code("conn"), rig.get("conn.Error_Code")) == ("", 0)
 
 
 def test_nobody_answers() -> None:
@@ -115,18 +120,20 @@ def test_nobody_answers() -> None:
     rig.network.faults.append(Fault(silent=True))
     rig.run_until("CIO 1519.02")
     assert rig.run_until("Main.conn.Error", 11) == pytest.approx(10.01)
-    assert code(rig) == "0053"
+    assert rig.code("conn") == "0053"
     rig.network.faults.clear()
     assert rig.run_until("Main.conn.ENO", 2) == pytest.approx(1.06, abs=0.03)
 
 
-@pytest.mark.parametrize(("end", "expected"), [(Fin(0), "0081"), (Reset(0), "004B")])
+@pytest.mark.parametrize(("end", "expected"), [(Fin(100_000_000), "0081"), (Reset(100_000_000), "004B")])
 def test_a_lost_connection_is_opened_again(end: Action, expected: str) -> None:
-    peer = ScriptedPeer(greeting=[type(end)(100_000_000)])
+    peer = ScriptedPeer(greeting=[end])
     rig = Rig(peer).connect()
     rig.run_until("Main.conn.Error", 1)
-    assert (code(rig), rig.get("conn.ENO")) == (expected, False)
-    assert rig.chart(5, *PINS, *WORDS[:3]) == """
+    assert (rig.code("conn"), rig.get("conn.ENO")) == (expected, False)
+    assert (
+        rig.chart(5, *PINS, *WORDS[:3])
+        == """
         Main.Connect              #####
         Main.conn.ENO             .....
         Main.conn.Waiting_Server  #####
@@ -135,14 +142,15 @@ def test_a_lost_connection_is_opened_again(end: Action, expected: str) -> None:
         CIO1519.05                #....   Close Request Switch
         CIO1509.15                #....   TCP Open Flag
     """
+    )
     rig.run_until("Main.conn.ENO", 2)
-    assert (code(rig), len(peer.callers)) == ("", 2)
+    assert (rig.code("conn"), len(peer.callers)) == ("", 2)
 
 
 def test_a_server_that_closes_at_once() -> None:
     rig = Rig(ScriptedPeer(greeting=[Fin()]))
     rig.run_until("Main.conn.Error", 2)
-    assert code(rig) == "0081"
+    assert rig.code("conn") == "0081"
     rig.run_until("CIO 1519.02", 2)
 
 
@@ -152,7 +160,9 @@ def test_a_socket_left_open_by_a_mode_change() -> None:
     rig.plc.mode = Mode.PROGRAM
     rig.scan(2)
     rig.plc.mode = Mode.RUN
-    assert rig.chart(6, *PINS, *WORDS) == """
+    assert (
+        rig.chart(6, *PINS, *WORDS)
+        == """
         Main.Connect              ######
         Main.conn.ENO             ....##
         Main.conn.Waiting_Server  ####..
@@ -162,6 +172,7 @@ def test_a_socket_left_open_by_a_mode_change() -> None:
         CIO1509.15                ...###   TCP Open Flag
         D30009                    6|||4    = 6, 10, 2, 4   TCP Connection State
     """
+    )
 
 
 def test_a_restart_of_the_unit() -> None:
@@ -169,14 +180,14 @@ def test_a_restart_of_the_unit() -> None:
     rig.plc.units[0].link.submit(rig.unit.reset(rig.plc.memory), rig.plc.now_ns)
     rig.run_until("Main.conn.Error", 1)
     rig.run_until("Main.conn.ENO", 2)
-    assert code(rig) == ""
+    assert rig.code("conn") == ""
 
 
 def test_all_sockets_closed_by_force() -> None:
     rig = Rig().connect()
     rig.plc.write("CIO 1500.02", True)
     rig.run_until("Main.conn.Error", 1)
-    assert code(rig) == "0081"
+    assert rig.code("conn") == "0081"
     rig.run_until("Main.conn.ENO", 2)
 
 
@@ -185,13 +196,13 @@ def test_an_octet_above_ff(octet: int) -> None:
     rig = Rig()
     rig.set("Octet1", octet)
     rig.scan()
-    assert code(rig) == "1100"
+    assert rig.code("conn") == "1100"
     assert not rig.get("conn.Waiting_Server")
     rig.scan(3)
     assert rig.words(30018, 10) == [0] * 10, "nothing was asked of the unit"
     rig.set("Octet1", 192)
     rig.connect()
-    assert code(rig) == ""
+    assert rig.code("conn") == ""
 
 
 def test_an_octet_that_becomes_wrong_between_two_tries() -> None:
@@ -210,7 +221,7 @@ def test_a_second_connect_block_gets_220f() -> None:
     rig = Rig(more=SECOND, more_variables="conn2 : MTCP_ETN_Connect; Connect2 : BOOL;").connect()
     rig.set("Connect2", True)
     rig.scan(5)
-    assert code(rig, "conn2") == "220F"
+    assert rig.code("conn2") == "220F"
     assert rig.get("conn.ENO")
     rig.set("Connect", False)
     rig.run_until("CIO 1519.02", 1)
@@ -220,11 +231,14 @@ def test_a_second_connect_block_gets_220f() -> None:
 def test_en_falls_and_the_connection_stays() -> None:
     rig = Rig().connect()
     rig.set("conn_EN", False)
-    assert rig.chart(2, "conn.ENO", "CIO 1509.15", "CIO 1519.05") == """
+    assert (
+        rig.chart(2, "conn.ENO", "CIO 1509.15", "CIO 1519.05")
+        == """
         Main.conn.ENO  ..
         CIO1509.15     ##   TCP Open Flag
         CIO1519.05     ..   Close Request Switch
     """
+    )
     rig.set("conn_EN", True)
     rig.scan()
     assert rig.get("conn.ENO")
@@ -237,7 +251,7 @@ def test_en_falls_while_the_socket_opens() -> None:
     rig.scan(2000)
     rig.set("conn_EN", True)
     rig.scan()
-    assert (rig.get("conn.ENO"), code(rig)) == (True, "")
+    assert (rig.get("conn.ENO"), rig.code("conn")) == (True, "")
 
 
 def test_the_area_bound_by_another_socket() -> None:
@@ -249,5 +263,5 @@ def test_the_area_bound_by_another_socket() -> None:
     rig.run_until("CIO 1510.15")
     rig.set("Connect", True)
     rig.run_until("Main.conn.Error", 1)
-    assert code(rig) == "2607"
+    assert rig.code("conn") == "2607"
     assert rig.get("conn.Waiting_Server")

@@ -32,7 +32,6 @@ def next_command_is_good(rig: Rig) -> None:
     rig.connect()
     before = rig.result("rd")[0]
     rig.command("rd")
-    assert isinstance(before, int)
     assert rig.result("rd") == (before + 1, "")
     assert rig.words(200, 3) == list(rig.server.holding_registers[1000:1003])
 
@@ -304,7 +303,7 @@ def test_error_and_code_hold_until_the_next_command() -> None:
     assert rig.result("rd")[1] == ""
 
 
-# --- codes of the unit -------------------------------------------------------------------------------------------------
+# --- codes of the unit ------------------------------------------------------------------------------------------------
 
 UNIT_CODES = ["0302", "1100", "1103", "220F", "2211", "2606", "2607", "0020", "003E", "0045", "004E", "0051", "0053"]
 

@@ -27,7 +27,9 @@ def reading(**options: object) -> Rig:
 def test_fn03() -> None:
     rig = reading()
     rig.set("rd_Cmd", True)
-    assert rig.chart(6, *PINS, *WORDS, "D200", "D202") == """
+    assert (
+        rig.chart(6, *PINS, *WORDS, "D200", "D202")
+        == """
         Main.rd_Cmd          ######
         Main.rd.Rcv_Counter  0   |1
         Main.rd.Error        ......
@@ -39,12 +41,15 @@ def test_fn03() -> None:
         D200                 0   |43794
         D202                 0   |38675
     """
+    )
 
 
 def test_fn06() -> None:
     rig = Rig(rd=WRITE_ONE).connect()
     rig.set("rd_Cmd", True)
-    assert rig.chart(6, *PINS, *WORDS) == """
+    assert (
+        rig.chart(6, *PINS, *WORDS)
+        == """
         Main.rd_Cmd          ######
         Main.rd.Rcv_Counter  0   |1
         Main.rd.Error        ......
@@ -54,6 +59,7 @@ def test_fn06() -> None:
         D30001               0||0     = 0, 12, 0   Number of Bytes Received
         D30023               12       Number of Bytes to Send or Receive
     """
+    )
     assert rig.server.holding_registers[2000] == 0x3AC5
 
 
@@ -61,7 +67,9 @@ def test_fn10() -> None:
     rig = Rig(rd=WRITE).connect()
     rig.fill(300, [0x3AC5, 0x9713])
     rig.set("rd_Cmd", True)
-    assert rig.chart(6, *PINS, *WORDS) == """
+    assert (
+        rig.chart(6, *PINS, *WORDS)
+        == """
         Main.rd_Cmd          ######
         Main.rd.Rcv_Counter  0   |1
         Main.rd.Error        ......
@@ -71,6 +79,7 @@ def test_fn10() -> None:
         D30001               0||0     = 0, 12, 0   Number of Bytes Received
         D30023               17|12    Number of Bytes to Send or Receive
     """
+    )
     assert list(rig.server.holding_registers[1000:1002]) == [0x3AC5, 0x9713]
 
 
@@ -78,7 +87,9 @@ def test_fn03_when_the_reply_is_an_exception() -> None:
     """Fifteen bytes were expected and nine came: first the six up to the length, then the rest."""
     rig = Rig(rd=READ.replace("1000", "65534")).connect()
     rig.set("rd_Cmd", True)
-    assert rig.chart(8, *PINS, "rd.Error_Code", *WORDS) == """
+    assert (
+        rig.chart(8, *PINS, "rd.Error_Code", *WORDS)
+        == """
         Main.rd_Cmd          ########
         Main.rd.Rcv_Counter  0     |1
         Main.rd.Error        ......##
@@ -89,13 +100,17 @@ def test_fn03_when_the_reply_is_an_exception() -> None:
         D30001               0||||0     = 0, 9, 0, 3, 0   Number of Bytes Received
         D30023               12|6|3     Number of Bytes to Send or Receive
     """
+    )
 
 
 def test_fn03_when_the_reply_comes_in_pieces() -> None:
     """A block does not ask for bytes that are not there yet."""
-    rig = reading(peer=answering(lambda frame: [Say(frame[:4]), Say(frame[4:9], 30_000_000), Say(frame[9:], 60_000_000)]))
+    pieces = answering(lambda frame: [Say(frame[:4]), Say(frame[4:9], 30_000_000), Say(frame[9:], 60_000_000)])
+    rig = reading(peer=pieces)
     rig.set("rd_Cmd", True)
-    assert rig.chart(12, *PINS, *WORDS, "D200") == """
+    assert (
+        rig.chart(12, *PINS, *WORDS, "D200")
+        == """
         Main.rd_Cmd          ############
         Main.rd.Rcv_Counter  0        |1
         Main.rd.Error        ............
@@ -106,6 +121,7 @@ def test_fn03_when_the_reply_comes_in_pieces() -> None:
         D30023               12  |6 |9         Number of Bytes to Send or Receive
         D200                 0        |43794
     """
+    )
 
 
 # --- the sheet's examples ---------------------------------------------------------------------------------------------
@@ -173,7 +189,7 @@ def test_a_command_acts_on_its_rising_edge() -> None:
 
 
 def test_transaction_numbers_differ() -> None:
-    rig = reading(more="")
+    rig = reading()
     for _ in range(4):
         rig.command("rd")
     numbers = [frame[:2] for frame in rig.peer.heard]
@@ -190,9 +206,8 @@ def test_the_slave_id(slave: int, sent: int) -> None:
 
 def test_inputs_are_taken_at_the_edge() -> None:
     """What the program writes to the pins while a command runs is for the next one."""
-    rig = Rig(
-        rd="Fn03(Register_Address := 1000, Register_Qty := 1, RespData_DM := Where)", more_variables="Where : UINT := 200;"
-    ).connect()
+    block = "Fn03(Register_Address := 1000, Register_Qty := 1, RespData_DM := Where)"
+    rig = Rig(rd=block, more_variables="Where : UINT := 200;").connect()
     rig.server.holding_registers[1000] = 7
     rig.set("rd_Cmd", True)
     rig.scan()
@@ -221,7 +236,9 @@ def test_reply_and_end_of_the_connection_together() -> None:
     reply = bytes.fromhex("000100000009FF0306AB1256789713")
     rig = Rig(ScriptedPeer([Say(reply), Fin()]), rd=READ).connect()
     rig.set("rd_Cmd", True)
-    assert rig.chart(9, "conn.ENO", *PINS, "CIO 1519.04", "CIO 1519.05", "D30009", "D202") == """
+    assert (
+        rig.chart(9, "conn.ENO", *PINS, "CIO 1519.04", "CIO 1519.05", "D30009", "D202")
+        == """
         Main.conn.ENO        #####....
         Main.rd_Cmd          #########
         Main.rd.Rcv_Counter  0   |1
@@ -231,3 +248,4 @@ def test_reply_and_end_of_the_connection_together() -> None:
         D30009               4|5   ||0    = 4, 5, 8, 0   TCP Connection State
         D202                 0   |38675
     """
+    )

@@ -41,7 +41,9 @@ def test_two_commands_in_one_scan() -> None:
     rig = two()
     rig.set("a_Cmd", True)
     rig.set("b_Cmd", True)
-    assert rig.chart(10, *SIGNALS) == """
+    assert (
+        rig.chart(10, *SIGNALS)
+        == """
         Main.a.Exchange.State  3 |4|0
         Main.b.Exchange.State  1   |3|4|0
         Main.a.Rcv_Counter     0   |1
@@ -49,6 +51,7 @@ def test_two_commands_in_one_scan() -> None:
         CIO1519.03             #...#.....   Send Request Switch
         CIO1519.04             ..#...#...   Receive Request Switch
     """
+    )
     assert both_are_right(rig)
 
 
@@ -81,8 +84,8 @@ def test_nobody_is_overtaken() -> None:
             rig.set(f"{name}_Cmd", rig.get(f"{name}.Exchange.State") == 0 and not rig.get(f"{name}_Cmd"))
         rig.scan()
     served = [rig.result(name)[0] for name in ALL]
-    assert min(served) >= 40  # type: ignore[type-var]
-    assert max(served) - min(served) <= 1  # type: ignore[operator]
+    assert min(served) >= 40
+    assert max(served) - min(served) <= 1
 
 
 @pytest.mark.parametrize("after", range(1, 10))

@@ -1,0 +1,73 @@
+"""The folders of fblib: each file named as its POU, each library described, its README's program running."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from mtcp_rig import SERVER
+
+from fbvm.base.data import data_folder
+from fbvm.code.compiler import compile_text
+from fbvm.net.loop import LoopNetwork
+from fbvm.net.peers import ModbusPeer
+from fbvm.plc import Plc
+from fbvm.units.etn21 import Etn21
+
+FBLIB = data_folder("fblib")
+FILES = sorted(FBLIB.rglob("*.st"))
+BLOCKS = [path for path in FILES if "\nFUNCTION_BLOCK " in path.read_text(encoding="utf-8")]
+LIBRARIES = sorted({path.parent for path in FILES})
+MTCP = FBLIB / "omron" / "mtcp_etn"
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_a_file_holds_the_pou_that_it_is_named_after(path: Path) -> None:
+    described = tomllib.loads((path.parent / "library.toml").read_text(encoding="utf-8"))
+    text = path.read_text(encoding="utf-8")
+    pous = re.findall(r"^(?:FUNCTION_BLOCK|FUNCTION|PROGRAM) (\w+)", text, re.M)
+    assert pous == ([] if path.name in described["globals"] else [path.stem])
+    assert text.startswith("//"), "it says what it is for"
+    assert max(map(len, text.splitlines())) <= 120
+
+
+@pytest.mark.parametrize("folder", LIBRARIES, ids=lambda path: path.name)
+def test_a_library_is_described(folder: Path) -> None:
+    described = tomllib.loads((folder / "library.toml").read_text(encoding="utf-8"))
+    assert {"title", "sheet", "globals"} <= described.keys()
+    assert all((folder / name).is_file() for name in described["globals"])
+    assert (folder / "README.md").is_file()
+
+
+@pytest.mark.parametrize("path", BLOCKS, ids=lambda path: path.stem)
+def test_no_block_gives_a_message(path: Path) -> None:
+    """Functions are checked with the blocks that use them."""
+    made = compile_text(f"PROGRAM Main VAR b : {path.stem}; END_VAR END_PROGRAM")
+    assert made.diagnostics == []
+
+
+def test_the_program_in_the_readme() -> None:
+    readme = (MTCP / "README.md").read_text(encoding="utf-8")
+    text = re.search(r"```\n(PROGRAM.*?)```", readme, re.S)
+    assert text is not None
+    made = compile_text(text[1])
+    assert made.image is not None
+    plc, network, peer = Plc(made.image), LoopNetwork(), ModbusPeer()
+    peer.server.holding_registers[1000] = 4711
+    network.place(SERVER, peer)
+    plc.attach(Etn21(0, "192.168.250.1"), network)
+    plc.run(scans=10)
+    assert plc.read("D200") == 4711
+
+
+def test_the_time_limits_may_be_set_by_a_declaration() -> None:
+    made = compile_text(
+        "PROGRAM Main VAR rd : MTCP_ETN_Fn03 := (Reply_Time := T#2s); "
+        "conn : MTCP_ETN_Connect := (Open_Time := T#3s, Retry_Time := T#4s); END_VAR END_PROGRAM"
+    )
+    assert made.image is not None
+    plc = Plc(made.image)
+    names = ("Main.rd.Reply_Time", "Main.conn.Open_Time", "Main.conn.Retry_Time")
+    assert [plc.read(name) for name in names] == [2 * 10**9, 3 * 10**9, 4 * 10**9]
