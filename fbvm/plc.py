@@ -89,6 +89,8 @@ class Plc:
         self.budget = budget
         self.memory = Memory(image.layout.size, image.layout.areas)
         self.engine: Engine = PythonEngine(image, self.memory, observed=observed)
+        cio = self.memory.areas["CIO"]
+        self._cio = self.memory.u8[cio.offset : cio.offset + cio.size_bytes]
         self.units: list[Attached] = []
         self.watchers: list[Callable[[Plc], None]] = []
         """Called at the end of each scan, after its I/O refresh: recorders, watches."""
@@ -97,7 +99,7 @@ class Plc:
         self.scans = 0
         self.trap: Trap | None = None
         self.stirred = False
-        """True if in the last scan something passed between a unit and its network."""
+        """True if in the last scan a network told something or a unit changed a CIO word: the program has news to see."""
         self._mode = Mode.RUN
         self._first = True
         self._forces: dict[Place, Value] = {}
@@ -152,12 +154,17 @@ class Plc:
 
     def _refresh(self) -> None:
         """I/O refresh: each unit exchanges its words once, the networks take what the units ask for."""
-        self.stirred = False
+        if not self.units:
+            return
+        before = self._cio.tobytes()
+        told = False
         for attached in self.units:
             events = attached.link.events(self.now_ns)
             requests = attached.unit.refresh(self.memory, events, self.now_ns)
-            attached.link.submit(requests, self.now_ns)
-            self.stirred = self.stirred or bool(events or requests)
+            if requests:
+                attached.link.submit(requests, self.now_ns)
+            told = told or bool(events)
+        self.stirred = told or self._cio.tobytes() != before
 
     @property
     def elapsed_ns(self) -> int:

@@ -92,8 +92,8 @@ class _Real:
             while (left_ns := self._planned_ns - self._now_ns()) > 0:
                 time.sleep(left_ns / 1e9)
         now_ns = max(self._now_ns(), self._plc.now_ns)
-        self._planned_ns = max(self._planned_ns + self._plc.cycle_ns, now_ns)
-        if self._pace == EVENT:
+        self._planned_ns += self._plc.cycle_ns
+        if self._pace == EVENT or self._planned_ns <= now_ns:
             self._planned_ns = now_ns + self._plc.cycle_ns
         return now_ns
 

@@ -1,0 +1,178 @@
+"""The loop that waits: periods, overruns, events, timed writes, Ctrl-C.
+
+The host's clock is a stand-in that never waits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pytest
+from images import counter_image, task
+
+from fbvm.plc import Plc
+from fbvm.run import TimedWrite, loop, run
+from fbvm.units.unit import AreaMemory
+from fbvm.wire.link import Event, Link, Request
+
+MS = 1_000_000
+
+
+class Clock:
+    """Stands in for the module `time`: sleeping moves it, and each look costs a microsecond."""
+
+    def __init__(self) -> None:
+        self.now_ns = 1_000_000_000_000
+        self.slept_ns: list[int] = []
+
+    def monotonic_ns(self) -> int:
+        self.now_ns += 1000
+        return self.now_ns
+
+    def sleep(self, seconds: float) -> None:
+        self.slept_ns.append(round(seconds * 1e9))
+        self.now_ns += round(seconds * 1e9)
+
+
+class RealNetwork:
+    """A network of real time on which something happens at the given times."""
+
+    virtual_time = False
+    address = ""
+
+    def __init__(self, clock: Clock, *happenings_ms: int) -> None:
+        self.clock = clock
+        self.waits_ms: list[float] = []
+        self._happenings_ns = [clock.now_ns + at_ms * MS for at_ms in happenings_ms]
+
+    def attach(self, address: str) -> Link:
+        return self
+
+    def wait(self, timeout_s: float) -> bool:
+        self.waits_ms.append(round(timeout_s * 1e3))
+        until_ns = self.clock.now_ns + max(0, round(timeout_s * 1e9))
+        early = self._happenings_ns.pop(0) if self._happenings_ns and self._happenings_ns[0] < until_ns else None
+        self.clock.now_ns = max(self.clock.now_ns, until_ns if early is None else early)
+        return early is not None
+
+    def events(self, now_ns: int) -> list[Event]:
+        return []
+
+    def submit(self, requests: Sequence[Request], now_ns: int) -> None:  # type: ignore[override]
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+class Idle:
+    """A unit that does nothing."""
+
+    name, address = "Idle 0", "192.168.250.9"
+
+    def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
+        return []
+
+    def reset(self, memory: AreaMemory) -> list[Request]:
+        return []
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    stand_in = Clock()
+    monkeypatch.setattr(loop, "time", stand_in)
+    return stand_in
+
+
+def real_plc(clock: Clock, *happenings_ms: int) -> tuple[Plc, RealNetwork]:
+    plc, network = Plc(counter_image()), RealNetwork(clock, *happenings_ms)
+    plc.attach(Idle(), network)
+    return plc, network
+
+
+def scan_times_ms(plc: Plc, **bounds: object) -> list[int]:
+    times: list[int] = []
+    plc.watchers.append(lambda plc: times.append(plc.now_ns // MS))
+    run(plc, **bounds)  # type: ignore[arg-type]
+    return times
+
+
+# --- virtual time -----------------------------------------------------------------------------------------------------
+
+
+def test_virtual_time_never_sleeps(clock: Clock) -> None:
+    assert scan_times_ms(Plc(counter_image()), scans=4) == [0, 10, 20, 30]
+    assert clock.slept_ns == []
+
+
+def test_writes_come_before_the_scan_of_their_time() -> None:
+    plc = Plc(counter_image())
+    writes = [TimedWrite(plc.find("Main.step"), 10, 15 * MS), TimedWrite(plc.find("Main.step"), 2)]
+    assert run(plc, scans=4, writes=writes) == "scans"
+    assert plc.read("Main.n") == 2 + 2 + 10 + 10
+
+
+def test_progress_is_told_now_and_then(clock: Clock) -> None:
+    told: list[int] = []
+    run(Plc(counter_image()), scans=1000, progress=lambda plc: told.append(plc.scans))
+    assert told == []
+    plc = Plc(counter_image())
+    plc.watchers.append(lambda plc: clock.sleep(0.03))
+    run(plc, scans=8, progress=lambda plc: told.append(plc.scans))
+    assert told == [4, 8]
+
+
+def test_ctrl_c_ends_a_run_cleanly() -> None:
+    plc = Plc(counter_image())
+
+    def interrupt(plc: Plc) -> None:
+        if plc.scans == 3:
+            raise KeyboardInterrupt
+
+    plc.watchers.append(interrupt)
+    assert run(plc, scans=9) == "interrupted"
+    assert plc.scans == 3
+
+
+def test_an_unknown_pace_is_refused() -> None:
+    with pytest.raises(ValueError, match="pace is cyclic or event"):
+        run(Plc(counter_image()), scans=1, pace="fast")
+
+
+# --- real time --------------------------------------------------------------------------------------------------------
+
+
+def test_a_period_is_kept(clock: Clock) -> None:
+    plc, _ = real_plc(clock)
+    assert scan_times_ms(plc, scans=5) == [0, 10, 20, 30, 40]
+    assert all(9 * MS < slept_ns <= 10 * MS for slept_ns in clock.slept_ns)
+
+
+def test_a_period_that_was_overrun_is_not_made_up_for(clock: Clock) -> None:
+    plc, _ = real_plc(clock)
+
+    def long(plc: Plc) -> None:
+        if plc.scans == 2:
+            clock.now_ns += 25 * MS
+
+    plc.watchers.append(long)
+    assert scan_times_ms(plc, scans=5) == [0, 10, 35, 45, 55]
+
+
+def test_a_real_run_goes_on_from_where_time_stands(clock: Clock) -> None:
+    plc, _ = real_plc(clock)
+    run(plc, scans=2)
+    clock.now_ns += 500 * MS
+    assert scan_times_ms(plc, for_ns=30 * MS) == [20, 30, 40]
+
+
+def test_event_pace_scans_when_something_arrives(clock: Clock) -> None:
+    plc, network = real_plc(clock, 3, 4, 22)
+    assert scan_times_ms(plc, scans=6, pace="event") == [0, 3, 4, 14, 22, 32]
+    assert network.waits_ms == [0, 10, 10, 10, 10, 10]
+
+
+def test_event_pace_wakes_for_a_tasks_interval(clock: Clock) -> None:
+    plc, network = Plc(counter_image(task("fast", interval_ns=4 * MS))), RealNetwork(clock)
+    plc.attach(Idle(), network)
+    assert scan_times_ms(plc, scans=4, pace="event") == [0, 4, 8, 12]
