@@ -112,7 +112,7 @@ find       | a b                    | i16    |             | first position of b
 to_text    | data_type a            | s8     |             | the value as a literal would be read back, by data type's name
 from_text  | data_type a site       | any    | R0111 R0105 | reads a literal with or without type prefix, spaces trimmed
 enum_text  | names a                | s8     |             | the member's name by value from `names`, else the number
-reference  | address bit            | ref    |             | object 1 (the whole buffer) or that of the base: where the place is; bit 0..7, or 255 for a value that fills bytes
+reference  | address bit            | ref    |             | the place in object 1, or the base's; bit 0..7 or 255 (WHOLE_BYTES)
 """
 
 _STATEMENTS = """
