@@ -10,7 +10,7 @@ from typing import Any
 from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import width
 from fbvm.code.operations import INTEGERS, SIZES, Address, Node
-from fbvm.engine.ranges import fits, is_float, mask, may_trap, span
+from fbvm.engine.ranges import fits, is_float, mask, may_trap, number, span
 from fbvm.engine.writer import Expressions, Rows, bare
 
 SIGNS = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^",
@@ -73,23 +73,25 @@ def _divide(e: Expressions, machine: str, a: Node, b: Node, site: int) -> str:
     node = ("div", machine, a, b, site)
     if is_float(machine):
         return _brought("div")(e, machine, a, b, site)
-    if b[0] == "const" and b[2] > 0:
-        return _toward_zero("//", e, a, b[2])
+    divisor = number(b)
+    if divisor is not None and divisor > 0:
+        return _toward_zero("//", e, a, divisor)
     text = f"quotient({bare(e.value(a))}, {bare(e.value(b))}, {site})"
-    return text if fits(node) or (b[0] == "const" and b[2] != -1) else e.bring(text, machine)
+    return text if fits(node) or divisor not in (None, -1) else e.bring(text, machine)
 
 
 def _toward_zero(sign: str, e: Expressions, a: Node, b: int) -> str:
     """Quotient or remainder by a positive constant; Python's go toward minus infinity."""
     if span(a)[0] >= 0:
         return f"({e.value(a)} {sign} {b})"
-    v = e.name("v")
-    return f"({v} {sign} {b} if ({v} := {bare(e.value(a))}) >= 0 else -(-{v} {sign} {b}))"
+    first, v = e.once(e.value(a))
+    return f"({v} {sign} {b} if {first} >= 0 else -(-{v} {sign} {b}))"
 
 
 def _remainder(e: Expressions, machine: str, a: Node, b: Node, site: int) -> str:
-    if b[0] == "const" and b[2] > 0:
-        return _toward_zero("%", e, a, b[2])
+    divisor = number(b)
+    if divisor is not None and divisor > 0:
+        return _toward_zero("%", e, a, divisor)
     return f"remainder({bare(e.value(a))}, {bare(e.value(b))}, {site})"
 
 
@@ -132,11 +134,12 @@ def _compare(name: str) -> Callable[..., str]:
 
 def _shift(name: str) -> Callable[..., str]:
     def emit(e: Expressions, machine: str, a: Node, n: Node, site: int) -> str:
-        if n[0] == "const" and 0 <= n[2] < width(machine):
+        count = number(n)
+        if count is not None and 0 <= count < width(machine):
             if name == "shift_left":
-                return e.bring(f"({e.loose(a)} << {n[2]})", machine)
-            if name == "shift_right" and (n[2] == 0 or span(a)[0] >= 0):
-                return f"({e.value(a)} >> {n[2]})" if n[2] else e.value(a)
+                return e.bring(f"({e.loose(a)} << {count})", machine)
+            if name == "shift_right" and (count == 0 or span(a)[0] >= 0):
+                return f"({e.value(a)} >> {count})" if count else e.value(a)
         return f"{name}({bare(e.value(a))}, {bare(e.value(n))}, {machine!r}, {site})"
 
     return emit
@@ -178,8 +181,9 @@ def _extreme(sign: str, function: str) -> Callable[..., str]:
     def emit(e: Expressions, machine: str, a: Node, b: Node) -> str:
         if is_float(machine):
             return f"{function}({bare(e.value(a))}, {bare(e.value(b))})"
-        v, w = e.name("v"), e.name("v")
-        return f"({v} if ({v} := {bare(e.value(a))}) {sign} ({w} := {bare(e.value(b))}) else {w})"
+        first, v = e.once(e.value(a))
+        second, w = e.once(e.value(b))
+        return f"({v} if {first} {sign} {second} else {w})"
 
     return emit
 
@@ -188,8 +192,8 @@ def _check(e: Expressions, machine: str, a: Node, low: int, high: int, code: str
     least, greatest = span(a)
     if low <= least and greatest <= high:
         return e.value(a)
-    v = e.name("v")
-    return f"({v} if {low} <= ({v} := {bare(e.value(a))}) <= {high} else stop({code!r}, {site}, {v}, {low}, {high}))"
+    first, v = e.once(e.value(a))
+    return f"({v} if {low} <= {first} <= {high} else stop({code!r}, {site}, {v}, {low}, {high}))"
 
 
 def _load(e: Expressions, machine: str, address: Address) -> str:
@@ -199,6 +203,8 @@ def _load(e: Expressions, machine: str, address: Address) -> str:
 
 
 def _load_raw(e: Expressions, machine: str, address: Address) -> str:
+    if SIZES[machine] == 1:
+        return f"{view(machine)}[{bare(e.place(address, 1))}]"
     return f"get_{machine}(buffer, {bare(e.place(address, SIZES[machine]))})[0]"
 
 

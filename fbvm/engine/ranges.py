@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fbvm.base.arithmetic import limits, quotient, width
+from fbvm.base.arithmetic import limits, quotient, width, wrap
 from fbvm.code.operations import EXPRESSIONS, INTEGERS, Node
 from fbvm.code.shapes import is_address, is_expression
 
@@ -29,12 +29,23 @@ def may_trap(item: Any) -> bool:
     return any(may_trap(part) for part in item)
 
 
+def number(node: Node) -> int | None:
+    """The value of an integer that is a constant, also one that was converted; else None."""
+    if node[0] == "const" and not is_float(node[1]):
+        return int(node[2])
+    if node[0] == "convert" and not is_float(node[1]) and not is_float(node[2]):
+        value = number(node[3])
+        return None if value is None else wrap(value, node[1])
+    return None
+
+
 def _traps_itself(node: Node) -> bool:
     name = node[0]
     if name in ("div", "mod"):
-        return not is_float(node[1]) and not (node[3][0] == "const" and node[3][2])
+        return not is_float(node[1]) and not number(node[3])
     if name in ("shl", "shr", "rol", "ror"):
-        return not (node[3][0] == "const" and node[3][2] >= 0)
+        count = number(node[3])
+        return count is None or count < 0
     if name == "load_flag":
         return False  # by its address
     return bool(EXPRESSIONS[name].traps)
@@ -78,17 +89,18 @@ def _product(node: Node) -> Range:
 
 
 def _quotient(node: Node) -> Range:
-    if node[3][0] == "const" and node[3][2] > 0:
+    divisor = number(node[3])
+    if divisor is not None and divisor > 0:
         low, high = span(node[2])
-        return quotient(low, node[3][2]), quotient(high, node[3][2])
+        return quotient(low, divisor), quotient(high, divisor)
     low, high = limits(node[1])
     return low, high + (low < 0)
 
 
 def _remainder(node: Node) -> Range:
     low, high = span(node[2])
-    if node[3][0] == "const" and node[3][2]:
-        most = abs(node[3][2]) - 1
+    if divisor := number(node[3]):
+        most = abs(divisor) - 1
         return (max(low, -most) if low < 0 else 0), (min(high, most) if high > 0 else 0)
     return min(low, 0), max(high, 0)
 
@@ -110,9 +122,8 @@ def _bitwise(node: Node) -> Range:
 
 def _shifted(node: Node) -> Range:
     low, high = span(node[2])
-    if low >= 0 and node[3][0] == "const" and node[3][2] >= 0:
-        return 0, high >> min(node[3][2], 64)
-    return limits(node[1])
+    count = number(node[3])
+    return (0, high >> min(count, 64)) if low >= 0 and count is not None and count >= 0 else limits(node[1])
 
 
 def _converted(node: Node) -> Range:
@@ -125,8 +136,8 @@ def _checked(node: Node) -> Range:
 
 
 def _floored(node: Node) -> Range:
-    low, high = span(node[2])
-    return (low // node[3][2], high // node[3][2]) if node[3][0] == "const" else limits(node[1])
+    (low, high), divisor = span(node[2]), number(node[3])
+    return (low // divisor, high // divisor) if divisor else limits(node[1])
 
 
 _LENGTH = (0, (1 << 31) - 1)

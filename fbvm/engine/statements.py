@@ -157,6 +157,11 @@ def _store(w: BodyWriter, machine: str, address: Address, a: Node) -> None:
 
 
 def _store_raw(w: BodyWriter, machine: str, address: Address, a: Node) -> None:
+    if SIZES[machine] == 1:
+        place = _ordered(w, address, a, bare(w.place(address, 1)))
+        stored, text = w.stored(machine, a)
+        w.line(f"{view(stored)}[{place}] = {text}")
+        return
     place = bare(w.place(address, SIZES[machine]))
     stored, text = w.stored(machine, a)
     if machine == "f32":
@@ -313,8 +318,8 @@ def _charge(w: BodyWriter, count: int, site: int) -> None:
 
 
 def _due(w: BodyWriter, a: Node) -> None:
-    name = w.name("v")
-    w.line(f"if ({name} := {bare(w.value(a))}) < i64[{DUE // 8}]: i64[{DUE // 8}] = {name}")
+    first, time = w.once(w.value(a))
+    w.line(f"if {first} < i64[{DUE // 8}]: i64[{DUE // 8}] = {time}")
 
 
 def _stop(w: BodyWriter, code: str, site: int) -> None:

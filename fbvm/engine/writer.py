@@ -72,6 +72,13 @@ class Expressions:
         self._names += 1
         return f"{letter}{self._names}"
 
+    def once(self, text: str) -> tuple[str, str]:
+        """Python that works something out, and Python for its value from then on."""
+        if text.isidentifier() or text.isdigit():
+            return text, text
+        v = self.name("v")
+        return f"({v} := {bare(text)})", v
+
     def constant(self, value: Any) -> str:
         """The name of an object that is made once."""
         name = f"K{len(self.constants) + 1}"
@@ -125,16 +132,16 @@ class Expressions:
         low, high = limits(machine)
         if low == 0:
             return f"({text} & {high})"
-        v = self.name("v")
-        return f"({v} if {low} <= ({v} := {bare(text)}) <= {high} else ({v} + {-low} & {high - low}) - {-low})"
+        first, v = self.once(text)
+        return f"({v} if {low} <= {first} <= {high} else ({v} + {-low} & {high - low}) - {-low})"
 
     def stored(self, machine: str, node: Node) -> tuple[str, str]:
         """The type of the view and Python for what is stored there: cheaper than the value where the view rounds."""
         if is_float(machine):
             if (node[0] == "const" and node[2] == node[2]) or (node[0] == "convert" and not is_float(node[2])):
                 return machine, self.value(node)
-            v = self.name("v")
-            return machine, f"{v} if ({v} := {bare(self.loose(node))}) == {v} else NAN"
+            first, v = self.once(self.loose(node))
+            return machine, f"{v} if {first} == {v} else NAN"
         if machine in INTEGERS and node[0] in ARITHMETIC and not fits(node):
             return f"u{width(machine)}", f"{self.loose(node)} & {mask(machine)}"
         return machine, bare(self.value(node))
@@ -172,8 +179,7 @@ class Expressions:
         for stride, term in terms:
             text = self.value(term)
             parts.append(text if stride == 1 else f"{text} * {stride}")
-        text = " + ".join(parts)
-        if not text:
+        if not parts:
             return str(offset)
-        text = plus(text, offset)
-        return f"({text})" if " " in text else text
+        text = plus(" + ".join(parts), offset)
+        return text if text in parts and "*" not in text else f"({text})"
