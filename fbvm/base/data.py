@@ -1,4 +1,4 @@
-"""Finds the folders `grammar/` and `fblib/` that travel with the package, and the folder for what may be computed again."""
+"""Finds the folders `grammar/` and `fblib/` that travel with the package, and the folder for what can be made again."""
 
 from __future__ import annotations
 

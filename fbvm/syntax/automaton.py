@@ -17,13 +17,13 @@ NESTING_LIMIT = 200
 STACK_LIMIT = 4000
 """States of a parse that keeps NESTING_LIMIT; only a chain of signs or NOTs without end needs more."""
 
-NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "STRUCT", "UNION", "ARRAY", "REF_TO", "POINTER",
-                     "REFERENCE"))
+NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "STRUCT", "UNION", "ARRAY", "REF_TO",
+                     "POINTER", "REFERENCE"))
 REFUSED = frozenset(("REFUSED_SECTION", "REFUSED_BLOCK"))
-DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT", "END_FUNCTION",
-                      "END_FUNCTION_BLOCK", "END_PROGRAM"))
-"""Words that end a list of statements.  The tables reduce the list for any of them and find out later that it was the wrong
-one; those who mend want to know before."""
+DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT",
+                      "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM"))
+"""Words that end a list of statements.  The tables reduce the list for any of them and find out later that it was the
+wrong one; those who mend want to know before."""
 
 FUNCTION_OPERATORS = frozenset(("AND", "OR", "XOR", "MOD", "NOT"))
 """Reserved words that are names in front of `(`, as in `AND(a, b)`."""

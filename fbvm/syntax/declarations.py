@@ -13,7 +13,6 @@ from fbvm.syntax.tree import (
     Expr,
     GlobalVars,
     Initial,
-    Literal,
     Location,
     Name,
     NamedType,
@@ -25,7 +24,6 @@ from fbvm.syntax.tree import (
     SourceText,
     StructInit,
     Task,
-    TypeDecl,
     TypeSpec,
     VarDecl,
     VarSection,
@@ -124,9 +122,11 @@ class Declarations(Statements):
         if values is None or len(values) == 1:
             return [(times, values[0] if values else None)]
         if not isinstance(times.value, int) or times.value * len(values) > REPEATED_LIMIT:
-            self.report("S0108", times.start, times.end, f"`{count.text}` repetitions of {len(values)} values are too many", "")
+            self.report("S0108", times.start, times.end,
+                        f"`{count.text}` repetitions of {len(values)} values are too many")
             return []
-        return [(None, value) for value in values] * times.value
+        group: list[Item] = [(None, value) for value in values]
+        return group * times.value
 
     def struct_init(self, opener: Token, fields: list[tuple[Name, Initial]], closer: Token) -> StructInit:
         return StructInit(opener.start, closer.end, tuple(fields))
@@ -141,8 +141,9 @@ class Declarations(Statements):
         resources = [i for i in items if isinstance(i, Resource)]
         if loose:
             resources.append(_resource(loose[0].start, loose[-1].end, None, None, loose))
-        return Configuration(word.start, end.end, self.declared(token), tuple(i for i in items if isinstance(i, VarSection)),
-                             tuple(resources), tuple(i for i in items if isinstance(i, Refused)))
+        return Configuration(
+            word.start, end.end, self.declared(token), tuple(i for i in items if isinstance(i, VarSection)),
+            tuple(resources), tuple(i for i in items if isinstance(i, Refused)))
 
     def resource(self, word: Token, token: Token, on: Token | None, processor: Token | None, items: list[ConfigItem],
                  end: Token) -> Resource:
@@ -162,13 +163,14 @@ class Declarations(Statements):
                 parts[key] = argument.value
         return Task(word.start, end.end, self.declared(token), parts["SINGLE"], parts["INTERVAL"], parts["PRIORITY"])
 
-    def program_instance(self, word: Token, qualifiers: list[Name], token: Token, with_: Token | None, task: Token | None,
-                         colon: Token, type_name: NamedType, end: Token) -> ProgramInstance:
+    def program_instance(self, word: Token, qualifiers: list[Name], token: Token, with_: Token | None,
+                         task: Token | None, colon: Token, type_name: NamedType, end: Token) -> ProgramInstance:
         return self.program_connected(word, qualifiers, token, with_, task, colon, type_name, None, None, None, end)
 
     def program_connected(self, word: Token, qualifiers: list[Name], token: Token, with_: Token | None,
                           task: Token | None, colon: Token, type_name: NamedType, opener: Token | None,
-                          connections: list[Argument | Refused] | None, closer: Token | None, end: Token) -> ProgramInstance:
+                          connections: list[Argument | Refused] | None, closer: Token | None,
+                          end: Token) -> ProgramInstance:
         given = connections or []
         return ProgramInstance(
             word.start, end.end, self.declared(token), tuple(qualifiers), self.name(task) if task else None,

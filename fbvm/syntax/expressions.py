@@ -54,7 +54,8 @@ class Expressions(Builder):
             return self._decoded(token, lambda: literals.typed(prefix.upper(), rest), ("int", 0, None))
         middle = token.start + len(prefix)
         if not rest[:1].isalpha() and rest[:1] != "_":
-            self.report("S0105", token.start, token.end, f"`{prefix}` is no elementary type, so no value can stand behind `#`",
+            self.report("S0105", token.start, token.end,
+                        f"`{prefix}` is no elementary type, so no value can stand behind `#`",
                         f"`{prefix}#` wants the name of a member of an enumeration")
         return EnumLiteral(token.start, token.end, Name(token.start, middle, prefix), Name(middle + 1, token.end, rest))
 

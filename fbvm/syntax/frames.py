@@ -13,10 +13,10 @@ from fbvm.syntax.tables import tables
 from fbvm.syntax.tree import Binary, EnumLiteral, Literal, NullLiteral, Unary
 
 ENDS = {
-    "IF": "END_IF", "CASE": "END_CASE", "FOR": "END_FOR", "WHILE": "END_WHILE", "REPEAT": "END_REPEAT", "VAR": "END_VAR",
-    "VAR_GLOBAL": "END_VAR", "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE", "FUNCTION": "END_FUNCTION",
-    "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "PROGRAM": "END_PROGRAM", "CONFIGURATION": "END_CONFIGURATION",
-    "RESOURCE": "END_RESOURCE"}
+    "IF": "END_IF", "CASE": "END_CASE", "FOR": "END_FOR", "WHILE": "END_WHILE", "REPEAT": "END_REPEAT",
+    "VAR": "END_VAR", "VAR_GLOBAL": "END_VAR", "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE",
+    "FUNCTION": "END_FUNCTION", "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "PROGRAM": "END_PROGRAM",
+    "CONFIGURATION": "END_CONFIGURATION", "RESOURCE": "END_RESOURCE"}
 """Word that opens -> word that ends it."""
 
 OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL": {"REPEAT"}}

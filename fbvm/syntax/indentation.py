@@ -15,8 +15,8 @@ BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}
 
 
 def advice(source: Source, opener: Token, until: Token) -> str:
-    """Which END is missing, if `opener` has none before `until`: one behind ELSE IF, or that of the first word whose END
-    stands further left than itself.  "" if nothing can be told."""
+    """Which END is missing, if `opener` has none before `until`: one behind ELSE IF, or that of the first word whose
+    END stands further left than itself.  "" if nothing can be told."""
     if opener.type not in BLOCKS or until.start - opener.start > LONGEST:
         return ""
     open_: list[Token] = []

@@ -1,7 +1,7 @@
 """Characters to tokens: words, literals, signs; comments skipped, pragmas collected.
 
-The patterns and words come from `grammar/common.lark`.  A word that the grammar takes only in some places is handed on as
-that word; the driver makes it a name where the word cannot stand.
+The patterns and words come from `grammar/common.lark`.  A word that the grammar takes only in some places is handed on
+as that word; the automaton makes it a name where the word cannot stand.
 """
 
 from __future__ import annotations
@@ -30,18 +30,19 @@ class Token(NamedTuple):
 
 MISSPELT = {
     "ELSEIF": "ELSIF", "ELIF": "ELSIF", "ENDIF": "END_IF", "ENDFOR": "END_FOR", "ENDWHILE": "END_WHILE",
-    "ENDCASE": "END_CASE", "ENDREPEAT": "END_REPEAT", "ENDVAR": "END_VAR", "ENDSTRUCT": "END_STRUCT", "ENDTYPE": "END_TYPE",
-    "ENDFUNCTION": "END_FUNCTION", "ENDFUNCTION_BLOCK": "END_FUNCTION_BLOCK", "ENDPROGRAM": "END_PROGRAM",
-    "SWITCH": "CASE", "BREAK": "EXIT"}
+    "ENDCASE": "END_CASE", "ENDREPEAT": "END_REPEAT", "ENDVAR": "END_VAR", "ENDSTRUCT": "END_STRUCT",
+    "ENDTYPE": "END_TYPE", "ENDFUNCTION": "END_FUNCTION", "ENDFUNCTION_BLOCK": "END_FUNCTION_BLOCK",
+    "ENDPROGRAM": "END_PROGRAM", "SWITCH": "CASE", "BREAK": "EXIT"}
 """Words of other languages, and ours without their `_`: of the type MISSPELT, and names where they fit as such."""
 
-_FOREIGN = {"==": ("EQUAL", "=", "`=` compares"), "!=": ("UNEQUAL", "<>", "write `<>`"), "&&": ("AND", "AND", "write AND"),
-            "||": ("OR", "OR", "write OR")}
+_FOREIGN = {"==": ("EQUAL", "=", "`=` compares"), "!=": ("UNEQUAL", "<>", "write `<>`"),
+            "&&": ("AND", "AND", "write AND"), "||": ("OR", "OR", "write OR")}
 """Operators of other languages -> our terminal, its text, and advice."""
 
-_MEANT = {"!": "write NOT, or `<>` for unequal", "%": "write MOD for the remainder; an address has letters and digits behind %",
-          "|": "write OR", "~": "write NOT", "#": "a type stands in front of `#`, and no space", "?": "there is no `? :` in ST",
-          "\\": "text in a string needs no `\\`; `$` is the escape"}
+_MEANT = {"!": "write NOT, or `<>` for unequal", "|": "write OR", "~": "write NOT",
+          "?": "write SEL(condition, if_false, if_true)",
+          "%": "write MOD for the remainder; an address has letters and digits behind %",
+          "#": "a type stands in front of `#`, and no space", "\\": "the escape in a string is `$`"}
 _FOREIGN_WORD = re.compile(r"[^\W0-9]\w*")
 _WORDS = re.compile(r"\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?", re.DOTALL)
 _BY_HAND = {"LOCATION", "SET_ASSIGN"}
@@ -175,7 +176,8 @@ class Lexer:
         if character in "'\"":
             return self._open_string(at)
         if word := _FOREIGN_WORD.match(text, at):
-            self.report("S0102", at, word.end(), f"`{_short(word[0])}` is no name: of letters only A to Z can be part of one",
+            self.report("S0102", at, word.end(),
+                        f"`{_short(word[0])}` is no name: of letters only A to Z can be part of one",
                         "comments and strings may have any character")
             return Token("NAME", word[0], at, word.end()), word.end()
         run = lex.unknown.match(text, at + 1)

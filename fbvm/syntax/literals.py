@@ -36,7 +36,8 @@ ELEMENTARY = {"BOOL", *SIGNED, *UNSIGNED, *REALS, *TEXTS, *TIMES, *DATES, *CLOCK
 
 SECOND_NS = 1_000_000_000
 DAY_NS = 86_400 * SECOND_NS
-UNITS_NS = {"d": DAY_NS, "h": 3600 * SECOND_NS, "m": 60 * SECOND_NS, "s": SECOND_NS, "ms": 1_000_000, "us": 1000, "ns": 1}
+UNITS_NS = {"d": DAY_NS, "h": 3600 * SECOND_NS, "m": 60 * SECOND_NS, "s": SECOND_NS, "ms": 1_000_000, "us": 1000,
+            "ns": 1}
 DAYS_1970 = 719_163
 """Number of the day 1970-01-01, counted from 0001-01-01 as 1."""
 
@@ -76,7 +77,8 @@ def _number(text: str) -> tuple[str, int | float]:
         return "int", int(text.replace("_", ""))
     if _REAL.fullmatch(text):
         return "real", float(text.replace("_", ""))
-    raise Malformed(f"`{text}` is no number", "digits, with single `_` between them, a point with digits on both sides, an exponent")
+    raise Malformed(f"`{text}` is no number",
+                    "digits with single `_` between them, a point with digits on both sides, an exponent")
 
 
 def _based(text: str) -> int:
@@ -210,7 +212,8 @@ def duration(text: str) -> int:
                             "units are d h m s ms us ns, as in `T#1d2h3m4s5ms`")
         unit = units.index(part[3].lower())
         if unit <= last:
-            raise Malformed(f"unit `{part[3]}` stands too late or twice in the duration", "the order is d h m s ms us ns")
+            raise Malformed(f"unit `{part[3]}` stands too late or twice in the duration",
+                            "the order is d h m s ms us ns")
         if part[2] and part.end() != len(rest):
             raise Malformed("only the last unit of a duration may have a fraction", "")
         total += _scaled(part[1], part[2] or "", UNITS_NS[units[unit]], text)
@@ -224,7 +227,7 @@ def duration(text: str) -> int:
 def _scaled(whole: str, fraction: str, unit_ns: int, text: str) -> int:
     """`whole.fraction` units as nanoseconds, exactly."""
     fraction = fraction.replace("_", "")
-    value, rest = divmod(int(whole.replace("_", "") + fraction) * unit_ns, 10 ** len(fraction))
+    value, rest = divmod(int(whole.replace("_", "") + fraction) * unit_ns, int("1" + "0" * len(fraction)))
     if rest:
         raise OutOfRange(f"`{_short(text)}` is finer than one nanosecond", "")
     return value
@@ -243,8 +246,8 @@ def _day(text: str) -> int:
     if not 1 <= month <= 12 or not 1 <= day <= MONTH_DAYS[month - 1] + (leap and month == 2):
         raise Malformed(f"there is no date {text}", "")
     before = year - 1
-    days = before * 365 + before // 4 - before // 100 + before // 400 + sum(MONTH_DAYS[:month - 1]) + (leap and month > 2) + day
-    days -= DAYS_1970
+    days = before * 365 + before // 4 - before // 100 + before // 400 - DAYS_1970
+    days += sum(MONTH_DAYS[:month - 1]) + (leap and month > 2) + day
     if not -NS_MAX <= days * DAY_NS <= NS_MAX:
         raise OutOfRange(f"the date {text} is outside 1677-09-22 to 2262-04-11", "")
     return days

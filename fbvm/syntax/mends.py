@@ -73,10 +73,9 @@ def _insertions(automaton: Automaton, following: list[Token]) -> Iterator[Trial]
         score = _score(automaton, after, following)
         if score < (1 if kind == "SEMICOLON" else 2):
             continue
+        where = f"before {found(token)}"
         if kind == "SEMICOLON":
-            where = "after the statement" if anchor(automaton.states).symbol == "ended_list" else "after the declaration"
-        else:
-            where = f"before {found(token)}"
+            where = f"after the {'statement' if anchor(automaton.states).symbol == 'ended_list' else 'declaration'}"
         yield score, -rank, Mend([Token(kind, sign(kind), at, at), token], at, at, f"{quoted(kind)} expected {where}",
                                  hint(token, kinds), _bracket(automaton, BRACKETS.get(kind)))
 
@@ -93,8 +92,8 @@ def _replacements(automaton: Automaton, following: list[Token]) -> Iterator[Tria
         if score >= GOOD:
             message = f"{quoted(kind)} expected, but {found(token)} found"
             advice = hint(token, {kind})
-            yield score, 1 - rank, Mend([Token(kind, sign(kind), token.start, token.end)], token.start, token.end, message,
-                                        advice)
+            other = Token(kind, sign(kind), token.start, token.end)
+            yield score, 1 - rank, Mend([other], token.start, token.end, message, advice)
 
 
 def _removal(automaton: Automaton, following: list[Token]) -> Iterator[Trial]:
@@ -124,7 +123,9 @@ def _misspelt(token: Token) -> Mend | None:
 
 def _reserved_name(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
     """`VAR if : INT;`"""
-    if token.type not in lexis().reserved or len(following) < 2 or following[1].type not in ("COLON", "COMMA", "ASSIGN"):
+    if token.type not in lexis().reserved or following[1:2] == []:
+        return None
+    if following[1].type not in ("COLON", "COMMA", "ASSIGN"):
         return None
     if advance(automaton.states, "NAME") is None or advance(automaton.states, "NUMBER"):
         return None

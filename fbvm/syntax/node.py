@@ -10,8 +10,8 @@ _T = TypeVar("_T")
 
 @dataclass_transform(eq_default=False, field_specifiers=(field,))
 def node(cls: type[_T]) -> type[_T]:
-    """A dataclass with slots that compares by identity.  `Node` has the one `__repr__` for all: sixty of their own would
-    cost a third of the time that it takes to start."""
+    """A dataclass with slots that compares by identity.  `Node` has the one `__repr__` for all: sixty of their own
+    would cost a third of the time that it takes to start."""
     return dataclass(eq=False, slots=True, repr=False)(cls)
 
 

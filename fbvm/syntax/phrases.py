@@ -10,8 +10,8 @@ GROUPS = (
         "FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "REFUSED_SECTION",
         "REFUSED_BLOCK", "$END"}),
     ("a statement", {"IF", "FOR", "SEMICOLON"}, {
-        "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "REFUSED_BLOCK", "NAME",
-        "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS", "MINUS",
+        "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "REFUSED_BLOCK",
+        "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS", "MINUS",
         "NOT", "DIRECT", "SELF"}),
     ("an expression", {"NAME", "NUMBER", "LPAR"}, {
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS",
@@ -31,7 +31,8 @@ CONTINUATIONS = {
 LABEL_SIGNS = {"COLON", "COMMA", "RANGE", "SET_ASSIGN", "ATTEMPT"}
 """What may follow a name at the start of a statement, beside `:=`, `(` and `;`."""
 
-UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "INHERITANCE", "POU_MODIFIER", "SELF", "JMP", "QUALIFIER", "EDGE", "OVERLAP"}
+UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "INHERITANCE", "POU_MODIFIER", "SELF", "JMP", "QUALIFIER", "EDGE",
+          "OVERLAP"}
 """What may stand there and would be refused, or is seldom meant."""
 
 FIRST = ("SEMICOLON", "THEN", "DO", "OF", "TO", "ASSIGN", "COLON", "COMMA", "RPAR", "RSQB")

@@ -1,7 +1,7 @@
 """Reports a syntax error and finds where to go on, so that one mistake hides nothing and is told once.
 
-First a small mend is tried (`mends`): one word put in, taken away or replaced, if the parse then goes on well.  Next comes
-what stands open: an END that is missing or has no beginning.  At last the statement or declaration is given up."""
+First a small mend is tried (`mends`): one word put in, taken away or replaced, if the parse then goes on well.  Next
+comes what stands open: an END that is missing or has no beginning.  At last the statement or declaration is given up."""
 
 from __future__ import annotations
 

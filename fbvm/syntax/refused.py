@@ -30,7 +30,7 @@ def refused_what(text: str) -> tuple[str, str]:
 
 
 def whole(opener: Token, source: str, following: Callable[[], Token]) -> tuple[Token, Token | None]:
-    """The token from a refused word to its end; if the end is missing, also the token in front of which it was missed."""
+    """The token from a refused word to its end; if the end is missing, also the token before which it was missed."""
     word = opener.text.upper()
     end_word = ENDS.get(word, f"END_{word}")
     depth, last = 1, opener

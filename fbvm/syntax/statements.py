@@ -121,7 +121,8 @@ class Statements(Expressions):
         branches = ((condition, self.block(items)), *more)
         return self.checked(If(word.start, end.end, branches, None if otherwise is None else self.block(otherwise)))
 
-    def add_elsif(self, branches: list[Branch], word: Token, condition: Expr, then: Token, items: Items) -> list[Branch]:
+    def add_elsif(self, branches: list[Branch], word: Token, condition: Expr, then: Token,
+                  items: Items) -> list[Branch]:
         branches.append((condition, self.block(items)))
         return branches
 
@@ -139,7 +140,8 @@ class Statements(Expressions):
         starts = [at for at, item in enumerate(items) if isinstance(item, Label)]
         if items and (not starts or starts[0] > 0):
             first = items[0]
-            self.report("S0101", first.start, first.end, "a statement in CASE stands behind a label, none is in front of this one",
+            self.report("S0101", first.start, first.end,
+                        "a statement in CASE stands behind a label, none is in front of this one",
                         "write `value:` in front of it")
         branches = tuple(self._branch(items[at:until]) for at, until in pairwise([*starts, len(items)]))
         rest = None if otherwise is None else self.block(otherwise)
@@ -150,8 +152,8 @@ class Statements(Expressions):
         assert isinstance(label, Label)
         return CaseBranch(label.start, items[-1].end, label.values, self.block(items[1:]))
 
-    def for_statement(self, word: Token, variable: Expr, sign: Token, first: Expr, to: Token, last: Expr, by: Token | None,
-                      step: Expr | None, do: Token, items: Items, end: Token) -> Statement:
+    def for_statement(self, word: Token, variable: Expr, sign: Token, first: Expr, to: Token, last: Expr,
+                      by: Token | None, step: Expr | None, do: Token, items: Items, end: Token) -> Statement:
         return self.checked(For(word.start, end.end, variable, first, last, step, self.block(items)))
 
     def while_statement(self, word: Token, condition: Expr, do: Token, items: Items, end: Token) -> Statement:

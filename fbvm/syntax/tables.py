@@ -27,8 +27,9 @@ START = "source_text"
 class Rule:
     """One alternative of a production.
 
-    `action` names the builder's function; None for a rule that hands on its only child.  `places` tells for each argument
-    of the function which child it is, None for an optional part that is absent; None if they are all children in order."""
+    `action` names the builder's function; None for a rule that hands on its only child.  `places` tells for each
+    argument of the function which child it is, None for an optional part that is absent; None if they are all children
+    in order."""
 
     origin: str
     size: int
@@ -83,7 +84,7 @@ def _lark_identity() -> str:
 
 
 def _store(path: Path, content: dict[str, Any]) -> None:
-    """Write through a file of its own, so that nobody reads half of it.  A folder that cannot be written does no harm."""
+    """Write through a file of its own, so that nobody reads half of it.  It does no harm if that is not possible."""
     part = path.with_suffix(f".{os.getpid()}.part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -111,7 +112,7 @@ def compile_grammar(text: str) -> dict[str, Any]:
     class NoLexer(Lexer):
         """Ours is `lexer`; lark need not prepare one."""
 
-        __future_interface__ = 2  # type: ignore[assignment]
+        __future_interface__ = 2
 
         def __init__(self, conf: Any) -> None:
             pass
@@ -137,8 +138,8 @@ def compile_grammar(text: str) -> dict[str, Any]:
                 act = ~numbers[arg["@"]]
             actions[order[state]][table["tokens"][token]] = act
     terminals = [
-        [t.name, t.pattern.value, "i" in t.pattern.flags, t.pattern.type == "str", t.priority > 0] for t in lark.terminals
-    ]
+        [t.name, t.pattern.value, "i" in t.pattern.flags, t.pattern.type == "str", t.priority > 0]
+        for t in lark.terminals]
     return {"start": order[table["start_states"][START]], "end": order[table["end_states"][START]],
             "actions": actions, "rules": rules, "terminals": terminals}
 

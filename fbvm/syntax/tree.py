@@ -30,8 +30,8 @@ class Expr(Node):
 class Literal(Expr):
     """A literal of an elementary type.
 
-    `kind` is "int", "real", "bool", "string", "wstring", "time", "date", "tod" or "dt"; `value` an int, float, bool, str
-    (one character per STRING byte or WSTRING unit) or whole nanoseconds; `type_name` the type written before `#`,
+    `kind` is "int", "real", "bool", "string", "wstring", "time", "date", "tod" or "dt"; `value` an int, float, bool,
+    str (one character per STRING byte or WSTRING unit) or whole nanoseconds; `type_name` the type written before `#`,
     in capitals and in its long form (T -> TIME, D -> DATE, LTOD -> LTIME_OF_DAY), or None.  `text` is as written."""
 
     kind: str
@@ -245,8 +245,8 @@ class VarDecl(Node):
 
 @_node
 class VarSection(Node):
-    """One VAR.. END_VAR: `kind` is VAR, VAR_INPUT, VAR_OUTPUT, VAR_IN_OUT, VAR_TEMP, VAR_EXTERNAL, VAR_GLOBAL, VAR_STAT or
-    VAR_INST; `qualifiers` the words behind it in capitals (CONSTANT, RETAIN, NON_RETAIN, PERSISTENT, PUBLIC ...)."""
+    """One VAR.. END_VAR: `kind` is VAR, VAR_INPUT, VAR_OUTPUT, VAR_IN_OUT, VAR_TEMP, VAR_EXTERNAL, VAR_GLOBAL,
+    VAR_STAT or VAR_INST; `qualifiers` the words behind it in capitals (CONSTANT, RETAIN, NON_RETAIN, PERSISTENT, PUBLIC ...)."""
 
     kind: str
     qualifiers: tuple[Name, ...]
@@ -344,7 +344,7 @@ class Empty(Statement):
 
 @_node
 class RefusedStatement(Statement):
-    """Understood but never executed (JMP, a label, SUPER() ...): `what` names it for the message, `code` S0901/S0902."""
+    """Understood but never executed (JMP, a label, SUPER() ...): `what` names it, `code` is S0901 or S0902."""
 
     what: str
     code: str = "S0901"

@@ -80,8 +80,8 @@ class Types(Declarations):
 
     # --- composite types ---
 
-    def array_spec(self, word: Token, opener: Token, dimensions: list[tuple[Expr, Expr] | None], closer: Token, of: Token,
-                   element: TypeSpec) -> ArraySpec:
+    def array_spec(self, word: Token, opener: Token, dimensions: list[tuple[Expr, Expr] | None], closer: Token,
+                   of: Token, element: TypeSpec) -> ArraySpec:
         return ArraySpec(word.start, element.end, tuple(dimensions), element)
 
     def dimension(self, low: Expr, sign: Token, high: Expr) -> tuple[Expr, Expr]:
