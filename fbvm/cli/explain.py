@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
-
 import click
 
 from fbvm.base.codes import CODES
+from fbvm.base.pages import UnknownCode, page
 
 
 @click.command("explain")
@@ -17,14 +16,7 @@ def command(code: str | None) -> None:
         for row in CODES.values():
             click.echo(f"{row.code}  {row.severity:<7}  {row.title}")
         return
-    row_or_none = CODES.get(code.upper())
-    if row_or_none is None:
-        near = [known for known in CODES if known[:3] == code.upper()[:3]]
-        hint = f"; there are {near[0]} to {near[-1]}" if near else "; `fbvm explain` alone lists all"
-        raise click.UsageError(f"there is no diagnostic {code}{hint}")
-    click.echo(page(row_or_none.code))
-
-
-def page(code: str) -> str:
-    """The page of a code.  Raises FileNotFoundError if it has none."""
-    return (files("fbvm.base") / "pages" / f"{code}.md").read_text(encoding="utf-8").rstrip("\n")
+    try:
+        click.echo(page(code))
+    except UnknownCode as error:
+        raise click.UsageError(f"{error}\n`fbvm explain` alone lists all.") from None

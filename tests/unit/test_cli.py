@@ -262,7 +262,7 @@ def test_explain_lists_all_codes() -> None:
 
 def test_explain_of_no_code_is_wrong_usage() -> None:
     result = fbvm("explain", "S0999")
-    assert (result.exit_code, "there is no diagnostic S0999; there are S0901 to S0902" in result.stderr) == (2, True)
+    assert (result.exit_code, "there is no diagnostic S0999" in result.stderr) == (2, True)
     assert "`fbvm explain` alone lists all" in fbvm("explain", "X").stderr
 
 
