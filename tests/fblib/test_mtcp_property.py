@@ -8,6 +8,7 @@ from mtcp_rig import SERVER, Rig
 
 from fbvm.net.faults import Fault
 from fbvm.net.peers import Action, Fin, Leave, Reset, Say
+from fbvm.plc import Mode
 
 READS = {
     "a": "Fn03(Register_Address := 10, Register_Qty := 2, RespData_DM := 100)",
@@ -148,4 +149,28 @@ def test_a_network_that_fails_at_any_scan(timing: str, seed: int, events: list[t
         rig.scan(scans)
         nothing_wrong(rig)
     rig.network.place(SERVER, rig.peer)
+    works_by_itself(rig)
+
+
+@given(TIMINGS, SEEDS, st.integers(0, 60), st.sampled_from(["mode", "unit", "power", "force-close"]))
+@settings(max_examples=60, deadline=None)
+def test_a_restart_of_anything_at_any_scan(timing: str, seed: int, after: int, what: str) -> None:
+    rig = prepared(timing, seed)
+    if after % 2:
+        rig.connect()
+    for name in READS:
+        rig.set(f"{name}_Cmd", True)
+    rig.scan(after)
+    if what == "mode":
+        rig.plc.mode = Mode.PROGRAM
+        rig.scan(after % 5)
+        rig.plc.mode = Mode.RUN
+    elif what == "power":
+        rig.plc.warm_start()
+    elif what == "unit":
+        rig.plc.units[0].link.submit(rig.unit.reset(rig.plc.memory), rig.plc.now_ns)
+    else:
+        rig.plc.write("CIO 1500.02", True)
+    rig.scan(10)
+    nothing_wrong(rig)
     works_by_itself(rig)
