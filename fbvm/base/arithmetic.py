@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from functools import cache
 
 NAN: float = struct.unpack("<d", b"\0\0\0\0\0\0\xf8\x7f")[0]
 """The canonical NaN: quiet, positive, no payload (7FF8000000000000; as REAL 7FC00000)."""
@@ -28,6 +29,7 @@ class Undefined(ArithmeticError):
 # --- widths ---------------------------------------------------------------------------------------------------------
 
 
+@cache
 def limits(machine: str) -> tuple[int, int]:
     """Smallest and greatest value of an integer machine type ("b" counts as one bit, "ref" as 64)."""
     if machine == "b":

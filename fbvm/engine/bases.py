@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 from fbvm.code.image import Image
-from fbvm.code.operations import Block, Node
-
-
-def calls(code: Block) -> Iterator[Node]:
-    """The `call` statements of a piece of code."""
-    rest: list[tuple[object, ...]] = [code]
-    while rest:
-        item = rest.pop()
-        if item[:1] == ("call",):
-            yield item
-        rest += [part for part in item if isinstance(part, tuple)]
+from fbvm.code.operations import Node
+from fbvm.code.shapes import statements
 
 
 def fixed_bases(image: Image) -> dict[int, int]:
     """The base of each body that is always executed with the same one, by the body's number."""
     callers: dict[int, list[tuple[int, Node]]] = {number: [] for number in range(len(image.bodies))}
     for number, body in enumerate(image.bodies):
-        for call in calls(body.code):
-            callers[call[1]].append((number, call))
+        for node in statements(body.code):
+            if node[0] == "call":
+                callers[node[1]].append((number, node))
     starts: dict[int, set[int | None]] = {number: set() for number in callers}
     for task in image.tasks:
         for run in task.programs:

@@ -9,7 +9,8 @@ from hand_image import SLOTS_BYTES, behind, const, execute, image, load, own, po
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.code.image import ProgramRun, TaskRow
 from fbvm.code.operations import Node
-from fbvm.engine.bases import calls, fixed_bases
+from fbvm.code.shapes import statements
+from fbvm.engine.bases import fixed_bases
 from fbvm.engine.python import PythonEngine
 
 MAIN = SLOTS_OFFSET + SLOTS_BYTES
@@ -64,7 +65,7 @@ def test_calls_are_found_in_all_blocks() -> None:
     inner = call(3, None)
     code = (("if", ((const("b", 1), (inner,)),), (call(1, None),)),
             ("loop", (), (("case", "i16", const("i16", 1), ((((1, 1),), (call(2, None),)),), ()),), ()))
-    assert sorted(found[1] for found in calls(code)) == [1, 2, 3]
+    assert sorted(node[1] for node in statements(code) if node[0] == "call") == [1, 2, 3]
 
 
 def test_places_are_constants_and_a_call_elsewhere_still_works() -> None:
