@@ -49,7 +49,7 @@ def binary_cases() -> Iterator[tuple[str, str, str, str]]:
     for operator in ("AND", "OR", "XOR", "AND_THEN", "OR_ELSE", "=", "<"):
         yield operator, "BOOL", "BOOL", "BOOL"
     yield from ((operator, "TIME", "TIME", "TIME") for operator in ("+", "-"))
-    yield from ((operator, "TIME", "INT", "TIME") for operator in ("*", "/"))
+    yield from ((operator, "TIME", kind, "TIME") for operator in ("*", "/") for kind in ("INT", "LREAL"))
     yield from ((operator, "TIME", "TIME", "BOOL") for operator in ("=", "<", ">="))
     for left, right, result in (("SINT", "INT", "INT"), ("USINT", "SINT", "INT"), ("UINT", "INT", "DINT"),
                                 ("UDINT", "DINT", "LINT"), ("INT", "REAL", "REAL"), ("DINT", "REAL", "LREAL")):
