@@ -32,9 +32,12 @@ def page(code: str) -> str:
 
 
 def near(text: str) -> list[Code]:
-    """Rows whose code is like `text`, the likest first; if none is, those whose title contains it."""
+    """Rows whose code is like `text`, the likest first; if none is, those whose title contains it.
+
+    A code of a range that there is, such as S02, is near to others of that range only."""
     wanted = text.strip()
-    codes = get_close_matches(wanted.upper(), CODES, n=_SHOWN)
+    same_range = [code for code in CODES if code[:3] == wanted[:3].upper()]
+    codes = get_close_matches(wanted.upper(), same_range or CODES, n=_SHOWN)
     if codes or not wanted:
         return [CODES[code] for code in codes]
     return [row for row in CODES.values() if wanted.casefold() in row.title.casefold()][:_SHOWN]

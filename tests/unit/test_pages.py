@@ -159,6 +159,10 @@ def test_a_misspelt_code_lists_those_near_it(misspelt: str, meant: str) -> None:
     assert f"{meant}  {CODES[meant].title}" in str(raised.value)
 
 
+def test_a_code_of_a_known_range_lists_that_range_only() -> None:
+    assert {row.code[:3] for row in near("S0299")} == {"S02"}
+
+
 @pytest.mark.parametrize("nonsense", ["", "   ", "x1y2", "../codes"])
 def test_nonsense_lists_nothing(nonsense: str) -> None:
     with pytest.raises(UnknownCode) as raised:
