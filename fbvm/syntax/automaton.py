@@ -19,7 +19,7 @@ STACK_LIMIT = 4000
 
 NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "STRUCT", "UNION", "ARRAY", "REF_TO",
                      "POINTER", "REFERENCE"))
-REFUSED = frozenset(("REFUSED_SECTION", "REFUSED_BLOCK"))
+REFUSED = frozenset(("REFUSED_SECTION", "REFUSED_BLOCK", "TRY"))
 DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT",
                       "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM"))
 """Words that end a list of statements.  The tables reduce the list for any of them and find out later that it was the

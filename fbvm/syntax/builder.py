@@ -33,6 +33,8 @@ class Builder:
         self.source = source
         self.diagnostics: list[Diagnostic] = []
         self.errors = 0
+        self.odd: list[int] = []
+        """Where characters were passed over that no word begins with, and where strings without end end."""
         self.cut_short = False
         """Whether a comment or pragma without end has swallowed the rest of the text."""
         self.full = False
@@ -53,6 +55,8 @@ class Builder:
             self.errors += 1
             self.full = self.errors >= ERROR_LIMIT
         self.cut_short |= diagnostic.code == "S0103"
+        if diagnostic.code in ("S0102", "S0104"):
+            self.odd.append(diagnostic.end)
         self.diagnostics.append(diagnostic)
 
     def empty(self) -> list[Any]:

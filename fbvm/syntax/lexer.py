@@ -36,19 +36,19 @@ MISSPELT = {
 """Words of other languages, and ours without their `_`: of the type MISSPELT, and names where they fit as such."""
 
 _FOREIGN = {"==": ("EQUAL", "=", "`=` compares"), "!=": ("UNEQUAL", "<>", "write `<>`"),
-            "&&": ("AND", "AND", "write AND"), "||": ("OR", "OR", "write OR")}
+            "&&": ("AND", "AND", "write AND"), "||": ("OR", "OR", "write OR"), "|": ("OR", "OR", "write OR"),
+            "!": ("NOT", "NOT", "write NOT, or `<>` for unequal"), "~": ("NOT", "NOT", "write NOT"),
+            "%": ("MOD", "MOD", "write MOD for the remainder; an address has letters and digits behind `%`")}
 """Operators of other languages -> our terminal, its text, and advice."""
 
-_MEANT = {"!": "write NOT, or `<>` for unequal", "|": "write OR", "~": "write NOT",
-          "?": "write SEL(condition, if_false, if_true)",
-          "%": "write MOD for the remainder; an address has letters and digits behind %",
-          "#": "a type stands in front of `#`, and no space", "\\": "the escape in a string is `$`"}
+_MEANT = {"?": "write SEL(condition, if_false, if_true)", "#": "a type stands in front of `#`, and no space",
+          "\\": "the escape in a string is `$`"}
 _FOREIGN_WORD = re.compile(r"[^\W0-9]\w*")
 _WORDS = re.compile(r"\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?", re.DOTALL)
 _BY_HAND = {"LOCATION", "SET_ASSIGN"}
 """Terminals that only exist behind certain others."""
 
-_ORDER = ("NAME", "PART", "NUMBER", "DATE_LITERAL", "TYPED_LITERAL", "STRING_LITERAL", "DIRECT")
+_ORDER = ("NAME", "PART", "COMMENT", "FOREIGN", "SIGN", "NUMBER", "DATE_LITERAL", "TYPED_LITERAL", "STRING_LITERAL", "DIRECT")
 _OPERAND_ENDS = {"NAME", "RPAR", "RSQB", "CARET", "DIRECT", "PART"}
 
 
@@ -89,14 +89,12 @@ def lexis() -> Lexis:
             signs[terminal.pattern] = terminal.name
         else:
             patterns[terminal.name] = _pattern(terminal)
-    alternatives = [f"(?P<{name}>{patterns[name]})" for name in _ORDER]
-    alternatives.insert(1, r"(?P<FOREIGN>==|!=|&&|\|\||[-+*/]=)")
-    alternatives.insert(1, r"(?P<COMMENT>//[^\n]*|\(\*|/\*)")
-    alternatives.insert(2, "(?P<SIGN>" + "|".join(re.escape(s) for s in sorted(signs, key=len, reverse=True)) + ")")
-    # `.` begins PART and `..`; a part is the longer word, a range is not one
-    alternatives.insert(1, alternatives.pop(alternatives.index(f"(?P<PART>{patterns['PART']})")))
+    patterns["COMMENT"] = r"//[^\n]*|\(\*|/\*"
+    patterns["FOREIGN"] = r"==|!=|&&|\|\||[-+*/]=|[!|~]|%(?![A-Za-z*])"
+    patterns["SIGN"] = "|".join(re.escape(sign) for sign in sorted(signs, key=len, reverse=True))
+    alternatives = "|".join(f"(?P<{name}>{patterns[name]})" for name in _ORDER)
     known = re.escape("".join(sorted(set("".join(signs) + "'\"{%"))))
-    return Lexis(words, conditions, frozenset(reserved), signs, re.compile(r"\s*(?:" + "|".join(alternatives) + ")"),
+    return Lexis(words, conditions, frozenset(reserved), signs, re.compile(rf"\s*(?:{alternatives})"),
                  re.compile(r"\s*(" + patterns["LOCATION"] + ")"), re.compile(rf"[^\s\w{known}]+"),
                  re.compile(patterns["SET_ASSIGN"]))
 

@@ -15,7 +15,7 @@ INSERTED = ("SEMICOLON", "RPAR", "RSQB", "THEN", "DO", "OF", "COLON", "ASSIGN", 
 """Words that may be put in, the most likely first."""
 
 REPLACED = {"EQUAL": ("ASSIGN",), "ASSIGN": ("EQUAL", "COLON"), "COLON": ("SEMICOLON", "ASSIGN"),
-            "SEMICOLON": ("COLON", "COMMA"), "COMMA": ("SEMICOLON",), "DOT": ("SEMICOLON",)}
+            "SEMICOLON": ("COLON",), "COMMA": ("SEMICOLON",), "DOT": ("SEMICOLON",)}
 """Signs that are mistaken for others."""
 
 BRACKETS = {"RPAR": "LPAR", "RSQB": "LSQB"}
@@ -127,7 +127,9 @@ def _reserved_name(automaton: Automaton, token: Token, following: list[Token]) -
         return None
     if following[1].type not in ("COLON", "COMMA", "ASSIGN"):
         return None
-    if advance(automaton.states, "NAME") is None or advance(automaton.states, "NUMBER"):
+    if advance(automaton.states, "NAME") is None:
+        return None
+    if following[1].type != "ASSIGN" and advance(automaton.states, "NUMBER"):
         return None
     return Mend([Token("NAME", token.text, token.start, token.end)], token.start, token.end,
                 f"{found(token)} is a reserved word and cannot be a name", "choose another name")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import fields
 from typing import Any
 
-from fbvm.syntax.tree import Binary, Direct, Literal, Location, Name, NamedType, NameRef, Node
+from fbvm.syntax.tree import Binary, Direct, EnumLiteral, Literal, Location, Name, NamedType, NameRef, Node
 
-HIDDEN = {"start", "end", "op_start", "type_name"}
+HIDDEN = {"start", "end", "op_start"}
 
 
 def dump(tree: Node) -> str:
@@ -19,16 +19,19 @@ def dump(tree: Node) -> str:
 
 def _leaf(value: Any) -> str | None:
     """A value that needs no line of its own, or None."""
+    if value is None:
+        return "_"
     if isinstance(value, (Name, NameRef, NamedType, Direct, Location)):
         return value.text
     if isinstance(value, Literal):
         typed = f"{value.type_name}#" if value.type_name else ""
         return f"{typed}{value.kind}:{value.value!r}"
-    if not isinstance(value, (Node, tuple)):
-        return str(value)
-    if isinstance(value, tuple) and value and all(isinstance(v, Name) for v in value):
-        return ", ".join(v.text for v in value)
-    return None
+    if isinstance(value, EnumLiteral):
+        return f"{value.type_name.text}#{value.member.text}"
+    if isinstance(value, tuple):
+        leaves = [_leaf(item) for item in value]
+        return f"[{', '.join(leaf or '' for leaf in leaves)}]" if None not in leaves else None
+    return None if isinstance(value, Node) else str(value)
 
 
 def _walk(value: Any, label: str, depth: int, lines: list[str]) -> None:
@@ -48,7 +51,7 @@ def _node(node: Node, label: str, depth: int, lines: list[str]) -> None:
     short, long = [], []
     for name in (f.name for f in fields(node) if f.name not in HIDDEN):
         value = getattr(node, name)
-        if value is None or value is False or value == () or value == "":
+        if value is None or value is False or value == "" or (value == () and name != "otherwise"):
             continue
         leaf = _leaf(value)
         if leaf is None:

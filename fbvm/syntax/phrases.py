@@ -31,7 +31,7 @@ CONTINUATIONS = {
 LABEL_SIGNS = {"COLON", "COMMA", "RANGE", "SET_ASSIGN", "ATTEMPT"}
 """What may follow a name at the start of a statement, beside `:=`, `(` and `;`."""
 
-UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "INHERITANCE", "POU_MODIFIER", "SELF", "JMP", "QUALIFIER", "EDGE",
+UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "TRY", "ACCESS", "INHERITANCE", "POU_MODIFIER", "SELF", "JMP", "QUALIFIER", "EDGE",
           "OVERLAP"}
 """What may stand there and would be refused, or is seldom meant."""
 
@@ -107,10 +107,10 @@ def hint(token: Token, kinds: set[str]) -> str:
         return "`:=` assigns and gives initial values, `=` compares"
     if token.type == "ASSIGN" and "EQUAL" in kinds:
         return "`=` compares, `:=` assigns"
-    if token.type in lexis().reserved and "NAME" in kinds and "NUMBER" not in kinds:
-        return f"{token.text} is a reserved word and cannot be a name"
     if token.type == "VAR" and "SEMICOLON" in kinds:
         return "VAR sections stand in front of the first statement"
+    if token.type in lexis().reserved and "NAME" in kinds and "IF" not in kinds and token.type[:4] != "END_":
+        return f"{token.text} is a reserved word and cannot be a name"
     if token.type == "PART" and "NUMBER" in kinds:
         return "a number has digits in front of its point, as 0.5"
     return ""

@@ -47,7 +47,7 @@ class Recovery:
         self.last = -1
         """Where the last error was told; another one there or in front of it is its shadow."""
         self.mute = False
-        """Whether the rest of the text was swallowed by a comment, so that its END words cannot be missed."""
+        """Whether the cause was told: a comment that swallowed the rest of the text, an unknown character."""
         self.seen: set[tuple[int, int]] = set()
         """Places of the text, with the height of the stack, at which this token was refused."""
 
@@ -59,11 +59,15 @@ class Recovery:
             raise Stop
         if self.turns_in_circles(token):
             return []
-        self.mute = token.type == "$END" and self.builder.cut_short
+        self.mute = (token.type == "$END" and self.builder.cut_short) or any(
+            self.automaton.before.end <= odd <= token.start for odd in self.builder.odd)
         reopen(self.states, self.values)
         mend = best_mend(self.automaton, token, self.peek(token))
         if mend:
             return self.mended(mend, token)
+        if token.type in UNITS and self.amid(token):
+            self.tell(token)
+            return self.give_up(self.following())
         if token.type in OPENERS or token.type in UNITS or self.shows_end_of_section(token):
             return self.closing(token)
         self.tell(token)
@@ -168,7 +172,28 @@ class Recovery:
         if inner:
             return self.close(inner, token)
         self.tell(token)
-        return self.give_up(token)
+        if open_head(self.states, self.values):
+            return self.give_up(token)
+        cut(self.states, self.values, anchor(self.states))
+        if token.type in UNITS or advance(self.states, token.type):
+            return [token]
+        return self.behind_then() if token.type == "ELSIF" else []
+
+    def behind_then(self) -> list[Token]:
+        """Pass over the head of an ELSIF that follows ELSE."""
+        token = self.following()
+        while token.type != "THEN":
+            if token.type == "SEMICOLON" or self.stops(token):
+                return [token]
+            token = self.following()
+        return []
+
+    def amid(self, token: Token) -> bool:
+        """Whether a word that begins a declaration stands in the middle of a line and of something else."""
+        before = self.automaton.before
+        if token.type == "$END" or before.type == "SEMICOLON" or before.type in OPENERS:
+            return False
+        return bool(self.values) and "\n" not in self.builder.source.text[before.end:token.start]
 
     def no_opener(self, token: Token) -> list[Token]:
         words = " or ".join(sorted(OPENERS[token.type]))

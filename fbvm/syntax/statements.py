@@ -74,11 +74,11 @@ class Statements(Expressions):
 
     def checked(self, statement: Statement) -> Statement:
         """The statement itself, or its refusal if it spoke of THIS or SUPER."""
-        if not self.selves:
+        mine = [token for token in self.selves if token.start >= statement.start] if self.selves else None
+        if not mine:
             return statement
-        word = self.selves[0].text.upper()
-        self.selves.clear()
-        return RefusedStatement(statement.start, statement.end, word, "S0902")
+        del self.selves[-len(mine):]
+        return RefusedStatement(statement.start, statement.end, mine[0].text.upper(), "S0902")
 
     # --- simple statements ---
 

@@ -1,0 +1,36 @@
+"""Sources beside the tree or the messages that they give.  `FBVM_REWRITE=1 pytest tests/golden` writes them anew; look at
+the difference before you keep it."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from fbvm.base.diagnostics import Source
+from fbvm.syntax.outline import dump
+from fbvm.syntax.parser import parse
+
+HERE = Path(__file__).resolve().parent
+REWRITE = bool(os.environ.get("FBVM_REWRITE"))
+
+
+def check_golden(path: Path, actual: str) -> None:
+    if REWRITE:
+        path.write_text(actual, encoding="utf-8")
+    assert actual == path.read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("path", sorted((HERE / "syntax").glob("*.st")), ids=lambda p: p.stem)
+def test_tree_of_a_good_source(path: Path) -> None:
+    tree, diagnostics = parse(Source(path.name, path.read_text(encoding="utf-8")))
+    assert [d.render() for d in diagnostics if d.severity == "error"] == []
+    check_golden(path.with_suffix(".tree"), dump(tree))
+
+
+@pytest.mark.parametrize("path", sorted((HERE / "errors").glob("*.st")), ids=lambda p: p.stem)
+def test_messages_of_a_wrong_source(path: Path) -> None:
+    tree, diagnostics = parse(Source(path.name, path.read_text(encoding="utf-8")))
+    assert diagnostics and tree.end == path.stat().st_size - sum(len(c.encode()) - 1 for c in path.read_text("utf-8"))
+    check_golden(path.with_suffix(".messages"), "".join(d.render() + "\n\n" for d in diagnostics))
