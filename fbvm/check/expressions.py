@@ -69,10 +69,16 @@ class Expressions:
     # --- entry points -----------------------------------------------------------------------------------------------
 
     def infer(self, expr: tree.Expr, want: Type | None = None) -> Type | None:
-        """The type of an expression, or None after a diagnostic.  `want` helps literals that meet nothing else."""
+        """The type of an expression, or None after a diagnostic.  `want` helps literals that meet nothing else.
+
+        An expression is worked out once; calls ask for their arguments' types more than once."""
+        if expr in self.facts.types or expr in self.facts.wrong:
+            return self.facts.types.get(expr)
         kind = _INFER[type(expr)](self, expr, want)
         if kind is not None:
             self.facts.types[expr] = kind
+        else:
+            self.facts.wrong.add(expr)
         return kind
 
     def settle(self, expr: tree.Expr, want: Type | None = None) -> Type | None:

@@ -134,6 +134,8 @@ class Facts:
     """Side tables by node."""
 
     types: dict[tree.Expr, Type] = field(default_factory=dict)
+    wrong: set[tree.Expr] = field(default_factory=set)
+    """Expressions that have no type, which was said."""
     constants: dict[tree.Expr, Value] = field(default_factory=dict)
     variables: dict[tree.Expr, Variable] = field(default_factory=dict)
     fields: dict[tree.Expr, Field] = field(default_factory=dict)

@@ -1,6 +1,6 @@
 """All declarations of a program: the user's own, and those of libraries, which are read when a name asks for them.
 
-A user's own POU or type shadows a library's of the same name, but not inside that library."""
+A user's own POU or type shadows a library's of the same name, but not inside libraries."""
 
 from __future__ import annotations
 
@@ -85,9 +85,8 @@ class Project:
     # --- look-up ----------------------------------------------------------------------------------------------------
 
     def _owners(self, source: Source) -> Iterable[str]:
-        if source.library:
-            yield source.library
-        yield ""
+        """Whose names `source` sees, nearest first; a library never sees the user's own."""
+        yield source.library
         yield from (name for name in self.libraries.names if name != source.library)
 
     def _load(self, name: str, owner: str) -> None:
