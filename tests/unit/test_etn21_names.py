@@ -1,0 +1,47 @@
+"""What an ETN21's bits and words are called, and that charts show it."""
+
+from __future__ import annotations
+
+import pytest
+from images import counter_image
+
+from fbvm.base.areas import parse_address
+from fbvm.net.loop import LoopNetwork
+from fbvm.plc import Plc
+from fbvm.record.chart import chart
+from fbvm.units.etn21 import Etn21
+
+
+@pytest.mark.parametrize(("number", "address", "name"), [
+    (0, "CIO 1519.02", "TCP Active Open Request Switch"),
+    (0, "CIO 1519.11", "Send Request Switch 2"),
+    (0, "CIO 1522.13", "Close Request Switch 8"),
+    (0, "CIO 1509.15", "TCP Open Flag"),
+    (0, "CIO 1508.00", "UDP Opening Flag 8"),
+    (0, "D30001", "Number of Bytes Received"),
+    (0, "D30016", "TCP Connection State 8"),
+    (0, "D30027", "Response Code"),
+    (0, "D30097", "Response Code 8"),
+    (15, "CIO 1894.02", "TCP Active Open Request Switch"),
+    (15, "CIO 1875.02", "Socket Force-close Switch"),
+    (15, "D31527", "Response Code"),
+])
+def test_names_follow_the_unit_number(number: int, address: str, name: str) -> None:
+    assert Etn21(number).descriptions[address] == name
+
+
+@pytest.mark.parametrize("number", [0, 15])
+def test_every_key_is_an_address_as_charts_write_it(number: int) -> None:
+    assert [key for key in Etn21(number).descriptions if str(parse_address(key)) != key] == []
+
+
+def test_a_chart_shows_them() -> None:
+    plc = Plc(counter_image())
+    plc.attach(Etn21(0), LoopNetwork())
+    plc.write("D30018", 1)
+    plc.write("CIO 1519.05", True)
+    assert chart(plc, scans=3, signals=["CIO 1519.05", "CIO 1509.03", "D30027"]) == """
+        CIO1519.05  #..      Close Request Switch
+        CIO1509.03  ...      TCP Closing Flag
+        D30027      0|8720   Response Code
+    """
