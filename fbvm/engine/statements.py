@@ -264,7 +264,7 @@ def case_table(rows: list[tuple[tuple[int, int], ...]]) -> tuple[list[int], list
 
 
 def _loop(w: BodyWriter, head: Block, body: Block, tail: Block) -> None:
-    if w.loops >= MOST_LOOPS:
+    if w.loops >= MOST_LOOPS or w.indent >= MOST_INDENTS:
         w.outline(lambda: _loop(w, head, body, tail))
         return
     outer = w.tail
