@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fbvm.syntax.automaton import Automaton
-from fbvm.syntax.frames import OPENERS, UNITS, anchor, frames
+from fbvm.syntax.frames import OPENERS, STATEMENT_WORDS, UNITS, anchor, frames
 from fbvm.syntax.lexer import MISSPELT, Token, lexis
 from fbvm.syntax.phrases import found, hint, quoted, sign, unlike
 from fbvm.syntax.prospect import State, advance, expected, symbols
@@ -122,7 +122,12 @@ def _misspelt(token: Token) -> Mend | None:
 
 
 def _reserved_name(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """`VAR if : INT;`"""
+    """`VAR if : INT;`, `FOR := 1;`"""
+    word = automaton.before
+    if token.type == "ASSIGN" and word.type in STATEMENT_WORDS and automaton.values[-1] is word:
+        name = Token("NAME", word.text, word.start, word.end)
+        return Mend([name, token], word.start, word.end, f"{found(word)} is a reserved word and cannot be a name",
+                    "choose another name", cut=True)
     if token.type not in lexis().reserved or following[1:2] == []:
         return None
     if following[1].type not in ("COLON", "COMMA", "ASSIGN"):

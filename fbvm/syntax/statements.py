@@ -19,6 +19,7 @@ from fbvm.syntax.tree import (
     Expr,
     For,
     If,
+    NameRef,
     Node,
     RefusedStatement,
     Repeat,
@@ -67,7 +68,7 @@ class Statements(Expressions):
 
     def _outside_case(self, label: Label) -> Statement:
         value, high = label.values[0]
-        if len(label.values) == 1 and high is None and hasattr(value, "text"):
+        if len(label.values) == 1 and high is None and isinstance(value, NameRef):
             return RefusedStatement(label.start, label.end, f"label `{value.text}`")
         self.report("S0101", label.start, label.end, "label of CASE outside of a CASE statement", "")
         return Empty(label.start, label.end)

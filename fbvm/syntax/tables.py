@@ -17,7 +17,7 @@ from typing import Any
 from fbvm.base.data import cache_folder, data_folder
 
 FILES = ("common.lark", "declarations.lark", "st.lark")
-FORMAT = 1
+FORMAT = 2
 """Of the cache file; another number makes old files worthless."""
 
 START = "source_text"
@@ -122,26 +122,40 @@ def compile_grammar(text: str) -> dict[str, Any]:
 
     lark = Lark(text, parser="lalr", lexer=NoLexer, start=START, keep_all_tokens=True, maybe_placeholders=True)
     data, memo = lark.memo_serialize([TerminalDef, LarkRule])
-    table = data["parser"]["parser"]
-    numbers: dict[int, int] = {}
-    rules: list[Any] = []
-    actions: list[dict[str, int]] = [{} for _ in table["states"]]
-    order = {state: index for index, state in enumerate(table["states"])}
-    for state, row in table["states"].items():
-        for token, (kind, arg) in row.items():
-            if kind == 0:
-                act = order[arg]
-            else:
-                if arg["@"] not in numbers:
-                    numbers[arg["@"]] = len(rules)
-                    rules.append(_plain_rule(memo[arg["@"]]))
-                act = ~numbers[arg["@"]]
-            actions[order[state]][table["tokens"][token]] = act
     terminals = [
         [t.name, t.pattern.value, "i" in t.pattern.flags, t.pattern.type == "str", t.priority > 0]
         for t in lark.terminals]
-    return {"start": order[table["start_states"][START]], "end": order[table["end_states"][START]],
-            "actions": actions, "rules": rules, "terminals": terminals}
+    return {**_numbered(data["parser"]["parser"], memo), "terminals": terminals}
+
+
+def _numbered(table: dict[str, Any], memo: dict[int, Any]) -> dict[str, Any]:
+    """lark's states and rules with numbers that are the same on every run: states as they are met from the start, in
+    the order of their symbols."""
+    names = table["tokens"]
+    used = {arg["@"] for row in table["states"].values() for kind, arg in row.values() if kind}
+    rules = sorted(used, key=lambda number: _rule_key(memo[number]))
+    rule_numbers = {number: index for index, number in enumerate(rules)}
+    todo = [table["start_states"][START]]
+    order = {todo[0]: 0}
+    for state in todo:
+        for _, (kind, arg) in sorted((names[token], act) for token, act in table["states"][state].items() if not act[0]):
+            if kind == 0 and arg not in order:
+                order[arg] = len(order)
+                todo.append(arg)
+    actions: list[dict[str, int]] = []
+    for state in todo:
+        acts = sorted((names[token], act) for token, act in table["states"][state].items() if not act[0])
+        reduces = [(names[token], act) for token, act in table["states"][state].items() if act[0]]
+        row = {name: order[arg] for name, (_, arg) in acts}
+        row |= {name: ~rule_numbers[arg["@"]] for name, (_, arg) in sorted(reduces, key=lambda item: item[0])}
+        actions.append(row)
+    return {"start": 0, "end": order[table["end_states"][START]], "actions": actions,
+            "rules": [_plain_rule(memo[number]) for number in rules]}
+
+
+def _rule_key(rule: dict[str, Any]) -> tuple[Any, ...]:
+    return (rule["origin"]["name"], [symbol["name"] for symbol in rule["expansion"]], rule["alias"] or "",
+            list(rule["options"]["empty_indices"]))
 
 
 def _plain_rule(rule: dict[str, Any]) -> list[Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import stat
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source
@@ -17,7 +18,10 @@ def read(path: Path, name: str, library: str = "") -> Source | Diagnostic:
 
     UTF-8 with or without mark, UTF-16 with mark; what is neither is taken as Windows-1252, as older tools write it."""
     try:
-        if path.is_file() and path.stat().st_size > MAX_BYTES:
+        status = path.stat()
+        if stat.S_ISFIFO(status.st_mode) or stat.S_ISSOCK(status.st_mode):
+            return _refusal(name, "it is no file")
+        if status.st_size > MAX_BYTES:
             return _refusal(name, f"it has more than {MAX_BYTES >> 20} MiB")
         data = path.read_bytes()
     except OSError as error:
@@ -36,11 +40,19 @@ def decode(data: bytes, name: str, library: str = "") -> Source | Diagnostic:
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
-        text = data.decode("cp1252", "replace")
+        text = _older(data)
     if not _CONTROLS.isdisjoint(data):
         at = next(i for i, byte in enumerate(data) if byte in _CONTROLS)
         return _refusal(name, f"byte {at} is 16#{data[at]:02X}, which no text contains; it looks like a binary file")
     return Source(name, text, library)
+
+
+def _older(data: bytes) -> str:
+    """Windows-1252, or Latin-1 where that has no character."""
+    try:
+        return data.decode("cp1252")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
 
 
 def _refusal(name: str, why: str) -> Diagnostic:

@@ -1,0 +1,88 @@
+"""The tables come from a cache file that may be missing, damaged, old or forbidden, and are the same in every case."""
+
+from __future__ import annotations
+
+import json
+import logging
+from collections.abc import Iterator
+from pathlib import Path
+
+import lark
+import pytest
+
+from fbvm.base.data import data_folder
+from fbvm.syntax import tables as module
+from fbvm.syntax.tables import FILES, Tables, compile_grammar, tables
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "deep" / "cache"))
+    yield tmp_path / "deep" / "cache"
+
+
+def fresh() -> Tables:
+    """The tables as another process would get them."""
+    return tables.__wrapped__()
+
+
+def test_a_missing_file_is_written_and_used(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = fresh()
+    (file,) = cache.iterdir()
+    monkeypatch.setattr(module, "compile_grammar", lambda text: pytest.fail("the cache is not used"))
+    assert fresh() == first == tables()
+    assert file.suffix == ".json"
+
+
+@pytest.mark.parametrize("content", [
+    b"", b"{", b"[]", b"null", b'{"key": 1}', b"\xff\xfe", b"[" * 100_000, b'{"key": 1, "tables": {}}'], ids=range(8))
+def test_a_damaged_file_is_replaced(cache: Path, content: bytes) -> None:
+    fresh()
+    (file,) = cache.iterdir()
+    good = file.read_bytes()
+    file.write_bytes(content)
+    assert fresh() == tables()
+    assert file.read_bytes() == good
+
+
+@pytest.mark.parametrize("spoil", [
+    lambda t: t["tables"]["actions"][0].update(NAME=99_999), lambda t: t["tables"].pop("rules"),
+    lambda t: t["tables"]["rules"][0].pop(), lambda t: t["key"].append("other")], ids=["state", "rules", "rule", "key"])
+def test_a_file_with_wrong_contents_is_replaced(cache: Path, spoil: object) -> None:
+    fresh()
+    (file,) = cache.iterdir()
+    good = json.loads(file.read_bytes())
+    bad = json.loads(file.read_bytes())
+    spoil(bad)  # type: ignore[operator]
+    file.write_text(json.dumps(bad))
+    assert fresh() == tables()
+    assert json.loads(file.read_bytes()) == good
+
+
+def test_a_folder_that_cannot_be_made_does_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "file" / "cache"))
+    assert fresh() == tables()
+
+
+def test_the_grammar_has_only_the_conflicts_that_are_meant(caplog: pytest.LogCaptureFixture) -> None:
+    """A result type in front of a statement that begins with `(` or a name: the bracket or name belongs to the type."""
+    text = "\n".join((data_folder("grammar") / name).read_text(encoding="utf-8") for name in FILES)
+    with caplog.at_level(logging.DEBUG, logger=lark.logger.name):
+        lark.Lark(text, parser="lalr", start="source_text", debug=True, keep_all_tokens=True, maybe_placeholders=True)
+    messages = [line for record in caplog.records for line in record.getMessage().splitlines()]
+    conflicts = sorted(line for line in messages if "conflict" in line.lower())
+    assert conflicts == ["Shift/Reduce conflict for terminal LPAR: (resolving as shift)"] * 3 + [
+        "Shift/Reduce conflict for terminal NAME: (resolving as shift)"]
+
+
+def test_the_grammar_is_plain_lark() -> None:
+    text = "\n".join((data_folder("grammar") / name).read_text(encoding="utf-8") for name in FILES)
+    tree = lark.Lark(text + "\n%ignore /\\s+/", parser="lalr", start="source_text").parse("PROGRAM p x := 1; END_PROGRAM")
+    assert isinstance(tree, lark.Tree) and compile_grammar(text)["rules"]
+
+
+def test_every_production_is_named() -> None:
+    for name in FILES[1:]:
+        lines = (data_folder("grammar") / name).read_text(encoding="utf-8").splitlines()
+        assert sum(line.startswith("// ") for line in lines) > 20

@@ -1,0 +1,56 @@
+"""Files in any encoding that a PLC tool writes; what is no text is refused."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.syntax.text import decode, read
+
+TEXT = "PROGRAM p (* é € *) END_PROGRAM\r\n"
+
+
+@pytest.mark.parametrize("data", [
+    TEXT.encode("utf-8"), TEXT.encode("utf-8-sig"), TEXT.encode("utf-16"), b"\xfe\xff" + TEXT.encode("utf-16-be"),
+    TEXT.encode("cp1252")], ids=["utf-8", "utf-8 with mark", "utf-16-le", "utf-16-be", "windows"])
+def test_encodings(data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "x.st"
+    path.write_bytes(data)
+    source = read(path, "x.st", "lib")
+    assert isinstance(source, Source)
+    assert (source.text, source.name, source.library) == (TEXT, "x.st", "lib")
+
+
+def test_bytes_that_windows_does_not_know_are_latin_1() -> None:
+    source = decode(b"(* \x81 *)", "x")
+    assert isinstance(source, Source) and source.text == "(* \x81 *)"
+
+
+@pytest.mark.parametrize("data", [
+    b"\x7fELF\0\0", b"PROGRAM\0", TEXT.encode("utf-16-le"), b"\xff\xfea", b"\x1b[0m", b"\xef\xbb\xbf\xff"],
+    ids=["program", "nul", "no mark", "half a word", "escape", "wrong utf-8"])
+def test_binary_files_are_refused(data: bytes) -> None:
+    refusal = decode(data, "x.st")
+    assert isinstance(refusal, Diagnostic)
+    assert refusal.code == "S0107" and refusal.render().startswith("x.st:1:1: error S0107: x.st cannot be read: ")
+
+
+def test_files_that_cannot_be_opened_are_refused(tmp_path: Path) -> None:
+    for path in (tmp_path / "none.st", tmp_path):
+        refusal = read(path, "x.st")
+        assert isinstance(refusal, Diagnostic) and refusal.code == "S0107"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    refusal = read(tmp_path / "pipe", "x.st")
+    assert isinstance(refusal, Diagnostic) and refusal.code == "S0107"
+
+
+def test_an_empty_file_is_a_source() -> None:
+    source = decode(b"", "x")
+    assert isinstance(source, Source) and source.text == ""
