@@ -1,0 +1,101 @@
+"""The native engine: an Image becomes machine code over the same flat memory, with the same traps and step budget.
+
+It has the surface of the Python engine and its results to the bit; it has no observations.  It decides nothing: every
+meaning is in the table of operations."""
+
+from __future__ import annotations
+
+import ctypes
+import struct
+from typing import Any
+from weakref import finalize
+
+from fbvm.base.memory import STRUCTS, Memory
+from fbvm.code.image import Image
+from fbvm.engine import native_compiler
+from fbvm.engine.native_code import Code, code_of
+from fbvm.engine.native_context import FIELDS
+from fbvm.engine.native_entries import Entry, entry, scans
+from fbvm.engine.native_writer import Unsupported
+from fbvm.engine.trap import Trap, trap
+
+__all__ = ["NativeEngine", "Unsupported", "available"]
+available = native_compiler.available
+
+
+class NativeEngine:
+    """Runs an image over a memory.
+
+    The caller sets time and budget in the system page before a run.  `level` 0 is code that is soon there, 2 is code
+    that is fast, None begins with the one and goes on with the other.  A program's mistakes come back as a Trap; memory
+    is then what was stored before it.  Raises ImportError where llvmlite is missing (see `available`), Unsupported for
+    code that the compiler never makes."""
+
+    def __init__(self, image: Image, memory: Memory, level: int | None = None) -> None:
+        if memory.size < image.layout.size:
+            raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")
+        self.image, self.memory, self.level = image, memory, level
+        self._code: Code = code_of(image)
+        self._code.prepare(level)
+        self._context = bytearray(self._code.context_size)
+        self._places = [(ctypes.c_char * len(view)).from_buffer(view) for view in (memory.map, self._context)]
+        self._memory_at, self._context_at = map(ctypes.addressof, self._places)
+        struct.pack_into("<q", self._context, FIELDS["size"], memory.size)
+        self._entries = [self._entry(number) for number in range(len(image.tasks))]
+        self._calls = [entry.call for entry in self._entries]
+
+    def _entry(self, task: int) -> Entry:
+        bound = entry()
+        bound.bind(self._memory_at, self._context_at)
+        self._code.follow(bound, task, self.level)
+        finalize(self, bound.give_back)
+        return bound
+
+    @property
+    def source(self) -> str:
+        """The module of LLVM's language, before optimisation."""
+        return self._code.translation.text
+
+    @property
+    def optimised(self) -> bool:
+        """True if the fast code is running."""
+        return self._code.level_of(self.level) == 2
+
+    def run(self, task_index: int) -> Trap | None:
+        """Execute the programs of a task in their order, until the end or a trap."""
+        point = self._calls[task_index]()
+        return self._trap(point) if point else None
+
+    def run_n(self, task_index: int, n: int, step_ns: int) -> tuple[int, Trap | None]:
+        """Execute a task up to n times while nobody needs to be told; returns how often, and the trap that ended it.
+
+        Before each time the scan's time advances by `step_ns`, nothing is due, and the budget is what it is now; after
+        each time the number of scans is one more."""
+        done = ctypes.c_int64()
+        point = scans()(self._code.address(task_index, self.level), self._memory_at, self._context_at, n, step_ns,
+                        ctypes.addressof(done))
+        return done.value, self._trap(point) if point else None
+
+    def _trap(self, number: int) -> Trap:
+        """What the point says, with the values that the context holds."""
+        code, site, shown = self._code.points[number - 1]
+        values: list[Any] = []
+        at = FIELDS["values"]
+        for kind, constant in shown:
+            if kind == "const":
+                values.append(constant)
+                continue
+            if kind == "text":
+                start, length = struct.unpack_from("<qq", self._context, at)
+                values.append(ctypes.string_at(start, length))
+                at += 16
+                continue
+            values.append(_read(self._context, at, kind))
+            at += 8
+        return trap(self.image, code, site, tuple(values))
+
+
+def _read(context: bytearray, at: int, kind: str) -> Any:
+    """One value of a trap: a float as LREAL, an integer in 64 bits with its sign or without."""
+    form = "f64" if kind[0] == "f" else "i64" if kind[0] == "i" else "u64"
+    return STRUCTS[form].unpack_from(context, at)[0]

@@ -1,0 +1,125 @@
+"""Entries: functions without arguments, each bound to one task of one PLC, which Python calls in a tenth of a microsecond.
+
+They come in blocks, made once and loaded as often as needed.  An entry reads from its slot what to call and with which
+memory and context, so that it can be bound anew and be given better code between two calls."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import cache
+
+from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
+from fbvm.engine.native_compiler import Linked, compile_text
+
+BLOCK = 64
+"""Entries that are loaded together."""
+SLOT_BYTES = 24
+_ENTRY = """
+define i32 @e{0}() {{
+%f = load ptr, ptr getelementptr (i8, ptr @slots, i64 {1})
+%m = load ptr, ptr getelementptr (i8, ptr @slots, i64 {2})
+%c = load ptr, ptr getelementptr (i8, ptr @slots, i64 {3})
+%p = tail call i32 %f(ptr %m, ptr %c)
+ret i32 %p
+}}"""
+_SCANS = f"""
+define i32 @scans(ptr %f, ptr %m, ptr %c, i64 %n, i64 %step, ptr %done) {{
+entry:
+%now = getelementptr i8, ptr %m, i64 {NOW}
+%due = getelementptr i8, ptr %m, i64 {DUE}
+%left = getelementptr i8, ptr %m, i64 {BUDGET}
+%count = getelementptr i8, ptr %m, i64 {SCANS}
+%budget = load i64, ptr %left
+br label %test
+test:
+%i = phi i64 [ 0, %entry ], [ %i1, %scan ]
+%p = phi i32 [ 0, %entry ], [ %p1, %scan ]
+store i64 %i, ptr %done
+%fine = icmp eq i32 %p, 0
+%more = icmp slt i64 %i, %n
+%go = and i1 %fine, %more
+br i1 %go, label %scan, label %end
+scan:
+%t = load i64, ptr %now
+%t1 = add i64 %t, %step
+store i64 %t1, ptr %now
+store i64 {NEVER}, ptr %due
+store i64 %budget, ptr %left
+%p1 = call i32 %f(ptr %m, ptr %c)
+%s = load i64, ptr %count
+%s1 = add i64 %s, 1
+store i64 %s1, ptr %count
+%i1 = add i64 %i, 1
+br label %test
+end:
+ret i32 %p
+}}
+"""
+
+
+class Entry:
+    """One entry: `call` is the function.  It has to be bound before it is called."""
+
+    def __init__(self, block: _Block, number: int) -> None:
+        self._block, self._number = block, number
+        self._slot = (ctypes.c_void_p * 3).from_address(block.slots + SLOT_BYTES * number)
+        self.call: Callable[[], int] = ctypes.PYFUNCTYPE(ctypes.c_int32)(block.linked.address(f"e{number}"))
+
+    def bind(self, memory: int, context: int) -> None:
+        """Say over which memory and context the entry works."""
+        self._slot[1], self._slot[2] = memory, context
+
+    def point_to(self, function: int) -> None:
+        """Say what the entry calls from now on; another thread may say so."""
+        self._slot[0] = function
+
+    def give_back(self) -> None:
+        """Somebody else may have the slot; `call` must not be used any more."""
+        self._block.free.append(self._number)
+        _open.append(self._block)
+
+
+class _Block:
+    """Entries that were loaded together, and the numbers of those that nobody has."""
+
+    def __init__(self) -> None:
+        self.linked = Linked(_compiled(), ["slots", "scans", *(f"e{number}" for number in range(BLOCK))])
+        self.slots = self.linked.address("slots")
+        self.free = list(range(BLOCK - 1, -1, -1))
+
+
+_open: list[_Block] = []
+"""Blocks with free entries, each as often as it got one."""
+
+
+@cache
+def _compiled() -> bytes:
+    entries = [_ENTRY.format(number, *(SLOT_BYTES * number + part for part in (0, 8, 16))) for number in range(BLOCK)]
+    head = f"@slots = global [{SLOT_BYTES * BLOCK} x i8] zeroinitializer, align 8"
+    return compile_text("\n".join([head, *entries, _SCANS]), 2)
+
+
+def entry() -> Entry:
+    """An entry that nobody else has."""
+    while _open and not _open[-1].free:
+        _open.pop()
+    if not _open:
+        _open.append(_Block())
+    return Entry(_open[-1], _open[-1].free.pop())
+
+
+@cache
+def scans() -> Callable[..., int]:
+    """The function that executes a task many times: (function, memory, context, n, step in ns, where to count)."""
+    address = _first_block().linked.address("scans")
+    return ctypes.PYFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64,
+                             ctypes.c_int64, ctypes.c_void_p)(address)
+
+
+@cache
+def _first_block() -> _Block:
+    """A block that stays."""
+    block = _Block()
+    _open.append(block)
+    return block

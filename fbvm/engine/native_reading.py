@@ -1,0 +1,496 @@
+"""Routines of native code that read values from text, in the subset that `native_subset` translates.
+
+They take what `syntax.literals` takes, and find the same fault first.  A routine named `read_...` yields GOOD, MALFORMED
+or OUTSIDE (the type cannot hold it) and writes the value to `out`: an integer, or the bits of a double."""
+
+from __future__ import annotations
+
+import struct
+
+from fbvm.base.types import DAY_NS, SHORT_NAMES
+from fbvm.engine.native_context import DIGITS, FIELDS
+from fbvm.engine.native_routines import INFINITE, SECOND_NS, UNITS, unit_ns
+from fbvm.engine.native_subset import data, float_bits, peek, peek_all, poke, poke_all, text_float
+from fbvm.syntax.literals import LONGEST, REALS
+
+GOOD, MALFORMED, OUTSIDE = 0, 1, 2
+KINDS = {name: number for number, name in enumerate((
+    "BOOL", "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD", "REAL",
+    "LREAL", "TIME", "LTIME", "DATE", "LDATE", "TIME_OF_DAY", "LTIME_OF_DAY", "DATE_AND_TIME", "LDATE_AND_TIME",
+    "STRING"))}
+"""Data types by number; STRING stands for every kind of text."""
+NAMES = b"".join(name.encode() + bytes((0, number)) for name, number in (
+    KINDS | {short: KINDS[name] for short, name in SHORT_NAMES.items()}
+    | dict.fromkeys(("WSTRING", "CHAR", "WCHAR"), KINDS["STRING"])).items()) + b"\0"
+"""Names of types, each followed by 0 and its number; an empty one ends them."""
+BITS = b"\0\x08\x10\x20\x40\x08\x10\x20\x40\x08\x10\x20\x40"
+"""Widths of the integer types by number."""
+LINT, REAL, LREAL, TIME = KINDS["LINT"], KINDS["REAL"], KINDS["LREAL"], KINDS["TIME"]
+DATE, TOD, DT, STRING = KINDS["DATE"], KINDS["TIME_OF_DAY"], KINDS["DATE_AND_TIME"], KINDS["STRING"]
+CANONICAL_NAN, SIGN, MOST = 0x7FF8000000000000, -(1 << 63), (1 << 63) - 1
+REAL_LIMIT = struct.unpack("<q", struct.pack("<d", REALS["REAL"]))[0]
+CLEANED = DIGITS - FIELDS["result"]
+"""How far behind the result the bytes lie in which a number's text is cleaned."""
+TENTH = ((1 << 64) - 1) // 10
+LAST_DAY = MOST // DAY_NS
+
+
+# --- characters -----------------------------------------------------------------------------------------------------
+
+
+def upper(letter: int) -> int:
+    if ord("a") <= letter <= ord("z"):
+        return letter - 32
+    return letter
+
+
+def is_digit(at: int) -> int:
+    return ord("0") <= peek(at) <= ord("9")
+
+
+def says(at: int, n: int, word: int) -> int:
+    """Whether a text is a word (in capitals, ended by 0), whatever its case."""
+    i = 0
+    while i < n:
+        if upper(peek(at + i)) != peek(word + i) or peek(word + i) == 0:
+            return 0
+        i += 1
+    return peek(word + n) == 0
+
+
+def place_of(letter: int, at: int, n: int) -> int:
+    """Where a character stands first; n if nowhere."""
+    i = 0
+    while i < n and peek(at + i) != letter:
+        i += 1
+    return i
+
+
+def kind_of(at: int, n: int) -> int:
+    """The number of the type of that name; -1 if there is none."""
+    name = data(NAMES)
+    while peek(name) != 0:
+        end = name + place_of(0, name, 64)
+        if says(at, n, name):
+            return peek(end + 1)
+        name = end + 2
+    return -1
+
+
+def run_of_digits(at: int, n: int) -> int:
+    """How many characters digits take, with single `_` between them."""
+    i = 0
+    while i < n and is_digit(at + i):
+        i += 1
+        if i + 1 < n and peek(at + i) == ord("_") and is_digit(at + i + 1):
+            i += 1
+    return i
+
+
+def count_digits(at: int, n: int) -> int:
+    i = 0
+    while i < n and is_digit(at + i):
+        i += 1
+    return i
+
+
+def number_at(at: int, n: int) -> int:
+    """The number that few digits write; `_` is passed over."""
+    number = 0
+    i = 0
+    while i < n:
+        if peek(at + i) != ord("_"):
+            number = number * 10 + peek(at + i) - ord("0")
+        i += 1
+    return number
+
+
+# --- numbers --------------------------------------------------------------------------------------------------------
+
+
+def is_real(at: int, n: int) -> int:
+    """Whether a text is digits with a point or an exponent."""
+    i = run_of_digits(at, n)
+    if i == 0:
+        return 0
+    if i < n and peek(at + i) == ord("."):
+        more = run_of_digits(at + i + 1, n - i - 1)
+        if more == 0:
+            return 0
+        i += 1 + more
+    if i < n and upper(peek(at + i)) == ord("E"):
+        i += 1
+        if i < n and (peek(at + i) == ord("+") or peek(at + i) == ord("-")):
+            i += 1
+        more = count_digits(at + i, n - i)
+        if more == 0:
+            return 0
+        i += more
+    return i == n
+
+
+def float_at(out: int, at: int, n: int) -> int:
+    """The bits of the double that a decimal number is nearest to."""
+    clean = out + CLEANED
+    i = 0
+    while i < n:
+        if peek(at + i) != ord("_"):
+            poke(clean, peek(at + i))
+            clean += 1
+        i += 1
+    poke(clean, 0)
+    return text_float(out + CLEANED)
+
+
+def read_decimal(out: int, at: int, n: int) -> int:
+    """A whole number below 2**64."""
+    number = 0
+    i = 0
+    while i < n:
+        if peek(at + i) != ord("_"):
+            digit = peek(at + i) - ord("0")
+            if number < 0 or number > TENTH or (number == TENTH and digit > 5):
+                return OUTSIDE
+            number = number * 10 + digit
+        i += 1
+    poke_all(out, number)
+    return GOOD
+
+
+def digit_bits(at: int, n: int) -> int:
+    """Bits of a digit of the base that is written before `#`; 0 if there is no such base."""
+    if n == 1 and peek(at) == ord("2"):
+        return 1
+    if n == 1 and peek(at) == ord("8"):
+        return 3
+    if n == 2 and peek(at) == ord("1") and peek(at + 1) == ord("6"):
+        return 4
+    return 0
+
+
+def digit_value(letter: int) -> int:
+    """Value of a digit of any base; 99 for another character."""
+    if ord("0") <= letter <= ord("9"):
+        return letter - ord("0")
+    letter = upper(letter)
+    if ord("A") <= letter <= ord("Z"):
+        return letter - 55
+    return 99
+
+
+def is_based(at: int, n: int, bits: int) -> int:
+    """Whether a text is digits of a base, with single `_` between them."""
+    after_digit = 0
+    i = 0
+    while i < n:
+        if peek(at + i) == ord("_"):
+            if not after_digit:
+                return 0
+            after_digit = 0
+        elif digit_value(peek(at + i)) >> bits:
+            return 0
+        else:
+            after_digit = 1
+        i += 1
+    return after_digit
+
+
+def read_based(out: int, at: int, n: int, real: int) -> int:
+    """A number such as 16#FF, below 2**64, or the double nearest to it."""
+    mark = place_of(ord("#"), at, n)
+    bits = digit_bits(at, mark)
+    if bits == 0 or not is_based(at + mark + 1, n - mark - 1, bits):
+        return MALFORMED
+    number = 0
+    left_out = 0
+    sticky = 0
+    i = mark + 1
+    while i < n:
+        digit = digit_value(peek(at + i))
+        if digit == 99:
+            i += 1
+            continue
+        if real and number >> 58:
+            left_out += bits
+            sticky = sticky | (digit != 0)
+        elif number >> (64 - bits):
+            return OUTSIDE
+        else:
+            number = number << bits | digit
+        i += 1
+    if real and number != 0:
+        number = float_bits(number | sticky)
+        if (number >> 52) + left_out > 2046:
+            return OUTSIDE
+        number += left_out << 52
+    poke_all(out, number)
+    return GOOD
+
+
+def read_number(out: int, kind: int, at: int, n: int) -> int:
+    """A number of an integer or real type, with a sign if it has no base."""
+    sign = 0
+    if n > 0 and (peek(at) == ord("-") or peek(at) == ord("+")):
+        sign = peek(at)
+        at += 1
+        n -= 1
+    based = place_of(ord("#"), at, n) < n
+    if n == 0 or (based and sign != 0):
+        return MALFORMED
+    if n > LONGEST:
+        return OUTSIDE
+    whole = run_of_digits(at, n) == n
+    if not based and not whole and not is_real(at, n):
+        return MALFORMED
+    if kind >= REAL:
+        return read_real(out, kind, at, n, sign, based, whole)
+    if not based and not whole:
+        return MALFORMED
+    if based:
+        status = read_based(out, at, n, 0)
+    else:
+        status = read_decimal(out, at, n)
+    if status != GOOD:
+        return status
+    return within(out, kind, sign == ord("-"))
+
+
+def within(out: int, kind: int, negative: int) -> int:
+    """Whether an integer type holds the number in `out`, which gets its sign."""
+    number = peek_all(out)
+    bits = peek(data(BITS) + kind)
+    if negative:
+        poke_all(out, -number)
+        if kind > LINT:
+            if number != 0:
+                return OUTSIDE
+        elif bits == 64:
+            if number < 0 and number != SIGN:
+                return OUTSIDE
+        elif number < 0 or number > 1 << (bits - 1):
+            return OUTSIDE
+        return GOOD
+    if kind <= LINT:
+        bits -= 1
+    if bits < 64 and number >> bits != 0:
+        return OUTSIDE
+    return GOOD
+
+
+def read_real(out: int, kind: int, at: int, n: int, sign: int, based: int, whole: int) -> int:
+    if based:
+        status = read_based(out, at, n, 1)
+        if status != GOOD:
+            return status
+        bits = peek_all(out)
+    else:
+        bits = float_at(out, at, n)
+    if bits >= INFINITE or (kind == REAL and bits >= REAL_LIMIT):
+        return OUTSIDE
+    if sign == ord("-") and (bits != 0 or not whole):
+        bits = bits | SIGN
+    poke_all(out, bits)
+    return GOOD
+
+
+# --- times and dates ------------------------------------------------------------------------------------------------
+
+
+def read_fraction(out: int, at: int, n: int, size: int) -> int:
+    """Digits behind a point times a size, which must give a whole number."""
+    while n > 0 and (peek(at + n - 1) == ord("0") or peek(at + n - 1) == ord("_")):
+        n -= 1
+    poke_all(out, 0)
+    parts = 1
+    number = 0
+    i = 0
+    while i < n:
+        if peek(at + i) != ord("_"):
+            if parts >= 10000000000000000:
+                return OUTSIDE
+            parts *= 10
+            number = number * 10 + peek(at + i) - ord("0")
+        i += 1
+    prime = 5  # then 2
+    while prime >= 2:
+        while size % prime == 0 and parts % prime == 0:
+            size //= prime
+            parts //= prime
+        prime -= 3
+    if number % parts != 0:
+        return OUTSIDE
+    poke_all(out, number // parts * size)
+    return GOOD
+
+
+def unit_at(at: int, n: int) -> int:
+    """Place in d h m s ms us ns of the unit that a text begins with, the longest one; 7 if none."""
+    unit = 6
+    if n > 1 and upper(peek(at + 1)) == ord("S"):
+        while unit > 3:
+            if upper(peek(at)) == upper(peek(data(UNITS) + unit * 2)):
+                return unit
+            unit -= 1
+    unit = 0
+    while unit < 4 and (n == 0 or upper(peek(at)) != upper(peek(data(UNITS) + unit * 2))):
+        unit += 1
+    if unit == 4:
+        return 7
+    return unit
+
+
+def read_duration(out: int, at: int, n: int) -> int:
+    """1d2h3.5s or -5us300ns; the total is kept below 0, where there is room for one more."""
+    negative = 0
+    if n > 0 and (peek(at) == ord("-") or peek(at) == ord("+")):
+        negative = peek(at) == ord("-")
+        at += 1
+        n -= 1
+    if n == 0:
+        return MALFORMED
+    total = 0
+    outside = 0
+    last = -1
+    while n > 0:
+        skip = peek(at) == ord("_")
+        whole = run_of_digits(at + skip, n - skip)
+        end = skip + whole
+        behind = 0
+        if end < n and peek(at + end) == ord("."):
+            behind = run_of_digits(at + end + 1, n - end - 1)
+            if behind == 0:
+                return MALFORMED
+            end += 1 + behind
+        unit = unit_at(at + end, n - end)
+        if whole == 0 or unit == 7:
+            return MALFORMED
+        size = unit_ns(unit)
+        end += 1 + (unit > 3)
+        if end > LONGEST or unit <= last or (behind != 0 and end != n):
+            return MALFORMED
+        counted = read_decimal(out, at + skip, whole)
+        count = peek_all(out)
+        if counted == GOOD and count == SIGN and size == 1 and total == 0:
+            total = SIGN
+        elif counted != GOOD or count < 0 or count > MOST // size or count * size - 1 > total + MOST:
+            outside = 1
+        else:
+            total -= count * size
+        if behind != 0:
+            if read_fraction(out, at + skip + whole + 1, behind, size) != GOOD or peek_all(out) - 1 > total + MOST:
+                outside = 1
+            total -= peek_all(out)
+        last = unit
+        at += end
+        n -= end
+    if outside or (total == SIGN and not negative):
+        return OUTSIDE
+    if not negative:
+        total = -total
+    poke_all(out, total)
+    return GOOD
+
+
+def days_of_month(year: int, month: int) -> int:
+    if month == 2:
+        if year % 4 == 0 and (year % 100 != 0 or year % 400 == 0):
+            return 29
+        return 28
+    return 30 + (month + month // 8) % 2
+
+
+def read_day(out: int, at: int, n: int) -> int:
+    """Days since 1970-01-01 of a date such as 2024-05-31."""
+    size = count_digits(at, n)
+    if size == 0 or size > 4 or size >= n or peek(at + size) != ord("-"):
+        return MALFORMED
+    year = number_at(at, size)
+    at += size + 1
+    n -= size + 1
+    size = count_digits(at, n)
+    if size == 0 or size > 2 or size >= n or peek(at + size) != ord("-"):
+        return MALFORMED
+    month = number_at(at, size)
+    at += size + 1
+    n -= size + 1
+    if n == 0 or n > 2 or count_digits(at, n) != n:
+        return MALFORMED
+    day = number_at(at, n)
+    if year < 1 or month < 1 or month > 12 or day < 1 or day > days_of_month(year, month):
+        return MALFORMED
+    if month < 3:
+        year -= 1
+        month += 12
+    days = 365 * year + year // 4 - year // 100 + year // 400 + (153 * (month - 3) + 2) // 5 + day - 719469
+    if days < -LAST_DAY or days > LAST_DAY:
+        return OUTSIDE
+    poke_all(out, days)
+    return GOOD
+
+
+def read_date(out: int, at: int, n: int) -> int:
+    status = read_day(out, at, n)
+    poke_all(out, peek_all(out) * DAY_NS)
+    return status
+
+
+def two_digits(at: int, n: int) -> int:
+    """Length of a number of one or two digits; 0 for another."""
+    size = count_digits(at, n)
+    if size > 2:
+        return 0
+    return size
+
+
+def read_clock(out: int, at: int, n: int) -> int:
+    """Nanoseconds since midnight of 13:45 or 13:45:30.25."""
+    size = two_digits(at, n)
+    if n > LONGEST or size == 0 or size >= n or peek(at + size) != ord(":"):
+        return MALFORMED
+    hour = number_at(at, size)
+    at += size + 1
+    n -= size + 1
+    size = two_digits(at, n)
+    if size == 0 or (size < n and peek(at + size) != ord(":")):
+        return MALFORMED
+    minute = number_at(at, size)
+    second = 0
+    poke_all(out, 0)
+    behind = 0
+    if size < n:
+        at += size + 1
+        n -= size + 1
+        size = two_digits(at, n)
+        if size == 0 or (size < n and peek(at + size) != ord(".")):
+            return MALFORMED
+        second = number_at(at, size)
+        at += size + 1
+        behind = n - size - 1
+        if size < n and (behind == 0 or run_of_digits(at, behind) != behind):
+            return MALFORMED
+    if hour > 23 or minute > 59 or second > 59:
+        return MALFORMED
+    if behind > 0 and read_fraction(out, at, behind, SECOND_NS) != GOOD:
+        return OUTSIDE
+    poke_all(out, ((hour * 60 + minute) * 60 + second) * SECOND_NS + peek_all(out))
+    return GOOD
+
+
+def read_moment(out: int, at: int, n: int) -> int:
+    """A date, `-` and a time of day."""
+    mark = n - 1
+    while mark >= 0 and peek(at + mark) != ord("-"):
+        mark -= 1
+    if mark < 0 or place_of(ord(":"), at + mark + 1, n - mark - 1) == n - mark - 1:
+        return MALFORMED
+    status = read_day(out, at, mark)
+    if status != GOOD:
+        return status
+    start = peek_all(out) * DAY_NS
+    status = read_clock(out, at + mark + 1, n - mark - 1)
+    if status != GOOD:
+        return status
+    if start > MOST - peek_all(out):
+        return OUTSIDE
+    poke_all(out, start + peek_all(out))
+    return GOOD

@@ -1,0 +1,265 @@
+"""Routines of native code over bytes, and those that write values as text, in the subset that `native_subset` translates.
+
+Texts are given as the address of their first byte and their length.  A routine named `put_...` writes a text and yields
+its length."""
+
+from __future__ import annotations
+
+import struct
+
+from fbvm.base.types import DAY_NS
+from fbvm.engine.native_subset import data, float_text, free_text, peek, poke, single_bits, text_float
+from fbvm.syntax.literals import UNITS_NS
+
+UNITS = b"d\0h\0m\0s\0msusns"
+SIZES = b"".join(struct.pack("<Q", size) for size in UNITS_NS.values())
+MAGNITUDE, INFINITE = 0x7FFFFFFFFFFFFFFF, 0x7FF0000000000000
+SECOND_NS = 1_000_000_000
+
+
+# --- bytes ----------------------------------------------------------------------------------------------------------
+
+
+def text_length(at: int, capacity: int) -> int:
+    """Bytes up to the first 0, at most the capacity."""
+    n = 0
+    while n < capacity and peek(at + n) != 0:
+        n += 1
+    return n
+
+
+def text_order(a: int, m: int, b: int, n: int) -> int:
+    """Below 0, 0 or above: how text a stands to text b."""
+    i = 0
+    while i < m and i < n:
+        if peek(a + i) != peek(b + i):
+            return peek(a + i) - peek(b + i)
+        i += 1
+    return m - n
+
+
+def text_find(a: int, m: int, b: int, n: int) -> int:
+    """Position of the first b in a; 0 if there is none or b is empty."""
+    if n == 0:
+        return 0
+    i = 0
+    while i + n <= m:
+        if text_order(a + i, n, b, n) == 0:
+            return i + 1
+        i += 1
+    return 0
+
+
+def bcd_number(a: int) -> int:
+    """The number that decimal nibbles form; -1 if one is above 9."""
+    number = 0
+    shift = 64
+    while shift > 0:
+        shift -= 4
+        if (a >> shift) & 15 > 9:
+            return -1
+        number = number * 10 + ((a >> shift) & 15)
+    return number
+
+
+def bcd_digits(a: int) -> int:
+    """The decimal digits of a in nibbles."""
+    digits = 0
+    shift = 0
+    while a != 0:
+        digits |= (a % 10) << shift
+        a //= 10
+        shift += 4
+    return digits
+
+
+# --- values to text -------------------------------------------------------------------------------------------------
+
+
+def put_bytes(out: int, at: int, n: int) -> int:
+    i = 0
+    while i < n:
+        poke(out + i, peek(at + i))
+        i += 1
+    return n
+
+
+def put_digits(out: int, value: int, count: int) -> int:
+    """That many decimal digits."""
+    i = count
+    while i > 0:
+        i -= 1
+        poke(out + i, ord("0") + value % 10)
+        value //= 10
+    return count
+
+
+def put_number(out: int, value: int) -> int:
+    """A number without sign."""
+    count = 1
+    rest = value // 10
+    while rest != 0:
+        count += 1
+        rest //= 10
+    return put_digits(out, value, count)
+
+
+def put_integer(out: int, value: int) -> int:
+    if value < 0:
+        poke(out, ord("-"))
+        return 1 + put_number(out + 1, -value)
+    return put_number(out, value)
+
+
+def put_lreal(out: int, bits: int) -> int:
+    """Fewest digits that read back; an exponent's letter is a capital."""
+    if bits & INFINITE == INFINITE:
+        if bits & MAGNITUDE != INFINITE:
+            return put_bytes(out, data(b"NaN"), 3)
+        if bits < 0:
+            return put_bytes(out, data(b"-INF"), 4)
+        return put_bytes(out, data(b"INF"), 3)
+    text = float_text(bits, ord("r"), 0, 2)
+    n = put_bytes(out, text, text_length(text, 48))
+    free_text(text)
+    i = 0
+    while i < n:
+        if peek(out + i) == ord("e"):
+            poke(out + i, ord("E"))
+        i += 1
+    return n
+
+
+def put_real(out: int, bits: int) -> int:
+    """Fewest digits that round to the same 32 bits; the bits are those of the same LREAL."""
+    digits = 1
+    while digits < 10 and bits & INFINITE != INFINITE:
+        text = float_text(bits, ord("g"), digits, 0)
+        shortest = text_float(text)
+        free_text(text)
+        if single_bits(shortest) == bits:
+            return put_lreal(out, shortest)
+        digits += 1
+    return put_lreal(out, bits)
+
+
+def unit_ns(unit: int) -> int:
+    """Nanoseconds of a unit by its place in d h m s ms us ns."""
+    at = data(SIZES) + unit * 8
+    size = 0
+    i = 8
+    while i > 0:
+        i -= 1
+        size = size * 256 + peek(at + i)
+    return size
+
+
+def put_duration(out: int, value: int, n: int) -> int:
+    """A duration behind the n bytes of its prefix."""
+    rest = value
+    if value < 0:
+        poke(out + n, ord("-"))
+        n += 1
+        rest = -value
+    start = n
+    unit = 0
+    while unit < 7:
+        count = rest // unit_ns(unit)
+        rest = rest % unit_ns(unit)
+        if count != 0:
+            n += put_number(out + n, count)
+            n += put_bytes(out + n, data(UNITS) + unit * 2, text_length(data(UNITS) + unit * 2, 2))
+        unit += 1
+    if n == start:
+        n += put_bytes(out + n, data(b"0s"), 2)
+    return n
+
+
+def put_time(out: int, value: int) -> int:
+    return put_duration(out, value, put_bytes(out, data(b"T#"), 2))
+
+
+def put_ltime(out: int, value: int) -> int:
+    return put_duration(out, value, put_bytes(out, data(b"LT#"), 3))
+
+
+def whole_days(value: int) -> int:
+    """Days since 1970, toward minus infinity."""
+    if value < 0:
+        return -1 - (-1 - value) // DAY_NS
+    return value // DAY_NS
+
+
+def put_day(out: int, value: int) -> int:
+    """The date of a moment: years begin in March here, the leap day ends them."""
+    day = whole_days(value) + 719468
+    era = day // 146097
+    of_era = day % 146097
+    year = (of_era - of_era // 1460 + of_era // 36524 - of_era // 146096) // 365
+    of_year = of_era - (365 * year + year // 4 - year // 100)
+    month = (5 * of_year + 2) // 153
+    put_digits(out + 8, of_year - (153 * month + 2) // 5 + 1, 2)
+    year += era * 400
+    month += 3
+    if month > 12:
+        month -= 12
+        year += 1
+    put_digits(out, year, 4)
+    put_digits(out + 5, month, 2)
+    poke(out + 4, ord("-"))
+    poke(out + 7, ord("-"))
+    return 10
+
+
+def put_clock(out: int, value: int) -> int:
+    """The time of day of a moment, without zeros at the end of its fraction."""
+    rest = value - whole_days(value) * DAY_NS
+    seconds = rest // SECOND_NS
+    rest = rest % SECOND_NS
+    put_digits(out, seconds // 3600, 2)
+    put_digits(out + 3, seconds // 60 % 60, 2)
+    put_digits(out + 6, seconds % 60, 2)
+    poke(out + 2, ord(":"))
+    poke(out + 5, ord(":"))
+    if rest == 0:
+        return 8
+    poke(out + 8, ord("."))
+    put_digits(out + 9, rest, 9)
+    n = 18
+    while peek(out + n - 1) == ord("0"):
+        n -= 1
+    return n
+
+
+def put_date(out: int, value: int) -> int:
+    n = put_bytes(out, data(b"D#"), 2)
+    return n + put_day(out + n, value)
+
+
+def put_ldate(out: int, value: int) -> int:
+    n = put_bytes(out, data(b"LD#"), 3)
+    return n + put_day(out + n, value)
+
+
+def put_tod(out: int, value: int) -> int:
+    n = put_bytes(out, data(b"TOD#"), 4)
+    return n + put_clock(out + n, value)
+
+
+def put_ltod(out: int, value: int) -> int:
+    n = put_bytes(out, data(b"LTOD#"), 5)
+    return n + put_clock(out + n, value)
+
+
+def put_moment(out: int, value: int, n: int) -> int:
+    n += put_day(out + n, value)
+    poke(out + n, ord("-"))
+    return n + 1 + put_clock(out + n + 1, value)
+
+
+def put_dt(out: int, value: int) -> int:
+    return put_moment(out, value, put_bytes(out, data(b"DT#"), 3))
+
+
+def put_ldt(out: int, value: int) -> int:
+    return put_moment(out, value, put_bytes(out, data(b"LDT#"), 4))

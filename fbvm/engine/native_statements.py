@@ -1,0 +1,211 @@
+"""Statements of code as instructions of LLVM: one row an operation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from fbvm.base.areas import BUDGET, DUE
+from fbvm.base.arithmetic import width
+from fbvm.code.operations import SIZES, Address, Block, Node
+from fbvm.engine.native_expressions import canonical_bits, flag_mask, signed
+from fbvm.engine.native_texts import keep
+from fbvm.engine.native_writer import RARE, Writer, ir, stored
+from fbvm.engine.ranges import is_float
+from fbvm.engine.statements import case_table
+
+FEW_VALUES = 8
+"""Values up to which a range of a CASE is taken value by value."""
+
+
+# --- stores ---------------------------------------------------------------------------------------------------------
+
+
+def _store(w: Writer, machine: str, address: Address, a: Node) -> None:
+    _put(w, machine, address, a, 1 if w.loose(address) else SIZES[machine])
+
+
+def _store_raw(w: Writer, machine: str, address: Address, a: Node) -> None:
+    _put(w, machine, address, a, 1)
+
+
+def _put(w: Writer, machine: str, address: Address, a: Node, align: int) -> None:
+    pointer = w.pointer(address, SIZES[machine])
+    to_memory(w, machine, pointer, a, align, w.scope(address, SIZES[machine]))
+
+
+def to_memory(w: Writer, machine: str, pointer: str, a: Node, align: int, scope: str) -> None:
+    """Store a value as memory holds it."""
+    value, kind = w.value(a), stored(machine)
+    if machine == "b":
+        value = w.new(f"zext i1 {value} to i8")
+    elif is_float(machine) and not (a[0] == "const" or (a[0] == "convert" and not is_float(a[2]))):
+        value, kind = canonical_bits(w, value, machine), f"i{width(machine)}"
+    w.emit(f"store {kind} {value}, ptr {pointer}, align {align}{scope}")
+
+
+def _store_bit(w: Writer, address: Address, bit: int, a: Node) -> None:
+    pointer, scope = w.pointer(address, 1), w.scope(address, 1)
+    value = w.value(a)
+    byte = w.new(f"load i8, ptr {pointer}{scope}")
+    cleared = w.new(f"and i8 {byte}, {~(1 << bit)}")
+    moved = w.new(f"shl i8 {w.new(f'zext i1 {value} to i8')}, {bit}")
+    w.emit(f"store i8 {w.new(f'or i8 {cleared}, {moved}')}, ptr {pointer}{scope}")
+
+
+def _store_flag(w: Writer, address: Address, a: Node) -> None:
+    if not w.loose(address):
+        _store(w, "b", address, a)
+        return
+    pointer = w.pointer(address, 1)
+    whole, mask = flag_mask(w, address)
+    value = w.value(a)
+    byte = w.new(f"load i8, ptr {pointer}")
+    cleared = w.new(f"and i8 {byte}, {w.new(f'xor i8 {mask}, -1')}")
+    changed = w.new(f"select i1 {value}, i8 {w.new(f'or i8 {byte}, {mask}')}, i8 {cleared}")
+    full = w.new(f"zext i1 {value} to i8")
+    w.emit(f"store i8 {w.new(f'select i1 {whole}, i8 {full}, i8 {changed}')}, ptr {pointer}")
+
+
+def _store_text(w: Writer, address: Address, capacity: int, a: Node) -> None:
+    pointer = w.pointer(address, capacity + 1)
+    text = w.text(a)
+    length = w.new(f"call i64 @llvm.umin.i64(i64 {text.length}, i64 {capacity})")
+    w.emit(f"call void @llvm.memmove.p0.p0.i64(ptr {pointer}, ptr {text.at}, i64 {length}, i1 false)")
+    w.emit(f"store i8 0, ptr {w.new(f'getelementptr inbounds i8, ptr {pointer}, i64 {length}')}")
+
+
+def _copy(w: Writer, to: Address, source: Address, size: int) -> None:
+    target, origin = w.pointer(to, size), w.pointer(source, size)
+    w.emit(f"call void @llvm.memmove.p0.p0.i64(ptr {target}, ptr {origin}, i64 {size}, i1 false)")
+
+
+def _fill(w: Writer, address: Address, pattern: bytes) -> None:
+    pointer = w.pointer(address, len(pattern))
+    if not any(pattern):
+        w.emit(f"call void @llvm.memset.p0.i64(ptr {pointer}, i8 0, i64 {len(pattern)}, i1 false)")
+    else:
+        origin = w.module.constant(pattern)
+        w.emit(f"call void @llvm.memcpy.p0.p0.i64(ptr {pointer}, ptr {origin}, i64 {len(pattern)}, i1 false)")
+
+
+def _let(w: Writer, number: int, machine: str, a: Node) -> None:
+    if machine == "s8":
+        keep(w, number, a)
+        return
+    value = w.value(a)
+    if machine == "b":
+        value = w.new(f"zext i1 {value} to i8")
+    w.emit(f"store {stored(machine)} {value}, ptr {w.temporary(number, machine)}, align {SIZES[machine]}")
+
+
+# --- control --------------------------------------------------------------------------------------------------------
+
+
+def _if(w: Writer, rows: tuple[tuple[Node, Block], ...], otherwise: Block) -> None:
+    after = w.label()
+    for condition, block in rows:
+        yes, no = w.label(), w.label()
+        w.branch(w.value(condition), yes, no)
+        w.begin(yes)
+        w.write(block)
+        w.jump(after)
+        w.begin(no)
+    w.write(otherwise)
+    w.jump(after)
+    w.begin(after)
+
+
+def _case(w: Writer, machine: str, a: Node, rows: tuple[tuple[Any, Block], ...], otherwise: Block) -> None:
+    value, kind, after = w.value(a), ir(machine), w.label()
+    blocks = [w.label() for _ in rows] + [w.label()]
+    cases = []
+    starts, numbers = case_table([labels for labels, _ in rows])
+    for low, end, number in zip(starts, starts[1:], numbers[1:], strict=False):
+        if number == len(rows):
+            continue
+        if end - low <= FEW_VALUES:
+            cases += [f"{kind} {label}, label %{blocks[number]}" for label in range(low, end)]
+        else:
+            inside, more = _between(w, machine, value, low, end - 1), w.label()
+            w.branch(inside, blocks[number], more)
+            w.begin(more)
+    w.emit(f"switch {kind} {value}, label %{blocks[-1]} [ {' '.join(cases)} ]")
+    for label, block in zip(blocks, [block for _, block in rows] + [otherwise], strict=True):
+        w.begin(label)
+        w.write(block)
+        w.jump(after)
+    w.begin(after)
+
+
+def _between(w: Writer, machine: str, value: str, low: int, high: int) -> str:
+    kind, sign = ir(machine), "s" if signed(machine) else "u"
+    above, below = w.new(f"icmp {sign}ge {kind} {value}, {low}"), w.new(f"icmp {sign}le {kind} {value}, {high}")
+    return w.new(f"and i1 {above}, {below}")
+
+
+def _loop(w: Writer, head: Block, body: Block, tail: Block) -> None:
+    start, following, after = w.label("l"), w.label(), w.label()
+    w.jump(start)
+    w.begin(start)
+    w.loops.append((following, after))
+    w.write(head)
+    w.write(body)
+    w.jump(following)
+    w.loops[-1] = start, after
+    w.begin(following)
+    w.write(tail)
+    w.jump(start)
+    w.loops.pop()
+    w.begin(after)
+
+
+def _exit(w: Writer) -> None:
+    w.jump(w.loops[-1][1])
+
+
+def _next(w: Writer) -> None:
+    w.jump(w.loops[-1][0])
+
+
+def _return(w: Writer) -> None:
+    w.emit("ret i32 0")
+    w.dead = True
+
+
+def _call(w: Writer, pou: int, address: Address | None) -> None:
+    size = w.module.image.bodies[pou].instance_size
+    place = w.offset(address, max(1, size)) if address else "0"
+    point = w.new(f"call i32 @b{pou}(ptr %m, ptr %c, i64 {place})")
+    bad, good = w.label("x"), w.label()
+    w.emit(f"br i1 {w.new(f'icmp ne i32 {point}, 0')}, label %{bad}, label %{good}, {RARE}")
+    w.cold += [f"{bad}:", f"ret i32 {point}"]
+    w.begin(good)
+
+
+def _charge(w: Writer, count: int, site: int) -> None:
+    left = w.new(f"sub i64 {w.system(BUDGET)}, {count}")
+    w.put_system(BUDGET, left)
+    w.trap_if(w.new(f"icmp slt i64 {left}, 0"), "R0104", site)
+
+
+def _due(w: Writer, a: Node) -> None:
+    value = w.value(a)
+    w.put_system(DUE, w.new(f"call i64 @llvm.smin.i64(i64 {value}, i64 {w.system(DUE)})"))
+
+
+def _stop(w: Writer, code: str, site: int) -> None:
+    w.trap(code, site)
+
+
+def _observe(w: Writer, kind: str, site: int, detail: Any) -> None:
+    """Native code is a plain build."""
+
+
+EMITTERS: dict[str, Callable[..., None]] = {
+    "store": _store, "store_raw": _store_raw, "store_bit": _store_bit, "store_flag": _store_flag,
+    "store_text": _store_text, "copy": _copy, "fill": _fill, "let": _let, "if": _if, "case": _case, "loop": _loop,
+    "exit": _exit, "next": _next, "return": _return, "call": _call, "charge": _charge, "due": _due, "stop": _stop,
+    "observe": _observe,
+}
+"""How each statement is written: called with the operands of its row."""

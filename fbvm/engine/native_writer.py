@@ -1,0 +1,313 @@
+"""What the rows of native code write with: names, blocks, addresses, traps and constants of one body in LLVM's language.
+
+A body is a function `i32 (ptr %m, ptr %c, i64 %self)`: the flat memory, the context (see `native_context`), the place of
+its instance.  It returns 0, or the number of the point at which the run has to end, whose values are in the context."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from fbvm.base.areas import PAGE_BYTES
+from fbvm.base.arithmetic import single, width
+from fbvm.code.image import Image
+from fbvm.code.operations import Address, Block, Node
+from fbvm.engine.native_context import FIELDS, SCRATCH, Point, Shown
+from fbvm.engine.ranges import is_float, span
+
+NAN_BITS = {"f32": "0x7FF8000000000000", "f64": "0x7FF8000000000000"}
+"""The canonical NaN as LLVM writes it; a float's digits are those of the double of that value."""
+SYSTEM, PROGRAM = ", !alias.scope !2, !noalias !3", ", !alias.scope !3, !noalias !2"
+"""What marks accesses to words of the system page, and to memory that no such word lies in."""
+METADATA = """\
+!0 = !{!"branch_weights", i32 1, i32 4000}
+!1 = !{}
+!2 = !{!4}
+!3 = !{!5}
+!4 = distinct !{!4, !6, !"system page"}
+!5 = distinct !{!5, !6, !"program"}
+!6 = distinct !{!6, !"memory"}
+"""
+RARE = "!prof !0"
+"""What marks a branch whose first way is hardly ever taken."""
+
+
+def ir(machine: str) -> str:
+    """LLVM's name of a machine type as it is worked on."""
+    return _IR.get(machine) or f"i{width(machine)}"
+
+
+_IR = {"b": "i1", "f32": "float", "f64": "double", "ref": "i64"}
+
+
+def stored(machine: str) -> str:
+    """LLVM's name of a machine type as it lies in memory."""
+    return "i8" if machine == "b" else ir(machine)
+
+
+def literal(machine: str, value: Any) -> str:
+    """A constant of a machine type."""
+    if machine == "b":
+        return "true" if value else "false"
+    if not is_float(machine):
+        return str(int(value))
+    if value != value:
+        return NAN_BITS[machine]
+    number = single(value) if machine == "f32" else float(value)
+    return f"0x{struct.unpack('<Q', struct.pack('<d', number))[0]:016X}"
+
+
+class Text(NamedTuple):
+    """A string as code has it: where its bytes begin, and how many they are."""
+
+    at: str
+    length: str
+
+
+class Unsupported(ValueError):
+    """An image has code that this engine cannot translate, which the compiler never makes; the message says what."""
+
+
+@dataclass
+class Module:
+    """What the bodies of an image share: points, constants, routines that are called, scratch bytes handed out."""
+
+    image: Image
+    bases: Mapping[int, int]
+    points: list[Point]
+    constants: dict[bytes, str]
+    routines: set[str]
+    scratch: int = SCRATCH
+
+    def point(self, code: str, site: int, shown: tuple[Shown, ...]) -> int:
+        """The number of a point at which a run can end; 0 is none."""
+        self.points.append((code, site, shown))
+        return len(self.points)
+
+    def constant(self, value: bytes) -> str:
+        """The name of constant bytes."""
+        return self.constants.setdefault(value, f"@k{len(self.constants)}")
+
+    def room(self, size: int) -> int:
+        """Scratch bytes that nothing else uses: where in the context they lie."""
+        at = self.scratch
+        self.scratch += max(size, 1)
+        return at
+
+
+class Writer:
+    """Writes one body.  `values`, `texts` and `statements` are the tables of rows, by operation."""
+
+    values: Mapping[str, Callable[..., str]]
+    texts: Mapping[str, Callable[..., Text]]
+    statements: Mapping[str, Callable[..., None]]
+
+    def __init__(self, module: Module, number: int) -> None:
+        self.module, self.body = module, module.image.bodies[number]
+        self.base = module.bases.get(number)
+        self.lines: list[str] = []
+        self.cold: list[str] = []
+        self.here = "entry"
+        """Label of the block that is being written."""
+        self.dead = False
+        """True behind a jump, where nothing can be executed."""
+        self.loops: list[tuple[str, str]] = []
+        """Labels of tail and end of the loops around, the innermost last."""
+        self.temporaries: dict[str, str] = {}
+        self.capacities: dict[int, tuple[int, int]] | None = None
+        self.uses_instance = False
+        self._names = 0
+
+    # --- lines
+
+    def emit(self, text: str) -> None:
+        self.lines.append(text)
+
+    def new(self, text: str) -> str:
+        """The name of what an instruction yields."""
+        self._names += 1
+        name = f"%v{self._names}"
+        self.lines.append(f"{name} = {text}")
+        return name
+
+    def label(self, letter: str = "b") -> str:
+        self._names += 1
+        return f"{letter}{self._names}"
+
+    def begin(self, label: str) -> None:
+        """Start a block."""
+        self.lines.append(f"{label}:")
+        self.here, self.dead = label, False
+
+    def jump(self, label: str) -> None:
+        if not self.dead:
+            self.emit(f"br label %{label}")
+        self.dead = True
+
+    def branch(self, condition: str, yes: str, no: str) -> None:
+        self.emit(f"br i1 {condition}, label %{yes}, label %{no}")
+        self.dead = True
+
+    def write(self, block: Block) -> None:
+        """The statements of a block, up to one that leaves it."""
+        for node in block:
+            if self.dead:
+                return
+            self.statements[node[0]](self, *node[1:])
+
+    # --- operands
+
+    def value(self, node: Node) -> str:
+        """The value of an expression (not of a text)."""
+        return self.values[node[0]](self, *node[1:])
+
+    def text(self, node: Node) -> Text:
+        """The value of a text expression.  Its bytes stay as they are until the next statement."""
+        return self.texts[node[0]](self, *node[2:])
+
+    def wide(self, node: Node) -> str:
+        """The value of an integer expression in 64 bits."""
+        return self.widened(self.value(node), node[1])
+
+    def widened(self, value: str, machine: str) -> str:
+        """An integer in 64 bits."""
+        if ir(machine) == "i64":
+            return value
+        return self.new(f"{'sext' if machine[0] == 'i' else 'zext'} {ir(machine)} {value} to i64")
+
+    def temporary(self, number: int, machine: str) -> str:
+        """Where a temporary is kept."""
+        name = f"%t{number}.{machine}"
+        self.temporaries[name] = stored(machine)
+        return name
+
+    def call(self, routine: str, *operands: str) -> str:
+        """What a routine yields for numbers of 64 bits."""
+        self.module.routines.add(routine)
+        return self.new(f"call i64 @{routine}({', '.join(f'i64 {operand}' for operand in operands)})")
+
+    def field(self, name: str) -> str:
+        """Address of a field of the context."""
+        return self.new(f"getelementptr inbounds i8, ptr %c, i64 {FIELDS[name]}")
+
+    def scratch(self, size: int) -> str:
+        """Address of scratch bytes of this place in the code."""
+        return self.new(f"getelementptr inbounds i8, ptr %c, i64 {self.module.room(size)}")
+
+    def integer(self, pointer: str) -> str:
+        return self.new(f"ptrtoint ptr {pointer} to i64")
+
+    # --- the system page, and what does not overlap
+
+    def system(self, offset: int) -> str:
+        """A word of the system page."""
+        return self.new(f"load i64, ptr {self._system_word(offset)}, align 8{SYSTEM}")
+
+    def put_system(self, offset: int, value: str) -> None:
+        self.emit(f"store i64 {value}, ptr {self._system_word(offset)}, align 8{SYSTEM}")
+
+    def _system_word(self, offset: int) -> str:
+        return self.new(f"getelementptr inbounds i8, ptr %m, i64 {offset}")
+
+    def scope(self, address: Address, count: int) -> str:
+        """What marks an access that cannot meet the words that charge, due and now use."""
+        base, offset, _ = address
+        return "" if isinstance(base, tuple) or (base == "abs" and offset < PAGE_BYTES) else PROGRAM
+
+    @staticmethod
+    def loose(address: Address) -> bool:
+        """True for an address behind a reference, which may lie anywhere."""
+        return isinstance(address[0], tuple)
+
+    # --- traps
+
+    def trap_if(self, condition: str, code: str, site: int, *shown: tuple[str, str] | Shown) -> None:
+        """End the run if the condition is TRUE.
+
+        `shown` are the values of the trap: (machine type, operand), ("text", at, length) or ("const", value)."""
+        bad, good = self.label("x"), self.label()
+        self.emit(f"br i1 {condition}, label %{bad}, label %{good}, {RARE}")
+        hot, self.lines = self.lines, [f"{bad}:"]
+        self._end(code, site, shown)
+        self.cold += self.lines
+        self.lines = hot
+        self.begin(good)
+
+    def trap(self, code: str, site: int) -> None:
+        """End the run."""
+        self._end(code, site, ())
+        self.dead = True
+
+    def _end(self, code: str, site: int, shown: tuple[Any, ...]) -> None:
+        kinds: list[Shown] = []
+        place = 0
+        for kind, *operands in shown:
+            kinds.append((kind, operands[0] if kind == "const" else None))
+            if kind == "const":
+                continue
+            for number in [self._raw(kind, operands[0])] if kind != "text" else operands:
+                at = self.new(f"getelementptr inbounds i8, ptr %c, i64 {FIELDS['values'] + 8 * place}")
+                self.emit(f"store i64 {number}, ptr {at}")
+                place += 1
+        self.emit(f"ret i32 {self.module.point(code, site, tuple(kinds))}")
+
+    def _raw(self, kind: str, operand: str) -> str:
+        """The 64 bits in which a value of a trap is told."""
+        if kind == "f32":
+            operand = self.new(f"fpext float {operand} to double")
+        return self.new(f"bitcast double {operand} to i64") if is_float(kind) else self.widened(operand, kind)
+
+    # --- addresses
+
+    def pointer(self, address: Address, count: int) -> str:
+        """Where an address lies in the host; its `count` bytes are used."""
+        base, offset, terms = address
+        if isinstance(base, tuple):
+            return self.new(f"getelementptr i8, ptr %m, i64 {self._behind(address, count)}")
+        if base == "self" and self.base is None:
+            self.uses_instance = True
+            start = "%s"
+        else:
+            start, offset = "%m", offset + (self.base or 0 if base == "self" else 0)
+        if offset:
+            start = self.new(f"getelementptr inbounds i8, ptr {start}, i64 {offset}")
+        for stride, term in terms:
+            start = self.new(f"getelementptr inbounds [{stride} x i8], ptr {start}, i64 {self.wide(term)}")
+        return start
+
+    def offset(self, address: Address, count: int) -> str:
+        """How many bytes from the start of the memory an address lies, in 64 bits."""
+        base, offset, terms = address
+        if isinstance(base, tuple):
+            return self._behind(address, count)
+        start = "%self" if base == "self" and self.base is None else str(self.base if base == "self" else 0)
+        total = self.new(f"add i64 {start}, {offset}")
+        for stride, term in terms:
+            total = self.new(f"add i64 {total}, {self.new(f'mul i64 {self.wide(term)}, {stride}')}")
+        return total
+
+    def _behind(self, address: Address, count: int) -> str:
+        """The offset of what lies behind a reference, which is checked (R0110)."""
+        (_, pointer, site), offset, terms = address
+        reference = self.value(pointer)
+        form = "i128" if any(abs(stride * edge) >> 56 for stride, term in terms for edge in span(term)) else "i64"
+        delta = str(offset)
+        for stride, term in terms:
+            number = self.value(term)
+            if ir(term[1]) != form:
+                number = self.new(f"{'sext' if term[1][0] == 'i' else 'zext'} {ir(term[1])} {number} to {form}")
+            delta = self.new(f"add {form} {delta}, {self.new(f'mul {form} {number}, {stride}')}")
+        start = self.new(f"and i64 {self.new(f'lshr i64 {reference}, 8')}, 4294967295")
+        if form == "i128":
+            start = self.new(f"zext i64 {start} to i128")
+        total = self.new(f"add {form} {start}, {delta}")
+        size = self.new(f"load i64, ptr {self.field('size')}, !invariant.load !1")
+        last = self.new(f"sub i64 {size}, {count}")
+        if form == "i128":
+            last = self.new(f"zext i64 {last} to i128")
+        ended = self.new(f"icmp ne i64 {self.new(f'lshr i64 {reference}, 40')}, 1")
+        outside = self.new(f"icmp ugt {form} {total}, {last}")
+        self.trap_if(self.new(f"or i1 {ended}, {outside}"), "R0110", site, ("ref", reference))
+        return self.new(f"trunc i128 {total} to i64") if form == "i128" else total
