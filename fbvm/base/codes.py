@@ -74,6 +74,7 @@ CODES: dict[str, Code] = {
         "S0902": "object-oriented text is refused",
     }),
     **_table("warning", {
+        "S0190": "pragma is not known and has no effect",
         "S0191": "name with doubled or trailing underscore",
         "S0192": "characters beyond the type of the literal",
         "S0590": "FOR variable written inside its loop",

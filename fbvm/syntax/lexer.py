@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple
 
+from fbvm.syntax.pragmas import harmless
 from fbvm.syntax.tables import Terminal, tables
 from fbvm.syntax.tree import Pragma
 
@@ -169,6 +170,8 @@ class Lexer:
         if at >= len(text):
             return None, at
         character = text[at]
+        if character == "\ufeff" and at == 0:
+            return None, 1
         if character == "{":
             return None, self._pragma(at)
         if character in "'\"":
@@ -201,7 +204,11 @@ class Lexer:
         if end < 0:
             self.report("S0103", start, start + 1, "pragma without end", "close it with }")
             return len(self.text)
-        self.pragmas.append(Pragma(start, end + 1, self.text[start + 1:end]))
+        contents = self.text[start + 1:end]
+        self.pragmas.append(Pragma(start, end + 1, contents))
+        if not harmless(contents):
+            self.report("S0190", start, end + 1, f"the pragma `{{{_short(contents.strip())}}}` is not known and has no effect",
+                        "what it switches for another compiler is not switched here")
         return end + 1
 
     def _comment(self, start: int) -> int:

@@ -150,3 +150,16 @@ def test_what_was_read_before_too_many_errors_is_kept() -> None:
 def test_names_the_standard_forbids_are_warned_of_where_they_are_declared(name: str) -> None:
     _, diagnostics = parse(Source("x", f"PROGRAM p VAR {name} : INT; END_VAR {name} := 1; END_PROGRAM"))
     assert [(d.code, d.severity) for d in diagnostics] == [("S0191", "warning")]
+
+
+@pytest.mark.parametrize(("pragma", "known"), [
+    ("{region 'x'}", True), ("{ENDREGION}", True), ("{attribute 'qualified_only'}", True), ("{ }", True),
+    ("{attribute 'pack_mode' := '1'}", False), ("{IF defined(x)}", False), ("{??}", False)])
+def test_pragmas_that_might_matter_are_warned_of(pragma: str, known: bool) -> None:
+    tree, diagnostics = parse(Source("x", f"{pragma} PROGRAM p END_PROGRAM"))
+    assert [d.code for d in diagnostics] == ([] if known else ["S0190"])
+    assert tree.pragmas[0].text == pragma[1:-1] and len(tree.declarations) == 1
+
+
+def test_a_byte_order_mark_is_no_text() -> None:
+    assert parse(Source("x", "\ufeffPROGRAM p END_PROGRAM"))[1] == []

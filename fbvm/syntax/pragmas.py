@@ -1,0 +1,25 @@
+"""Which pragmas may be passed over without a word, since they only speak to editors and other tools."""
+
+from __future__ import annotations
+
+import re
+
+WORDS = {"region", "endregion", "warning", "info", "text"}
+"""First words of pragmas for the reader or for messages of a compiler that we are not."""
+
+ATTRIBUTES = {
+    "qualified_only", "strict", "hide", "hide_all_locals", "conditionalshow", "conditionalshow_all_locals", "displaymode",
+    "monitoring", "symbol", "linkalways", "naming", "obsolete", "analysis", "estimated-stack-usage", "to_string",
+    "opc.ua.da", "tcencoding", "tcdisplayscale", "tcnocopy"}
+"""Names of attributes that make no valid program do anything else: they restrict, show, hide or export."""
+
+_SHAPE = re.compile(r"""\s*(?:attribute\s*'([^']*)'|(\w+))""", re.IGNORECASE)
+
+
+def harmless(text: str) -> bool:
+    """Whether the program means the same without the pragma whose contents are `text`."""
+    found = _SHAPE.match(text)
+    if not found:
+        return not text.strip()
+    name, word = found[1], found[2]
+    return name.lower() in ATTRIBUTES if name is not None else word.lower() in WORDS
