@@ -5,7 +5,9 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import Enum
 from typing import Protocol
@@ -17,6 +19,7 @@ from fbvm.code.image import Image
 from fbvm.engine.python import PythonEngine
 from fbvm.engine.trap import Trap
 from fbvm.goal import Goal
+from fbvm.net.journal import Journal
 from fbvm.schedule import Schedule
 from fbvm.units.unit import Unit
 from fbvm.watch import places
@@ -50,6 +53,12 @@ class Engine(Protocol):
         """Executes the programs of one task once."""
 
 
+def fingerprint(image: Image) -> str:
+    """A number in hexadecimal that another program, or the same in another layout, does not have."""
+    said = (image.layout, image.bodies, image.tasks, image.initial, image.retained)
+    return hashlib.sha256(repr(said).encode()).hexdigest()[:32]
+
+
 @dataclass(frozen=True)
 class Attached:
     """A unit on the backplane and its place on a network."""
@@ -77,10 +86,17 @@ class Plc:
     """One PLC with a compiled program, in RUN mode at time 0, before its first scan.
 
     `cycle_ns` is how far a scan advances virtual time; `budget` the statements a scan may execute; `observed` runs the
-    build that reports each statement.  Raises nothing that a program, a file or a peer could cause: look at `trap`."""
+    build that reports each statement; `journal` is told every input.  Raises nothing that a program, a file or a peer
+    could cause: look at `trap`."""
 
     def __init__(
-        self, image: Image, cycle_ns: int = 10_000_000, *, budget: int = STEP_BUDGET, observed: bool = False
+        self,
+        image: Image,
+        cycle_ns: int = 10_000_000,
+        *,
+        budget: int = STEP_BUDGET,
+        observed: bool = False,
+        journal: Journal | None = None,
     ) -> None:
         if cycle_ns <= 0:
             raise ValueError(f"a cycle takes time; {cycle_ns} ns is not possible")
@@ -105,6 +121,9 @@ class Plc:
         self._forces: dict[Place, Value] = {}
         self._schedule = Schedule(image.tasks, lambda path: self.read(path) is True)
         self._write_initial()
+        self._journal = journal
+        if journal:
+            journal.begin(fingerprint(image), cycle_ns, budget, self.memory)
 
     # --- one scan -----------------------------------------------------------------------------------------------------
 
@@ -115,6 +134,9 @@ class Plc:
         ValueError if time runs backwards or real connections are to live in virtual time."""
         if self.trap:
             raise Stopped(self.trap)
+        now_ns = self._time(now_ns)
+        if self._journal:
+            self._journal.before(self.scans, now_ns, self.budget, self.forces)
         self._oversee(now_ns)
         if self._mode is Mode.RUN:
             self._apply_forces()
@@ -124,18 +146,24 @@ class Plc:
             self._refresh()
         self.scans += 1
         self.memory.write(SCANS, "i64", self.scans)
+        if self._journal:
+            self._journal.after()
         for watcher in self.watchers:
             watcher(self)
         return self.trap
 
-    def _oversee(self, now_ns: int | None) -> None:
-        """Time, first-cycle flag, clock pulses, cycle time of the cycle before, step budget."""
+    def _time(self, now_ns: int | None) -> int:
+        """When the scan is, told or virtual."""
         if now_ns is None:
             if not all(attached.network.virtual_time for attached in self.units):
                 raise ValueError("real connections need real time: run this PLC with fbvm.run, or say scan(now_ns)")
-            now_ns = self.elapsed_ns
-        elif now_ns < self.now_ns:
+            return self.elapsed_ns
+        if now_ns < self.now_ns:
             raise ValueError(f"time runs forward only: {now_ns} ns is before {self.now_ns} ns")
+        return now_ns
+
+    def _oversee(self, now_ns: int) -> None:
+        """Time, first-cycle flag, clock pulses, cycle time of the cycle before, step budget."""
         cycle_time_ns = 0 if self._first else now_ns - self.now_ns
         self.now_ns = now_ns
         self.memory.write(NOW, "i64", now_ns)
@@ -158,8 +186,10 @@ class Plc:
             return
         before = self._cio.tobytes()
         told = False
-        for attached in self.units:
+        for number, attached in enumerate(self.units):
             events = attached.link.events(self.now_ns)
+            if self._journal:
+                self._journal.told(number, events)
             requests = attached.unit.refresh(self.memory, events, self.now_ns)
             if requests:
                 attached.link.submit(requests, self.now_ns)
@@ -209,6 +239,8 @@ class Plc:
     def write(self, where: str | Place | Span, value: object) -> None:
         """Writes a variable, an address, or a range (a list).  Raises UnknownPlace, ValueError (range), TypeError."""
         found = self.find(where) if isinstance(where, str) else where
+        if self._journal:
+            self._journal.remark(f"{found.name} := {value!r}")
         if isinstance(found, Place):
             places.write(self.memory, found, value)
             return
@@ -246,8 +278,9 @@ class Plc:
         if any(other.unit.name == unit.name for other in self.units):
             raise ValueError(f"{unit.name} is on the backplane already")
         attached = Attached(unit, network.attach(unit.address), network)
-        self.units.append(attached)
-        attached.link.submit(unit.reset(self.memory), self.now_ns)
+        with self._acting("unit", self._journal.unit(unit) if self._journal else None):
+            self.units.append(attached)
+            attached.link.submit(unit.reset(self.memory), self.now_ns)
 
     # --- start, stop and travel ---------------------------------------------------------------------------------------
 
@@ -258,18 +291,25 @@ class Plc:
 
     @mode.setter
     def mode(self, mode: Mode) -> None:
-        if mode is Mode.RUN and self._mode is Mode.PROGRAM:
-            held = ("CIO", "W", "TF", "T") if flags.io_memory_held(self.memory) else ()
-            self._restart(self._kept(held))
-        self._mode = mode
+        with self._acting("mode", mode.value):
+            if mode is Mode.RUN and self._mode is Mode.PROGRAM:
+                held = ("CIO", "W", "TF", "T") if flags.io_memory_held(self.memory) else ()
+                self._restart(self._kept(held))
+            self._mode = mode
 
     def warm_start(self) -> None:
         """Power off and on: retained variables and areas keep their values, everything else begins anew."""
-        self._power_on(self._kept(()))
+        with self._acting("start", "warm"):
+            self._power_on(self._kept(()))
 
     def cold_start(self) -> None:
         """As new: all memory at its initial values."""
-        self._power_on([])
+        with self._acting("start", "cold"):
+            self._power_on([])
+
+    def _acting(self, what: str, value: object) -> AbstractContextManager[None]:
+        """Lets the journal know of something that is done between scans."""
+        return self._journal.acting(what, value) if self._journal else nullcontext()
 
     def _power_on(self, kept: list[tuple[int, bytes]]) -> None:
         self._restart(kept)
@@ -305,9 +345,12 @@ class Plc:
         )  # fmt: skip
 
     def restore(self, state: State) -> None:
-        """Back to a snapshot.  Raises ValueError with units attached: connections do not travel in time."""
+        """Back to a snapshot.  Raises ValueError with units attached, whose connections do not travel in time, and with
+        a journal, which goes forward only."""
         if self.units:
             raise ValueError("a PLC with units attached cannot go back: their connections do not travel in time")
+        if self._journal:
+            raise ValueError("a PLC that writes a journal cannot go back: fork it")
         self.memory.restore(state.memory)
         self.now_ns, self.scans, self.trap = state.now_ns, state.scans, state.trap
         self._mode, self._first, self._forces = state.mode, state.first, dict(state.forces)

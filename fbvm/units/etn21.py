@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from typing import Any
 
 from fbvm.units import etn21_map as at
 from fbvm.units.etn21_dispatch import NEVER_NS, Choices, Dispatch, Fault
@@ -52,6 +53,8 @@ class Etn21:
         self.error_status = 0
         """What n+18 shows."""
         choices = Choices(time_wait_ns, odd_filler)
+        self._made = {"unit_number": unit_number, "address": address, "timing": timing, "seed": seed,
+                      "time_wait_ns": time_wait_ns, "odd_filler": odd_filler}  # fmt: skip
         self._dispatch = Dispatch(self.layout, address, timing_of(timing, seed), choices, self.faults)
         self._switches_at = slice(self.layout.n + at.SWITCHES, self.layout.n + at.FINS_TCP_STATUS)
         self._seen = [0, 0, 0, 0]
@@ -61,6 +64,23 @@ class Etn21:
     def descriptions(self) -> dict[str, str]:
         """What the unit's bits and words are called, by address as charts write it (`CIO 1519.02`, `D30001`)."""
         return descriptions(self.layout)
+
+    @property
+    def configuration(self) -> dict[str, Any]:
+        """The arguments with which `Etn21` makes the same unit, but for its faults: they are `settings`."""
+        return dict(self._made)
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What may be set on the unit while it runs, as plain data: faults, link, error status."""
+        faults = [[fault.code, fault.switch, fault.socket] for fault in self.faults]
+        return {"faults": faults, "link_up": self.link_up, "error_status": self.error_status}
+
+    @settings.setter
+    def settings(self, given: dict[str, Any]) -> None:
+        self.link_up, self.error_status = bool(given["link_up"]), int(given["error_status"])
+        self.faults[:] = [Fault(code, None if switch is None else at.Switch(switch), socket)
+                          for code, switch, socket in given["faults"]]  # fmt: skip
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on or restart: the unit's own words and all switches 0, connections broken by RST."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 from fbvm.wire.link import Event, Request
 
@@ -25,6 +25,17 @@ class Unit(Protocol):
 
     address: str
     """IPv4 address of the unit, by which it is attached to a network."""
+
+    @property
+    def configuration(self) -> dict[str, Any]:
+        """The arguments with which the unit's class makes the same unit; plain data, as a journal keeps it."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What may be set on the unit while it runs (faults, cable), as plain data; assigning it sets all of it."""
+
+    @settings.setter
+    def settings(self, given: dict[str, Any]) -> None: ...
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
         """Exchange the unit's words once: read what the program set, write what the unit reports.

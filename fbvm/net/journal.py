@@ -1,0 +1,296 @@
+"""The journal of one PLC: every input of every scan, a line each, so that a run can be done again to the same memory.
+
+Inputs are the time, what the network told each unit, memory that was written from outside, forces, changes of mode,
+power-on, and what units were given.  After each scan stands a fingerprint of the memory.  Lines are JSON; they are
+data and nothing else.  `fbvm.run.replay` does a journal again.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, fields
+from typing import Any, Protocol, TextIO
+
+from fbvm.base.areas import PAGE_BYTES
+from fbvm.base.memory import Memory, compare
+from fbvm.wire.link import Broken, Closed, Event, Failed, Opened, Peer, PeerClosed, Received, Sent
+
+FORMAT = 1
+"""The version of the format that this module writes and reads."""
+EVENTS: dict[str, type[Event]] = {
+    kind.__name__: kind for kind in (Opened, Failed, Sent, Received, PeerClosed, Broken, Closed)
+}
+ZERO_PAGE = bytes(PAGE_BYTES)
+Writes = tuple[tuple[int, bytes], ...]
+"""Bytes written from outside: offset in the flat memory, and what stands there now."""
+
+
+class JournalError(ValueError):
+    """A file that is no journal or a damaged one; the message names the line and what is wrong with it."""
+
+
+class Recordable(Protocol):
+    """What a journal needs of a unit, to build it again."""
+
+    @property
+    def configuration(self) -> dict[str, Any]:
+        """The arguments with which its class makes the same unit."""
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """What may be changed on it while it runs."""
+
+
+# --- what a journal holds ---------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Header:
+    """Which program ran: fingerprint of its image, cycle, step budget, and what the writer says `about` the run."""
+
+    image: str
+    cycle_ns: int
+    budget: int
+    about: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Act:
+    """Something that was done to the PLC between scans: "mode" with its name, "start" with "warm" or "cold", "unit"
+    with a unit's class and configuration.  `writes` came before it."""
+
+    what: str
+    value: Any
+    writes: Writes = ()
+
+
+@dataclass(frozen=True)
+class Scan:
+    """One scan with its inputs, in the order in which they hold: settings, forces, writes, time, events."""
+
+    number: int
+    now_ns: int
+    fingerprint: str
+    writes: Writes = ()
+    forced: dict[str, Any] = field(default_factory=dict)
+    unforced: tuple[str, ...] = ()
+    settings: dict[int, dict[str, Any]] = field(default_factory=dict)
+    events: dict[int, tuple[Event, ...]] = field(default_factory=dict)
+    budget: int | None = None
+
+
+@dataclass(frozen=True)
+class End:
+    """The journal was closed after so many scans.  One without it was cut off."""
+
+    scans: int
+
+
+Entry = Header | Act | Scan | End
+
+
+class Fingerprint:
+    """Follows a memory: which bytes changed since the last look, and a number that stands for its whole history."""
+
+    def __init__(self, memory: Memory) -> None:
+        self._memory = memory
+        self._known = self._settled = memory.snapshot()
+        self._sum = 0
+
+    def changes(self) -> Writes:
+        """What was written since the last look."""
+        now = self._memory.snapshot()
+        runs = compare(self._known, now)
+        self._known = now
+        return tuple((offset, bytes(self._memory.u8[offset : offset + size])) for offset, size in runs)
+
+    def settle(self) -> str:
+        """The number for the memory as it is now, in hexadecimal; everything before has its part in it."""
+        now = self._memory.snapshot()
+        for number, (old, new) in enumerate(zip(self._settled.pages, now.pages, strict=True)):
+            if old is not new and old != new:
+                self._sum = zlib.crc32(new or ZERO_PAGE, zlib.crc32(b"%d" % number, self._sum))
+        self._known = self._settled = now
+        return f"{self._sum:08x}"
+
+
+# --- writing ----------------------------------------------------------------------------------------------------------
+
+
+class Journal:
+    """Writes a journal to a text file while a PLC runs: `Plc(image, journal=Journal(file))`.
+
+    `about` may hold whatever a reader should know and JSON can write.  `close` ends the journal, not the file."""
+
+    def __init__(self, file: TextIO, about: Mapping[str, Any] | None = None) -> None:
+        self._file = file
+        self._about = dict(about or {})
+        self._units: list[tuple[Recordable, dict[str, Any]]] = []
+        self._forces: dict[str, Any] = {}
+        self._remarks: list[str] = []
+        self._line: dict[str, Any] = {}
+        self._scans = 0
+        self._budget = 0
+        self._fingerprint: Fingerprint
+
+    # The PLC calls these.
+
+    def begin(self, image: str, cycle_ns: int, budget: int, memory: Memory) -> None:
+        """A PLC with its memory as new."""
+        self._fingerprint, self._budget = Fingerprint(memory), budget
+        self._write({"journal": FORMAT, "image": image, "cycle_ns": cycle_ns, "budget": budget, "about": self._about})
+
+    def remark(self, text: str) -> None:
+        """What somebody did, for people who read the journal."""
+        self._remarks.append(text)
+
+    @contextmanager
+    def acting(self, what: str, value: object) -> Iterator[None]:
+        """Something is done to the PLC that is not a scan; what it does to the memory is not written down."""
+        line = {what: value, **self._outside()}
+        yield
+        self._settle()
+        self._write(line)
+
+    def unit(self, unit: Recordable) -> dict[str, Any]:
+        """How a unit that comes on the backplane is written.  Raises TypeError if it does not say how it was made."""
+        try:
+            described = {"class": type(unit).__name__, "with": unit.configuration}
+            self._units.append((unit, unit.settings))
+        except AttributeError:
+            raise TypeError(f"{type(unit).__name__} has no configuration to be written to a journal") from None
+        return described
+
+    def before(self, number: int, now_ns: int, budget: int, forces: Mapping[str, Any]) -> None:
+        """A scan begins."""
+        line: dict[str, Any] = {"scan": number, "now_ns": now_ns, **self._outside()}
+        if budget != self._budget:
+            line["budget"] = self._budget = budget
+        changed = {name: value for name, value in forces.items() if self._forces.get(name, ...) is not value}
+        gone = [name for name in self._forces if name not in forces]
+        settings = {str(at): now for at, (unit, was) in enumerate(self._units) if (now := unit.settings) != was}
+        for key, found in (("force", changed), ("unforce", gone), ("settings", settings)):
+            if found:
+                line[key] = found
+        self._forces = dict(forces)
+        self._line = line
+
+    def told(self, unit: int, events: Sequence[Event]) -> None:
+        """What the network tells a unit in this scan."""
+        if events:
+            self._line.setdefault("events", {})[str(unit)] = [_from_event(event) for event in events]
+
+    def after(self) -> None:
+        """The scan has ended."""
+        self._scans += 1
+        self._write({**self._line, "memory": self._settle()})
+
+    def close(self) -> None:
+        """Say that nothing follows."""
+        self._write({"end": self._scans})
+        self._file.flush()
+
+    def _settle(self) -> str:
+        self._units = [(unit, unit.settings) for unit, _ in self._units]
+        return self._fingerprint.settle()
+
+    def _outside(self) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        if self._remarks:
+            found["by"], self._remarks = self._remarks, []
+        if writes := self._fingerprint.changes():
+            found["write"] = [[offset, data.hex()] for offset, data in writes]
+        return found
+
+    def _write(self, line: dict[str, Any]) -> None:
+        self._file.write(json.dumps(line, separators=(",", ":"), ensure_ascii=False) + "\n")
+
+
+# --- reading ----------------------------------------------------------------------------------------------------------
+
+
+def read_journal(lines: Iterable[str]) -> Iterator[Entry]:
+    """The entries of a journal, the header first.  Raises JournalError for what is damaged.
+
+    A last line without its end, as a run that was killed leaves it, is left out."""
+    number, scans = 0, 0
+    for number, text in enumerate(lines, 1):
+        if not text.endswith("\n") and number > 1:
+            return
+        try:
+            entry = _entry(json.loads(text))
+            _check_order(entry, number == 1, scans)
+        except json.JSONDecodeError as error:
+            raise JournalError(f"line {number}: {error.msg} at column {error.colno}") from None
+        except KeyError as error:
+            raise JournalError(f"line {number}: {error} is missing") from None
+        except (TypeError, ValueError, AttributeError, RecursionError) as error:
+            raise JournalError(f"line {number}: {error}") from None
+        scans += isinstance(entry, Scan)
+        yield entry
+        if isinstance(entry, End):
+            return
+    if not number:
+        raise JournalError("the file is empty")
+
+
+def _check_order(entry: Entry, first: bool, scans: int) -> None:
+    if isinstance(entry, Header) != first:
+        raise ValueError("no journal of fbvm: it begins without a header" if first else "a second header")
+    told = entry.number if isinstance(entry, Scan) else entry.scans if isinstance(entry, End) else scans
+    if told != scans:
+        raise ValueError(f"scan {told} where {scans} should be: lines are missing, or not in their order")
+
+
+def _entry(line: dict[str, Any]) -> Entry:
+    """One line.  Raises all kinds of errors for what has not the right form."""
+    if not isinstance(line, dict):
+        raise TypeError("no entry of a journal")
+    if "journal" in line:
+        if line["journal"] != FORMAT:
+            raise ValueError(f"a journal of format {line['journal']}; this version of fbvm reads format {FORMAT}")
+        return Header(str(line["image"]), int(line["cycle_ns"]), int(line["budget"]), dict(line["about"]))
+    if "end" in line:
+        return End(int(line["end"]))
+    writes = tuple((int(offset), bytes.fromhex(data)) for offset, data in line.get("write", ()))
+    if "scan" in line:
+        return Scan(
+            int(line["scan"]), int(line["now_ns"]), str(line["memory"]), writes,
+            dict(line.get("force", {})), tuple(map(str, line.get("unforce", ()))),
+            {int(unit): dict(given) for unit, given in line.get("settings", {}).items()},
+            {int(unit): tuple(map(_to_event, told)) for unit, told in line.get("events", {}).items()},
+            int(line["budget"]) if "budget" in line else None,
+        )  # fmt: skip
+    for what in ("mode", "start", "unit"):
+        if what in line:
+            return Act(what, line[what], writes)
+    raise ValueError("no entry of a journal")
+
+
+def _from_event(event: Event) -> list[Any]:
+    """`["Received", 1, "0A0B", "192.168.250.1:502"]`: the class, then its fields in order."""
+    return [type(event).__name__, *(_plain(getattr(event, row.name)) for row in fields(event))]
+
+
+def _plain(value: int | str | bytes | Peer) -> int | str:
+    return value.hex() if isinstance(value, bytes) else str(value) if isinstance(value, Peer) else value
+
+
+def _to_event(told: list[Any]) -> Event:
+    kind = EVENTS.get(told[0])
+    rows = fields(kind) if kind else ()
+    if kind is None or len(told) != 1 + len(rows):
+        raise ValueError(f"{told[0]!r} with {len(told) - 1} values is no event")
+    return kind(*(_READ[str(row.type)](value) for row, value in zip(rows, told[1:], strict=True)))
+
+
+def _peer(text: str) -> Peer:
+    host, _, port = text.rpartition(":")
+    return Peer(host, int(port))
+
+
+_READ: dict[str, Callable[[Any], Any]] = {"int": int, "str": str, "bytes": bytes.fromhex, "Peer": _peer}
+"""From JSON to the type of a field."""
