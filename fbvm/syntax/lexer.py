@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple
 
@@ -44,17 +43,15 @@ _FOREIGN = {"==": ("EQUAL", "=", "`=` compares"), "!=": ("UNEQUAL", "<>", "write
 
 _MEANT = {"?": "write SEL(condition, if_false, if_true)", "#": "a type stands in front of `#`, and no space",
           "\\": "the escape in a string is `$`"}
-_FOREIGN_WORD = re.compile(r"[^\W0-9]\w*")
-_WORDS = re.compile(r"\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?", re.DOTALL)
+_WORDS = r"(?s:\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?)"
 _BY_HAND = {"LOCATION", "SET_ASSIGN"}
 """Terminals that only exist behind certain others."""
 
 _ORDER = ("NAME", "PART", "COMMENT", "FOREIGN", "SIGN", "NUMBER", "DATE_LITERAL", "TYPED_LITERAL", "STRING_LITERAL", "DIRECT")
-_OPERAND_ENDS = {"NAME", "RPAR", "RSQB", "CARET", "DIRECT", "PART"}
+OPERAND_ENDS = {"NAME", "RPAR", "RSQB", "CARET", "DIRECT", "PART"}
 
 
-@dataclass(frozen=True)
-class Lexis:
+class Lexis(NamedTuple):
     """What the grammar says about words and characters, ready for use."""
 
     words: dict[str, str]
@@ -62,11 +59,15 @@ class Lexis:
     conditions: dict[str, re.Pattern[str]]
     """Terminal -> what must follow the word."""
     reserved: frozenset[str]
+    operand_ends: frozenset[str]
+    """Terminals with which an operand may end."""
     signs: dict[str, str]
     master: re.Pattern[str]
     location: re.Pattern[str]
     unknown: re.Pattern[str]
     """A run of characters that nothing begins with."""
+    foreign_word: re.Pattern[str]
+    """A word with letters of any alphabet."""
     set_assign: re.Pattern[str]
 
 
@@ -79,7 +80,7 @@ def lexis() -> Lexis:
     signs: dict[str, str] = {}
     patterns: dict[str, str] = {}
     for terminal in tables().terminals:
-        shape = _WORDS.fullmatch(terminal.pattern)
+        shape = re.fullmatch(_WORDS, terminal.pattern)
         if shape and terminal.ignore_case:
             words.update(dict.fromkeys(shape[1].split("|"), terminal.name))
             if shape[2]:
@@ -95,8 +96,9 @@ def lexis() -> Lexis:
     patterns["SIGN"] = "|".join(re.escape(sign) for sign in sorted(signs, key=len, reverse=True))
     alternatives = "|".join(f"(?P<{name}>{patterns[name]})" for name in _ORDER)
     known = re.escape("".join(sorted(set("".join(signs) + "'\"{%"))))
-    return Lexis(words, conditions, frozenset(reserved), signs, re.compile(rf"\s*(?:{alternatives})"),
-                 re.compile(r"\s*(" + patterns["LOCATION"] + ")"), re.compile(rf"[^\s\w{known}]+"),
+    return Lexis(words, conditions, frozenset(reserved), frozenset(OPERAND_ENDS | set(words.values()) - reserved), signs,
+                 re.compile(rf"\s*(?:{alternatives})"),
+                 re.compile(r"\s*(" + patterns["LOCATION"] + ")"), re.compile(rf"[^\s\w{known}]+"), re.compile(r"[^\W0-9]\w*"),
                  re.compile(patterns["SET_ASSIGN"]))
 
 
@@ -104,19 +106,19 @@ def _pattern(terminal: Terminal) -> str:
     return f"(?i:{terminal.pattern})" if terminal.ignore_case else f"(?:{terminal.pattern})"
 
 
-@dataclass
 class Lexer:
     """The tokens of one text, in order; `pragmas` fills while they are taken."""
 
-    text: str
-    report: Report
-    pragmas: list[Pragma] = field(default_factory=list)
+    def __init__(self, text: str, report: Report) -> None:
+        self.text, self.report = text, report
+        self.pragmas: list[Pragma] = []
 
     def tokens(self) -> Iterator[Token]:
         """Every token, then one of type "$END"."""
         text, at, lex = self.text, 0, lexis()
         match, signs, words, conditions = lex.master.match, lex.signs, lex.words, lex.conditions
         known: dict[str, str] = {}
+        ends = lex.operand_ends
         before, length, new = "", len(text), tuple.__new__
         while True:
             found = match(text, at)
@@ -139,7 +141,7 @@ class Lexer:
                     kind = known[word] = words.get(word.upper(), "NAME")
                 if kind in conditions and not conditions[kind].match(text, at):
                     kind = "NAME"
-                if before == "AT" or (before in _OPERAND_ENDS and text.startswith("=", at)):
+                if before == "AT" or (before in ends and text.startswith("=", at)):
                     kind, at = self._special(lex, before, kind, start, at)
                     word = text[start:at]
             elif kind == "COMMENT":
@@ -176,7 +178,7 @@ class Lexer:
             return None, self._pragma(at)
         if character in "'\"":
             return self._open_string(at)
-        if word := _FOREIGN_WORD.match(text, at):
+        if word := lex.foreign_word.match(text, at):
             self.report("S0102", at, word.end(),
                         f"`{_short(word[0])}` is no name: of letters only A to Z can be part of one",
                         "comments and strings may have any character")

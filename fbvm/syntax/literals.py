@@ -46,12 +46,11 @@ INTEGER_MAX = 2**64 - 1
 LONGEST = 400
 """Digits of a number beyond which nobody meant it; Python's own conversion is slow for millions of them."""
 
-_BASED = re.compile(r"([0-9]+)#([0-9A-Za-z_]*)")
-_INTEGER = re.compile(r"[0-9]+(?:_[0-9]+)*")
-_REAL = re.compile(r"[0-9]+(?:_[0-9]+)*(?:\.[0-9]+(?:_[0-9]+)*)?(?:[eE][+-]?[0-9]+)?")
-_DURATION_PART = re.compile(r"_?([0-9]+(?:_[0-9]+)*)(?:\.([0-9]+(?:_[0-9]+)*))?(ms|us|ns|d|h|m|s)", re.IGNORECASE)
-_DATE = re.compile(r"([0-9]{1,4})-([0-9]{1,2})-([0-9]{1,2})")
-_CLOCK = re.compile(r"([0-9]{1,2}):([0-9]{1,2})(?::([0-9]{1,2})(?:\.([0-9]+(?:_[0-9]+)*))?)?")
+_INTEGER = r"[0-9]+(?:_[0-9]+)*"
+_REAL = r"[0-9]+(?:_[0-9]+)*(?:\.[0-9]+(?:_[0-9]+)*)?(?:[eE][+-]?[0-9]+)?"
+_DURATION_PART = r"(?i:_?([0-9]+(?:_[0-9]+)*)(?:\.([0-9]+(?:_[0-9]+)*))?(ms|us|ns|d|h|m|s))"
+_DATE = r"([0-9]{1,4})-([0-9]{1,2})-([0-9]{1,2})"
+_CLOCK = r"([0-9]{1,2}):([0-9]{1,2})(?::([0-9]{1,2})(?:\.([0-9]+(?:_[0-9]+)*))?)?"
 
 
 def number(text: str) -> Decoded:
@@ -73,9 +72,9 @@ def _number(text: str) -> tuple[str, int | float]:
         raise OutOfRange(f"a number of {len(text)} characters fits no type", "")
     if "#" in text:
         return "int", _based(text)
-    if _INTEGER.fullmatch(text):
+    if re.fullmatch(_INTEGER, text):
         return "int", int(text.replace("_", ""))
-    if _REAL.fullmatch(text):
+    if re.fullmatch(_REAL, text):
         return "real", float(text.replace("_", ""))
     raise Malformed(f"`{text}` is no number",
                     "digits with single `_` between them, a point with digits on both sides, an exponent")
@@ -139,7 +138,7 @@ def _typed_number(prefix: str, rest: str) -> Decoded:
 # --- strings ---
 
 _ESCAPES = {"$": "$", "L": "\n", "N": "\n", "P": "\f", "R": "\r", "T": "\t"}
-_HEX = re.compile(r"[0-9A-Fa-f]+")
+_HEX = r"[0-9A-Fa-f]+"
 
 
 def text_literal(text: str) -> Decoded:
@@ -188,7 +187,7 @@ def _without_escapes(inner: str, quote: str, digits: int) -> str:
         if letter == quote or letter.upper() in _ESCAPES:
             parts.append(quote if letter == quote else _ESCAPES[letter.upper()])
             at = mark + 2
-        elif len(code) == digits and _HEX.fullmatch(code):
+        elif len(code) == digits and re.fullmatch(_HEX, code):
             parts.append(chr(int(code, 16)))
             at = mark + 1 + digits
         else:
@@ -202,22 +201,22 @@ def duration(text: str) -> int:
     """`1d2h3.5s` or `-5us300ns` as whole nanoseconds; a rest below one nanosecond is an error, not rounded away."""
     negative = text.startswith("-")
     rest = text[1:] if text[:1] in ("-", "+") else text
-    units, at, total, last = list(UNITS_NS), 0, 0, -1
+    units, total, last = list(UNITS_NS), 0, -1
     if not rest:
         raise Malformed("a duration needs a number and a unit, as in `T#1s500ms`", "")
-    while at < len(rest):
-        part = _DURATION_PART.match(rest, at)
+    while rest:
+        part = re.match(_DURATION_PART, rest)
         if not part or len(part[0]) > LONGEST:
-            raise Malformed(f"`{_short(rest[at:])}` is no part of a duration",
+            raise Malformed(f"`{_short(rest)}` is no part of a duration",
                             "units are d h m s ms us ns, as in `T#1d2h3m4s5ms`")
         unit = units.index(part[3].lower())
         if unit <= last:
             raise Malformed(f"unit `{part[3]}` stands too late or twice in the duration",
                             "the order is d h m s ms us ns")
-        if part[2] and part.end() != len(rest):
+        if part[2] and part[0] != rest:
             raise Malformed("only the last unit of a duration may have a fraction", "")
         total += _scaled(part[1], part[2] or "", UNITS_NS[units[unit]], text)
-        last, at = unit, part.end()
+        last, rest = unit, rest[part.end():]
     total = -total if negative else total
     if not -NS_MAX - 1 <= total <= NS_MAX:
         raise OutOfRange(f"`{_short(text)}` does not fit 64 bits of nanoseconds, about 292 years", "")
@@ -238,7 +237,7 @@ MONTH_DAYS = (31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31)
 
 def _day(text: str) -> int:
     """Days since 1970-01-01."""
-    found = _DATE.fullmatch(text)
+    found = re.fullmatch(_DATE, text)
     if not found:
         raise Malformed(f"`{_short(text)}` is no date", "write it as 2024-05-31")
     year, month, day = int(found[1]), int(found[2]), int(found[3])
@@ -255,7 +254,7 @@ def _day(text: str) -> int:
 
 def _clock(text: str) -> int:
     """Nanoseconds since midnight."""
-    found = _CLOCK.fullmatch(text)
+    found = re.fullmatch(_CLOCK, text)
     if not found or len(text) > LONGEST:
         raise Malformed(f"`{_short(text)}` is no time of day", "write it as 13:45:30 or 13:45:30.250")
     hour, minute, second = int(found[1]), int(found[2]), found[3] or "0"

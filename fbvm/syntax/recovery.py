@@ -59,7 +59,7 @@ class Recovery:
             raise Stop
         if self.turns_in_circles(token):
             return []
-        self.mute = (token.type == "$END" and self.builder.cut_short) or any(
+        self.mute = self.swallowed(token) or any(
             self.automaton.before.end <= odd <= token.start for odd in self.builder.odd)
         reopen(self.states, self.values)
         mend = best_mend(self.automaton, token, self.peek(token))
@@ -72,6 +72,10 @@ class Recovery:
             return self.closing(token)
         self.tell(token)
         return self.give_up(token)
+
+    def swallowed(self, token: Token) -> bool:
+        """Whether a comment without end has swallowed all that could stand here."""
+        return token.type == "$END" and self.builder.cut_short
 
     def turns_in_circles(self, token: Token) -> bool:
         """Whether the same token was refused at the same height before: then it must go, whatever it means."""
@@ -90,6 +94,7 @@ class Recovery:
         """Give up the statement, or for blocks the whole declaration."""
         if self.builder.full:
             raise Stop
+        self.mute = False
         if why == "operators":
             self.report("S0106", token.start, token.end, f"the expression is more than {CHAIN_LIMIT} operators deep",
                         "split it into several statements")
@@ -170,6 +175,7 @@ class Recovery:
         elif token.type not in UNITS:
             inner = open_[-1:]
         if inner:
+            self.mute = self.swallowed(token)
             return self.close(inner, token)
         self.tell(token)
         if open_head(self.states, self.values):

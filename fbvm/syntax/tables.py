@@ -8,11 +8,10 @@ from __future__ import annotations
 import json
 import os
 import sys
-from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from fbvm.base.data import cache_folder, data_folder
 
@@ -23,8 +22,7 @@ FORMAT = 2
 START = "source_text"
 
 
-@dataclass(frozen=True, slots=True)
-class Rule:
+class Rule(NamedTuple):
     """One alternative of a production.
 
     `action` names the builder's function; None for a rule that hands on its only child.  `places` tells for each
@@ -37,8 +35,9 @@ class Rule:
     places: tuple[int | None, ...] | None
 
 
-@dataclass(frozen=True, slots=True)
-class Terminal:
+class Terminal(NamedTuple):
+    """A terminal: its pattern is a `literal` text or a regular expression; a `reserved` word is never a name."""
+
     name: str
     pattern: str
     ignore_case: bool
@@ -46,8 +45,7 @@ class Terminal:
     reserved: bool
 
 
-@dataclass(frozen=True, slots=True)
-class Tables:
+class Tables(NamedTuple):
     """`actions[state][symbol]`: a state to shift to (>= 0), or ~index of the rule to reduce by."""
 
     start: int

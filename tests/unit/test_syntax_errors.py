@@ -163,3 +163,13 @@ def test_pragmas_that_might_matter_are_warned_of(pragma: str, known: bool) -> No
 
 def test_a_byte_order_mark_is_no_text() -> None:
     assert parse(Source("x", "\ufeffPROGRAM p END_PROGRAM"))[1] == []
+
+
+def test_an_odd_character_does_not_hide_an_open_block() -> None:
+    _, diagnostics = body("IF a THEN x := 1; @")
+    assert [d.code for d in diagnostics] == ["S0102", "S0101"]
+
+
+def test_words_that_matter_in_one_place_can_be_set_and_reset() -> None:
+    pou, diagnostics = body("on S= TRUE; with R= step; step S= on; IF S=1 THEN ; END_IF")
+    assert diagnostics == [] and [getattr(s, "op", "") for s in pou.body] == ["S=", "R=", "S=", ""]
