@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, StructType, Type, base, fold
+from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.expressions import assignable, conversion_hint, same
 from fbvm.check.facts import Pou, PouCall, Variable, is_block
 from fbvm.check.standard import StandardCalls
@@ -99,18 +100,19 @@ class Calls:
     def _bind(self, call: tree.Call, pou: Pou, bound: PouCall) -> None:
         """Match arguments with parameters, complain about what does not fit or is missing."""
         self.expressions.note_call(pou, call)
+        other = mixed(call)
+        if other is not None:
+            self.error("S0406", other, MIXED, MIXED_HINT)
+            return
         named = [a for a in call.arguments if a.kind]
         positional = [a for a in call.arguments if not a.kind]
-        if named and positional:
-            self.error("S0406", positional[-1] if call.arguments[0].kind else named[0],
-                       "a call names all of its parameters or none", "name them: parameter := value")
-            return
         given: dict[str, tree.Node] = {}
         if positional:
             self._positional(call, positional, pou, bound, given)
         for argument in named:
             self._named(argument, pou, bound, given)
-        missing = [v.name for v in pou.parameters("VAR_IN_OUT") if fold(v.name) not in given]
+        empty = {name for name, node in given.items() if isinstance(node, tree.Argument) and node.value is None}
+        missing = [v.name for v in pou.parameters("VAR_IN_OUT") if fold(v.name) not in given.keys() - empty]
         if missing and not pou.damaged:
             self.error("S0404", call, f"the in-out {' and '.join(missing)} of {pou.name} is missing",
                        f"pass a variable: {missing[0]} := ...")

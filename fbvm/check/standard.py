@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import (
-    BOOL,
     ELEMENTARY,
     GENERIC,
     LREAL,
@@ -17,11 +16,11 @@ from fbvm.base.types import (
     common,
     converts,
     families,
-    fold,
     string,
 )
 from fbvm.check import functions
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Guard, StandardCall
+from fbvm.check.arguments import Arguments, callee
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, StandardCall
 from fbvm.check.functions import Conversion, Signature
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
@@ -64,60 +63,8 @@ class StandardCalls:
                 self.expressions.infer(argument.value)
         project = self.expressions.project
         known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]
-        self.error("S0401", call.callee, f"there is no function or instance {_name(call)}",
-                   project.nearest(_name(call), known))
-        return None
-
-    # --- arguments --------------------------------------------------------------------------------------------------
-
-    def _arguments(self, call: tree.Call, names: list[str], repeats: bool) -> list[tree.Expr] | None:
-        """Values in the order of the parameters, or None after a diagnostic."""
-        values: dict[int, tree.Expr] = {}
-        arguments = [a for a in call.arguments if not self._guard(call, a)]
-        for position, argument in enumerate(arguments):
-            index: int | None = position
-            if argument.name is not None:
-                index = self._index(argument, names, repeats)
-            if index is None or argument.value is None:
-                return None
-            if index in values:
-                self.error("S0403", argument, f"{argument.name.text if argument.name else 'it'} is given twice")
-                return None
-            values[index] = argument.value
-        least = len(names)
-        if sorted(values) != list(range(len(values))) or len(values) < least or \
-                (len(values) > least and not repeats):
-            more = " or more" if repeats else ""
-            shown = ", ".join(names)
-            self.error("S0404" if len(values) < least else "S0402", call,
-                       f"{_name(call)} takes {least}{more} argument{'s' if least != 1 or repeats else ''} ({shown}), "
-                       f"{len(values)} given")
-            return None
-        return [values[i] for i in range(len(values))]
-
-    def _guard(self, call: tree.Call, argument: tree.Argument) -> bool:
-        """True for EN and ENO, which every function has."""
-        name = fold(argument.name.text) if argument.name is not None else ""
-        if (name, argument.kind) not in (("EN", ":="), ("ENO", "=>")) or argument.value is None:
-            return False
-        guard = self.facts.guards.setdefault(call, Guard())
-        if name == "EN":
-            if self.expressions.fit(argument.value, BOOL, "S0405", "EN"):
-                guard.enable = argument.value
-        elif self.expressions.checker.calls(self.expressions).output(argument, BOOL, "ENO"):
-            guard.enabled.append((argument.value, argument.negated))
-        return True
-
-    def _index(self, argument: tree.Argument, names: list[str], repeats: bool) -> int | None:
-        assert argument.name is not None
-        name = fold(argument.name.text)
-        if argument.kind == ":=" and name in names:
-            return names.index(name)
-        stem = names[-1].rstrip("0123456789") if names else ""
-        if argument.kind == ":=" and repeats and name.startswith(stem) and name[len(stem):].isdigit():
-            return int(name[len(stem):]) - int(names[-1][len(stem):]) + len(names) - 1
-        self.error("S0402", argument.name, f"there is no parameter {argument.name.text} here",
-                   "the parameters are " + ", ".join(names))
+        self.error("S0401", call.callee, f"there is no function or instance {callee(call)}",
+                   project.nearest(callee(call), known))
         return None
 
     # --- kinds ------------------------------------------------------------------------------------------------------
@@ -126,7 +73,7 @@ class StandardCalls:
         """ADD(a, b, c) means a + b + c; NOT(a) means NOT a."""
         op = functions.OPERATORS[name]
         names = ["IN"] if name == "NOT" else ["IN1", "IN2"]
-        values = self._arguments(call, names, name in functions.EXTENSIBLE_OPERATORS)
+        values = Arguments(self.expressions, call, names, name in functions.EXTENSIBLE_OPERATORS).in_order()
         if values is None:
             return None
         if name == "NOT":
@@ -143,7 +90,7 @@ class StandardCalls:
         if result is None:
             return None
         if kind is not None and not converts(result, kind):
-            self.error("S0405", call, f"the arguments are {result}, {_name(call)} takes {kind}")
+            self.error("S0405", call, f"the arguments are {result}, {callee(call)} takes {kind}")
             return None
         self.facts.rewritten[call] = meaning
         if meaning in self.facts.constants and call not in self.facts.guards:
@@ -151,7 +98,7 @@ class StandardCalls:
         return result
 
     def _signature(self, call: tree.Call, row: Signature, fixed: Elementary | None, want: Type | None) -> Type | str | None:
-        values = self._arguments(call, [name for name, _ in row.parameters], row.repeats)
+        values = Arguments(self.expressions, call, [name for name, _ in row.parameters], row.repeats).in_order()
         if values is None:
             return None
         wanted = [kind for _, kind in row.parameters]
@@ -235,7 +182,7 @@ class StandardCalls:
             return LREAL
         if not good or not isinstance(bound, Elementary | StringType | EnumType):
             shown = " or ".join(limit for limit in row.limits if limit != "ANY") or "an elementary type"
-            self.error("S0405", call, f"{_name(call)} is defined for {shown}, not for {bound}")
+            self.error("S0405", call, f"{callee(call)} is defined for {shown}, not for {bound}")
             return None
         return bound
 
@@ -249,7 +196,7 @@ class StandardCalls:
             if isinstance(named, EnumType) and source in ELEMENTARY else None
 
     def _conversion(self, call: tree.Call, row: Conversion) -> Type | None:
-        values = self._arguments(call, ["IN"], False)
+        values = Arguments(self.expressions, call, ["IN"]).in_order()
         if values is None:
             return None
         value = values[0]
@@ -260,7 +207,7 @@ class StandardCalls:
         if isinstance(source, StringType):
             source = string(RESULT_STRING)
         if not convertible(row.form, base(source), target):
-            self.error("S0405", call, f"{_name(call)} is not defined for {source}", "")
+            self.error("S0405", call, f"{callee(call)} is not defined for {source}", "")
             return None
         self.facts.calls[call] = StandardCall(row.form, [(value, base(source))], (base(source), target))
         return target
@@ -302,7 +249,3 @@ def convertible(form: str, source: Type, target: Type) -> bool:
     if is_any(source, "ANY_REAL") and is_any(target, "ANY_BIT") or is_any(source, "ANY_BIT") and is_any(target, "ANY_REAL"):
         return "BOOL" in (source.name, target.name) or source.size == target.size
     return True
-
-
-def _name(call: tree.Call) -> str:
-    return call.callee.text if isinstance(call.callee, tree.NameRef) else "this"

@@ -41,7 +41,7 @@ def _check_diagnostics(program: Program, diagnostics: list[Diagnostic]) -> None:
     wanted = list(program.diagnostics)
     unexpected = []
     for diagnostic in diagnostics:
-        fitting = [m for m in wanted if m.fits(diagnostic.line, diagnostic.code, diagnostic.message)]
+        fitting = [m for m in wanted if m.fits(diagnostic.line, diagnostic.code, f"{diagnostic.message}\n{diagnostic.hint}")]
         if fitting:
             wanted.remove(fitting[0])
         else:

@@ -2,7 +2,7 @@
 
 A file holds programs one after the other, each begun by a line `// ---- what it shows`.  Comments say what is expected:
 
-    x := y;  // error S0301: part of the message     at the line that causes it; `warning` alike
+    x := y;  // error S0301: part of the message     at the line that causes it, or of its hint; `warning` alike
     x := 1 / z;  // trap R0101                       at the line that stops the program
     // expect x = 5, q = TRUE                        values after the first scan
     // expect scan 3: a[2].b = 7                     values after another one

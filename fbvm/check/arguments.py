@@ -1,0 +1,125 @@
+"""Arguments of a call of a standard function: each finds its parameter, and what is missing is named."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import islice
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import BOOL, fold
+from fbvm.check.facts import Guard
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.expressions import Expressions
+
+MIXED = "a call names all of its parameters or none"
+MIXED_HINT = "name them: parameter := value"
+NAMED = 3
+"""How many of the missing parameters a message names."""
+
+
+def mixed(call: tree.Call) -> tree.Argument | None:
+    """The first argument that is given another way than the first one of its call; None if all are given alike."""
+    return next((a for a in call.arguments if bool(a.kind) != bool(call.arguments[0].kind)), None)
+
+
+class Arguments:
+    """The arguments of one call; `names` are its parameters, of which the last may repeat."""
+
+    def __init__(self, expressions: Expressions, call: tree.Call, names: Sequence[str], repeats: bool = False) -> None:
+        self.expressions = expressions
+        self.error = expressions.error
+        self.call = call
+        self.names = names
+        self.repeats = repeats
+
+    def in_order(self) -> list[tree.Expr] | None:
+        """Values in the order of the parameters, or None after a diagnostic."""
+        other = mixed(self.call)
+        if other is not None:
+            self.error("S0406", other, MIXED, MIXED_HINT)
+            return None
+        values: dict[int, tree.Expr] = {}
+        given: set[int] = set()
+        for position, argument in enumerate(a for a in self.call.arguments if not self._guard(a)):
+            index = position if argument.name is None else self._index(argument)
+            if index is None:
+                return None
+            if index in given:
+                assert argument.name is not None
+                self.error("S0403", argument, f"{argument.name.text} is given twice")
+                return None
+            given.add(index)
+            if argument.value is not None:
+                values[index] = argument.value
+        return [values[i] for i in sorted(values)] if self._complete(values, given) else None
+
+    def _complete(self, values: dict[int, tree.Expr], given: set[int]) -> bool:
+        """True if every parameter has a value; one that is named without a value has none."""
+        least = len(self.names)
+        if len(given) > least and not self.repeats:
+            self.error("S0402", self.call, self._takes(len(given)))
+            return False
+        count = max(least, 1 + max(given, default=0)) if least else 0
+        missing = [self._name(i) for i in islice((i for i in range(count) if i not in values), NAMED)]
+        if not missing:
+            return True
+        named = bool(self.call.arguments) and self.call.arguments[0].name is not None
+        self.error("S0404", self.call, f"{callee(self.call)} needs {' and '.join(missing)} too" if named else
+                   self._takes(len(given)))
+        return False
+
+    def _takes(self, given: int) -> str:
+        least = len(self.names)
+        more = " or more" if self.repeats else ""
+        plural = "" if least == 1 and not self.repeats else "s"
+        shown = f" ({', '.join(self.names)})" if self.names else ""
+        return f"{callee(self.call)} takes {least or 'no'}{more} argument{plural}{shown}, {given or 'none'} given"
+
+    def _name(self, index: int) -> str:
+        """The name of a parameter, those that repeat included."""
+        if index < len(self.names):
+            return self.names[index]
+        stem = self.names[-1].rstrip("0123456789")
+        return f"{stem}{int(self.names[-1][len(stem):]) + index - len(self.names) + 1}"
+
+    def _index(self, argument: tree.Argument) -> int | None:
+        assert argument.name is not None
+        name = fold(argument.name.text)
+        if argument.kind == ":=":
+            if name in self.names:
+                return self.names.index(name)
+            stem = self.names[-1].rstrip("0123456789") if self.names else ""
+            number = name[len(stem):]
+            if self.repeats and name.startswith(stem) and number.isdecimal() and len(number) < 10:
+                index = int(number) - int(self.names[-1][len(stem):]) + len(self.names) - 1
+                if index >= len(self.names):
+                    return index
+        elif name in self.names:
+            self.error("S0402", argument, f"{name} is an input: write {name} := ...")
+            return None
+        known = ", ".join(self.names) + (" ..." if self.repeats else "")
+        self.error("S0402", argument.name, f"there is no parameter {argument.name.text} here",
+                   f"the parameters are {known}" if known else "it takes none")
+        return None
+
+    def _guard(self, argument: tree.Argument) -> bool:
+        """True for EN and ENO, which every function has; noted unless they are named without a value."""
+        name = fold(argument.name.text) if argument.name is not None else ""
+        if (name, argument.kind) not in (("EN", ":="), ("ENO", "=>")):
+            return False
+        if argument.value is None:
+            return True
+        guard = self.expressions.facts.guards.setdefault(self.call, Guard())
+        if name == "EN":
+            if self.expressions.fit(argument.value, BOOL, "S0405", "EN"):
+                guard.enable = argument.value
+        elif self.expressions.checker.calls(self.expressions).output(argument, BOOL, "ENO"):
+            guard.enabled.append((argument.value, argument.negated))
+        return True
+
+
+def callee(call: tree.Call) -> str:
+    """The name of what is called, for messages."""
+    return call.callee.text if isinstance(call.callee, tree.NameRef) else "this"
