@@ -158,7 +158,7 @@ class Journal:
     def unit(self, unit: Recordable) -> dict[str, Any]:
         """How a unit that comes on the backplane is written.  Raises TypeError if it does not say how it was made."""
         try:
-            described = {"class": type(unit).__name__, "with": unit.configuration}
+            described = {"class": type(unit).__name__, "with": unit.configuration, "settings": unit.settings}
             self._units.append((unit, unit.settings))
         except AttributeError:
             raise TypeError(f"{type(unit).__name__} has no configuration to be written to a journal") from None
@@ -212,10 +212,18 @@ class Journal:
 # --- reading ----------------------------------------------------------------------------------------------------------
 
 
-def read_journal(lines: Iterable[str]) -> Iterator[Entry]:
-    """The entries of a journal, the header first.  Raises JournalError for what is damaged.
+def open_journal(lines: Iterable[str]) -> tuple[Header, Iterator[Entry]]:
+    """The header of a journal and, one after the other, its entries.
 
-    A last line without its end, as a run that was killed leaves it, is left out."""
+    Raises JournalError for what is damaged, now or when it is come to.  A last line without its end, as a run that was
+    killed leaves it, is left out."""
+    entries = _read(lines)
+    header = next(entries)
+    assert isinstance(header, Header)
+    return header, entries
+
+
+def _read(lines: Iterable[str]) -> Iterator[Entry]:
     number, scans = 0, 0
     for number, text in enumerate(lines, 1):
         if not text.endswith("\n") and number > 1:

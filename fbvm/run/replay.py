@@ -1,0 +1,149 @@
+"""Does a journal again: the same program, the same inputs, and after each scan the same memory, to the bit.
+
+Time is what the journal says, so that an hour on real connections is done again in seconds, and nothing leaves memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any
+
+from fbvm.code.image import Image
+from fbvm.goal import Goal
+from fbvm.net.journal import Act, End, Entry, Fingerprint, Header, JournalError, Scan
+from fbvm.plc import Mode, Plc, Stopped, fingerprint
+from fbvm.units.etn21 import Etn21
+from fbvm.units.unit import Unit
+from fbvm.wire.link import Event, Request
+
+UNITS: Mapping[str, Callable[..., Unit]] = {"Etn21": Etn21}
+"""What builds the units that a journal names."""
+
+
+class _Recorded:
+    """Network and link at once: tells what the journal says, and takes requests without doing anything."""
+
+    virtual_time = True
+
+    def __init__(self) -> None:
+        self.address = ""
+        self.next: list[Event] = []
+
+    def attach(self, address: str) -> _Recorded:
+        self.address = address
+        return self
+
+    def submit(self, requests: Iterable[Request], now_ns: int) -> None:
+        """What they led to stands in the journal."""
+
+    def events(self, now_ns: int) -> list[Event]:
+        told, self.next = self.next, []
+        return told
+
+    def close(self) -> None:
+        """There is nothing to end."""
+
+
+class Replay:
+    """A journal on its way: `plc` stands where it stood after the scan that was done last.
+
+    `header` and `entries` come from `open_journal`; `image` is the program that ran, `units` make the units by class
+    name.  Raises JournalError if another program wrote the journal, and later if the file is damaged."""
+
+    def __init__(
+        self,
+        header: Header,
+        entries: Iterator[Entry],
+        image: Image,
+        *,
+        units: Mapping[str, Callable[..., Unit]] = UNITS,
+        observed: bool = False,
+    ) -> None:
+        if fingerprint(image) != header.image:
+            raise JournalError("the journal was written by another program, or by another version of fbvm")
+        self._entries = entries
+        self.plc = Plc(image, header.cycle_ns, budget=header.budget, observed=observed)
+        self.differs: int | None = None
+        """Number of the first scan after which the memory was not what the journal says; None if there is none."""
+        self.complete = False
+        """True when the end of the journal was reached.  One that was cut off has none."""
+        self._units = units
+        self._links: list[_Recorded] = []
+        self._fingerprint = Fingerprint(self.plc.memory)
+
+    def step(self) -> bool:
+        """Everything up to the end of the next scan; False if there is none."""
+        for entry in self._entries:
+            try:
+                if isinstance(entry, Scan):
+                    self._scan(entry)
+                    return True
+                if isinstance(entry, Act):
+                    self._act(entry)
+            except (ArithmeticError, LookupError, TypeError, ValueError, Stopped) as error:
+                raise JournalError(f"scan {self.plc.scans} cannot be done again: {error}") from error
+            self.complete = isinstance(entry, End)
+        return False
+
+    def run(self, *, scans: int | None = None, until: str | Callable[[Plc], bool] | None = None) -> str:
+        """Goes on until "scans" or "until" of `Plc.run`, to the "end" of the journal, or to the first scan that
+        "differs"; says which."""
+        never = scans is None and until is None
+        goal = Goal(self.plc, scans=1 << 62 if never else scans, until=until)
+        while not (reason := goal.reached()) or reason == "trap":
+            if not self.step():
+                return "end"
+            if self.differs is not None:
+                return "differs"
+        return reason
+
+    def _act(self, act: Act) -> None:
+        self._write(act.writes)
+        if act.what == "mode":
+            self.plc.mode = Mode(act.value)
+        elif act.what == "unit":
+            self._attach(act.value)
+        elif act.value == "warm":
+            self.plc.warm_start()
+        else:
+            self.plc.cold_start()
+        self._fingerprint.settle()
+
+    def _attach(self, described: Mapping[str, Any]) -> None:
+        make = self._units.get(described["class"])
+        if make is None:
+            raise JournalError(f"nothing here makes a unit of class {described['class']}")
+        unit, link = make(**described["with"]), _Recorded()
+        unit.settings = described["settings"]
+        self.plc.attach(unit, link)
+        self._links.append(link)
+
+    def _scan(self, scan: Scan) -> None:
+        plc = self.plc
+        for number, settings in scan.settings.items():
+            plc.units[number].unit.settings = settings
+        if scan.forced or scan.unforced:
+            self._force(scan)
+        if scan.budget is not None:
+            plc.budget = scan.budget
+        self._write(scan.writes)
+        for number, events in scan.events.items():
+            self._links[number].next = list(events)
+        plc.scan(scan.now_ns)
+        if self._fingerprint.settle() != scan.fingerprint and self.differs is None:
+            self.differs = scan.number
+
+    def _force(self, scan: Scan) -> None:
+        """Changes what is forced; the memory itself changes by what was written."""
+        before = self.plc.memory.snapshot()
+        for name, value in scan.forced.items():
+            self.plc.force(name, value)
+        for name in scan.unforced:
+            self.plc.unforce(name)
+        self.plc.memory.restore(before)
+
+    def _write(self, writes: Iterable[tuple[int, bytes]]) -> None:
+        for offset, data in writes:
+            if offset < 0 or offset + len(data) > self.plc.memory.size:
+                raise JournalError(f"{len(data)} bytes at {offset} are outside the memory")
+            self.plc.memory.u8[offset : offset + len(data)] = data
