@@ -20,6 +20,7 @@ from fbvm.engine.python import PythonEngine
 from fbvm.engine.trap import Trap
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
+from fbvm.scan_times import ScanTimes
 from fbvm.schedule import Schedule
 from fbvm.units.unit import Unit
 from fbvm.watch import places
@@ -113,6 +114,8 @@ class Plc:
         self.now_ns = 0
         """Time of the last scan; `elapsed_ns` is where the next one begins in virtual time."""
         self.scans = 0
+        self.scan_times = ScanTimes()
+        """How long scans took, where somebody with a clock measured it (`fbvm.run`)."""
         self.trap: Trap | None = None
         self.stirred = False
         """True if in the last scan a network told something or a unit changed a CIO word: the program has news to see."""

@@ -41,7 +41,8 @@ def run(
     """Runs until the first of the bounds, as `Plc.run` has them; returns its name, or "interrupted" after Ctrl-C.
 
     `pace` "cyclic" keeps the period of the PLC; "event" (real time only) scans again at once when a unit or its network
-    changed something, and at the latest when the period ends.  `progress` is called now and then, not in each scan."""
+    changed something, and at the latest when the period ends.  `progress` is called now and then, not in each scan.  How
+    long scans took is in `plc.scan_times`."""
     if pace not in (CYCLIC, EVENT):
         raise ValueError(f"pace is {CYCLIC} or {EVENT}, not {pace!r}")
     goal = Goal(plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
@@ -55,7 +56,9 @@ def run(
             while waiting and waiting[0].at_ns <= now_ns:
                 write = waiting.pop(0)
                 plc.write(write.where, write.value)
+            began_ns = time.monotonic_ns()
             plc.scan(now_ns)
+            plc.scan_times.note(plc.scans - 1, time.monotonic_ns() - began_ns, plc.cycle_ns)
             if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
                 told_ns = time.monotonic_ns()
                 progress(plc)
