@@ -15,6 +15,7 @@ from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, Report, TaskFact
 from fbvm.check.library import Libraries
 from fbvm.check.project import Project
+from fbvm.code.damage import Damage
 from fbvm.code.image import Image, ProgramRun, Site, TaskRow
 from fbvm.code.layout import Placed, place
 from fbvm.code.lower import BodyLowering
@@ -92,16 +93,19 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
     report = Report()
     with _deep():
         project = Project(Libraries([Path(folder) for folder in libraries]), report)
+        damage = Damage()
         for source in sources:
             text, diagnostics = parse(source)
             report.diagnostics += diagnostics
+            damage.note(source, text, errors(diagnostics))
             project.collect(text, source)
+        unread = len(report.diagnostics)
         checker = Checker(project)
-        if not errors(report.diagnostics):  # what could not be read would only give errors that follow from it
-            checker.check(program)
-            if runnable and not errors(report.diagnostics):
-                _demand_program(checker, program, sources, report)
-        diagnostics = sorted(report.diagnostics, key=Diagnostic.order)
+        checker.check(program)
+        if runnable and not errors(report.diagnostics):
+            _demand_program(checker, program, sources, report)
+        found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not damage.explains(d)]
+        diagnostics = sorted(found, key=Diagnostic.order)
         image = None if errors(diagnostics) else _image(checker)
     return Compilation(image, diagnostics)
 

@@ -1,0 +1,29 @@
+"""Syntax errors do not hide what is wrong elsewhere, and are not followed by messages that only follow from them."""
+
+from __future__ import annotations
+
+from fbvm.code.compiler import compile_text
+
+
+def found(text: str) -> list[tuple[str, int]]:
+    return [(d.code, d.line) for d in compile_text(text).diagnostics]
+
+
+def test_a_missing_semicolon_does_not_hide_the_rest() -> None:
+    assert found("PROGRAM Main\nVAR a : INT; END_VAR\na := 5 / c\na := TRUE;\nEND_PROGRAM") == [
+        ("S0201", 3), ("S0101", 3), ("S0301", 4)]
+
+
+def test_a_statement_that_was_skipped_silences_its_own_pou_only() -> None:
+    assert found("FUNCTION F : INT\nVAR_INPUT x : INT; END_VAR\nF := x + ;\nlost := 3;\nEND_FUNCTION\n"
+                 "PROGRAM Main\nVAR a : INT; END_VAR\na := F(x := 2);\nb := 1;\nEND_PROGRAM") == [
+        ("S0101", 3), ("S0201", 9)]
+
+
+def test_names_of_a_damaged_declaration_are_not_unknown() -> None:
+    assert found("PROGRAM Main\nVAR a : ; b : INT; END_VAR\na := 1; b := TRUE;\nEND_PROGRAM") == [("S0101", 2)]
+
+
+def test_names_of_a_damaged_type_are_not_unknown_elsewhere() -> None:
+    assert found("TYPE T : STRUCT x : ; END_STRUCT END_TYPE\nPROGRAM Main\nVAR t : T; i : INT; END_VAR\n"
+                 "t.x := 1; i := TRUE;\nEND_PROGRAM") == [("S0101", 1), ("S0301", 4)]
