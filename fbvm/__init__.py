@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from fbvm.code.compiler import compile_text as compile_text
     from fbvm.code.image import Image as Image
     from fbvm.engine.trap import Trap as Trap
+    from fbvm.net.journal import Journal as Journal
+    from fbvm.net.journal import JournalError as JournalError
+    from fbvm.net.journal import open_journal as open_journal
     from fbvm.net.loop import LoopNetwork as LoopNetwork
     from fbvm.net.peers import ModbusPeer as ModbusPeer
     from fbvm.net.tcp import TcpNetwork as TcpNetwork
@@ -34,6 +37,7 @@ if TYPE_CHECKING:
     from fbvm.record.chart import draw as draw
     from fbvm.record.pcapng import Capture as Capture
     from fbvm.record.recorder import Recorder as Recorder
+    from fbvm.run.replay import Replay as Replay
     from fbvm.units.etn21 import Etn21 as Etn21
     from fbvm.watch.paths import UnknownPlace as UnknownPlace
     from fbvm.wire.link import Peer as Peer
@@ -44,6 +48,7 @@ _HOMES = {
     "code.compiler": ("Compilation", "compile_files", "compile_sources", "compile_text"),
     "code.image": ("Image",),
     "engine.trap": ("Trap",),
+    "net.journal": ("Journal", "JournalError", "open_journal"),
     "net.loop": ("LoopNetwork",),
     "net.peers": ("ModbusPeer",),
     "net.tcp": ("TcpNetwork",),
@@ -51,6 +56,7 @@ _HOMES = {
     "record.chart": ("chart", "draw"),
     "record.pcapng": ("Capture",),
     "record.recorder": ("Recorder",),
+    "run.replay": ("Replay",),
     "units.etn21": ("Etn21",),
     "watch.paths": ("UnknownPlace",),
     "wire.link": ("Peer",),

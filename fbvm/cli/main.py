@@ -15,6 +15,7 @@ import fbvm
 VERBS = {
     "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
     "run": "Run a program, in virtual time or over real TCP.",
+    "replay": "Do a run again from its journal.",
     "check": "Say what is wrong with a program; silent when nothing is.",
     "list": "Print the compiled program, readable.",
     "explain": "Print the page of a diagnostic.",

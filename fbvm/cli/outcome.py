@@ -22,7 +22,7 @@ from fbvm.watch.values import Value, show, show_time
 
 PIPE_WIDTH = 100
 """Width of charts that do not go to a terminal."""
-_STATUS = {"max": status.FAILED, "trap": status.STOPPED, "interrupted": status.INTERRUPTED}
+_STATUS = {"max": status.FAILED, "differs": status.FAILED, "trap": status.STOPPED, "interrupted": status.INTERRUPTED}
 
 
 @dataclass(frozen=True)
@@ -35,6 +35,8 @@ class Outcome:
     recorder: Recorder | None
     as_json: bool
     until: str
+    scan_time: bool = False
+    """Whether somebody wants to know how long scans took."""
 
     @property
     def status(self) -> int:
@@ -50,6 +52,8 @@ class Outcome:
             click.echo(draw(self.recorder, width=chart_width(), ruler=True, compress=True), nl=False)
         for text, place in self.places.items():
             click.echo(f"{text} = {shown(place, self.plc.read(place))}")
+        if self.scan_time:
+            click.echo(str(self.plc.scan_times), err=True)
         if self.plc.trap:
             click.secho(str(self.plc.trap), fg="red", err=True)
         elif self.reason == "max":
@@ -67,6 +71,7 @@ class Outcome:
                 "code": trap.code, "file": site.file, "pou": site.pou, "line": site.line, "column": site.column,
                 "message": trap.message,
             },
+            **({"scan_time": plc.scan_times.as_dict()} if self.scan_time else {}),
         }  # fmt: skip
 
 

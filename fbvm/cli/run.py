@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from fbvm.cli import registers, status
+from fbvm.cli.journals import start_journal
 from fbvm.cli.options import Mapping, Setting, mapping, setting, split_names, time_ns
 from fbvm.cli.outcome import Outcome, Progress
 from fbvm.cli.sources import compiled, source_arguments
@@ -52,6 +53,13 @@ UNIT_ADDRESS = "192.168.250.21"
               help="With tcp: keep the cycle, or scan again at once when something arrived.")
 @click.option("--pcap", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Write what passed the network, for Wireshark.")
+@click.option("--journal", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+              help="Write every input of every scan, for `fbvm replay`.")
+@click.option("--timing", type=click.Choice(["exact", "real"]), default="exact", show_default=True,
+              help="exact: the unit answers in fixed scans.  real: late and out of step, as the device may.")
+@click.option("--seed", type=int, default=0, metavar="N", help="What chance begins with: the same again with the same N.")
+@click.option("--scan-time", is_flag=True,
+              help="Say how long scans took; a run over tcp on a terminal does so by itself.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int, as_json: bool,
@@ -62,13 +70,16 @@ def command(
     End by one of --scans, --for and --until.  Status 1 if --max ended --until, 3 if the program has errors, 4 if a
     trap stopped it, 5 if the network could not be used."""
     _check_usage(**options)
-    plc = Plc(compiled(files, program, libraries, runnable=True, as_json=as_json), cycle_ns)
+    image = compiled(files, program, libraries, runnable=True, as_json=as_json)
     with ExitStack() as stack:
-        network = build_network(options["net"], options["mappings"])
+        network = build_network(options["net"], options["mappings"], options["seed"])
         stack.callback(network.close)
+        path = options["journal"]
+        journal = start_journal(stack, path, files, program, libraries) if path else None
+        plc = Plc(image, cycle_ns, journal=journal)
         if options["pcap"]:
             network.tap = _capture(stack, options["pcap"], network).tap
-        plc.attach(Etn21(0, UNIT_ADDRESS), network)
+        plc.attach(Etn21(0, UNIT_ADDRESS, timing=options["timing"], seed=options["seed"]), network)
         outcome = _run(plc, as_json, **options)
         outcome.print()
     sys.exit(outcome.status)
@@ -76,7 +87,8 @@ def command(
 
 def _run(
     plc: Plc, as_json: bool, *, settings: tuple[Setting, ...], shown: tuple[str, ...], charted: tuple[str, ...],
-    pace: str, scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, **_: Any,
+    pace: str, scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, net: str,
+    scan_time: bool, **_: Any,
 ) -> Outcome:  # fmt: skip
     """Runs to the end.  Names, values and conditions that do not fit the program are mistakes of usage."""
     try:
@@ -91,7 +103,8 @@ def _run(
             )  # fmt: skip
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
-    return Outcome(plc, reason, places, recorder, as_json, until or "")
+    wanted = scan_time or (net == "tcp" and not as_json and sys.stderr.isatty())
+    return Outcome(plc, reason, places, recorder, as_json, until or "", wanted)
 
 
 def _write(plc: Plc, given: Setting) -> TimedWrite:
@@ -107,10 +120,10 @@ def _write(plc: Plc, given: Setting) -> TimedWrite:
     return TimedWrite(found, values, given.at_ns)
 
 
-def build_network(net: str, mappings: tuple[Mapping, ...]) -> LoopNetwork | TcpNetwork:
+def build_network(net: str, mappings: tuple[Mapping, ...], seed: int = 0) -> LoopNetwork | TcpNetwork:
     """The network that the options describe.  Ends with status 5 if the host does not let it be."""
     if net == "loop":
-        network = LoopNetwork()
+        network = LoopNetwork(seed)
         for row in mappings:
             network.place(row.said, ModbusPeer(registers.server()))
         return network

@@ -1,0 +1,77 @@
+"""Journals as files: what `fbvm run --journal` puts into one besides the inputs, and the program that one holds."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+import fbvm
+from fbvm.base.diagnostics import Source
+from fbvm.cli import status
+from fbvm.cli.sources import report
+from fbvm.code.compiler import compile_sources
+from fbvm.code.image import Image
+from fbvm.net.journal import Entry, Header, Journal, JournalError, open_journal
+from fbvm.run import loop
+from fbvm.syntax.text import read
+
+
+def start_journal(
+    stack: ExitStack, path: Path, files: Sequence[Path], program: str | None, libraries: Sequence[Path]
+) -> Journal:
+    """A journal to be written to a file; it holds the texts of the program, and ends with the stack."""
+    try:
+        file = stack.enter_context(path.open("w", encoding="utf-8", newline="\n"))
+    except OSError as error:
+        raise click.UsageError(f"{path} cannot be written: {error.strerror}") from None
+    texts = [read(name, str(name)) for name in files]
+    journal = Journal(file, {
+        "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program,
+        "libraries": [str(folder) for folder in libraries],
+        "sources": [[text.name, text.text] for text in texts if isinstance(text, Source)],
+    })  # fmt: skip
+    stack.callback(journal.close)
+    return journal
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[tuple[Header, Iterator[Entry]]]:
+    """A journal to be read.  What is wrong with it, now or while it is done again, is a mistake of usage."""
+    try:
+        with path.open(encoding="utf-8", newline="\n") as file:
+            yield open_journal(_text(file))
+    except JournalError as error:
+        raise click.UsageError(f"{path}: {error}") from None
+    except OSError as error:
+        raise click.UsageError(f"{path} cannot be read: {error.strerror}") from None
+
+
+def _text(lines: Iterable[str]) -> Iterator[str]:
+    try:
+        yield from lines
+    except UnicodeDecodeError:
+        raise JournalError("this is no text, so no journal") from None
+
+
+def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Image:
+    """The program whose texts a journal holds.  Ends with status 3 if they have errors here."""
+    about: dict[str, Any] = header.about
+    try:
+        sources = [Source(str(name), str(text)) for name, text in about["sources"]]
+        folders = list(libraries) or [Path(folder) for folder in about["libraries"]]
+        program = None if about["program"] is None else str(about["program"])
+    except (KeyError, TypeError, ValueError):
+        raise JournalError("it holds no program; one that Python wrote is done again from Python") from None
+    for folder in folders:
+        if not folder.is_dir():
+            raise JournalError(f"the program needs the library folder {folder}; say where it is now with --library")
+    compilation = compile_sources(sources, program, folders, runnable=True)
+    if compilation.image is None:
+        report(compilation, as_json)
+        sys.exit(status.PROGRAM_ERRORS)
+    return compilation.image

@@ -1,0 +1,57 @@
+"""`fbvm replay`: a journal of `fbvm run` done again, to look at what was not looked at."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from fbvm.cli import journals
+from fbvm.cli.options import split_names
+from fbvm.cli.outcome import Outcome
+from fbvm.record.recorder import Recorder
+from fbvm.run.replay import Replay
+from fbvm.watch.conditions import ConditionError
+
+
+@click.command("replay")
+@click.argument("journal", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--library", "libraries", multiple=True, metavar="DIR",
+              type=click.Path(exists=True, file_okay=False, path_type=Path),
+              help="Where folders of libraries are now, if the journal's are gone; may be repeated.")
+@click.option("--scans", type=click.IntRange(min=0), metavar="N", help="End after N scans.")
+@click.option("--until", metavar="EXPRESSION", help="End when this holds after a scan: 'Main.done AND D200 > 5'.")
+@click.option("--show", "shown", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST", help="Print this at the end.")
+@click.option("--chart", "charted", multiple=True, metavar="NAME|ADDRESS,...", help="Draw these, a column a scan.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def command(
+    journal: Path, libraries: tuple[Path, ...], scans: int | None, until: str | None, shown: tuple[str, ...],
+    charted: tuple[str, ...], as_json: bool,
+) -> None:  # fmt: skip
+    """Do again what `fbvm run --journal JOURNAL` did: the same program and inputs, in no time and without a network.
+
+    Ends with 1 if the memory was not the same to the bit after some scan, or if --until never held."""
+    with journals.opened(journal) as (header, entries):
+        replay = Replay(header, entries, journals.program_of(header, libraries, as_json))
+        try:
+            places = {text: replay.plc.find(text) for text in shown}
+            names = [name for text in charted for name in split_names(text)]
+            recorder = Recorder(replay.plc, names) if names else None
+            reason = replay.run(scans=scans, until=until)
+        except (LookupError, ConditionError) as error:
+            raise click.UsageError(str(error)) from None
+    outcome = Outcome(replay.plc, _reason(replay, reason, until), places, recorder, as_json, until or "")
+    outcome.print()
+    if replay.differs is not None:
+        click.secho(f"after scan {replay.differs} the memory is not what the journal says", fg="red", err=True)
+    elif reason == "end" and not replay.complete:
+        click.secho(f"the journal was cut off after {replay.plc.scans} scans", fg="yellow", err=True)
+    sys.exit(outcome.status)
+
+
+def _reason(replay: Replay, reason: str, until: str | None) -> str:
+    """As `fbvm run` says it."""
+    if reason != "end":
+        return reason
+    return "trap" if replay.plc.trap else "max" if until else "end"
