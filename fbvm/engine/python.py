@@ -17,10 +17,10 @@ from typing import Any
 from weakref import WeakValueDictionary, finalize
 
 from fbvm.base.memory import Memory
-from fbvm.code.image import Image
+from fbvm.code.image import Image, ProgramRun
 from fbvm.code.operations import Block
 from fbvm.engine.bases import fixed_bases
-from fbvm.engine.runtime import Observation, environment
+from fbvm.engine.runtime import NO_SITE, Observation, environment
 from fbvm.engine.statements import BodyWriter, function_name
 from fbvm.engine.trap import Stop, Trap, trap
 
@@ -149,12 +149,14 @@ class PythonEngine:
         Raises ValueError for a plain build, which has none."""
         if not self.observed:
             raise ValueError("a plain build has no observations")
-        return self._steps(self._tasks[task_index])
+        return self._steps(self.image.tasks[task_index].programs)
 
-    def _steps(self, calls: list[tuple[Callable[[int], Any], int]]) -> Generator[Observation, None, Trap | None]:
+    def _steps(self, programs: tuple[ProgramRun, ...]) -> Generator[Observation, None, Trap | None]:
         try:
-            for body, base in calls:
-                yield from body(base)
+            for run in programs:
+                yield Observation("call", NO_SITE, (run.body, run.offset))
+                yield from self._bodies[run.body](run.offset)
+                yield Observation("return", NO_SITE, (run.body, run.offset))
         except Stop as stop:
             return trap(self.image, stop.code, stop.site, stop.values)
         return None

@@ -21,10 +21,16 @@ BUFFER_OBJECT = 1
 """Number of the object that is the whole buffer; 0 is null, every other object has ended."""
 
 
+NO_SITE = -1
+"""The site of what no statement asked for."""
+
+
 class Observation(NamedTuple):
     """What an observed run tells: `kind` and `site` as in `observe`, `detail` evaluated.
 
-    Of read and write it is (type, byte offset in the buffer, bit), of contact (element, BOOL)."""
+    Of read and write it is (type, byte offset in the buffer, bit), of contact (element, BOOL).  Besides, a body says
+    when it begins and when it has ended: `kind` is call or return, `site` the statement that calls (NO_SITE for a
+    program), `detail` (number of the body, byte offset of its instance).  After a trap nothing returns."""
 
     kind: str
     site: int

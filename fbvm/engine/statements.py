@@ -16,6 +16,7 @@ from fbvm.code.image import Body, Image
 from fbvm.code.operations import SIZES, Address, Block, Node
 from fbvm.engine.expressions import ROWS, flag_operands, view
 from fbvm.engine.ranges import may_trap
+from fbvm.engine.runtime import NO_SITE
 from fbvm.engine.writer import Expressions, bare, plus
 
 MOST_LOOPS = 15
@@ -49,6 +50,7 @@ class BodyWriter(Expressions):
         self.leaves: set[int] = set()
         self.assigned: set[int] = set()
         self.shared: set[int] = set()
+        self.site = NO_SITE
         self._line = 0
 
     def write(self, number: int) -> list[str]:
@@ -309,7 +311,16 @@ def _return(w: BodyWriter) -> None:
 def _call(w: BodyWriter, pou: int, address: Address | None) -> None:
     body = w.image.bodies[pou]
     place = bare(w.place(address, max(1, body.instance_size))) if address else "0"
-    w.line(f"{'yield from ' if w.observed else ''}{function_name(pou, body)}({place})")
+    if not w.observed:
+        w.line(f"{function_name(pou, body)}({place})")
+        return
+    if not place.isdigit():
+        name = w.name("v")
+        w.line(f"{name} = {place}")
+        place = name
+    w.line(f"yield Observation('call', {w.site}, ({pou}, {place}))")
+    w.line(f"yield from {function_name(pou, body)}({place})")
+    w.line(f"yield Observation('return', {w.site}, ({pou}, {place}))")
 
 
 def _charge(w: BodyWriter, count: int, site: int) -> None:
@@ -330,6 +341,8 @@ def _stop(w: BodyWriter, code: str, site: int) -> None:
 
 
 def _observe(w: BodyWriter, kind: str, site: int, detail: Any) -> None:
+    if kind in ("statement", "rung"):
+        w.site = site
     if kind == "statement" and w.image.sites[site].line != w._line:
         w._line = w.image.sites[site].line
         w.line(f"# {w.image.sites[site]}".replace("\n", " ").replace("\r", " "))

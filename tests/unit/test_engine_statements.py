@@ -204,10 +204,20 @@ def test_observations_tell_places_and_values() -> None:
     memory = power_on(program, {0: b"\1", 16: STRUCTS["ref"].pack(1 << 40 | 5000 << 8 | 3)})
     steps = PythonEngine(program, memory, observed=True).observe(0)
     assert list(steps) == [
+        Observation("call", -1, (0, INSTANCE)),
         Observation("statement", 3, None), Observation("read", 3, ("i16", INSTANCE + 4, 255)),
         Observation("write", 3, ("b", SLOTS_OFFSET + 9, 4)), Observation("rung", 4, 17),
         Observation("contact", 4, ((1, "x"), True)), Observation("write", 4, ("b", 5000, 3)),
-        Observation("write", 4, (("s8", 20), 5008, 255)),
+        Observation("write", 4, (("s8", 20), 5008, 255)), Observation("return", -1, (0, INSTANCE)),
+    ]
+
+
+def test_observations_tell_who_is_called() -> None:
+    program = image((("observe", "statement", 3, None), ("call", 1, own(8))), (("observe", "statement", 4, None),))
+    steps = PythonEngine(program, power_on(program), observed=True).observe(0)
+    assert list(steps)[1:-1] == [
+        Observation("statement", 3, None), Observation("call", 3, (1, INSTANCE + 8)),
+        Observation("statement", 4, None), Observation("return", 3, (1, INSTANCE + 8)),
     ]
 
 
@@ -215,9 +225,9 @@ def test_an_observed_run_stops_where_it_is_left() -> None:
     program = image((store("u8", 0, const("u8", 1)), ("observe", "statement", 3, None), store("u8", 0, const("u8", 2))))
     memory = power_on(program)
     steps = PythonEngine(program, memory, observed=True).observe(0)
-    assert next(steps).kind == "statement"
+    assert [next(steps).kind, next(steps).kind] == ["call", "statement"]
     assert memory.u8[SLOTS_OFFSET] == 1
-    assert next(steps, None) is None
+    assert next(steps).kind == "return"
     assert memory.u8[SLOTS_OFFSET] == 2
 
 
