@@ -42,7 +42,7 @@ class Mender(Protocol):
 class Automaton:
     """One parse in progress.  `states` and `values` are its stacks; `states` is longer by the start."""
 
-    def __init__(self, builder: Any, stream: Iterator[Token]) -> None:
+    def __init__(self, builder: Any, stream: Iterator[Token], text: str = "") -> None:
         self.tables: Tables = tables()
         self.rows = self.tables.actions
         self.actions: list[Callable[..., Any] | None] = [
@@ -58,7 +58,7 @@ class Automaton:
         lex = lexis()
         self.soft = frozenset(lex.words.values()) - lex.reserved
         """Words that are names where they cannot be words."""
-        self.text = ""
+        self.text = text
 
     def run(self, mender: Callable[[Automaton], Mender]) -> Any:
         """Feed every token; the value of the start symbol.  The mender is made at the first error."""

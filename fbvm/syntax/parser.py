@@ -16,8 +16,7 @@ def parse(source: Source) -> tuple[SourceText, list[Diagnostic]]:
     Never raises for any text: what cannot be understood is left out of the tree and has a diagnostic."""
     builder = Types(source)
     lexer = Lexer(source.text, builder.report)
-    automaton = Automaton(builder, lexer.tokens())
-    automaton.text = source.text
+    automaton = Automaton(builder, lexer.tokens(), source.text)
     try:
         tree: SourceText = automaton.run(lambda stuck: _recovery(stuck, builder))
     except Stop:
