@@ -16,8 +16,8 @@ from types import CodeType
 from typing import Any
 from weakref import WeakValueDictionary, finalize
 
-from fbvm.base.memory import Memory
-from fbvm.code.image import Image, ProgramRun
+from fbvm.base.memory import WHOLE_BYTES, Memory
+from fbvm.code.image import Body, Image, ProgramRun
 from fbvm.code.operations import Block
 from fbvm.engine.bases import fixed_bases
 from fbvm.engine.runtime import NO_SITE, Observation, environment
@@ -104,6 +104,7 @@ class PythonEngine:
         if memory.size < image.layout.size:
             raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")
         self.image, self.memory, self.observed = image, memory, observed
+        self.substitutes: dict[int, Callable[[int], None]] = {}
         self._program = translate(image, observed)
         self._bodies = self._bind(self._program)
         self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in image.tasks]
@@ -112,8 +113,19 @@ class PythonEngine:
         """The bodies of a program over this memory."""
         names = environment(self.memory) | program.constants
         exec(program.code, names)
+        for number, function in self.substitutes.items():
+            body = self.image.bodies[number]
+            names[function_name(number, body)] = _reporting(function, body) if self.observed else function
         sys.setrecursionlimit(max(sys.getrecursionlimit(), program.frames + FRAMES_TO_SPARE))
         return [names[function_name(number, body)] for number, body in enumerate(self.image.bodies)]
+
+    def substitute(self, body: int, function: Callable[[int], None]) -> None:
+        """Python in place of a body, for tests: `function` is called with the byte offset of the instance.
+
+        An observed run sees it as one write of the whole instance."""
+        self.substitutes[body] = function
+        self._bodies = self._bind(self._program)
+        self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in self.image.tasks]
 
     @property
     def source(self) -> str:
@@ -161,3 +173,13 @@ class PythonEngine:
             return trap(self.image, stop.code, stop.site, stop.values)
         return None
 
+
+
+def _reporting(function: Callable[[int], None], body: Body) -> Callable[[int], Generator[Observation, None, None]]:
+    """A substitute as an observed body."""
+
+    def steps(base: int) -> Generator[Observation, None, None]:
+        function(base)
+        yield Observation("write", NO_SITE, (("", body.instance_size), base, WHOLE_BYTES))
+
+    return steps

@@ -1,0 +1,157 @@
+"""What happens inside a scan: every statement, call, read and write, with the instance that did it and the values.
+
+`Inside` takes the place of a PLC's engine while somebody looks and gives it back afterwards.  It tells what happened
+and keeps nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+from dataclasses import dataclass
+from mmap import mmap
+from typing import TypeAlias
+
+from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
+from fbvm.code.image import Image
+from fbvm.engine.python import PythonEngine
+from fbvm.engine.runtime import NO_SITE, Observation
+from fbvm.engine.trap import Trap
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A body that is being executed: its number in the image, where its instance begins, and who called it.
+
+    `site` is the statement of the caller, NO_SITE for a program."""
+
+    body: int
+    base: int
+    site: int
+    caller: Frame | None
+
+
+@dataclass(frozen=True, slots=True)
+class Began:
+    """A body began."""
+
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Ended:
+    """A body ended."""
+
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Statement:
+    """A statement, or a rung, is about to be executed."""
+
+    site: int
+    frame: Frame
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """A variable was read.  `bit` is WHOLE_BYTES, or that of a located BOOL, whose `value` is then one byte 0 or 1."""
+
+    site: int
+    frame: Frame
+    offset: int
+    bit: int
+    value: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Write:
+    """A variable was written; `old` and `value` may be the same."""
+
+    site: int
+    frame: Frame
+    offset: int
+    bit: int
+    old: bytes
+    value: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A contact of a rung let power through or not; `element` is what the image calls it."""
+
+    site: int
+    frame: Frame
+    element: object
+    value: bool
+
+
+Event: TypeAlias = Began | Ended | Statement | Read | Write | Contact
+
+
+class Inside:
+    """An engine that tells every event of a run.  `program` is the engine in whose place it stands."""
+
+    def __init__(self, image: Image, memory: Memory, tell: Callable[[Event], None], program: object = None) -> None:
+        self.memory = memory
+        self.tell = tell
+        self.program = program
+        self._engine = PythonEngine(image, memory, observed=True)
+        if isinstance(program, PythonEngine):
+            for body, function in program.substitutes.items():
+                self._engine.substitute(body, function)
+        self._shadow = bytearray(memory.size)
+
+    def run(self, task_index: int) -> Trap | None:
+        """Executes the programs of one task once, telling what they do."""
+        steps = self.steps(task_index)
+        tell = self.tell
+        while True:
+            try:
+                tell(next(steps))
+            except StopIteration as end:
+                trap: Trap | None = end.value
+                return trap
+
+    def steps(self, task_index: int) -> Generator[Event, None, Trap | None]:
+        """The events of one execution of a task; execution stands still between two of them."""
+        self._shadow[:] = self.memory.map[:]
+        observations = self._engine.observe(task_index)
+        frame = Frame(NO_SITE, 0, NO_SITE, None)
+        while True:
+            try:
+                seen = next(observations)
+            except StopIteration as end:
+                trap: Trap | None = end.value
+                return trap
+            if seen.kind == "call":
+                body, base = seen.detail
+                frame = Frame(body, base, seen.site, frame)
+                yield Began(frame)
+            elif seen.kind == "return":
+                yield Ended(frame)
+                assert frame.caller is not None
+                frame = frame.caller
+            else:
+                yield self._event(seen, frame)
+
+    def _event(self, seen: Observation, frame: Frame) -> Event:
+        kind, site, detail = seen
+        if kind in ("statement", "rung"):
+            return Statement(site, frame)
+        if kind == "contact":
+            return Contact(site, frame, *detail)
+        form, offset, bit = detail
+        size = form[1] + (form[0] == "s8") if isinstance(form, tuple) else STRUCTS[form].size
+        if kind == "read":
+            return Read(site, frame, offset, bit, value_at(self.memory.map, offset, size, bit))
+        old, value = value_at(self._shadow, offset, size, bit), value_at(self.memory.map, offset, size, bit)
+        self._shadow[offset : offset + size] = self.memory.map[offset : offset + size]
+        return Write(site, frame, offset, bit, old, value)
+
+
+def value_at(buffer: bytes | bytearray | mmap, offset: int, size: int, bit: int = WHOLE_BYTES) -> bytes:
+    """The bytes of a value; of a bit, one byte 0 or 1."""
+    if bit != WHOLE_BYTES:
+        return bytes((buffer[offset] >> bit & 1,))
+    return bytes(buffer[offset : offset + size])
+
