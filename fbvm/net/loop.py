@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 
 from fbvm.net.addresses import fits, impossible
-from fbvm.net.faults import Fault, find
+from fbvm.net.faults import NO_FAULT, Fault, find
 from fbvm.net.loop_channels import Bound, Door, Line, MemoryLink
 from fbvm.net.peers import Action, Actions, Conversation, Fin, Leave, Reset, Say, Station, Wake
 from fbvm.net.stream import End
@@ -81,12 +81,16 @@ class LoopNetwork:
         heapq.heappush(self._due, (due_ns, self._count, call))
 
     def fault(self, one: Peer, other: Peer) -> Fault:
-        """The row of the fault table that holds between two endpoints."""
-        return find(self.faults, one, other)
+        """The row of the fault table that holds now between two endpoints; the scan is the first one's, if it is a unit."""
+        if not self.faults:
+            return NO_FAULT
+        link = self._links.get(one.host) or self._links.get(other.host)
+        return find(self.faults, one, other, link.scan if link else 0, self.now_ns)
 
     def latency_ns(self, fault: Fault) -> int:
         """Time for one way."""
-        return self._latency_ns if fault.latency_ns is None else fault.latency_ns
+        latency_ns = self._latency_ns if fault.latency_ns is None else fault.latency_ns
+        return latency_ns + (self._dice.randint(0, fault.jitter_ns) if fault.jitter_ns else 0)
 
     def cut(self, fault: Fault, data: bytes) -> list[bytes]:
         """Data in the pieces in which they arrive."""
@@ -159,6 +163,9 @@ class LoopLink(MemoryLink):
     def __init__(self, network: LoopNetwork, address: str) -> None:
         super().__init__(address)
         self.network = network
+        self.scan = 0
+        """Number of the scan in which the unit was refreshed last."""
+        self._refreshes = 0
         self._ends: dict[tuple[int, Peer], End] = {}
         self._next_port = FIRST_EPHEMERAL_PORT
 
@@ -167,7 +174,13 @@ class LoopLink(MemoryLink):
         super().submit(requests, now_ns)
 
     def serve(self, now_ns: int) -> None:
+        self.scan = self._refreshes
+        self._refreshes += 1
         self.network.run(now_ns)
+        if any(row.reset for row in self.network.faults):
+            for end in list(self._ends.values()):
+                if self.network.fault(end.local, end.remote).reset:
+                    end.tear(now_ns)
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
         channel = request.channel

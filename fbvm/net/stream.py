@@ -125,6 +125,13 @@ class End:
 
     # What the way does.
 
+    def tear(self, now_ns: int) -> None:
+        """Something between the two ends resets both of them."""
+        for end in (self, self.other):
+            if not end.error:
+                self.way.tell(end, What.RST, False, b"")
+                end._break("ECONNRESET", now_ns)
+
     def _push(self, now_ns: int) -> None:
         while self._waiting and not self.error:
             head = self._waiting[0]
@@ -148,6 +155,8 @@ class End:
         fault = self.way.fault(self.local, self.remote)
         gap_ns = fault.gap_ns if fault.segment_bytes and what is What.DATA else 0
         arrival_ns = max(now_ns + self.way.latency_ns(fault), self._last_arrival_ns + gap_ns)
+        if fault.join_ns and what is What.DATA:
+            arrival_ns = -(-arrival_ns // fault.join_ns) * fault.join_ns
         self._last_arrival_ns = arrival_ns
         self._flying_bytes += len(data)
         self._flight.append((arrival_ns, now_ns, what, data))

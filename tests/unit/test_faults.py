@@ -1,0 +1,158 @@
+"""Faults of a network in memory: what each does, and when it holds."""
+
+from __future__ import annotations
+
+import pytest
+
+from fbvm.net.faults import KINDS, Fault, random_faults
+from fbvm.net.loop import LoopLink, LoopNetwork
+from fbvm.net.peers import ModbusPeer
+from fbvm.wire import modbus
+from fbvm.wire.link import Broken, Connect, Event, Failed, Grant, Opened, Peer, Received, Send, Sent
+from fbvm.wire.modbus import Adu
+from fbvm.wire.tap import What
+
+SERVER = Peer("10.0.0.1", 502)
+REQUEST = Adu(1, 1, modbus.read(3, 0, 2)).to_bytes()
+MS = 1_000_000
+OPENED = Opened(1, 49152, SERVER)
+
+
+class Line:
+    """A link whose scans are 10 ms apart, and what it was told in each."""
+
+    def __init__(self, *faults: Fault, seed: int = 0) -> None:
+        self.network = LoopNetwork(seed, faults=faults)
+        self.network.place(SERVER, ModbusPeer())
+        self.link: LoopLink = self.network.attach("10.0.0.2")
+        self.scans = 0
+
+    def scan(self, *requests: object) -> list[Event]:
+        """One refresh: events first, then what the unit asks for."""
+        now_ns = self.scans * 10 * MS
+        events = self.link.events(now_ns)
+        self.link.submit(requests, now_ns)  # type: ignore[arg-type]
+        self.scans += 1
+        return events
+
+    def open(self) -> None:
+        self.scan(Connect(1, SERVER), Grant(1, 4096))
+        assert self.scan() == [OPENED]
+
+    def arrivals(self, scans: int) -> list[tuple[int, int]]:
+        """Scans from now on in which bytes come, and how many."""
+        events = [(scan, event) for scan in range(scans) for event in self.scan()]
+        return [(scan, len(event.data)) for scan, event in events if isinstance(event, Received)]
+
+
+def test_a_row_holds_during_some_scans() -> None:
+    line = Line(Fault(error="ECONNREFUSED", from_scan=2, until_scan=4))
+    told = [line.scan(Connect(scan + 1, SERVER)) for scan in range(6)]
+    assert [[type(event) for event in events] for events in told] == [
+        [], [Opened], [Opened], [Failed], [Failed], [Opened]
+    ]  # fmt: skip
+    assert line.link.scan == 5
+
+
+def test_a_row_holds_during_some_time() -> None:
+    line = Line(Fault(error="EHOSTUNREACH", from_ns=20 * MS, until_ns=40 * MS))
+    told = [type(event) for scan in range(6) for event in line.scan(Connect(scan + 1, SERVER))]
+    assert told == [Opened, Opened, Failed, Failed, Opened]
+
+
+def test_the_first_row_that_holds_counts() -> None:
+    line = Line(Fault(latency_ns=50 * MS, until_scan=1), Fault(latency_ns=0, until_scan=1), Fault(latency_ns=20 * MS))
+    assert line.network.fault(SERVER, line_peer(line)).latency_ns == 50 * MS
+    line.scan()
+    line.scan()
+    assert line.network.fault(SERVER, line_peer(line)).latency_ns == 20 * MS
+
+
+def line_peer(line: Line) -> Peer:
+    return Peer(line.link.address, 1)
+
+
+def test_what_is_open_breaks_in_the_scan_of_a_reset() -> None:
+    line = Line(Fault(reset=True, from_scan=5, until_scan=6))
+    taps: list[What] = []
+    line.network.tap = lambda now_ns, unit, happening: taps.append(happening.what)
+    line.open()
+    told = [line.scan() for _ in range(5)]
+    assert told == [[], [], [], [Broken(1, "ECONNRESET")], []]
+    assert taps == [What.SYN, What.OPEN, What.RST]
+    assert line.scan(Connect(2, SERVER)) == []
+    assert [type(event) for event in line.scan()] == [Opened]
+    assert line.scan() == []
+
+
+def test_the_peer_learns_of_a_reset_too() -> None:
+    line = Line(Fault(reset=True, from_scan=4))
+    line.open()
+    line.scan(Send(1, REQUEST))
+    line.scan()
+    assert line.scan() == [Broken(1, "ECONNRESET")]
+    assert line.arrivals(50) == []
+
+
+def test_jitter_is_seeded_and_bounded() -> None:
+    def times(seed: int) -> list[tuple[int, int]]:
+        line = Line(Fault(jitter_ns=100 * MS), seed=seed)
+        line.scan(Connect(1, SERVER), Grant(1, 4096))
+        for _ in range(25):
+            line.scan()
+        line.scan(*[Send(1, REQUEST)] * 9)
+        arrivals = line.arrivals(40)
+        assert max(scan for scan, _ in arrivals) <= 20
+        return arrivals
+
+    assert times(1) == times(1) != times(2)
+    assert sum(size for _, size in times(1)) == 9 * 13
+    assert len(times(1)) > 3
+
+
+def test_joined_segments_come_together() -> None:
+    line = Line(Fault(join_ns=100 * MS, from_scan=2))
+    line.open()
+    for _ in range(3):
+        line.scan(Send(1, REQUEST))
+    assert line.arrivals(20) == [(5, 39)]
+
+
+def test_two_plcs_have_scans_of_their_own() -> None:
+    """The scan is that of the unit that speaks."""
+    line = Line(Fault(silent=True, from_scan=3))
+    other = line.network.attach("10.0.0.3")
+    for _ in range(9):
+        other.events(0)
+    assert (other.scan, line.link.scan) == (8, 0)
+    assert line.network.fault(Peer("10.0.0.3", 1), SERVER).silent
+    assert line.network.fault(Peer("10.0.0.3", 1), Peer("10.0.0.2", 1)).silent
+    assert not line.network.fault(Peer("10.0.0.2", 1), Peer("10.0.0.3", 1)).silent
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_after_each_kind_all_is_well(kind: str) -> None:
+    row = KINDS[kind]
+    line = Line(Fault(row.peer, row.latency_ns, row.silent, row.error, row.segment_bytes, row.random_cut,
+                      row.gap_ns, row.jitter_ns, row.join_ns, row.reset, 0, 30))  # fmt: skip
+    line.scan(Connect(1, SERVER), Grant(1, 4096))
+    for _ in range(40):
+        line.scan(Send(1, REQUEST))
+    for _ in range(300):
+        line.scan()
+    line.scan(Connect(2, SERVER), Grant(2, 4096))
+    line.scan(Send(2, REQUEST))
+    [sent, received] = line.scan()
+    assert isinstance(sent, Sent)
+    assert isinstance(received, Received)
+    assert len(received.data) == 13
+
+
+def test_random_faults_are_seeded() -> None:
+    rows = random_faults(7, 5000, longest=50)
+    assert rows == random_faults(7, 5000, longest=50) != random_faults(8, 5000, longest=50)
+    assert len(rows) > 50
+    for before, after in zip(rows, rows[1:], strict=False):
+        assert before.from_scan < before.until_scan <= before.from_scan + 50
+        assert before.until_scan < after.from_scan <= before.until_scan + 50
+    assert {row.silent for row in rows} == {True, False}
