@@ -39,6 +39,14 @@ class Mode(Enum):
     RUN = "RUN"
 
 
+class Phase(Enum):
+    """What a scan consists of, for those who look inside: each is told when it is over."""
+
+    INPUTS = "inputs"
+    PROGRAM = "program"
+    REFRESH = "I/O refresh"
+
+
 class Stopped(RuntimeError):
     """The PLC was asked to go on after a trap; `trap` says what stopped it.  Restart it first."""
 
@@ -111,6 +119,8 @@ class Plc:
         self.units: list[Attached] = []
         self.watchers: list[Callable[[Plc], None]] = []
         """Called at the end of each scan, after its I/O refresh: recorders, watches."""
+        self.phases: list[Callable[[Plc, Phase], None]] = []
+        """Called within each scan when a phase is over: what looks inside."""
         self.now_ns = 0
         """Time of the last scan; `elapsed_ns` is where the next one begins in virtual time."""
         self.scans = 0
@@ -143,10 +153,13 @@ class Plc:
         self._oversee(now_ns)
         if self._mode is Mode.RUN:
             self._apply_forces()
+            self._over(Phase.INPUTS)
             self.trap = self._execute()
             self._apply_forces()
+            self._over(Phase.PROGRAM)
         if not self.trap:
             self._refresh()
+            self._over(Phase.REFRESH)
         self.scans += 1
         self.memory.write(SCANS, "i64", self.scans)
         if self._journal:
@@ -173,6 +186,10 @@ class Plc:
         self.memory.write(DUE, "i64", NEVER)
         self.memory.write(BUDGET, "i64", self.budget)
         flags.update(self.memory, now_ns, cycle_time_ns, self._first and self._mode is Mode.RUN)
+
+    def _over(self, phase: Phase) -> None:
+        for told in self.phases:
+            told(self, phase)
 
     def _execute(self) -> Trap | None:
         """Program execution: the tasks that are due, by priority."""
