@@ -10,6 +10,7 @@ from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.expressions import assignable, conversion_hint, same
 from fbvm.check.facts import Pou, PouCall, Variable, is_block
 from fbvm.check.standard import StandardCalls
+from fbvm.check.writes import note_count, writable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -193,7 +194,7 @@ class Calls:
             self.error("S0405", value, f"the in-out {variable.name} needs {variable.type}, this is {kind}",
                        "an in-out takes a variable of exactly its own type")
             return False
-        return self.checker.writable(self.expressions, value, f"be passed to the in-out {variable.name}")
+        return writable(self.expressions, value, f"be passed to the in-out {variable.name}")
 
     def output(self, argument: tree.Argument, kind: Type, name: str) -> bool:
         """True if the target of `name => target` takes an output of `kind`; else a diagnostic."""
@@ -212,7 +213,8 @@ class Calls:
             self.error("S0405", value, f"the output {name} is {kind} and does not fit {target}",
                        conversion_hint(kind, target))
             return False
-        return self.checker.writable(self.expressions, value, f"take the output {name}")
+        note_count(self.expressions, value)
+        return writable(self.expressions, value, f"take the output {name}")
 
 
 def _described(variable: Variable) -> str:

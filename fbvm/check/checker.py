@@ -12,6 +12,7 @@ from fbvm.check.calls import Calls
 from fbvm.check.configurations import Configurations
 from fbvm.check.expressions import Expressions
 from fbvm.check.facts import Pou, TaskFact, Variable
+from fbvm.check.globals import Globals
 from fbvm.check.interfaces import Interfaces
 from fbvm.check.project import Project
 from fbvm.check.specs import Specs
@@ -29,15 +30,14 @@ class Checker:
         self.specs = Specs(project)
         self.values = Values(project, self._fit, self._infer, self.interface)
         self.specs.values = self.values
+        self.specs.scope = self.scope
         self.interfaces = Interfaces(self)
         self.e_banks: set[str] = set()
         self.tasks: list[TaskFact] = []
-        self.global_order: list[Variable] = []
-        """Global variables and program instances in the order of their slots."""
+        self.globals = Globals(self)
         self.bodies: list[Pou] = []
         """POUs with checked bodies; their `number` is the position here."""
         self._scope: Pou | None = None
-        self._declared_sections = 0
         self._blocks: dict[str, Pou] = {}
 
     def check(self, program: str | None = None) -> None:
@@ -45,13 +45,18 @@ class Checker:
         for entry in list(self.project.types.values()):
             if not entry.source.library:
                 self.specs.declared(entry.tree.name.text, entry.source)
-        self._declare_globals()
+        self.globals.declare()
         while self.project.new_pous:
             pou = self.project.new_pous.pop(0)
             if not pou.source.library:
                 self._body(pou)
         Configurations(self).resolve(program)
         self._complain_of_recursion()
+
+    @property
+    def global_order(self) -> list[Variable]:
+        """Global variables and program instances in the order of their slots."""
+        return self.globals.order
 
     # --- what others ask for ----------------------------------------------------------------------------------------
 
@@ -82,7 +87,7 @@ class Checker:
                             "an instance can hold instances of other blocks only")
             return False
         pou.busy = True
-        self._declare_globals()
+        self.globals.declare()
         with self.scope(pou):
             self.interfaces.resolve(pou)
         pou.busy = False
@@ -101,79 +106,16 @@ class Checker:
         self._scope = before
 
     def _fit(self, expr: tree.Expr, source: Source, kind: Type) -> bool:
-        return Expressions(self, source, self._scope).fit(expr, kind, "S0705", "the initial value")
+        return self._constants(source).fit(expr, kind, "S0705", "the initial value")
 
     def _infer(self, expr: tree.Expr, source: Source) -> Type | None:
-        return Expressions(self, source, self._scope).settle(expr)
+        return self._constants(source).settle(expr)
 
-    # --- writing ----------------------------------------------------------------------------------------------------
-
-    def writable(self, expressions: Expressions, expr: tree.Expr, purpose: str) -> bool:
-        """True if the place may be written here; else a diagnostic that says why not."""
-        facts = expressions.facts
-        inner = expr
-        while True:
-            member = facts.fields.get(inner)
-            if member is not None and (member.constant or member.kind == "VAR_OUTPUT"):
-                what = "a constant" if member.constant else "an output"
-                expressions.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here")
-                return False
-            if not isinstance(inner, tree.Member | tree.Index | tree.Part):
-                break
-            inner = inner.of
-        address = facts.directs.get(inner)
-        variable = facts.variables.get(inner)
-        if variable is not None:
-            address = variable.location
-            if variable.constant:
-                expressions.error("S0501", expr, f"{variable.name} is CONSTANT and cannot {purpose}", "",
-                                  (variable.source, variable.node.start, "declared here"))
-                return False
-            self._note_write(expressions, expr, inner, variable)
-        if address is not None and address.area in AREAS and address.number < AREAS[address.area].read_only:
-            expressions.error("S0501", expr, f"{address} is read-only for programs and cannot {purpose}")
-            return False
-        return True
-
-    def _note_write(self, expressions: Expressions, expr: tree.Expr, inner: tree.Expr, variable: Variable) -> None:
-        pou = expressions.pou
-        variable.written = True
-        raw = pou is not None and any(edge.hidden is variable for edge in pou.edges)
-        is_input = variable.kind == "VAR_INPUT" and variable.owner is pou
-        if inner is expr and (is_input or raw):
-            expressions.error("S0591", expr, f"{variable.name.removesuffix(' edge')} is an input of {pou.name if pou else ''}"
-                                             " and is written inside it")
+    def _constants(self, source: Source) -> Expressions:
+        """For constant expressions of declarations, which name constants of the POU that is being resolved."""
+        return Expressions(self, source, self._scope)
 
     # --- the run of the check ---------------------------------------------------------------------------------------
-
-    def _declare_globals(self) -> None:
-        """Declare the VAR_GLOBAL sections that were read since the last time, constants first."""
-        pending = self.project.sections
-        self.project.sections = []
-        pending.sort(key=lambda item: not any(fold(q.text) == "CONSTANT" for q in item[0].qualifiers))
-        for section, source in pending:
-            self.declare_globals(section, source)
-        if self.project.sections:
-            self._declare_globals()
-
-    def declare_globals(self, section: tree.VarSection, source: Source) -> None:
-        """Declare the variables of one VAR_GLOBAL section."""
-        self.interfaces.qualified(section, source, "program")
-        for declared in section.variables:
-            resolved = self.interfaces.typed(declared, source, None)
-            if resolved is None:
-                continue
-            for name in declared.names:
-                variable = self.interfaces.variable(declared, name, section, source, resolved)
-                variable.place = "area" if declared.location is not None else "abs"
-                key = (source.library, fold(name.text))
-                if key in self.project.globals:
-                    other = self.project.globals[key]
-                    self.report.add("S0202", source, name, f"the global {name.text} is declared twice", "",
-                                    (other.source, other.node.start, "first declared here"))
-                    continue
-                self.project.globals[key] = variable
-                self.global_order.append(variable)
 
     def _body(self, pou: Pou) -> None:
         if pou in self.bodies or not self.interface(pou, pou.source, pou.tree.name) or pou in self.bodies:

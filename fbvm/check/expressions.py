@@ -61,10 +61,16 @@ class Expressions:
         self.source = source
         self.pou = pou
         self.operators = Operators(self)
+        self.counting: list[tuple[object, ...]] = []
+        """Places of the counters of the FOR loops around the present statement."""
 
     def error(self, code: str, node: tree.Node, message: str, hint: str = "",
               related: tuple[Source, int, str] | None = None) -> None:
         self.project.report.add(code, self.source, node, message, hint, related)
+
+    def text(self, node: tree.Node) -> str:
+        """A piece of the program as it is written, for messages."""
+        return " ".join(self.source.text[node.start:node.end].split())
 
     # --- entry points -----------------------------------------------------------------------------------------------
 
@@ -212,7 +218,13 @@ class Expressions:
         return self.project.global_variable(name, self.source)
 
     def _name(self, expr: tree.NameRef, want: Type | None) -> Type | None:
+        if self.pou is not None and fold(expr.text) in self.pou.later:
+            self.error("S0701", expr, f"{expr.text} has no value yet where this is worked out",
+                       "declare it in front, in a VAR CONSTANT section")
+            return None
         variable = self.variable(expr.text)
+        if variable is not None and variable.wrong:
+            return None
         if variable is not None:
             self.facts.variables[expr] = variable
             if variable.constant and variable.value is not None:
@@ -232,7 +244,8 @@ class Expressions:
 
     def _unknown(self, expr: tree.NameRef) -> None:
         name = expr.text
-        if self.pou is not None and self.checker.is_damaged(self.pou, name):
+        if self.pou is not None and self.checker.is_damaged(self.pou, name) or \
+                self.checker.globals.is_told(expr, self.source):
             return
         try:
             address = parse_address(name)

@@ -38,6 +38,8 @@ class Variable:
     """True if the declaration itself gives an initial value."""
     value: Value | None = None
     """The value of a CONSTANT of elementary type."""
+    wrong: bool = False
+    """True for a CONSTANT whose value is wrong, which was said."""
     constant: bool = False
     retain: bool = False
     reference: bool = False
@@ -75,6 +77,8 @@ class Pou:
     """True if the body writes ENO without declaring it: ENO is TRUE at each start then."""
     damaged: set[str] = field(default_factory=set)
     """Folded names whose declaration is wrong: using them is not complained about again."""
+    later: set[str] = field(default_factory=set)
+    """Folded names that are declared behind what is being worked out."""
     busy: bool = False
     edges: list[Edge] = field(default_factory=list)
 

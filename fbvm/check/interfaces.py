@@ -46,9 +46,12 @@ class Interfaces:
 
     def resolve(self, pou: Pou) -> None:
         """Fill in the variables and the layout of a POU."""
+        pou.later = {fold(name.text) for section in pou.tree.sections if section.kind != "VAR_EXTERNAL"
+                     for declared in section.variables for name in declared.names}
         for section in pou.tree.sections:
             if self._section_allowed(section, pou):
                 self._section(section, pou)
+        pou.later = set()
         if pou.tree.result is not None:
             self._result(pou, pou.tree.result)
         if "ENO" not in pou.variables and assigns_to(pou.tree.body, "ENO"):
@@ -91,6 +94,7 @@ class Interfaces:
                 continue
             resolved = self.typed(declared, pou.source, pou)
             for name in declared.names:
+                pou.later.discard(fold(name.text))
                 if resolved is None:
                     pou.damaged.add(fold(name.text))
                     continue
@@ -103,12 +107,13 @@ class Interfaces:
                 self._register(variable, pou)
 
     def typed(self, declared: tree.VarDecl, source: Source, pou: Pou | None) -> tuple[Type, bytes] | None:
-        resolved = self.checker.specs.resolve(declared.spec, source)
-        if resolved is None:
-            return None
-        kind, initial = resolved
-        if declared.initial is not None:
-            with self.checker.scope(pou):
+        """Type and initial bytes of a declaration in `pou`, or of a global one; None after a diagnostic."""
+        with self.checker.scope(pou):
+            resolved = self.checker.specs.resolve(declared.spec, source)
+            if resolved is None:
+                return None
+            kind, initial = resolved
+            if declared.initial is not None:
                 initial = self.checker.values.initial(kind, declared.initial, source, initial)
         return kind, initial
 
@@ -125,7 +130,8 @@ class Interfaces:
             if declared.initial is None:
                 self.report.add("S0701", source, name, f"the constant {name.text} has no value", "write := and its value")
             elif isinstance(declared.initial, tree.Expr):
-                made.value = self.project.facts.constants.get(declared.initial)
+                made.wrong = declared.initial in self.project.facts.wrong
+                made.value = None if made.wrong else self.project.facts.constants.get(declared.initial)
         if declared.location is not None:
             made.location = self.location(declared, kind, source)
         return made

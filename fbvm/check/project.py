@@ -5,7 +5,7 @@ A user's own POU or type shadows a library's of the same name, but not inside li
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -43,6 +43,8 @@ class Project:
         """VAR_GLOBAL sections that still have to be declared."""
         self.configurations: list[tuple[tree.Configuration, Source]] = []
         self.enum_members: dict[str, list[tuple[EnumType, int]]] = {}
+        self.late_global: Callable[[tuple[str, str]], None] = lambda key: None
+        """Declares a global variable whose turn has not come yet (set by the checker)."""
         self._loaded: set[str] = set()
         self.new_pous: list[Pou] = []
         """POUs that have been named but not checked yet."""
@@ -84,7 +86,7 @@ class Project:
 
     # --- look-up ----------------------------------------------------------------------------------------------------
 
-    def _owners(self, source: Source) -> Iterable[str]:
+    def owners(self, source: Source) -> Iterable[str]:
         """Whose names `source` sees, nearest first; a library never sees the user's own."""
         yield source.library
         yield from (name for name in self.libraries.names if name != source.library)
@@ -104,7 +106,7 @@ class Project:
 
     def _find(self, table: dict[tuple[str, str], T], name: str, source: Source) -> T | None:
         folded = fold(name)
-        for owner in self._owners(source):
+        for owner in self.owners(source):
             if owner and (owner, folded) not in table:
                 self._load(folded, owner)
             if (owner, folded) in table:
@@ -113,7 +115,9 @@ class Project:
 
     def global_variable(self, name: str, source: Source) -> Variable | None:
         folded = fold(name)
-        for owner in self._owners(source):
+        for owner in self.owners(source):
+            if (owner, folded) not in self.globals:
+                self.late_global((owner, folded))
             if (owner, folded) in self.globals:
                 return self.globals[owner, folded]
         return None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import (
     ELEMENTARY,
@@ -21,7 +24,7 @@ from fbvm.base.types import (
 )
 from fbvm.check.constants import default
 from fbvm.check.facts import Pou
-from fbvm.check.project import Project
+from fbvm.check.project import Project, TypeEntry
 from fbvm.check.values import Values
 from fbvm.syntax import tree
 
@@ -32,12 +35,13 @@ Resolved = tuple[Type, bytes]
 
 
 class Specs:
-    """Resolves type specifications.  `interface` makes the type of a block's instances known (set by the checker)."""
+    """Resolves type specifications.  `values` and `scope` are the checker's, which sets them."""
 
     def __init__(self, project: Project) -> None:
         self.project = project
         self.report = project.report
         self.values: Values
+        self.scope: Callable[[Pou | None], AbstractContextManager[None]]
         self._anonymous = 0
 
     def resolve(self, spec: tree.TypeSpec, source: Source, name: str = "") -> Resolved | None:
@@ -108,14 +112,18 @@ class Specs:
             return None
         if entry.resolved is None:
             entry.busy = True
-            declared = entry.tree
-            resolved = self.resolve(declared.spec, entry.source, declared.name.text)
-            if resolved and declared.initial is not None:
-                kind, initial = resolved
-                resolved = kind, self.values.initial(kind, declared.initial, entry.source, initial)
+            with self.scope(None):
+                entry.resolved = self._type(entry)
             entry.busy = False
-            entry.resolved = resolved
         return entry.resolved
+
+    def _type(self, entry: TypeEntry) -> Resolved | None:
+        declared = entry.tree
+        resolved = self.resolve(declared.spec, entry.source, declared.name.text)
+        if resolved and declared.initial is not None:
+            kind, initial = resolved
+            resolved = kind, self.values.initial(kind, declared.initial, entry.source, initial)
+        return resolved
 
     def _block(self, pou: Pou, spec: tree.NamedType, source: Source) -> Resolved | None:
         if pou.kind != "FUNCTION_BLOCK":

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, EnumType, StringType, Type, base, fold
 from fbvm.check.expressions import assignable, conversion_hint
-from fbvm.check.facts import Pou, Variable
+from fbvm.check.facts import Pou
 from fbvm.check.values import is_any
+from fbvm.check.writes import note_count, place, writable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ class Statements:
         self.calls = checker.calls(self.expressions)
         self.error = self.expressions.error
         self._loops = 0
-        self._counting: list[Variable] = []
 
     def block(self, statements: tree.Block) -> None:
         for statement in statements:
@@ -43,12 +43,8 @@ class Statements:
             self.error("S0501", expr, f"this is a value of {kind} and cannot {purpose}",
                        "only variables stand left of :=")
             return None
-        if not self.checker.writable(self.expressions, expr, purpose):
-            return None
-        variable = self.facts.variables.get(expr)
-        if variable is not None and variable in self._counting:
-            self.error("S0590", expr, f"{variable.name} counts the FOR loop and is written inside it")
-        return kind
+        note_count(self.expressions, expr)
+        return kind if writable(self.expressions, expr, purpose) else None
 
     def _assign(self, node: tree.Assign) -> None:
         if node.op in ("REF=", "?="):
@@ -146,12 +142,9 @@ class Statements:
                 self._step(part, kind)
             else:
                 self.expressions.fit(part, base(kind), "S0504", role)
-        variable = self.facts.variables.get(node.variable)
-        if variable is not None:
-            self._counting.append(variable)
+        self.expressions.counting.append(place(self.facts, node.variable) or () if kind is not None else ())
         self._body(node.body)
-        if variable is not None:
-            self._counting.pop()
+        self.expressions.counting.pop()
 
     def _step(self, expr: tree.Expr, kind: Type) -> None:
         """A step may be negative where the variable may not: it is then a literal, and worked out in LINT."""

@@ -43,9 +43,11 @@ class Values:
     def constant(self, expr: tree.Expr, source: Source, kind: Type) -> Value | None:
         """The value of a constant expression for a variable of `kind`, or None after a diagnostic."""
         if not self._fit(expr, source, kind):
+            self.facts.wrong.add(expr)
             return None
         value = self.facts.constants.get(expr)
         if value is None:
+            self.facts.wrong.add(expr)
             self.report.add("S0701", source, expr, "an initial value must be known before the program runs",
                             "assign it in the body instead")
         return value

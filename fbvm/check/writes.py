@@ -1,0 +1,78 @@
+"""What a program may write, and what it is warned of when it does."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.areas import AREAS
+from fbvm.base.types import fold
+from fbvm.check.facts import Facts, Variable
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.expressions import Expressions
+
+Path = tuple[object, ...]
+"""A variable or address, and the steps from it to a part."""
+
+
+def writable(expressions: Expressions, expr: tree.Expr, purpose: str) -> bool:
+    """True if the place may be written here; else a diagnostic that says why not."""
+    facts = expressions.facts
+    inner = expr
+    while True:
+        member = facts.fields.get(inner)
+        if member is not None and (member.constant or member.kind == "VAR_OUTPUT"):
+            what = "a constant" if member.constant else "an output"
+            expressions.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here")
+            return False
+        if not isinstance(inner, tree.Member | tree.Index | tree.Part):
+            break
+        inner = inner.of
+    address = facts.directs.get(inner)
+    variable = facts.variables.get(inner)
+    if variable is not None:
+        address = variable.location
+        if variable.constant:
+            expressions.error("S0501", expr, f"{variable.name} is CONSTANT and cannot {purpose}", "",
+                              (variable.source, variable.node.start, "declared here"))
+            return False
+        _note_input(expressions, expr, variable)
+    if address is not None and address.area in AREAS and address.number < AREAS[address.area].read_only:
+        expressions.error("S0501", expr, f"{address} is read-only for programs and cannot {purpose}")
+        return False
+    return True
+
+
+def _note_input(expressions: Expressions, expr: tree.Expr, variable: Variable) -> None:
+    """Warn of an input that is written inside its block."""
+    pou = expressions.pou
+    variable.written = True
+    if pou is None:
+        return
+    raw = any(edge.hidden is variable for edge in pou.edges)
+    if raw or variable.kind == "VAR_INPUT" and variable.owner is pou:
+        expressions.error("S0591", expr, f"{variable.name.removesuffix(' edge')} is an input of {pou.name}"
+                                         " and is written inside it")
+
+
+def place(facts: Facts, expr: tree.Expr) -> Path | None:
+    """The path of a variable or a part of one; None if a subscript is not known."""
+    if not isinstance(expr, tree.Member | tree.Index | tree.Part):
+        root = facts.variables.get(expr) or facts.directs.get(expr)
+        return (root,) if root is not None else None
+    outer = place(facts, expr.of)
+    if isinstance(expr, tree.Index):
+        steps = tuple(facts.constants.get(subscript) for subscript in expr.subscripts)
+        return None if outer is None or None in steps else outer + steps
+    step = fold(expr.name.text) if isinstance(expr, tree.Member) else f"{expr.size}{expr.index}"
+    return None if outer is None else (*outer, step)
+
+
+def note_count(expressions: Expressions, expr: tree.Expr) -> None:
+    """Warn of a write to the counter of a loop around it, to a part of it, or to what it is part of."""
+    written = place(expressions.facts, expr)
+    for counter in expressions.counting if written else ():
+        if counter and all(a == b for a, b in zip(written or (), counter, strict=False)):
+            expressions.error("S0590", expr, f"{expressions.text(expr)} counts the FOR loop and is written inside it")
+            return
