@@ -167,6 +167,11 @@ DATE, TOD, DT = (ELEMENTARY[n] for n in ("DATE", "TIME_OF_DAY", "DATE_AND_TIME")
 NULL = RefType("NULL", 8, 8, None)
 
 
+def reference(target: Type) -> RefType:
+    """REF_TO target."""
+    return RefType(f"REF_TO {target.name}", 8, 8, target)
+
+
 @cache
 def string(capacity: int = DEFAULT_STRING, wide: bool = False) -> StringType:
     """STRING[capacity] or WSTRING[capacity]."""
@@ -230,7 +235,7 @@ def converts(source: Type, target: Type) -> bool:
     if isinstance(source, StringType) and isinstance(target, StringType):
         return source.wide == target.wide
     if isinstance(source, RefType) and isinstance(target, RefType):
-        return source.target is None
+        return source.target is None or source.target == target.target
     return isinstance(source, Elementary) and target.name in IMPLICIT.get(source.name, ()) \
         and isinstance(target, Elementary)
 

@@ -15,7 +15,7 @@ from fbvm.check.facts import Pou, TaskFact, Variable
 from fbvm.check.globals import Globals
 from fbvm.check.interfaces import Interfaces
 from fbvm.check.project import Project
-from fbvm.check.specs import Specs
+from fbvm.check.specs import Specs, settle
 from fbvm.check.statements import Statements, assigns_to
 from fbvm.check.values import Values
 from fbvm.syntax import tree
@@ -92,6 +92,7 @@ class Checker:
             self.interfaces.resolve(pou)
         pou.busy = False
         pou.resolved = True
+        settle(pou.awaited, pou.type)
         if pou.type is not None:
             self._blocks[pou.type.name] = pou
         if pou.source.library:

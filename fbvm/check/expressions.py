@@ -17,6 +17,7 @@ from fbvm.base.types import (
     LINT,
     LREAL,
     LWORD,
+    RefType,
     NULL,
     REAL,
     ULINT,
@@ -137,6 +138,9 @@ class Expressions:
         kind = base(target)
         untyped = self.facts.types[expr]
         assert isinstance(value, int | float)
+        if isinstance(kind, RefType) and value == 0:  # CODESYS writes 0 for NULL
+            self.facts.types[expr] = target
+            return target
         if untyped is UNTYPED_REAL and not is_any(kind, "ANY_REAL") or \
                 not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_REAL"):
             self.error(code, expr, f"{untyped} does not fit {target}", literal_hint(value, kind))
@@ -352,17 +356,24 @@ class Expressions:
     def _is_variable(self, expr: tree.Expr) -> bool:
         while isinstance(expr, tree.Index | tree.Member | tree.Part):
             expr = expr.of
-        return expr in self.facts.variables or expr in self.facts.directs
+        return isinstance(expr, tree.Deref) or expr in self.facts.variables or expr in self.facts.directs
 
     def is_variable(self, expr: tree.Expr) -> bool:
         """True for an expression that names a place in memory."""
         return expr not in self.facts.rewritten and self._is_variable(expr) and \
-            isinstance(expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part)
+            isinstance(expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part | tree.Deref)
 
-    def _refused(self, expr: tree.Expr, want: Type | None) -> Type | None:
-        what = "a reference (^)" if isinstance(expr, tree.Deref) else "NULL"
-        self.error("S0901", expr, f"{what} {NOT_EXECUTED}")
-        return None
+    def _deref(self, expr: tree.Deref, want: Type | None) -> Type | None:
+        kind = self.infer(expr.of)
+        if kind is None:
+            return None
+        if not isinstance(kind, RefType):
+            self.error("S0304", expr.of, f"this is {kind}, not a reference: ^ has nothing to follow")
+            return None
+        return kind.target
+
+    def _null(self, expr: tree.NullLiteral, want: Type | None) -> Type | None:
+        return NULL
 
     def _call(self, expr: tree.Call, want: Type | None) -> Type | None:
         return self.checker.calls(self).value(expr, want)
@@ -380,7 +391,7 @@ READABLE = ("", "VAR_INPUT", "VAR_OUTPUT")
 _INFER: dict[type, Callable[..., Type | None]] = {
     tree.Literal: Expressions._literal, tree.EnumLiteral: Expressions._enum_literal, tree.NameRef: Expressions._name,
     tree.Direct: Expressions._direct, tree.Member: Expressions._member, tree.Index: Expressions._index,
-    tree.Part: Expressions._part, tree.Deref: Expressions._refused, tree.NullLiteral: Expressions._refused,
+    tree.Part: Expressions._part, tree.Deref: Expressions._deref, tree.NullLiteral: Expressions._null,
     tree.Call: Expressions._call, tree.Unary: Expressions._unary, tree.Binary: Expressions._binary,
 }
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.base.types import Elementary, EnumType, Field, StructType, Type, fold
+from fbvm.base.types import Elementary, EnumType, Field, RefType, StructType, Type, fold
 from fbvm.syntax import tree
 from fbvm.syntax.tree import Node
 
@@ -80,6 +80,8 @@ class Pou:
     later: set[str] = field(default_factory=set)
     """Folded names that are declared behind what is being worked out."""
     busy: bool = False
+    awaited: list[RefType] = field(default_factory=list)
+    """References to instances that were met while the POU was being resolved."""
     edges: list[Edge] = field(default_factory=list)
 
     @property

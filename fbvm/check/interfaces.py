@@ -109,7 +109,10 @@ class Interfaces:
     def typed(self, declared: tree.VarDecl, source: Source, pou: Pou | None) -> tuple[Type, bytes] | None:
         """Type and initial bytes of a declaration in `pou`, or of a global one; None after a diagnostic."""
         with self.checker.scope(pou):
-            resolved = self.checker.specs.resolve(declared.spec, source)
+            spec = declared.spec
+            if isinstance(spec, tree.RefSpec) and spec.kind == "REFERENCE TO" and pou is not None:
+                spec = spec.target  # the variable stands for what it is bound to
+            resolved = self.checker.specs.resolve(spec, source)
             if resolved is None:
                 return None
             kind, initial = resolved
@@ -180,6 +183,8 @@ class Interfaces:
 
     def _place(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"
+        if isinstance(declared.spec, tree.RefSpec) and declared.spec.kind == "REFERENCE TO":
+            self._bound(variable, declared, pou)
         if variable.kind == "VAR_TEMP" or pou.is_function:
             variable.place = "self" if pou.is_function else "frame"
         if declared.location is not None:
@@ -191,6 +196,14 @@ class Interfaces:
             self._edge(variable, declared, pou)
         if fold(variable.name) == "EN" and variable.kind == "VAR_INPUT" and not variable.explicit:
             variable.initial = b"\x01"  # EN is TRUE where nobody connects it
+
+    def _bound(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
+        """REFERENCE TO: a variable that another one stands behind."""
+        variable.reference = True
+        if variable.kind != "VAR" or declared.location is not None or declared.initial is not None or variable.constant:
+            self.report.add("S0901", pou.source, declared.spec, f"REFERENCE TO as {variable.kind}, with a location or an "
+                            "initial value is understood but not executed by this version",
+                            "declare it in a VAR section and bind it with REF=")
 
     def _edge(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         if variable.kind != "VAR_INPUT" or base(variable.type) != BOOL or pou.is_function:

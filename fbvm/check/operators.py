@@ -16,6 +16,7 @@ from fbvm.base.types import (
     TOD,
     Elementary,
     EnumType,
+    RefType,
     StringType,
     StructType,
     Type,
@@ -137,7 +138,7 @@ class Operators:
         if op in ("AND_THEN", "OR_ELSE"):
             return kind == BOOL
         if op in COMPARISONS:
-            if isinstance(kind, EnumType):
+            if isinstance(kind, EnumType | RefType):
                 return op in ("=", "<>")
             return kind in (UNTYPED_INT, UNTYPED_REAL) or isinstance(kind, Elementary | StringType)
         if kind is UNTYPED_INT:

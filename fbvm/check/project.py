@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
 from fbvm.base.diagnostics import Source
-from fbvm.base.types import EnumType, Type, fold
+from fbvm.base.types import EnumType, RefType, Type, fold
 from fbvm.check.facts import Facts, Pou, Report, Variable
 from fbvm.check.library import Libraries
 from fbvm.syntax import tree
@@ -24,6 +24,8 @@ class TypeEntry:
     source: Source
     resolved: tuple[Type, bytes] | None = None
     busy: bool = False
+    awaited: list[RefType] = field(default_factory=list)
+    """References to the type that were met while it was being resolved."""
 
 
 T = TypeVar("T")

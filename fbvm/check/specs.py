@@ -15,11 +15,13 @@ from fbvm.base.types import (
     Elementary,
     EnumType,
     Field,
+    RefType,
     StructType,
     SubrangeType,
     Type,
     array,
     fold,
+    reference,
     string,
 )
 from fbvm.check.constants import default
@@ -32,6 +34,13 @@ MAX_SIZE = 64 << 20
 """Largest variable in bytes."""
 MAX_STRING = 65534
 Resolved = tuple[Type, bytes]
+
+
+def settle(awaited: list[RefType], target: Type | None) -> None:
+    """Give references their target, which is known now."""
+    for kind in awaited:
+        object.__setattr__(kind, "target", target)
+    awaited.clear()
 
 
 class Specs:
@@ -58,9 +67,25 @@ class Specs:
             return self._enumeration(spec, source, name)
         if isinstance(spec, tree.StructSpec) and not spec.overlap:
             return self._structure(spec, source, name)
-        what = {tree.RefSpec: getattr(spec, "kind", ""), tree.UnionSpec: "UNION", tree.StructSpec: "STRUCT OVERLAP"}
+        if isinstance(spec, tree.RefSpec) and spec.kind != "REFERENCE TO":
+            return self._reference(spec, source)
+        what = {tree.RefSpec: "REFERENCE TO here", tree.UnionSpec: "UNION", tree.StructSpec: "STRUCT OVERLAP"}
         self.report.add("S0901", source, spec, f"{what[type(spec)]} is understood but not executed by this version")
         return None
+
+    def _reference(self, spec: tree.RefSpec, source: Source) -> Resolved | None:
+        """REF_TO and POINTER TO.  The target may be what is being resolved just now: a list's node names itself."""
+        target = spec.target
+        if isinstance(target, tree.NamedType):
+            entry = self.project.type_entry(target.text, source)
+            pou = self.project.pou(target.text, source) if entry is None else None
+            awaiting = entry if entry is not None and entry.busy else pou if pou is not None and pou.busy else None
+            if awaiting is not None:
+                made = RefType(f"REF_TO {awaiting.tree.name.text}", 8, 8, None)
+                awaiting.awaited.append(made)
+                return made, bytes(8)
+        resolved = self.resolve(target, source)
+        return (reference(resolved[0]), bytes(8)) if resolved is not None else None
 
     # --- names ------------------------------------------------------------------------------------------------------
 
@@ -115,6 +140,7 @@ class Specs:
             with self.scope(None):
                 entry.resolved = self._type(entry)
             entry.busy = False
+            settle(entry.awaited, entry.resolved[0] if entry.resolved else None)
         return entry.resolved
 
     def _type(self, entry: TypeEntry) -> Resolved | None:

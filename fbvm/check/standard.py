@@ -18,7 +18,7 @@ from fbvm.base.types import (
     families,
     string,
 )
-from fbvm.check import functions
+from fbvm.check import functions, references
 from fbvm.check.arguments import Arguments, callee
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, StandardCall
 from fbvm.check.functions import Conversion, Signature
@@ -43,6 +43,11 @@ class StandardCalls:
 
     def call(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
         """The result's type, "" for a call without result, None after a diagnostic."""
+        if name in references.MAKERS or name == "SIZEOF":
+            values = Arguments(self.expressions, call, ["IN"]).in_order()
+            if values is None:
+                return None
+            return (references.size if name == "SIZEOF" else references.make)(self.expressions, call, values[0])
         if name in functions.TIME_OPERATORS:
             return self._operator(call, functions.TIME_OPERATORS[name], None, want)
         if name in functions.OPERATORS:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, EnumType, StringType, Type, base, fold
+from fbvm.check import references
 from fbvm.check.expressions import assignable, conversion_hint
 from fbvm.check.facts import Pou
 from fbvm.check.values import is_any
@@ -47,6 +48,9 @@ class Statements:
         return kind if writable(self.expressions, expr, purpose) else None
 
     def _assign(self, node: tree.Assign) -> None:
+        if node.op == "REF=" and len(node.targets) == 1:
+            references.bind(self.expressions, node)
+            return
         if node.op in ("REF=", "?="):
             self.error("S0901", node, f"{node.op} is understood but not executed by this version")
             return

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fbvm.base.diagnostics import Source
-from fbvm.base.types import ArrayType, Field, StructType, Type, families, fold
+from fbvm.base.types import ArrayType, Field, RefType, StructType, Type, families, fold
 from fbvm.check.constants import encode
 from fbvm.check.facts import Facts, Pou, Value
 from fbvm.check.project import Project
@@ -58,6 +58,8 @@ class Values:
             return self._array(kind, init, source, default)
         if isinstance(init, tree.StructInit):
             return self._structure(kind, init, source, default)
+        if isinstance(init, tree.NullLiteral) and isinstance(kind, RefType):
+            return bytes(8)
         if isinstance(kind, ArrayType | StructType):
             form = "[...]" if isinstance(kind, ArrayType) else "(name := value, ...)"
             self.report.add("S0705", source, init, f"an initial value of {kind} is written {form}")

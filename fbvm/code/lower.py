@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import BOOL, Type, base, machine
 from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, PouCall
+from fbvm.check.references import root_of
 from fbvm.code.image import Body
 from fbvm.code.loops import LoopLowering
 from fbvm.code.operations import Block, Node
@@ -126,9 +127,11 @@ class BodyLowering:
             self.block_into(statements)
         return tuple(inner)
 
-    def note_read(self, place: Place) -> None:
-        """Remember a variable that the statement reads, if its place is constant."""
-        if not place.address[2]:
+    def note_read(self, place: Place, expr: tree.Expr) -> None:
+        """Remember a variable that the statement reads, if looking at it beforehand can do no harm: its place needs no
+        subscripts, and no reference that might be null."""
+        root = self.facts.variables.get(root_of(expr))
+        if not place.address[2] and (not place.is_reference or (root is not None and root.kind == "VAR_IN_OUT")):
             self.reads.append(place)
 
     def observe_reads(self, mark: int, site: int) -> None:
@@ -155,6 +158,9 @@ class BodyLowering:
                 self.observe_reads(mark, site)
 
     def _assign(self, node: tree.Assign, site: int) -> None:
+        if node.op == "REF=":
+            self._bind(node, site)
+            return
         if node.op in ("S=", "R="):
             condition = self.value(node.value, BOOL)
             with self.block() as inner:
@@ -166,6 +172,13 @@ class BodyLowering:
         for target in reversed(node.targets):
             self.assign(target, value, site)
             value = target
+
+    def _bind(self, node: tree.Assign, site: int) -> None:
+        """`r REF= x`: the slot of r takes a reference to x."""
+        slot = self.places.slot(self.facts.variables[node.targets[0]])
+        null = isinstance(node.value, tree.NullLiteral)
+        pointer: Node = ("const", "ref", 0) if null else self.places.reference(self.places.of(node.value))
+        self.out.append(("store", "ref", slot.address, pointer))
 
     def assign(self, target: tree.Expr, value: tree.Expr, site: int) -> None:
         """`target := value`: the subscripts of the target first, then the value."""
@@ -188,7 +201,7 @@ class BodyLowering:
             assert isinstance(called, PouCall)
             return self.calls.aggregate(expr, called)
         place = self.places.of(expr)
-        self.note_read(place)
+        self.note_read(place, expr)
         return place
 
     def copy(self, to: Place, source: Place, site: int) -> None:

@@ -67,6 +67,8 @@ class Places:
             return self._part(expr, kind)
         if isinstance(expr, tree.Call):
             return self.body.aggregate(expr)
+        if isinstance(expr, tree.Deref):
+            return Place((("ref", self.body.value(expr.of), self.body.site(expr)), 0, ()), kind)
         assert isinstance(expr, tree.Index)
         return self._index(expr, kind)
 

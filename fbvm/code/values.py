@@ -115,8 +115,10 @@ class ValueLowering:
             return self._unary(expr)
         if isinstance(expr, tree.Call):
             return self._call(expr)
+        if isinstance(expr, tree.NullLiteral):
+            return ("const", "ref", 0)
         place = self.body.places.of(expr)
-        self.body.note_read(place)
+        self.body.note_read(place, expr)
         return self.body.places.load(place)
 
     def _unary(self, expr: tree.Unary) -> Node:
@@ -134,6 +136,8 @@ class ValueLowering:
 
     def standard(self, called: StandardCall, expr: tree.Call) -> Node:
         """A call of a standard function."""
+        if called.key == "REF":
+            return self.body.places.reference(self.body.places.of(called.arguments[0][0]))
         arguments = self.operands(*called.arguments)
         return FUNCTIONS[called.key](self.body, arguments, called, self.body.site(expr))
 
