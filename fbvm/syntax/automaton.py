@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
 from fbvm.syntax.builder import TooDeep
-from fbvm.syntax.lexer import MISSPELT, Token, lexis
+from fbvm.syntax.lexer import Token, lexis, meant
 from fbvm.syntax.prospect import advance
 from fbvm.syntax.refused import whole
 from fbvm.syntax.tables import Tables, tables
@@ -178,10 +178,10 @@ class Automaton:
     def misspelt(self, token: Token) -> bool:
         """Whether `ENDIF` and the like stand where the right word could, and not as somebody's name."""
         behind = self.text[token.end:token.end + 20].lstrip()
-        if MISSPELT[token.text.upper()] == "EXIT" and not behind.startswith(";"):
+        right = meant(token.text)
+        if right == "EXIT" and not behind.startswith(";"):
             return False
-        return not behind.startswith((":", "(", "[", ".", "^", "=")) and (
-            advance(self.states, MISSPELT[token.text.upper()]) is not None)
+        return not behind.startswith((":", ",", "(", "[", ".", "^", "=")) and advance(self.states, right) is not None
 
     def may_be_name(self, token: Token) -> bool:
         """Whether a word that the grammar cannot take here may be the user's name."""

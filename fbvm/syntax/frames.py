@@ -81,9 +81,12 @@ def reopen(states: State, values: list[Any]) -> None:
 
 
 def cut(states: State, values: list[Any], place: Anchor) -> None:
-    """Give up what stands behind an anchor, in place; its list stays and is open again."""
+    """Give up what stands behind an anchor, in place; its list stays and is open again.  An empty list of statements
+    goes too, since VAR sections may stand in its place."""
     del states[place.size:]
     del values[place.size - 1:]
+    if values and values[-1] == [] and symbols()[states[-1]] in STATEMENT_LISTS:
+        del states[-1], values[-1]
     if symbols()[states[-1]] in STATEMENT_LISTS:
         states[-1] = tables().actions[states[-2]]["ended_list"]
 

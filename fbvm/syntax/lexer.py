@@ -32,12 +32,25 @@ MISSPELT = {
     "ELSEIF": "ELSIF", "ELIF": "ELSIF", "ENDIF": "END_IF", "ENDFOR": "END_FOR", "ENDWHILE": "END_WHILE",
     "ENDCASE": "END_CASE", "ENDREPEAT": "END_REPEAT", "ENDVAR": "END_VAR", "ENDSTRUCT": "END_STRUCT",
     "ENDTYPE": "END_TYPE", "ENDFUNCTION": "END_FUNCTION", "ENDFUNCTION_BLOCK": "END_FUNCTION_BLOCK",
-    "ENDPROGRAM": "END_PROGRAM", "SWITCH": "CASE", "BREAK": "EXIT"}
-"""Words of other languages, and ours without their `_`: of the type MISSPELT, and names where they fit as such."""
+    "ENDPROGRAM": "END_PROGRAM", "SWITCH": "CASE", "BREAK": "EXIT", "END": "END_"}
+"""Words of other languages, and ours without their `_`: of the type MISSPELT, and names where they fit as such.  So are
+END with a space behind it, and words that begin with VAR_."""
+
+_END_OF = re.compile(r"(?i)[ \t]+(?:IF|CASE|FOR|WHILE|REPEAT|VAR|STRUCT|TYPE|FUNCTION|FUNCTION_BLOCK|PROGRAM)\b")
+
+
+def meant(text: str) -> str:
+    """The terminal that a misspelt word was to be."""
+    word = text.upper()
+    if word.startswith("END") and word[3:4].isspace():
+        return f"END_{word[3:].strip()}"
+    return MISSPELT.get(word, "VAR")
+
 
 _FOREIGN = {"==": ("EQUAL", "=", "`=` compares"), "!=": ("UNEQUAL", "<>", "write `<>`"),
             "&&": ("AND", "AND", "write AND"), "||": ("OR", "OR", "write OR"), "|": ("OR", "OR", "write OR"),
             "!": ("NOT", "NOT", "write NOT, or `<>` for unequal"), "~": ("NOT", "NOT", "write NOT"),
+            "=:": ("ASSIGN", ":=", "write `:=`"), "++": ("", "", "write `x := x + 1`"), "--": ("", "", "write `x := x - 1`"),
             "%": ("MOD", "MOD", "write MOD for the remainder; an address has letters and digits behind `%`")}
 """Operators of other languages -> our terminal, its text, and advice."""
 
@@ -92,7 +105,7 @@ def lexis() -> Lexis:
         else:
             patterns[terminal.name] = _pattern(terminal)
     patterns["COMMENT"] = r"//[^\n]*|\(\*|/\*"
-    patterns["FOREIGN"] = r"==|!=|&&|\|\||[-+*/]=|[!|~]|%(?![A-Za-z*])"
+    patterns["FOREIGN"] = r"==|!=|&&|\|\||[-+*/]=|=:|:[ \t]+=(?!>)|(?:\+\+|--)(?=\s*;)|[!|~]|%(?![A-Za-z*])"
     patterns["SIGN"] = "|".join(re.escape(sign) for sign in sorted(signs, key=len, reverse=True))
     alternatives = "|".join(f"(?P<{name}>{patterns[name]})" for name in _ORDER)
     known = re.escape("".join(sorted(set("".join(signs) + "'\"{%"))))
@@ -138,10 +151,14 @@ class Lexer:
             elif kind == "NAME":
                 kind = known.get(word, "")
                 if not kind:
-                    kind = known[word] = words.get(word.upper(), "NAME")
+                    kind = known[word] = words.get(word.upper()) or _unknown_word(word)
                 if kind in conditions and not conditions[kind].match(text, at):
                     kind = "NAME"
-                if before == "AT" or (before in ends and text.startswith("=", at)):
+                if kind == "MISSPELT" and len(word) == 3:
+                    end_of = _END_OF.match(text, at)
+                    kind, at = (kind, end_of.end()) if end_of else ("NAME", at)
+                    word = text[start:at]
+                elif before == "AT" or (before in ends and text.startswith("=", at)):
                     kind, at = self._special(lex, before, kind, start, at)
                     word = text[start:at]
             elif kind == "COMMENT":
@@ -150,6 +167,8 @@ class Lexer:
                 continue
             elif kind == "FOREIGN":
                 kind, word = self._foreign(word, start, at)
+                if not kind:
+                    continue
             elif before == "AT":
                 kind, at = self._special(lex, before, kind, start, at)
                 word = text[start:at]
@@ -196,8 +215,10 @@ class Lexer:
         return Token("STRING_LITERAL", quote * 2, at, end), end
 
     def _foreign(self, word: str, start: int, end: int) -> tuple[str, str]:
-        """Our operator for one of other languages: terminal and text."""
+        """Our operator for one of other languages: terminal and text, which are empty if we have none."""
         kind, ours, advice = _FOREIGN.get(word, ("ASSIGN", ":=", f"write out `x := x {word[0]} ..`"))
+        if word.startswith(":"):
+            advice = "`:=` is one sign, without a space inside"
         self.report("S0101", start, end, f"`{word}` is no operator of Structured Text", advice)
         return kind, ours
 
@@ -227,6 +248,11 @@ class Lexer:
             depth += 1 if found[0] == opener else -1
             at = found.end()
         return at
+
+
+def _unknown_word(word: str) -> str:
+    """The terminal of a word that is none of ours."""
+    return "MISSPELT" if word[:4].upper() == "VAR_" else "NAME"
 
 
 def _short(text: str) -> str:

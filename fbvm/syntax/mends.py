@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 from fbvm.syntax.automaton import Automaton
-from fbvm.syntax.frames import OPENERS, STATEMENT_WORDS, UNITS, anchor, frames
-from fbvm.syntax.lexer import MISSPELT, Token, lexis
+from fbvm.syntax.frames import OPENERS, UNITS, anchor, frames
+from fbvm.syntax.lexer import Token
 from fbvm.syntax.phrases import found, hint, quoted, sign, unlike
-from fbvm.syntax.prospect import State, advance, expected, symbols
+from fbvm.syntax.prospect import State, advance, expected
+from fbvm.syntax.slips import Mend, open_bracket, slip
+from fbvm.syntax.tree import EnumLiteral, Literal
 
-INSERTED = ("SEMICOLON", "RPAR", "RSQB", "THEN", "DO", "OF", "COLON", "ASSIGN", "COMMA")
+INSERTED = ("SEMICOLON", "RPAR", "RSQB", "THEN", "DO", "OF", "COLON", "ASSIGN", "COMMA", "END_REPEAT")
 """Words that may be put in, the most likely first."""
 
 REPLACED = {"EQUAL": ("ASSIGN",), "ASSIGN": ("EQUAL", "COLON"), "COLON": ("SEMICOLON", "ASSIGN"),
@@ -23,24 +24,11 @@ GOOD = 3
 """Tokens that must be read well after a word was taken away or replaced, or all that are left."""
 
 
-@dataclass(frozen=True)
-class Mend:
-    """What to say and which tokens to go on with; `cut` gives up the statement's beginning first."""
-
-    tokens: list[Token]
-    start: int
-    end: int
-    message: str
-    hint: str = ""
-    opener: Token | None = None
-    cut: bool = False
-
-
 def best_mend(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
     """The mend after which the most of `following` (which begins with `token`) can be read; None if none is good."""
-    special = _misspelt(token) or _reserved_name(automaton, token, following) or _end_of_section(automaton, token)
-    if special:
-        return special
+    known = slip(automaton, token, following)
+    if known:
+        return known
     trials = [*_insertions(automaton, following), *_replacements(automaton, following), *_removal(automaton, following)]
     return max(trials, key=lambda trial: trial[:2])[2] if trials else None
 
@@ -71,18 +59,23 @@ def _insertions(automaton: Automaton, following: list[Token]) -> Iterator[Trial]
         if after is None:
             continue
         score = _score(automaton, after, following)
-        if score < (1 if kind == "SEMICOLON" else 2):
+        if score < (1 if kind == "SEMICOLON" else 2) or (kind == "ASSIGN" and token.type == "NAME"):
             continue
+        if kind == "COLON" and _after_label(automaton):
+            rank = -1
         where = f"before {found(token)}"
         if kind == "SEMICOLON":
             where = f"after the {'statement' if anchor(automaton.states).symbol == 'ended_list' else 'declaration'}"
         yield score, -rank, Mend([Token(kind, sign(kind), at, at), token], at, at, f"{quoted(kind)} expected {where}",
-                                 hint(token, kinds), _bracket(automaton, BRACKETS.get(kind)))
+                                 "", open_bracket(automaton, BRACKETS.get(kind)))
 
 
-def _bracket(automaton: Automaton, kind: str | None) -> Token | None:
-    """The innermost open bracket of a kind."""
-    return next((v for v in reversed(automaton.values) if isinstance(v, Token) and v.type == kind), None)
+def _after_label(automaton: Automaton) -> bool:
+    """Whether a literal that may be a label of CASE begins the statement."""
+    open_ = frames(automaton.states, automaton.values)
+    literal = isinstance(automaton.values[-1], (Literal, EnumLiteral)) if automaton.values else False
+    return literal and bool(open_) and open_[-1].word.type == "CASE" and (
+        len(automaton.states) == anchor(automaton.states).size + 1)
 
 
 def _replacements(automaton: Automaton, following: list[Token]) -> Iterator[Trial]:
@@ -104,51 +97,7 @@ def _removal(automaton: Automaton, following: list[Token]) -> Iterator[Trial]:
     score = _score(automaton, automaton.states, rest)
     if score >= min(GOOD, len(rest)) and rest:
         opener = BRACKETS.get(token.type)
-        why = f"{found(token)} without `{sign(opener)}`" if opener and not _bracket(automaton, opener) else ""
+        why = f"{found(token)} without `{sign(opener)}`" if opener and not open_bracket(automaton, opener) else ""
         kinds = expected(automaton.states)
         yield score, -len(INSERTED), Mend([], token.start, token.end, why or unlike(token, kinds), hint(token, kinds))
 
-
-# --- mends of their own kind ---
-
-
-def _misspelt(token: Token) -> Mend | None:
-    """`ENDIF`, `ELSEIF`; the automaton has seen that the right word fits."""
-    if token.type != "MISSPELT":
-        return None
-    kind = MISSPELT[token.text.upper()]
-    return Mend([Token(kind, kind, token.start, token.end)], token.start, token.end,
-                f"{found(token)} is no word of Structured Text", f"write {kind}")
-
-
-def _reserved_name(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """`VAR if : INT;`, `FOR := 1;`"""
-    word = automaton.before
-    if token.type == "ASSIGN" and word.type in STATEMENT_WORDS and automaton.values[-1] is word:
-        name = Token("NAME", word.text, word.start, word.end)
-        return Mend([name, token], word.start, word.end, f"{found(word)} is a reserved word and cannot be a name",
-                    "choose another name", cut=True)
-    if token.type not in lexis().reserved or following[1:2] == []:
-        return None
-    if following[1].type not in ("COLON", "COMMA", "ASSIGN"):
-        return None
-    if advance(automaton.states, "NAME") is None:
-        return None
-    if following[1].type != "ASSIGN" and advance(automaton.states, "NUMBER"):
-        return None
-    return Mend([Token("NAME", token.text, token.start, token.end)], token.start, token.end,
-                f"{found(token)} is a reserved word and cannot be a name", "choose another name")
-
-
-def _end_of_section(automaton: Automaton, token: Token) -> Mend | None:
-    """`VAR x : INT; x := 5;`: the END_VAR is missing in front of the first statement."""
-    if token.type not in ("ASSIGN", "LPAR", "LSQB", "DOT", "CARET", "PART"):
-        return None
-    states, before = automaton.states, automaton.before
-    if anchor(states).symbol != "var_decls" or before.type != "NAME" or symbols()[states[-1]] != "names":
-        return None
-    word = frames(states, automaton.values)[-1].word
-    if word.type != "VAR":
-        return None
-    return Mend([Token("END_VAR", "END_VAR", before.start, before.start), before, token], before.start, before.end,
-                f"END_VAR expected before {found(before)}, which begins a statement", "", word, cut=True)

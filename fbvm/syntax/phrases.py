@@ -66,7 +66,7 @@ def wanted(kinds: set[str]) -> str:
         rest -= CONTINUATIONS
         if not {"NAME", "ARRAY"} & rest:
             rest -= {"LPAR"}
-    rest -= CONTINUATIONS
+    rest = rest - CONTINUATIONS or rest
     parts = []
     for phrase, marks, members in GROUPS:
         if marks <= rest:
@@ -107,6 +107,11 @@ def hint(token: Token, kinds: set[str]) -> str:
         return "`:=` assigns and gives initial values, `=` compares"
     if token.type == "ASSIGN" and "EQUAL" in kinds:
         return "`=` compares, `:=` assigns"
+    if token.type in ("SEMICOLON", "VAR") and "TYPE" in kinds:
+        return "no `;` stands behind the END of a declaration" if token.type == "SEMICOLON" else (
+            "VAR sections stand in a FUNCTION, FUNCTION_BLOCK or PROGRAM; VAR_GLOBAL by itself")
+    if token.type == "ASSIGN" and "COLON" in kinds and "NUMBER" not in kinds:
+        return "a declaration has a type, and then its value: `x : INT := 5;`"
     if token.type == "VAR" and "SEMICOLON" in kinds:
         return "VAR sections stand in front of the first statement"
     if token.type in lexis().reserved and "NAME" in kinds and "IF" not in kinds and token.type[:4] != "END_":

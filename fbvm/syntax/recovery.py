@@ -24,9 +24,10 @@ from fbvm.syntax.frames import (
 )
 from fbvm.syntax.indentation import advice
 from fbvm.syntax.lexer import Token
-from fbvm.syntax.mends import Mend, best_mend
+from fbvm.syntax.mends import BRACKETS, best_mend
 from fbvm.syntax.phrases import found, hint, sign, unlike
 from fbvm.syntax.prospect import advance, expected
+from fbvm.syntax.slips import Mend, open_bracket
 
 LOOK = 4
 """Tokens by which a mend is judged."""
@@ -125,7 +126,10 @@ class Recovery:
     def tell(self, token: Token) -> None:
         """What is expected here, what was found."""
         kinds = expected(self.states)
-        self.report("S0101", self.place(token), token.end, unlike(token, kinds), hint(token, kinds))
+        message = unlike(token, kinds)
+        if token.type in BRACKETS and not open_bracket(self.automaton, BRACKETS[token.type]):
+            message = f"{found(token)} without `{sign(BRACKETS[token.type])}`"
+        self.report("S0101", self.place(token), token.end, message, hint(token, kinds))
 
     def place(self, token: Token) -> int:
         """Where to point for a token: at its beginning; for the end of the text behind the last word."""

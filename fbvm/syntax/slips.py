@@ -1,0 +1,141 @@
+"""Mistakes that everybody makes now and then, each with a mend of its own: `ENDIF`, `ELSE:`, `END_VAR;` ..."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from fbvm.syntax.automaton import Automaton
+from fbvm.syntax.frames import STATEMENT_WORDS, anchor, frames
+from fbvm.syntax.lexer import Token, lexis, meant
+from fbvm.syntax.phrases import found
+from fbvm.syntax.prospect import advance, symbols
+from fbvm.syntax.tree import Empty
+
+
+@dataclass(frozen=True)
+class Mend:
+    """What to say and which tokens to go on with; `cut` gives up the statement's beginning first."""
+
+    tokens: list[Token]
+    start: int
+    end: int
+    message: str
+    hint: str = ""
+    opener: Token | None = None
+    cut: bool = False
+
+
+def slip(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """The mend of a slip that is known; None if it is none.  `following` begins with `token`."""
+    for known in SLIPS:
+        mend = known(automaton, token, following)
+        if mend:
+            return mend
+    return None
+
+
+def open_bracket(automaton: Automaton, kind: str | None) -> Token | None:
+    """The innermost open bracket of a kind."""
+    return next((v for v in reversed(automaton.values) if isinstance(v, Token) and v.type == kind), None)
+
+
+def _misspelt(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`ENDIF`, `ELSEIF`; the automaton has seen that the right word fits."""
+    if token.type != "MISSPELT":
+        return None
+    kind = meant(token.text)
+    advice = "write VAR, VAR_INPUT, VAR_OUTPUT, VAR_IN_OUT, VAR_TEMP or VAR_EXTERNAL" if kind == "VAR" else f"write {kind}"
+    return Mend([Token(kind, kind, token.start, token.end)], token.start, token.end,
+                f"{found(token)} is no word of Structured Text", advice)
+
+
+def _statement_word(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`FOR := 1;`"""
+    word = automaton.before
+    if token.type != "ASSIGN" or word.type not in STATEMENT_WORDS or automaton.values[-1] is not word:
+        return None
+    name = Token("NAME", word.text, word.start, word.end)
+    return Mend([name, token], word.start, word.end, f"{found(word)} is a reserved word and cannot be a name",
+                "choose another name", cut=True)
+
+
+def _reserved_name(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`VAR if : INT;`"""
+    if token.type not in lexis().reserved or len(following) < 2 or advance(automaton.states, "NAME") is None:
+        return None
+    sign = following[1].type
+    if sign != "ASSIGN" and (sign not in ("COLON", "COMMA") or advance(automaton.states, "NUMBER")):
+        return None
+    return Mend([Token("NAME", token.text, token.start, token.end)], token.start, token.end,
+                f"{found(token)} is a reserved word and cannot be a name", "choose another name")
+
+
+NEXT_WORD = re.compile(r"(?i)\b(?:(END_VAR)|VAR\w*|END_\w+|FUNCTION\w*|PROGRAM)\b")
+
+
+def _end_of_section(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`VAR x : INT; x := 5;`: the END_VAR is missing in front of the first statement, unless one stands behind it."""
+    states, before = automaton.states, automaton.before
+    if token.type not in ("ASSIGN", "LPAR", "LSQB", "DOT", "CARET", "PART") or symbols()[states[-1]] != "names":
+        return None
+    word = frames(states, automaton.values)[-1].word
+    if anchor(states).symbol != "var_decls" or before.type != "NAME" or word.type != "VAR":
+        return None
+    next_word = NEXT_WORD.search(automaton.text, token.end)
+    if next_word and next_word[1]:
+        return None
+    return Mend([Token("END_VAR", "END_VAR", before.start, before.start), before, token], before.start, before.end,
+                f"END_VAR expected before {found(before)}, which begins a statement", "", word, cut=True)
+
+
+def _semicolon_behind_section(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`END_VAR; VAR ..`"""
+    values: list[Any] = automaton.values
+    if token.type not in ("VAR", "VAR_GLOBAL") or symbols()[automaton.states[-1]] != "ended_list":
+        return None
+    if symbols()[automaton.states[-2]] != "sections" or not all(isinstance(item, Empty) for item in values[-1]):
+        return None
+    if not values[-1]:
+        return None
+    first = values[-1][0]
+    del automaton.states[-1], values[-1]
+    return Mend([token], first.start, first.end, "`;` stands in front of a VAR section", "END_VAR has no `;` behind it")
+
+
+def _colon_behind_else(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`ELSE: ..`"""
+    if token.type != "COLON" or automaton.before.type != "ELSE":
+        return None
+    return Mend([], token.start, token.end, "`:` behind ELSE", "ELSE is no label: it has no `:`")
+
+
+def _semicolon_in_call(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`fb(IN := a; PT := b);`: a comma is meant if the bracket is closed behind it."""
+    if token.type != "SEMICOLON" or not open_bracket(automaton, "LPAR") or advance(automaton.states, "COMMA") is None:
+        return None
+    end = automaton.text.find(";", token.end)
+    rest = automaton.text[token.end:end if end >= 0 else token.end]
+    if rest.count(")") <= rest.count("("):
+        return None
+    return Mend([Token("COMMA", ",", token.start, token.end)], token.start, token.end,
+                "`,` expected, but `;` found", "arguments are separated by commas")
+
+
+def _parameters_in_head(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`PROGRAM Main() ..`, `FUNCTION f(x : INT) ..`"""
+    opener = open_bracket(automaton, "LPAR")
+    head = next((v[0] for v in reversed(automaton.values) if isinstance(v, tuple) and hasattr(v[0], "end")), None)
+    if opener is None or head is None or automaton.text[head.end:opener.start].strip():
+        return None
+    while token.type not in ("RPAR", "SEMICOLON", "$END"):
+        token = automaton.next()
+    return Mend([] if token.type != "$END" else [token], opener.start, opener.end,
+                f"`(` behind the name `{head.text}` of a POU", "parameters are declared in VAR_INPUT .. END_VAR", cut=True)
+
+
+SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
+    _misspelt, _statement_word, _reserved_name, _end_of_section, _semicolon_behind_section, _colon_behind_else,
+    _semicolon_in_call, _parameters_in_head)
