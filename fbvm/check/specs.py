@@ -43,6 +43,13 @@ def settle(awaited: list[RefType], target: Type | None) -> None:
     awaited.clear()
 
 
+def overlaid(content: bytearray, initial: bytes) -> bytearray:
+    """The initial bytes of a union when one more member comes: those of the first that is not all zero."""
+    if not any(content):
+        return bytearray(initial) + bytes(max(0, len(content) - len(initial)))
+    return content + bytes(max(0, len(initial) - len(content)))
+
+
 class Specs:
     """Resolves type specifications.  `values` and `scope` are the checker's, which sets them."""
 
@@ -65,11 +72,11 @@ class Specs:
             return self._array(spec, source)
         if isinstance(spec, tree.EnumSpec):
             return self._enumeration(spec, source, name)
-        if isinstance(spec, tree.StructSpec) and not spec.overlap:
+        if isinstance(spec, tree.UnionSpec) or (isinstance(spec, tree.StructSpec) and not spec.overlap):
             return self._structure(spec, source, name)
         if isinstance(spec, tree.RefSpec) and spec.kind != "REFERENCE TO":
             return self._reference(spec, source)
-        what = {tree.RefSpec: "REFERENCE TO here", tree.UnionSpec: "UNION", tree.StructSpec: "STRUCT OVERLAP"}
+        what = {tree.RefSpec: "REFERENCE TO here", tree.StructSpec: "STRUCT OVERLAP"}
         self.report.add("S0901", source, spec, f"{what[type(spec)]} is understood but not executed by this version")
         return None
 
@@ -254,7 +261,9 @@ class Specs:
             self.project.enum_members.setdefault(member_name, []).append((made, value))
         return made, default(made)
 
-    def _structure(self, spec: tree.StructSpec, source: Source, name: str) -> Resolved | None:
+    def _structure(self, spec: tree.StructSpec | tree.UnionSpec, source: Source, name: str) -> Resolved | None:
+        """A structure, or a union: its members share their place, and the first initial value holds."""
+        shared = isinstance(spec, tree.UnionSpec)
         fields: dict[str, Field] = {}
         content = bytearray()
         align = 1
@@ -273,6 +282,10 @@ class Specs:
             for member in declared.names:
                 if fold(member.text) in fields:
                     self.report.add("S0202", source, member, f"{member.text} stands twice in this structure")
+                    continue
+                if shared:
+                    fields[fold(member.text)] = Field(member.text, kind, 0)
+                    content = overlaid(content, initial)
                     continue
                 content += bytes(-len(content) % kind.align)
                 fields[fold(member.text)] = Field(member.text, kind, len(content))
