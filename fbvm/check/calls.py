@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import BOOL, StructType, Type, base, fold
+from fbvm.base.types import BOOL, DEFAULT_STRING, StringType, StructType, Type, base, fold
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.expressions import assignable, conversion_hint, same
 from fbvm.check.facts import Pou, PouCall, Variable, is_block
@@ -190,9 +190,12 @@ class Calls:
         if not self.expressions.is_variable(value):
             self.error("S0407", value, f"the in-out {variable.name} needs a variable, not a value")
             return False
-        if not same(kind, variable.type):
-            self.error("S0405", value, f"the in-out {variable.name} needs {variable.type}, this is {kind}",
-                       "an in-out takes a variable of exactly its own type")
+        if not same(kind, variable.type) and not _long_enough(kind, variable):
+            hint = "an in-out takes a variable of exactly its own type"
+            if isinstance(kind, StringType) and variable.any_length:
+                hint = f"an in-out STRING without a length works on {DEFAULT_STRING} characters: " \
+                    "pass a variable that has as many, or give both the same length"
+            self.error("S0405", value, f"the in-out {variable.name} needs {variable.type}, this is {kind}", hint)
             return False
         return writable(self.expressions, value, f"be passed to the in-out {variable.name}")
 
@@ -215,6 +218,15 @@ class Calls:
             return False
         note_count(self.expressions, value)
         return writable(self.expressions, value, f"take the output {name}")
+
+
+def _long_enough(kind: Type, variable: Variable) -> bool:
+    """True for a STRING that is longer than an in-out declared without a length, which uses its beginning.
+
+    The standard leaves open what such an in-out takes; a reference carries no length, so a shorter one is refused."""
+    wanted = variable.type
+    return variable.any_length and isinstance(kind, StringType) and isinstance(wanted, StringType) and \
+        kind.wide == wanted.wide and kind.capacity >= wanted.capacity
 
 
 def _described(variable: Variable) -> str:

@@ -43,6 +43,8 @@ class Variable:
     constant: bool = False
     retain: bool = False
     reference: bool = False
+    any_length: bool = False
+    """True for an in-out STRING that is declared without a length."""
     location: Address | None = None
     edge: str = ""
     written: bool = False

@@ -185,6 +185,7 @@ class Interfaces:
         variable.reference = variable.kind == "VAR_IN_OUT"
         if isinstance(declared.spec, tree.RefSpec) and declared.spec.kind == "REFERENCE TO":
             self._bound(variable, declared, pou)
+        variable.any_length = variable.reference and isinstance(declared.spec, tree.StringSpec) and declared.spec.length is None
         if variable.kind == "VAR_TEMP" or pou.is_function:
             variable.place = "self" if pou.is_function else "frame"
         if declared.location is not None:
