@@ -112,7 +112,8 @@ class LoopNetwork:
         """Begin an active open for a unit's channel."""
         fault = self.fault(local, remote)
         self.tell_unit(local.host, What.SYN, local, remote, True)
-        if fault.silent:
+        station = self._stations.get(remote)
+        if fault.silent or (station and station.deaf):
             self.at(self.now_ns + CONNECT_TIMEOUT_NS, partial(line.refused, "ETIMEDOUT"))
             return
         end = End(self, local, remote, local.host, line)

@@ -87,6 +87,9 @@ class Conversation:
 class Station:
     """What is placed at an endpoint of a network: opens a conversation for each connection, answers datagrams."""
 
+    deaf = False
+    """True: who asks for a connection gets no answer at all."""
+
     def accept(self, caller: Peer) -> Conversation | None:
         """A conversation for a new connection; None refuses it."""
         return None
@@ -110,7 +113,7 @@ class ModbusPeer(Station):
         self.heard: list[bytes] = []
         """Every frame that came, in order, over all connections."""
 
-    def accept(self, caller: Peer) -> Conversation:
+    def accept(self, caller: Peer) -> Conversation | None:
         return _ModbusConversation(self)
 
 

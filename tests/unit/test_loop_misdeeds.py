@@ -5,11 +5,12 @@ from __future__ import annotations
 import pytest
 
 from fbvm.net.loop import LoopNetwork
-from fbvm.net.misdeeds import LATE_NS, MISDEEDS
-from fbvm.net.peers import ModbusPeer
+from fbvm.net.misdeeds import FLOOD_BYTES, LATE_NS, MISDEEDS, NEXT_NS, RUDE_PEERS, RudePeer, by_script, by_seed
+from fbvm.net.peers import ModbusPeer, Say
 from fbvm.wire import modbus
-from fbvm.wire.link import Broken, Connect, Grant, Opened, Peer, PeerClosed, Received, Send, Sent
+from fbvm.wire.link import Broken, Connect, Event, Grant, Opened, Peer, PeerClosed, Received, Send, Sent
 from fbvm.wire.modbus import Adu, Fault, Splitter, mismatch
+from fbvm.wire.modbus_server import ModbusServer
 
 SERVER = Peer("10.0.0.1", 502)
 PDU = modbus.read(3, 0, 2)
@@ -20,8 +21,12 @@ def seen(name: str, until_ns: int) -> list[str]:
     """What a client that asks one thing makes of what comes, in words."""
     network = LoopNetwork()
     network.place(SERVER, ModbusPeer(reply=MISDEEDS[name]))
+    return client(network, until_ns)
+
+
+def client(network: LoopNetwork, until_ns: int) -> list[str]:
     link = network.attach("10.0.0.2")
-    link.submit([Connect(1, SERVER), Grant(1, 4096)], 0)
+    link.submit([Connect(1, SERVER), Grant(1, 99_999)], 0)
     assert link.events(0) == [Opened(1, 49152, SERVER)]
     link.submit([Send(1, Adu(7, 1, PDU).to_bytes())], 0)
     splitter, words = Splitter(), list[str]()
@@ -51,6 +56,42 @@ RIGHT = "030400000000"
     ("name", "words"),
     [
         ("late", []),
+        ("late by one request", []),
+        ("again later", [RIGHT, RIGHT]),
+        ("a wrong one first", ["not mine", RIGHT]),
+        ("a wrong one last", [RIGHT, "not mine"]),
+        ("garbage behind", [RIGHT, "length 12081 outside 2..254"]),
+        ("a byte behind", [RIGHT, "1 pending"]),
+        ("flood behind", [RIGHT] + ["not mine"] * (FLOOD_BYTES // 13)),
+        ("right, then fin", [RIGHT, "fin"]),
+        ("right, then closed", [RIGHT, "fin"]),
+        ("right, then reset", [RIGHT, "ECONNRESET"]),
+        ("transaction swapped", ["not mine"]),
+        ("neighbour's function", ["function code 02 instead of 03"]),
+        ("two bytes more", ["6 data bytes instead of 4"]),
+        ("function only", ["too short"]),
+        ("exception 00", ["wrong length"]),
+        ("illegal function", ["8301"]),
+        ("gateway without target", ["830b"]),
+        ("exception 0C", ["830c"]),
+        ("exception FF", ["83ff"]),
+        ("another's exception", ["function code 02 instead of 03"]),
+        ("exception without code", ["exception reply without code"]),
+        ("exception with more", ["wrong length"]),
+        ("length 0", ["length 0 outside 2..254"]),
+        ("length 1", ["length 1 outside 2..254"]),
+        ("length 255", ["length 255 outside 2..254"]),
+        ("length one less", ["byte count 4, 3 follow", "1 pending"]),
+        ("length one more", ["13 pending"]),
+        ("length 254", ["13 pending"]),
+        ("garbage first", ["length 12081 outside 2..254"]),
+        ("flood", ["length 65535 outside 2..254"]),
+        ("one byte", ["1 pending"]),
+        ("all but one byte", ["12 pending"]),
+        ("half, the rest late", ["9 pending"]),
+        ("half closed", ["fin"]),
+        ("one byte, then reset", ["ECONNRESET", "1 pending"]),
+        ("header, then closed", ["fin", "7 pending"]),
         ("two pieces", [RIGHT]),
         ("byte by byte", [RIGHT]),
         ("twice", [RIGHT, RIGHT]),
@@ -79,3 +120,96 @@ def test_every_misdeed_is_tried() -> None:
     [mark] = test_a_misdeed.pytestmark  # type: ignore[attr-defined]
     assert {name for name, _ in mark.args[1]} == set(MISDEEDS)
     assert seen("late", LATE_NS) == [RIGHT]
+    assert seen("late by one request", NEXT_NS) == [RIGHT]
+
+
+# --- servers that misbehave as a whole --------------------------------------------------------------------------------
+
+
+def conversation(name: str, requests: int, until_ns: int = SECOND_NS) -> list[str]:
+    """What a client that asks so often sees, 10 ms between its requests; names of other events than bytes."""
+    network = LoopNetwork()
+    network.place(SERVER, RUDE_PEERS[name](ModbusServer()))
+    link, words = network.attach("10.0.0.2"), list[str]()
+    link.submit([Connect(1, SERVER), Grant(1, 99_999)], 0)
+    for number in range(requests + 1):
+        for event in link.events(number * 10_000_000):
+            words += said(event)
+        if number < requests:
+            link.submit([Send(1, Adu(number, 1, PDU).to_bytes())], number * 10_000_000)
+    return [*words, *(word for event in link.events(until_ns) for word in said(event))]
+
+
+def said(event: Event) -> list[str]:
+    """Numbers of transactions in what was received, or the kind of event."""
+    if not isinstance(event, Received):
+        return [] if isinstance(event, Sent | Opened) else [getattr(event, "error", type(event).__name__)]
+    found = Splitter().feed(event.data)
+    return [f"{adu.transaction}" if isinstance(adu, Adu) else adu.reason for adu in found] or ["part"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("nobody listens", ["ECONNREFUSED", "ENOTCONN", "ENOTCONN", "ENOTCONN"]),
+        ("never accepts", ["ENOTCONN"] * 3),
+        ("closes at once", ["PeerClosed", "ECONNRESET", "EPIPE", "EPIPE"]),
+        ("half closes at once", ["PeerClosed"]),
+        ("resets at once", ["ECONNRESET", "EPIPE", "EPIPE", "EPIPE"]),
+        ("closes after a while", ["0", "1", "2", "PeerClosed"]),
+        ("closes between requests", ["0", "1", "2", "PeerClosed"]),
+        ("resets between requests", ["0", "1", "2", "ECONNRESET"]),
+        ("takes one connection only", ["0", "PeerClosed", "ECONNRESET", "EPIPE"]),
+        ("never reads", []),
+        ("never reads, then resets", ["ECONNRESET"]),
+        ("closes in mid-request", ["PeerClosed", "ECONNRESET", "EPIPE"]),
+        ("resets in mid-request", ["ECONNRESET", "EPIPE", "EPIPE"]),
+        ("hears every second request", ["1"]),
+        ("previous reply instead", ["0", "1"]),
+        ("previous reply first", ["0", "0", "1", "1", "2"]),
+        ("previous reply behind", ["0", "1", "0", "2", "1"]),
+        ("speaks first", ["32768", "0", "1", "2"]),
+        ("speaks first, garbage", ["length 12081 outside 2..254", "0", "1", "2"]),
+        ("drips for ever", ["part", "part", "part", "part"]),
+        ("floods from the start", ["32768"]),
+    ],
+)
+def test_a_rude_peer(name: str, words: list[str]) -> None:
+    seen = conversation(name, 3)
+    if name == "floods from the start":
+        assert (len(seen), set(seen)) == (101 * 40 + 3, {"32768", "0", "1", "2"})
+    else:
+        assert seen == words
+
+
+def test_every_rude_peer_is_tried() -> None:
+    [mark] = test_a_rude_peer.pytestmark  # type: ignore[attr-defined]
+    assert {name for name, _ in mark.args[1]} == set(RUDE_PEERS)
+
+
+def test_a_rude_peer_may_reform() -> None:
+    network, peer = LoopNetwork(), RudePeer(reads=False, greeting=[Say(b"hello")], connections=1)
+    network.place(SERVER, peer)
+    link = network.attach("10.0.0.2")
+    link.submit([Connect(1, SERVER), Grant(1, 4096)], 0)
+    link.submit([Send(1, Adu(5, 1, PDU).to_bytes())], 0)
+    assert said(link.events(0)[-1]) == ["part"]
+    link.submit([Connect(2, SERVER)], 0)
+    assert [word for event in link.events(1) for word in said(event)] == ["ECONNREFUSED"]
+    peer.reform()
+    link.submit([Send(1, Adu(6, 1, PDU).to_bytes()), Connect(2, SERVER), Grant(2, 4096)], 2)
+    assert [word for event in link.events(2) for word in said(event)] == ["5", "6"]
+
+
+def test_misdeeds_by_script_and_by_seed() -> None:
+    frame = Adu(7, 1, b"\x03\x02\0\0").to_bytes()
+    script = by_script("twice", "", "silence")
+    assert [list(script(frame)) for _ in range(4)] == [[Say(frame * 2)], [Say(frame)], [], [Say(frame)]]
+
+    def told(seed: int, chance: float) -> list[list[object]]:
+        reply = by_seed(seed, chance, ["silence", "fin", "reset"])
+        return [list(reply(frame)) for _ in range(40)]
+
+    assert told(1, 0.5) == told(1, 0.5) != told(2, 0.5)
+    assert told(1, 0) == [[Say(frame)]] * 40
+    assert [Say(frame)] not in told(1, 1)

@@ -1,0 +1,233 @@
+"""Servers that misbehave in every way that has a name: never wrong data, nobody stuck, nothing else touched, a code
+that the README explains, and the next good exchange works by itself."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from mtcp_rig import SECOND_NS, SERVER, Rig
+
+from fbvm.base.data import data_folder
+from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS, RudePeer, by_script, by_seed, right
+from fbvm.net.peers import ModbusPeer
+
+README = (data_folder("fblib") / "omron" / "mtcp_etn" / "README.md").read_text(encoding="utf-8")
+READ, WRITE = 1000, 2000
+BLOCKS = {
+    "rd": f"Fn03(Register_Address := {READ}, Register_Qty := 3, RespData_DM := 200)",
+    "bits": "Fn01(Coil_Address := 7, Coil_Qty := 21, RespData_DM := 210)",
+    "wr": f"Fn10(Register_Address := {WRITE}, Register_Qty := 2, DataAddress_DM := 300)",
+}
+REPLY_NS = 700_000_000
+HELD = [0x1234, 0xFFFF, 0x8001]
+COILS = [0b1010101010101010, 0b01010]
+OWN_CIO = range(1500, 1525)
+AREAS = ("CIO", "D", "W", "H", "T", "C")
+
+
+def documented() -> set[str]:
+    """The codes that the library's README explains."""
+    table = README.partition("## Error codes")[2].partition("\n## ")[0]
+    rows = [re.match(r"\| ([0-9A-F]{4}[^|]*) \|", line) for line in table.splitlines()]
+    codes = {code for row in rows if row for code in re.findall(r"[0-9A-F]{4}", row[1])}
+    return codes | {f"{code:04X}" for code in range(1, 12)}
+
+
+DOCUMENTED = documented()
+
+
+def rig_with(peer: RudePeer | ModbusPeer | None = None, **options: object) -> Rig:
+    """A rig whose server holds known values, with blocks that do not wait long."""
+    rig = Rig(peer, **options, **BLOCKS)  # type: ignore[arg-type]
+    server = rig.server
+    server.holding_registers[READ : READ + 3] = type(server.holding_registers)("H", HELD)
+    server.coils[7:28] = bytes(bit % 2 for bit in range(21))
+    rig.fill(300, [11, 22])
+    for name in BLOCKS:
+        rig.set(f"{name}.Reply_Time", REPLY_NS)
+    return rig
+
+
+class Watch:
+    """What a block may have changed, and what it must not."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+        self.rest = self.others()
+        self.counters = {name: rig.result(name)[0] for name in BLOCKS}
+
+    def others(self) -> list[list[int]]:
+        """All words but the unit's, the sheet's areas, and the two destinations."""
+        words = [list(self.rig.plc.memory.words(area)) for area in AREAS]
+        for at in OWN_CIO:
+            words[0][at] = 0
+        words[1] = self.rig.all_words()
+        words[1][200:203], words[1][210:212] = [0] * 3, [0] * 2
+        return words
+
+    def ended_well(self, name: str) -> bool:
+        """Looks at one block after its command; True if it was served."""
+        counter, code = self.rig.result(name)
+        assert code == "" or code in DOCUMENTED
+        replied = code == "" or "0001" <= code <= "000B"
+        assert counter - self.counters[name] == replied, "Rcv_Counter counts right replies"
+        self.counters[name] = counter
+        return code == ""
+
+    def check(self, served: dict[str, bool]) -> None:
+        """Destinations are right, or as they were; all else as it was."""
+        assert self.others() == self.rest
+        assert self.rig.words(200, 3) == (HELD if served["rd"] else [0] * 3)
+        assert self.rig.words(210, 2) == (COILS if served["bits"] else [0] * 2)
+
+
+def command_all(rig: Rig, watch: Watch, names: list[str]) -> dict[str, str]:
+    """Commands blocks one after the other; what each ended with, "ok" or its code."""
+    ended = {}
+    for name in names:
+        rig.run_until("Main.conn.ENO", 15)
+        rig.fill(200, [0] * 3)
+        rig.fill(210, [0] * 2)
+        rig.command(name, max_s=8)
+        served = dict.fromkeys(BLOCKS, False) | {name: watch.ended_well(name)}
+        watch.check(served)
+        ended[name] = rig.result(name)[1] or "ok"
+    return ended
+
+
+def good_again(rig: Rig) -> None:
+    """The server behaves: without anybody's help everything works within seconds."""
+    rig.network.place(SERVER, rig.peer)
+    rig.peer.reply = right
+    rig.server.holding_registers[WRITE : WRITE + 2] = type(rig.server.holding_registers)("H", [0, 0])
+    rig.run_until("Main.conn.ENO", 15)
+    rig.scan(2)
+    for attempt in (1, 2):  # the first may still meet what a bad server left on a connection that looks good
+        watch = Watch(rig)
+        ended = command_all(rig, watch, list(BLOCKS))
+        if attempt == 2 or set(ended.values()) == {"ok"}:
+            break
+        rig.run_until("Main.conn.ENO", 15)
+    assert set(ended.values()) == {"ok"}
+    assert list(rig.server.holding_registers[WRITE : WRITE + 2]) == [11, 22]
+
+
+OK = {"ok"}
+EXPECTED: dict[str, set[str]] = {
+    "late": {"0080"},
+    "late by one request": {"0080"},
+    "two pieces": OK,
+    "byte by byte": OK,
+    "twice": OK,
+    "again later": OK,
+    "a wrong one first": OK,
+    "a wrong one last": OK,
+    "garbage behind": {"ok", "0045"},  # the next command meets it
+    "a byte behind": {"ok", "0045"},
+    "flood behind": {"ok", "0080"},
+    "right, then fin": OK,
+    "right, then closed": OK,
+    "right, then reset": {"ok", "004B"},  # a reset throws away what was not read yet
+    "illegal function": {"0001"},
+    "server failure": {"0004"},
+    "gateway without target": {"000B"},
+    "wrong protocol": {"0045"},
+    "impossible length": {"0045"},
+    "length 0": {"0045"},
+    "length 1": {"0045"},
+    "length 255": {"0045"},
+    "length one less": {"0045"},
+    "length one more": {"0045"},
+    "length 254": {"0045"},
+    "garbage": {"0045"},
+    "garbage first": {"0045"},
+    "flood": {"0045"},
+    "half, then fin": {"0081"},
+    "fin": {"0081"},
+    "half closed": {"0081"},
+    "header, then closed": {"0081"},
+    "reset": {"004B"},
+    "half, then reset": {"004B"},
+    "one byte, then reset": {"004B"},
+}
+"""With which codes a first command ends; those that are not named here with 0080, no answer."""
+
+
+TIMINGS = pytest.mark.parametrize("timing", ["exact", "real"])
+
+
+@TIMINGS
+@pytest.mark.parametrize("name", MISDEEDS)
+def test_a_wrong_answer(name: str, timing: str) -> None:
+    rig = rig_with(timing=timing, seed=len(name)).connect()
+    watch = Watch(rig)
+    for block in BLOCKS:
+        rig.peer.reply = by_script(name)
+        ended = command_all(rig, watch, [block])
+        assert set(ended.values()) <= EXPECTED.get(name, {"0080"})
+        rig.scan(150)
+    good_again(rig)
+
+
+RUDE: dict[str, set[str]] = {
+    "nobody listens": set(),
+    "never accepts": set(),
+    "closes at once": {"2210", "0081"},
+    "half closes at once": {"2210", "0081"},
+    "resets at once": {"2210", "004B", "0081"},
+    "closes after a while": {"ok", "2210", "0081", "004B"},
+    "closes between requests": OK,
+    "resets between requests": OK | {"004B"},
+    "takes one connection only": OK,
+    "never reads": {"0080"},
+    "never reads, then resets": {"0080", "004B", "2210"},
+    "closes in mid-request": {"0081"},
+    "resets in mid-request": {"004B"},
+    "hears every second request": {"ok", "0080"},
+    "previous reply instead": {"0080"},
+    "previous reply first": OK,
+    "previous reply behind": OK,
+    "speaks first": OK,
+    "speaks first, garbage": {"ok", "0045"},
+    "drips for ever": {"0080"},
+    "floods from the start": {"ok", "0080"},
+}
+"""With which codes commands end; none at all where nobody can connect."""
+
+
+@TIMINGS
+@pytest.mark.parametrize("name", RUDE_PEERS)
+def test_a_rude_server(name: str, timing: str) -> None:
+    rig = rig_with(timing=timing, seed=len(name))
+    peer = RUDE_PEERS[name](rig.server)
+    rig.network.place(SERVER, peer)
+    rig.scan(300)
+    watch, ended = Watch(rig), set[str]()
+    for block in [*BLOCKS, *BLOCKS]:
+        if rig.plc.run(until="Main.conn.ENO", max_ns=3 * SECOND_NS) == "until":
+            ended |= set(command_all(rig, watch, [block]).values())
+    assert ended <= RUDE[name]
+    if isinstance(peer, RudePeer):
+        peer.reform()
+    good_again(rig)
+
+
+def test_there_are_enough_of_them() -> None:
+    assert len(MISDEEDS) + len(RUDE_PEERS) >= 40
+    assert set(RUDE) == set(RUDE_PEERS)
+    assert set(EXPECTED) <= set(MISDEEDS)
+
+
+@TIMINGS
+@pytest.mark.parametrize("seed", range(12))
+def test_all_of_them_by_chance(seed: int, timing: str) -> None:
+    """Dozens of commands, each of which may meet anything."""
+    rig = rig_with(timing=timing, seed=seed).connect()
+    rig.peer.reply = by_seed(seed)
+    watch, ended = Watch(rig), list[str]()
+    for _ in range(12):
+        ended += command_all(rig, watch, list(BLOCKS)).values()
+    assert ended.count("ok") >= 9
+    assert len(set(ended)) >= 3
+    good_again(rig)
