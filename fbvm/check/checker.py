@@ -118,6 +118,10 @@ class Checker:
 
     # --- the run of the check ---------------------------------------------------------------------------------------
 
+    def check_body(self, pou: Pou) -> None:
+        """Check a body that stands in no source: the run of a program with its connections."""
+        self._body(pou)
+
     def _body(self, pou: Pou) -> None:
         if pou in self.bodies or not self.interface(pou, pou.source, pou.tree.name) or pou in self.bodies:
             return

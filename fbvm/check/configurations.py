@@ -86,10 +86,6 @@ class Configurations:
     def _program(self, program: tree.ProgramInstance, task: TaskFact, source: Source) -> None:
         for refused in program.refused:
             self._refuse(refused, source)
-        if program.connections:
-            self.report.add("S0901", source, program.connections[0],
-                            "connections of a program are understood but not executed by this version",
-                            "let the program use the global variable")
         pou = self.project.pou(program.type_name.text, source)
         if pou is None or pou.kind != "PROGRAM":
             names = [p.name for p in self.project.pous.values() if p.kind == "PROGRAM"]
@@ -97,6 +93,19 @@ class Configurations:
                             self.project.nearest(program.type_name.text, names))
         elif pou.type is not None:
             self._instance(program.name.text, pou, task, source, program.name)
+            if program.connections:
+                self._connect(program, task, source)
+
+    def _connect(self, program: tree.ProgramInstance, task: TaskFact, source: Source) -> None:
+        """Connections are copied before and after each run: the task runs a body that calls the instance with them."""
+        name = program.name
+        call = tree.Call(name.start, program.end, tree.NameRef(name.start, name.end, name.text), program.connections)
+        runner = tree.Pou(name.start, program.end, "PROGRAM", tree.Name(name.start, name.end, f"{name.text} run"), None, (),
+                          (tree.CallStatement(name.start, program.end, call),))
+        pou = Pou(runner.name.text, "PROGRAM", source, runner)
+        self.checker.check_body(pou)
+        instance, _ = task.programs[-1]
+        task.programs[-1] = instance, pou
 
     def _task(self, declared: tree.Task, source: Source) -> TaskFact:
         priority = self._constant(declared.priority, UINT, source) if declared.priority is not None else None
