@@ -63,6 +63,19 @@ class ArrayType(Type):
 
 
 @dataclass(frozen=True)
+class OpenArrayType(Type):
+    """ARRAY [*] of an in-out: what is passed brings its bounds.  `size` is that of the parameter's slot: a reference and
+    for each dimension the lower and the upper bound, 64 bits each."""
+
+    dimensions: int
+    element: Type
+
+    def bound_offset(self, dimension: int, upper: bool) -> int:
+        """Where in the slot a bound of `dimension` (from 0) lies."""
+        return 8 + 16 * dimension + (8 if upper else 0)
+
+
+@dataclass(frozen=True)
 class Field:
     """A member of a structure or a variable of a POU, at `offset` bytes from the start of the whole.
 
@@ -187,6 +200,12 @@ def array(bounds: tuple[tuple[int, int], ...], element: Type) -> ArrayType:
     for low, high in bounds:
         count *= high - low + 1
     return ArrayType(f"ARRAY [{shown}] OF {element.name}", count * element.size, element.align, bounds, element)
+
+
+def open_array(dimensions: int, element: Type) -> OpenArrayType:
+    """ARRAY [*, ...] OF element."""
+    name = f"ARRAY [{', '.join('*' * dimensions)}] OF {element.name}"
+    return OpenArrayType(name, 8 + 16 * dimensions, 8, dimensions, element)
 
 
 def base(kind: Type) -> Type:

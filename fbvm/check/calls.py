@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, DEFAULT_STRING, StringType, StructType, Type, base, fold
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
-from fbvm.check.expressions import assignable, conversion_hint, same
 from fbvm.check.facts import Pou, PouCall, Variable, is_block
+from fbvm.check.fitting import assignable, conversion_hint, same
 from fbvm.check.standard import StandardCalls
 from fbvm.check.writes import note_count, writable
 from fbvm.syntax import tree

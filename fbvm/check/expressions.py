@@ -17,27 +17,24 @@ from fbvm.base.types import (
     LINT,
     LREAL,
     LWORD,
-    RefType,
     NULL,
-    REAL,
     ULINT,
     WORD,
-    ArrayType,
     Elementary,
     EnumType,
-    StringType,
+    RefType,
     StructType,
     SubrangeType,
     Type,
     base,
-    converts,
-    families,
     fold,
     string,
 )
 from fbvm.check.constants import convert, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable
+from fbvm.check.fitting import assignable, conversion_hint, is_untyped, literal_hint
 from fbvm.check.operators import Operators
+from fbvm.check.subscripts import Subscripts
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
@@ -46,10 +43,6 @@ if TYPE_CHECKING:
 
 PARTS = {"X": BOOL, "B": BYTE, "W": WORD, "D": DWORD, "L": LWORD}
 NOT_EXECUTED = "is understood but not executed by this version"
-
-
-def is_untyped(kind: Type | None) -> bool:
-    return kind is UNTYPED_INT or kind is UNTYPED_REAL
 
 
 class Expressions:
@@ -303,39 +296,7 @@ class Expressions:
         return member.type
 
     def _index(self, expr: tree.Index, want: Type | None) -> Type | None:
-        whole = self.infer(expr.of)
-        kinds = [self.settle(subscript) for subscript in expr.subscripts]
-        if whole is None or None in kinds:
-            return None
-        if not isinstance(whole, ArrayType):
-            self.error("S0304", expr.of, f"this is {whole}, not an array")
-            return None
-        if len(kinds) < len(whole.bounds):
-            self.error("S0305", expr, f"{whole} needs {len(whole.bounds)} subscripts, {len(kinds)} are written")
-            return None
-        element: Type = whole
-        rest = list(zip(expr.subscripts, kinds, strict=True))
-        while rest:
-            if not isinstance(element, ArrayType) or len(rest) < len(element.bounds):
-                self.error("S0305", expr, f"{whole} has fewer dimensions than subscripts are written")
-                return None
-            for (subscript, kind), (low, high) in zip(rest, element.bounds, strict=False):
-                if not self._subscript(subscript, kind, low, high, element):
-                    return None
-            rest = rest[len(element.bounds):]
-            element = element.element
-        return element
-
-    def _subscript(self, expr: tree.Expr, kind: Type | None, low: int, high: int, whole: Type) -> bool:
-        assert kind is not None
-        if not is_any(kind, "ANY_INT") and not isinstance(kind, EnumType):
-            self.error("S0305", expr, f"a subscript is an integer, not {kind}", conversion_hint(kind, DINT))
-            return False
-        value = self.facts.constants.get(expr)
-        if isinstance(value, int) and not low <= value <= high:
-            self.error("S0702", expr, f"subscript {value} is outside {low}..{high} of {whole}")
-            return False
-        return True
+        return Subscripts(self).element(expr)
 
     def _part(self, expr: tree.Part, want: Type | None) -> Type | None:
         whole = self.infer(expr.of)
@@ -398,39 +359,3 @@ _INFER: dict[type, Callable[..., Type | None]] = {
 
 def _text(value: str) -> bytes:
     return value.encode("latin-1", "replace")
-
-
-def assignable(kind: Type, target: Type) -> bool:
-    """True if a value of `kind` may be stored where `target` is declared, arrays and structures as a whole included."""
-    if isinstance(target, ArrayType) and isinstance(kind, ArrayType):
-        return kind.bounds == target.bounds and same(kind.element, target.element)
-    if isinstance(target, StructType) or isinstance(kind, StructType):
-        return kind == target and not (isinstance(target, StructType) and target.block)
-    return converts(kind, target)
-
-
-def same(kind: Type, other: Type) -> bool:
-    """True if two types are the same, as an in-out needs it."""
-    if isinstance(kind, ArrayType) and isinstance(other, ArrayType):
-        return kind.bounds == other.bounds and same(kind.element, other.element)
-    return kind == other
-
-
-def conversion_hint(kind: Type, target: Type) -> str:
-    """How to write the conversion, "" if there is none."""
-    source, wanted = base(kind), base(target)
-    names = [ "STRING" if isinstance(t, StringType) else t.name for t in (source, wanted)]
-    if all(isinstance(t, Elementary | StringType) for t in (source, wanted)):
-        return f"write {names[0]}_TO_{names[1]}(...)"
-    return ""
-
-
-def literal_hint(value: Value, kind: Type) -> str:
-    if "ANY_DURATION" in families(kind):
-        return "a duration is written T#500ms"
-    if isinstance(kind, StringType):
-        return "a text is written 'text'"
-    return "write TRUNC(...) or a literal without a point" if isinstance(value, float) else ""
-
-
-__all__ = ["NULL", "REAL", "Expressions", "assignable", "conversion_hint", "is_untyped", "same"]

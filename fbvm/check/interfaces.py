@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.areas import AREAS, FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
-from fbvm.base.types import BOOL, ArrayType, Field, StringType, StructType, Type, base, fold
+from fbvm.base.types import BOOL, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold
 from fbvm.check.facts import Edge, Pou, Variable, is_block
 from fbvm.check.specs import MAX_SIZE
 from fbvm.check.statements import assigns_to
@@ -183,6 +183,7 @@ class Interfaces:
 
     def _place(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"
+        self._open(variable, declared, pou)
         if isinstance(declared.spec, tree.RefSpec) and declared.spec.kind == "REFERENCE TO":
             self._bound(variable, declared, pou)
         variable.any_length = variable.reference and isinstance(declared.spec, tree.StringSpec) and declared.spec.length is None
@@ -197,6 +198,12 @@ class Interfaces:
             self._edge(variable, declared, pou)
         if fold(variable.name) == "EN" and variable.kind == "VAR_INPUT" and not variable.explicit:
             variable.initial = b"\x01"  # EN is TRUE where nobody connects it
+
+    def _open(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
+        """ARRAY [*] is a parameter that borrows its bounds from what is passed."""
+        if isinstance(variable.type, OpenArrayType) and variable.kind != "VAR_IN_OUT":
+            self.report.add("S0205", pou.source, declared.spec, f"ARRAY [*] cannot be {variable.kind}",
+                            "declare it in VAR_IN_OUT")
 
     def _bound(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         """REFERENCE TO: a variable that another one stands behind."""
@@ -302,8 +309,12 @@ class Interfaces:
                             f"the variables of {pou.name} take more than {MAX_SIZE >> 20} MiB")
 
 
+def _slot(variable: Variable) -> int:
+    return variable.type.size if isinstance(variable.type, OpenArrayType) else 8
+
+
 def _append(content: bytearray, variable: Variable) -> None:
-    size, align = (8, 8) if variable.reference else (variable.type.size, variable.type.align)
+    size, align = (max(8, _slot(variable)), 8) if variable.reference else (variable.type.size, variable.type.align)
     content += bytes(-len(content) % align)
     variable.offset = len(content)
     content += bytes(size) if variable.reference else variable.initial

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import UDINT, Type, reference
+from fbvm.base.types import DINT, UDINT, ArrayType, OpenArrayType, Type, reference
 from fbvm.check.facts import StandardCall, Variable
 from fbvm.check.writes import writable
 from fbvm.syntax import tree
@@ -60,6 +60,26 @@ def make(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | 
     made = reference(kind)
     expressions.facts.calls[call] = StandardCall("REF", [(value, kind)], (made,))
     return made
+
+
+def bound(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr, dimension: tree.Expr) -> Type | None:
+    """LOWER_BOUND(array, dimension) and UPPER_BOUND, as DINT; a constant but for ARRAY [*]."""
+    kind = expressions.infer(value)
+    number = expressions.checker.values.integer(dimension, expressions.source)
+    if kind is None or number is None:
+        return None
+    if not isinstance(kind, ArrayType | OpenArrayType):
+        expressions.error("S0405", value, f"{name} needs an array, this is {kind}")
+        return None
+    count = kind.dimensions if isinstance(kind, OpenArrayType) else len(kind.bounds)
+    if not 1 <= number <= count:
+        expressions.error("S0405", dimension, f"{kind} has dimensions 1 to {count}, not {number}")
+        return None
+    if isinstance(kind, ArrayType):
+        expressions.facts.constants[call] = kind.bounds[number - 1][name == "UPPER_BOUND"]
+    else:
+        expressions.facts.calls[call] = StandardCall(name, [(value, kind), (dimension, DINT)], (kind,))
+    return DINT
 
 
 def size(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:

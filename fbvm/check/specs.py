@@ -21,6 +21,7 @@ from fbvm.base.types import (
     Type,
     array,
     fold,
+    open_array,
     reference,
     string,
 )
@@ -202,11 +203,11 @@ class Specs:
         return made, default(made)
 
     def _array(self, spec: tree.ArraySpec, source: Source) -> Resolved | None:
+        if None in spec.dimensions:
+            return self._open_array(spec, source)
         bounds = []
         for dimension in spec.dimensions:
-            if dimension is None:
-                self.report.add("S0901", source, spec, "ARRAY [*] is understood but not executed by this version")
-                return None
+            assert dimension is not None
             low, high = (self.values.integer(bound, source) for bound in dimension)
             if low is None or high is None:
                 return None
@@ -226,6 +227,17 @@ class Specs:
         kind = array(tuple(bounds), element[0])
         assert isinstance(kind, ArrayType)
         return kind, element[1] * kind.count
+
+    def _open_array(self, spec: tree.ArraySpec, source: Source) -> Resolved | None:
+        """ARRAY [*], which only an in-out can be; who declares the variable looks after that."""
+        element = self.resolve(spec.element, source)
+        if element is None:
+            return None
+        if any(dimension is not None for dimension in spec.dimensions):
+            self.report.add("S0704", source, spec, "all dimensions of ARRAY [*] are *, or none is")
+            return None
+        kind = open_array(len(spec.dimensions), element[0])
+        return kind, bytes(kind.size)
 
     def _enumeration(self, spec: tree.EnumSpec, source: Source, name: str) -> Resolved | None:
         base = INT

@@ -48,6 +48,9 @@ class StandardCalls:
             if values is None:
                 return None
             return (references.size if name == "SIZEOF" else references.make)(self.expressions, call, values[0])
+        if name in ("LOWER_BOUND", "UPPER_BOUND"):
+            values = Arguments(self.expressions, call, ["ARR", "DIM"]).in_order()
+            return references.bound(self.expressions, call, name, *values) if values is not None else None
         if name in functions.TIME_OPERATORS:
             return self._operator(call, functions.TIME_OPERATORS[name], None, want)
         if name in functions.OPERATORS:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, EnumType, StringType, Type, base, fold
 from fbvm.check import references
-from fbvm.check.expressions import assignable, conversion_hint
 from fbvm.check.facts import Pou
+from fbvm.check.fitting import assignable, conversion_hint
 from fbvm.check.values import is_any
 from fbvm.check.writes import note_count, place, writable
 from fbvm.syntax import tree

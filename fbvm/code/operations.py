@@ -94,6 +94,7 @@ mux        | k (a, ...) site        | any    | R0107       | k is i64; all are e
 min        | a b                    | not ref|             | the lesser, a if equal; NaN if one is NaN
 max        | a b                    | not ref|             | the greater, a if equal; NaN if one is NaN
 check      | a low high code site   | integer| code        | a itself; trap `code` (R0102, R0103, R0105) outside low..high
+within     | a low high code site   | i64    | code        | a itself; trap `code` outside low..high, all three worked out
 math       | function a             | float  |             | sqrt ln log exp sin cos tan asin acos atan; NaN outside the domain
 atan2      | y x                    | float  |             | angle; both 0 give 0
 floor_div  | a b                    | i64    |             | quotient toward minus infinity, b a positive constant

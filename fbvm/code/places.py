@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import FLAG_AREAS
-from fbvm.base.types import ArrayType, StringType, SubrangeType, Type, base, machine
-from fbvm.check.facts import Variable
+from fbvm.base.types import LINT, ArrayType, OpenArrayType, StringType, SubrangeType, Type, base, machine
+from fbvm.check.facts import StandardCall, Value, Variable
 from fbvm.code.layout import variable_bit
 from fbvm.code.operations import SIZES, WHOLE_BYTES, Address, Node
 from fbvm.syntax import tree
@@ -70,7 +70,8 @@ class Places:
         if isinstance(expr, tree.Deref):
             return Place((("ref", self.body.value(expr.of), self.body.site(expr)), 0, ()), kind)
         assert isinstance(expr, tree.Index)
-        return self._index(expr, kind)
+        whole = self.facts.types[expr.of]
+        return self._open_index(expr, whole) if isinstance(whole, OpenArrayType) else self._index(expr, kind)
 
     def variable(self, variable: Variable, expr: tree.Expr | None = None) -> Place:
         """The place of a variable; for an in-out, what its reference points at."""
@@ -117,6 +118,40 @@ class Places:
                     terms = (*terms, (stride, checked))
             element = element.element
         return Place((start, offset, terms), kind)
+
+    def _open_index(self, expr: tree.Index, kind: OpenArrayType) -> Place:
+        """An element of ARRAY [*]; the bounds lie beside the reference."""
+        place = self.of(expr.of)
+        start, offset, terms = place.address
+        distance: Node | None = None
+        for dimension, subscript in enumerate(expr.subscripts):
+            low, high = (self._bound_at(expr.of, kind, dimension, upper) for upper in (False, True))
+            checked = ("within", "i64", self.body.as_i64(subscript), low, high, "R0102", self.body.site(subscript))
+            step: Node = ("sub", "i64", checked, low)
+            if distance is not None:
+                width = ("add", "i64", ("sub", "i64", high, low), ("const", "i64", 1))
+                step = ("add", "i64", ("mul", "i64", distance, width), step)
+            distance = step
+        assert distance is not None
+        return Place((start, offset, (*terms, (kind.element.size, distance))), kind.element)
+
+    def _bound_at(self, expr: tree.Expr, kind: OpenArrayType, dimension: int, upper: bool) -> Node:
+        slot = self.slot(self.facts.variables[expr])
+        return ("load", "i64", slot.moved(kind.bound_offset(dimension, upper), LINT).address)
+
+    def bound(self, called: StandardCall, constants: dict[tree.Expr, Value]) -> Node:
+        """LOWER_BOUND or UPPER_BOUND of ARRAY [*], as i64."""
+        (array, kind), (dimension, _) = called.arguments
+        assert isinstance(kind, OpenArrayType)
+        return self._bound_at(array, kind, int(constants[dimension]) - 1, called.key == "UPPER_BOUND")
+
+    def bounds(self, expr: tree.Expr) -> list[Node]:
+        """The bounds of an array that is passed to ARRAY [*], as i64: lower and upper of each dimension."""
+        kind = self.facts.types[expr]
+        if isinstance(kind, OpenArrayType):
+            return [self._bound_at(expr, kind, d, upper) for d in range(kind.dimensions) for upper in (False, True)]
+        assert isinstance(kind, ArrayType)
+        return [("const", "i64", bound) for pair in kind.bounds for bound in pair]
 
     # --- access -----------------------------------------------------------------------------------------------------
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import BOOL, machine
+from fbvm.base.types import BOOL, LINT, OpenArrayType, machine
 from fbvm.check.constants import default
 from fbvm.check.facts import PouCall, Variable
 from fbvm.code.operations import Address, Block, Node
@@ -113,10 +113,12 @@ class CallLowering:
         nodes = body.values.sequence([lambda v=v, e=e: self._argument(v, e) for v, e in passed])  # type: ignore[misc]
         for variable, expr in aggregates:
             body.copy(self._place(called, variable, instance), body.aggregate(expr), site)
-        for (variable, _), node in zip(passed, nodes, strict=True):
+        for (variable, expr), node in zip(passed, nodes, strict=True):
             place = self._place(called, variable, instance)
             if variable.kind == "VAR_IN_OUT":
                 body.out.append(("store", "ref", place.address, node))
+                if isinstance(variable.type, OpenArrayType):
+                    self._bounds(place, expr)
             else:
                 body.write(place, node, site)
         if called.pou.is_function:
@@ -125,6 +127,11 @@ class CallLowering:
                 if id(variable) not in given and variable.name.upper() != "EN":
                     place = self._place(called, variable, instance)
                     body.out.append(("fill", place.address, variable.initial))
+
+    def _bounds(self, slot: Place, expr: tree.Expr) -> None:
+        """Store the bounds of what is passed to ARRAY [*] beside its reference."""
+        for number, node in enumerate(self.body.places.bounds(expr)):
+            self.body.out.append(("store", "i64", slot.moved(8 + 8 * number, LINT).address, node))
 
     def _argument(self, variable: Variable, expr: tree.Expr) -> Node:
         if variable.kind == "VAR_IN_OUT":

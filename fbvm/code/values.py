@@ -138,6 +138,8 @@ class ValueLowering:
         """A call of a standard function."""
         if called.key == "REF":
             return self.body.places.reference(self.body.places.of(called.arguments[0][0]))
+        if called.key in ("LOWER_BOUND", "UPPER_BOUND"):
+            return ("convert", "i32", "i64", self.body.places.bound(called, self.facts.constants))
         arguments = self.operands(*called.arguments)
         return FUNCTIONS[called.key](self.body, arguments, called, self.body.site(expr))
 

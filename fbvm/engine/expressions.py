@@ -196,6 +196,11 @@ def _check(e: Expressions, machine: str, a: Node, low: int, high: int, code: str
     return f"({v} if {low} <= {first} <= {high} else stop({code!r}, {site}, {v}, {low}, {high}))"
 
 
+def _within(e: Expressions, machine: str, a: Node, low: Node, high: Node, code: str, site: int) -> str:
+    parts = ", ".join(bare(e.value(part)) for part in (a, low, high))
+    return f"within({parts}, {code!r}, {site})"
+
+
 def _load(e: Expressions, machine: str, address: Address) -> str:
     if isinstance(address[0], tuple):
         return _load_raw(e, machine, address)
@@ -274,7 +279,7 @@ VALUES: dict[str, Callable[..., str]] = {
     "convert": _convert, "nearest": _to_integer("nearest"), "truncate": _to_integer("truncate"), "bits": _bits,
     "is_set": lambda e, machine, kind, a: f"({e.value(a)} != 0)",
     "select": _select, "mux": _mux, "min": _extreme("<=", "lesser"), "max": _extreme(">=", "greater"),
-    "check": _check,
+    "check": _check, "within": _within,
     "floor_div": lambda e, machine, a, b: f"({e.value(a)} // {e.value(b)})",
     "now": lambda e, machine: f"i64[{NOW // 8}]",
     "from_bcd": _to_integer("from_bcd"), "to_bcd": _to_integer("to_bcd"),

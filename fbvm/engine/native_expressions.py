@@ -5,7 +5,6 @@ A row decides nothing: what it writes means what the table of operations says.""
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import limits, width
@@ -298,6 +297,13 @@ def _check(w: Writer, machine: str, a: Node, low: int, high: int, code: str, sit
     return value
 
 
+def _within(w: Writer, machine: str, a: Node, low: Node, high: Node, code: str, site: int) -> str:
+    value, least, greatest = w.value(a), w.value(low), w.value(high)
+    under, over = w.new(f"icmp slt i64 {value}, {least}"), w.new(f"icmp sgt i64 {value}, {greatest}")
+    w.trap_if(w.new(f"or i1 {under}, {over}"), code, site, ("i64", value), ("i64", least), ("i64", greatest))
+    return value
+
+
 # --- conversion -----------------------------------------------------------------------------------------------------
 
 
@@ -316,20 +322,42 @@ def _convert(w: Writer, machine: str, source: str, a: Node) -> str:
     return w.new(f"{how} {from_kind} {value} to {kind}")
 
 
-def _to_integer(rounding: str) -> Row:
-    """A float rounded, checked, then an integer."""
+def _nearest(w: Writer, machine: str, source: str, a: Node, site: int) -> str:
+    """A tie goes to the even number: below the least one it fits, above the greatest one not."""
+    value, kind = w.value(a), ir(source)
+    low, high = limits(machine)
+    _must_fit(w, source, value, (_exactly(source, low, -0.5), True), _exactly(source, high, 0.5), machine, site)
+    if machine == "u64":
+        return w.new(f"fptoui {kind} {w.new(f'call {kind} @llvm.rint.{source}({kind} {value})')} to i64")
+    form = "i32" if high < 1 << 31 else "i64"
+    number = w.new(f"call {form} @llvm.lrint.{form}.{source}({kind} {value})")
+    return number if form == ir(machine) else w.new(f"trunc {form} {number} to {ir(machine)}")
 
-    def emit(w: Writer, machine: str, source: str, a: Node, site: int) -> str:
-        value = as_double(w, w.value(a), source)
-        whole = w.new(f"call double @llvm.{rounding}.f64(double {value})")
-        low, high = limits(machine)
-        above = w.new(f"fcmp oge double {whole}, {literal('f64', low)}")
-        below = w.new(f"fcmp olt double {whole}, {literal('f64', high + 1)}")
-        outside = w.new(f"xor i1 {w.new(f'and i1 {above}, {below}')}, true")
-        w.trap_if(outside, "R0105", site, ("f64", value), ("const", low), ("const", high))
-        return w.new(f"fpto{'s' if signed(machine) else 'u'}i double {whole} to {ir(machine)}")
 
-    return emit
+def _truncate(w: Writer, machine: str, source: str, a: Node, site: int) -> str:
+    value, (low, high) = w.value(a), limits(machine)
+    least = _exactly(source, low, -1.0)
+    _must_fit(w, source, value, (least, least == low), float(high + 1), machine, site)
+    return w.new(f"fpto{'s' if signed(machine) else 'u'}i {ir(source)} {value} to {ir(machine)}")
+
+
+def _exactly(source: str, limit: int, more: float) -> float:
+    """The float `more` beyond a limit of integers.
+
+    Where there is none, floats are whole numbers: then the limit itself, or above it the next number."""
+    bits = 24 if source == "f32" else 53
+    if abs(limit) < 1 << bits - 1 or (more == -1.0 and limit == 0):
+        return limit + more
+    return float(limit if more < 0 else limit + 1)
+
+
+def _must_fit(w: Writer, source: str, value: str, least: tuple[float, bool], above: float, machine: str, site: int) -> None:
+    """Trap (R0105) if a float is not between the least one, which may belong to it, and the first one above."""
+    kind, (low, high) = ir(source), limits(machine)
+    over = w.new(f"fcmp o{'ge' if least[1] else 'gt'} {kind} {value}, {literal('f64', least[0])}")
+    under = w.new(f"fcmp olt {kind} {value}, {literal('f64', above)}")
+    outside = w.new(f"xor i1 {w.new(f'and i1 {over}, {under}')}, true")
+    w.trap_if(outside, "R0105", site, (source, value), ("const", low), ("const", high))
 
 
 def _bits(w: Writer, machine: str, source: str, a: Node) -> str:
@@ -348,13 +376,13 @@ def canonical_bits(w: Writer, value: str, machine: str) -> str:
     """The bits of a float, those of every NaN the canonical ones.
 
     Asked of integers: LLVM holds any NaN of arithmetic for as good as another, and would leave out the choice of one."""
-    kind, (magnitude, infinite, nan) = f"i{width(machine)}", _PATTERNS[machine]
+    kind, (magnitude, infinite, nan) = f"i{width(machine)}", PATTERNS[machine]
     bits = w.new(f"bitcast {ir(machine)} {value} to {kind}")
     above = w.new(f"icmp ugt {kind} {w.new(f'and {kind} {bits}, {magnitude}')}, {infinite}")
     return w.new(f"select i1 {above}, {kind} {nan}, {kind} {bits}")
 
 
-_PATTERNS = {"f32": ((1 << 31) - 1, 0xFF << 23, 0x1FF << 22), "f64": ((1 << 63) - 1, 0x7FF << 52, 0xFFF << 51)}
+PATTERNS = {"f32": ((1 << 31) - 1, 0xFF << 23, 0x1FF << 22), "f64": ((1 << 63) - 1, 0x7FF << 52, 0xFFF << 51)}
 """Of each float the bits of its magnitude, of infinity, of the canonical NaN."""
 
 
@@ -380,9 +408,9 @@ VALUES: dict[str, Row] = {
     "and_then": _lazy("and"), "or_else": _lazy("or"),
     "shl": _shift("shl"), "shr": _shift("lshr"), "rol": _shift("fshl"), "ror": _shift("fshr"),
     **{name: _compare(name) for name in ("eq", "ne", "lt", "le", "gt", "ge")},
-    "convert": _convert, "nearest": _to_integer("rint"), "truncate": _to_integer("trunc"), "bits": _bits,
+    "convert": _convert, "nearest": _nearest, "truncate": _truncate, "bits": _bits,
     "is_set": _is_set, "select": _select, "mux": _mux, "min": _extreme("min"), "max": _extreme("max"),
-    "check": _check, "math": _math, "atan2": _arctangent, "floor_div": _floor_divide,
+    "check": _check, "within": _within, "math": _math, "atan2": _arctangent, "floor_div": _floor_divide,
     "now": lambda w, machine: w.system(NOW),
     "from_bcd": _bcd_number, "to_bcd": _bcd_digits, "length": _length, "find": _find, "reference": _reference,
 }

@@ -42,6 +42,12 @@ def stop(code: str, site: int, *values: Any) -> Any:
     raise Stop(code, site, *values)
 
 
+def within(value: int, low: int, high: int, code: str, site: int) -> int:
+    if not low <= value <= high:
+        raise Stop(code, site, value, low, high)
+    return value
+
+
 def quotient(a: int, b: int, site: int) -> int:
     if b == 0:
         raise Stop("R0101", site, a, b)
@@ -84,7 +90,7 @@ def enum_text(names: Mapping[int, str], value: int) -> bytes:
 _PURE: dict[str, Any] = {
     "Observation": Observation, "NAN": arithmetic.NAN, "INF": arithmetic.INF, "stop": stop, "bisect": bisect_right,
     "quotient": quotient, "remainder": remainder, "divide": arithmetic.divide, "power": arithmetic.power,
-    "lesser": arithmetic.lesser, "greater": arithmetic.greater, "choose": choose, "mux": mux,
+    "lesser": arithmetic.lesser, "greater": arithmetic.greater, "choose": choose, "mux": mux, "within": within,
     "single": arithmetic.single, "single_of_integer": arithmetic.single_of_integer, "bits": arithmetic.bits,
     "arctangent": arithmetic.arctangent, "find": strings.find, "to_text": texts.to_text, "enum_text": enum_text,
     **{function.__name__: sited(function) for function in (

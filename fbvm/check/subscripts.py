@@ -1,0 +1,71 @@
+"""Subscripts of arrays, with bounds that are known now or come with what is passed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, Type
+from fbvm.check.fitting import conversion_hint
+from fbvm.check.values import is_any
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.expressions import Expressions
+
+
+class Subscripts:
+    """Types `of[subscripts]` in one POU."""
+
+    def __init__(self, expressions: Expressions) -> None:
+        self.expressions = expressions
+        self.facts = expressions.facts
+        self.error = expressions.error
+
+    def element(self, expr: tree.Index) -> Type | None:
+        """The type of the element, or None after a diagnostic."""
+        whole = self.expressions.infer(expr.of)
+        kinds = [self.expressions.settle(subscript) for subscript in expr.subscripts]
+        if whole is None or None in kinds:
+            return None
+        if isinstance(whole, OpenArrayType):
+            return self._open(expr, whole, kinds)
+        if not isinstance(whole, ArrayType):
+            self.error("S0304", expr.of, f"this is {whole}, not an array")
+            return None
+        if len(kinds) < len(whole.bounds):
+            self.error("S0305", expr, f"{whole} needs {len(whole.bounds)} subscripts, {len(kinds)} are written")
+            return None
+        element: Type = whole
+        rest = list(zip(expr.subscripts, kinds, strict=True))
+        while rest:
+            if not isinstance(element, ArrayType) or len(rest) < len(element.bounds):
+                self.error("S0305", expr, f"{whole} has fewer dimensions than subscripts are written")
+                return None
+            for (subscript, kind), (low, high) in zip(rest, element.bounds, strict=False):
+                if not self._fits(subscript, kind, low, high, element):
+                    return None
+            rest = rest[len(element.bounds):]
+            element = element.element
+        return element
+
+    def _open(self, expr: tree.Index, whole: OpenArrayType, kinds: list[Type | None]) -> Type | None:
+        """Subscripts of ARRAY [*]: their bounds are known when the program runs."""
+        if len(kinds) != whole.dimensions:
+            self.error("S0305", expr, f"{whole} needs {whole.dimensions} subscripts, {len(kinds)} are written")
+            return None
+        least, most = -(1 << 63), (1 << 63) - 1
+        for subscript, kind in zip(expr.subscripts, kinds, strict=True):
+            if not self._fits(subscript, kind, least, most, whole):
+                return None
+        return whole.element
+
+    def _fits(self, expr: tree.Expr, kind: Type | None, low: int, high: int, whole: Type) -> bool:
+        assert kind is not None
+        if not is_any(kind, "ANY_INT") and not isinstance(kind, EnumType):
+            self.error("S0305", expr, f"a subscript is an integer, not {kind}", conversion_hint(kind, DINT))
+            return False
+        value = self.facts.constants.get(expr)
+        if isinstance(value, int) and not low <= value <= high:
+            self.error("S0702", expr, f"subscript {value} is outside {low}..{high} of {whole}")
+            return False
+        return True
