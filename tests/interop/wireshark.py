@@ -1,0 +1,27 @@
+"""What tshark says of a capture."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+TSHARK = shutil.which("tshark")
+WRONG = "_ws.malformed || tcp.checksum.status == 0 || ip.checksum.status == 0 || _ws.expert.severity >= 6291456"
+"""Malformed, a wrong checksum, or a warning or error of any dissector."""
+
+
+def dissected(capture: Path) -> list[str]:
+    """Function codes of the Modbus frames that tshark finds, if it has nothing to say against the capture.
+
+    An empty list where tshark is not installed."""
+
+    def tshark(*arguments: str) -> list[str]:
+        command = [str(TSHARK), "-n", "-r", str(capture), "-o", "tcp.check_checksum:TRUE",
+                   "-o", "ip.check_checksum:TRUE", *arguments]  # fmt: skip
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+
+    if not TSHARK:
+        return []
+    assert tshark("-Y", WRONG) == []
+    return tshark("-Y", "modbus", "-T", "fields", "-e", "modbus.func_code")
