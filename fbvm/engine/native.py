@@ -14,7 +14,7 @@ from fbvm.base.memory import STRUCTS, Memory
 from fbvm.code.image import Image
 from fbvm.engine import native_compiler
 from fbvm.engine.native_code import Code, code_of
-from fbvm.engine.native_context import FIELDS
+from fbvm.engine.native_context import FIELDS, new_context
 from fbvm.engine.native_entries import Entry, entry, scans
 from fbvm.engine.native_writer import Unsupported
 from fbvm.engine.trap import Trap, trap
@@ -37,10 +37,9 @@ class NativeEngine:
         self.image, self.memory, self.level = image, memory, level
         self._code: Code = code_of(image)
         self._code.prepare(level)
-        self._context = bytearray(self._code.context_size)
+        self._context = new_context(self._code.context_size, memory.size)
         self._places = [(ctypes.c_char * len(view)).from_buffer(view) for view in (memory.map, self._context)]
         self._memory_at, self._context_at = map(ctypes.addressof, self._places)
-        struct.pack_into("<q", self._context, FIELDS["size"], memory.size)
         self._entries = [self._entry(number) for number in range(len(image.tasks))]
         self._calls = [entry.call for entry in self._entries]
 

@@ -2,45 +2,98 @@
 
 from __future__ import annotations
 
-from functools import cached_property
-from weakref import WeakSet, WeakValueDictionary
+import threading
+from functools import cache, cached_property
+from weakref import WeakKeyDictionary, WeakValueDictionary
 
 from fbvm.code.image import Image
+from fbvm.engine import native_cache
+from fbvm.engine.native_cache import Stored, name_of
 from fbvm.engine.native_compiler import Linked, compile_text
 from fbvm.engine.native_context import Point
 from fbvm.engine.native_entries import Entry
-from fbvm.engine.native_module import Translation, translate
+from fbvm.engine.native_library import module_text, parts_of, routines_of
+from fbvm.engine.native_module import Translation, deep, translate
+from fbvm.engine.native_worker import worker
 
 QUICK, FAST = 0, 2
 """Levels of optimisation."""
 
 
 class Code:
-    """The code of one image at each level that somebody wanted."""
+    """The code of one image at each level that somebody wanted.
+
+    `points` and `context_size` are known once there is code."""
 
     def __init__(self, image: Image) -> None:
         self.image = image
+        self.points: tuple[Point, ...] = ()
+        self.context_size = 0
         self._tasks = [f"task{number}" for number in range(len(image.tasks))]
         self._linked: dict[int, Linked] = {}
-        self._followers: WeakSet[Entry] = WeakSet()
+        self._waiting = False
+        self._lock = threading.Lock()
+        self._followers: WeakKeyDictionary[Entry, int] = WeakKeyDictionary()
 
     @cached_property
     def translation(self) -> Translation:
+        """The image in LLVM's language."""
         return translate(self.image)
 
-    @property
-    def points(self) -> tuple[Point, ...]:
-        return self.translation.points
-
-    @property
-    def context_size(self) -> int:
-        return self.translation.context_size
+    @cached_property
+    def _fingerprint(self) -> str:
+        """All of the image that its code depends on."""
+        with deep():
+            return repr(([(body.name, body.code, body.instance_size) for body in self.image.bodies],
+                         [[(run.body, run.offset) for run in task.programs] for task in self.image.tasks]))
 
     def prepare(self, level: int | None) -> None:
-        """Have code of a level, or of any."""
-        wanted = FAST if level is None else level
-        if wanted not in self._linked:
-            self._linked[wanted] = Linked(compile_text(self.translation.text, wanted), self._tasks)
+        """Have code of a level; of None, any, and the fast one later."""
+        if level is not None:
+            if level not in self._linked:
+                self._load(level, self._known(level) or self._made(level))
+        elif FAST not in self._linked and not self._waiting:
+            known = self._known(FAST)
+            if known:
+                self._load(FAST, known)
+                return
+            if QUICK not in self._linked:
+                self._load(QUICK, self._known(QUICK) or self._made(QUICK))
+            self._waiting = True
+            worker.compile(lambda: self.translation.text, self._improve)
+
+    def _improve(self, compiled: bytes) -> None:
+        """Take fast code while quick code runs: all that follows is pointed to it.  The worker's thread does it."""
+        stored = Stored(self._facts(), compiled)
+        native_cache.write(self._name(FAST), stored)
+        self._load(FAST, stored)
+        with self._lock:
+            for entry, task in self._followers.items():
+                entry.point_to(self.address(task, None))
+
+    def _name(self, level: int) -> str:
+        return name_of(f"image {level}", self._fingerprint)
+
+    def _known(self, level: int) -> Stored | None:
+        return native_cache.read(self._name(level))
+
+    def _made(self, level: int) -> Stored:
+        stored = Stored(self._facts(), compile_text(self.translation.text, level))
+        native_cache.write(self._name(level), stored)
+        return stored
+
+    def _facts(self) -> dict[str, object]:
+        made = self.translation
+        return {"points": made.points, "context": made.context_size, "parts": parts_of(made.routines)}
+
+    def _load(self, level: int, stored: Stored) -> None:
+        facts = stored.facts
+        linked = Linked(stored.compiled, self._tasks, _addresses(facts["parts"]))
+        if not self.points:
+            self.points = tuple((code, site, tuple((kind, value) for kind, value in shown))
+                                for code, site, shown in facts["points"])
+            self.context_size = facts["context"]
+        self._linked[level] = linked
 
     def level_of(self, level: int | None) -> int:
         """The level of the code that runs for those who want `level`."""
@@ -51,9 +104,11 @@ class Code:
         return self._linked[self.level_of(level)].address(f"task{task}")
 
     def follow(self, entry: Entry, task: int, level: int | None) -> None:
-        """Point an entry to the code of a task."""
-        entry.point_to(self.address(task, level))
-        self._followers.add(entry)
+        """Point an entry to the code of a task; for level None also to better code when there is."""
+        with self._lock:
+            if level is None:
+                self._followers[entry] = task
+            entry.point_to(self.address(task, level))
 
 
 _codes: WeakValueDictionary[int, Code] = WeakValueDictionary()
@@ -65,3 +120,25 @@ def code_of(image: Image) -> Code:
     if code is None:
         code = _codes[id(image)] = Code(image)
     return code
+
+
+# --- the library ----------------------------------------------------------------------------------------------------
+
+
+def _addresses(parts: list[int]) -> dict[str, int]:
+    """Where the routines of some parts of the library are, each with those before it."""
+    return _part(max(parts))[1] if parts else {}
+
+
+@cache
+def _part(number: int) -> tuple[Linked, dict[str, int]]:
+    """A part in memory, and the addresses of its routines and of those before."""
+    before = _part(number - 1)[1] if number else {}
+    name = name_of(f"library {number}")
+    stored = native_cache.read(name)
+    if stored is None:
+        stored = Stored({"names": routines_of(number)}, compile_text(module_text(number), FAST))
+        native_cache.write(name, stored)
+    names = stored.facts["names"]
+    linked = Linked(stored.compiled, names, before)
+    return linked, before | {routine: linked.address(routine) for routine in names}

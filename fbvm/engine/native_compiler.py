@@ -6,14 +6,14 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.util import find_spec
 from itertools import count
 from typing import Any
 
-from fbvm.engine.native_module import MATH
-
+MATH = {"ln": 1, "log": 1, "exp": 1, "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "pow": 2, "atan2": 2}
+"""Functions of doubles that objects call, by their names in the table of operations, and how many they take."""
 _NUMBERS = count(1)
 _LIBRARIES = {"linux": "libm.so.6", "win32": "ucrtbase"}
 """Where the functions of C's math.h are that Python's `math` calls; elsewhere they come with the process."""
@@ -46,8 +46,11 @@ def llvm() -> Any:
 @cache
 def _symbols() -> dict[str, int]:
     """Functions that objects call, by the names that modules give them."""
-    library = ctypes.CDLL(_LIBRARIES.get(sys.platform))
-    found = {name: getattr(library, _NAMES.get(name, name)) for name in (*MATH, "pow", "atan2")}
+    try:
+        library = ctypes.CDLL(_LIBRARIES.get(sys.platform))
+    except OSError:
+        library = ctypes.CDLL(None)
+    found = {name: getattr(library, _NAMES.get(name, name)) for name in MATH}
     found |= {name: getattr(ctypes.pythonapi, function) for name, function in _PYTHON.items()}
     return {f"fbvm_{name}": _address(function) for name, function in found.items()}
 
@@ -116,11 +119,12 @@ def _jit() -> Any:
 class Linked:
     """An object in memory, ready to be called.  It stays as long as somebody has this.
 
-    `exports` are the functions and variables whose addresses are wanted.  Raises RuntimeError for a damaged object."""
+    `exports` are the functions and variables whose addresses are wanted, `others` functions that it may call besides
+    those of the host.  Raises RuntimeError for a damaged object."""
 
-    def __init__(self, compiled: bytes, exports: Iterable[str]) -> None:
+    def __init__(self, compiled: bytes, exports: Iterable[str], others: Mapping[str, int] | None = None) -> None:
         builder = llvm().JITLibraryBuilder().add_object_img(compiled).add_current_process()
-        for name, address in _symbols().items():
+        for name, address in (_symbols() | dict(others or {})).items():
             builder.import_symbol(name, address)
         for name in exports:
             builder.export_symbol(name)

@@ -10,6 +10,8 @@ from collections.abc import Callable
 from functools import cache
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
+from fbvm.engine import native_cache
+from fbvm.engine.native_cache import Stored, name_of
 from fbvm.engine.native_compiler import Linked, compile_text
 
 BLOCK = 64
@@ -95,9 +97,16 @@ _open: list[_Block] = []
 
 @cache
 def _compiled() -> bytes:
+    """The object of a block."""
     entries = [_ENTRY.format(number, *(SLOT_BYTES * number + part for part in (0, 8, 16))) for number in range(BLOCK)]
     head = f"@slots = global [{SLOT_BYTES * BLOCK} x i8] zeroinitializer, align 8"
-    return compile_text("\n".join([head, *entries, _SCANS]), 2)
+    text = "\n".join([head, *entries, _SCANS])
+    name = name_of("entries", text)
+    stored = native_cache.read(name)
+    if stored is None:
+        stored = Stored({}, compile_text(text, 2))
+        native_cache.write(name, stored)
+    return stored.compiled
 
 
 def entry() -> Entry:

@@ -3,11 +3,25 @@
 from __future__ import annotations
 
 from fbvm.engine.native_reading import (
-    CANONICAL_NAN, DATE, DT, GOOD, LREAL, MALFORMED, REAL, SIGN, STRING, TIME, TOD, kind_of, place_of, read_clock,
-    read_date, read_duration, read_moment, read_number, says,
-)  # fmt: skip
+    CANONICAL_NAN,
+    DATE,
+    DT,
+    GOOD,
+    LREAL,
+    MALFORMED,
+    REAL,
+    SIGN,
+    STRING,
+    TIME,
+    TOD,
+    kind_of,
+    place_of,
+    read_number,
+    says,
+)
 from fbvm.engine.native_routines import INFINITE
 from fbvm.engine.native_subset import data, peek, poke_all
+from fbvm.engine.native_times import read_clock, read_date, read_duration, read_moment
 
 
 def read_special(out: int, at: int, n: int) -> int:
@@ -68,7 +82,7 @@ def read_value(out: int, wanted: int, at: int, n: int) -> int:
         else:
             at += mark + 1
             n -= mark + 1
-    if kind == wanted and (kind == REAL or kind == LREAL) and read_special(out, at, n) == GOOD:
+    if kind == wanted and REAL <= kind <= LREAL and read_special(out, at, n) == GOOD:
         return GOOD
     status = read_typed(out, kind, at, n)
     if status == GOOD and kind != wanted:

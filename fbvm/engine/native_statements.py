@@ -6,11 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.areas import BUDGET, DUE
-from fbvm.base.arithmetic import width
 from fbvm.code.operations import SIZES, Address, Block, Node
-from fbvm.engine.native_expressions import canonical_bits, flag_mask, signed
+from fbvm.engine.native_expressions import flag_mask, signed
 from fbvm.engine.native_texts import keep
-from fbvm.engine.native_writer import RARE, Writer, ir, stored
+from fbvm.engine.native_writer import RARE, TRAPPED, Writer, ir, stored
 from fbvm.engine.ranges import is_float
 from fbvm.engine.statements import case_table
 
@@ -30,18 +29,28 @@ def _store_raw(w: Writer, machine: str, address: Address, a: Node) -> None:
 
 
 def _put(w: Writer, machine: str, address: Address, a: Node, align: int) -> None:
-    pointer = w.pointer(address, SIZES[machine])
-    to_memory(w, machine, pointer, a, align, w.scope(address, SIZES[machine]))
+    pointer, scope = w.pointer(address, SIZES[machine]), w.scope(address, SIZES[machine])
+    to_memory(w, machine, pointer, a, align, scope)
+    w.reload(scope)
 
 
 def to_memory(w: Writer, machine: str, pointer: str, a: Node, align: int, scope: str) -> None:
     """Store a value as memory holds it."""
-    value, kind = w.value(a), stored(machine)
+    value, kind, how = w.value(a), stored(machine), f"align {align}{scope}"
     if machine == "b":
         value = w.new(f"zext i1 {value} to i8")
     elif is_float(machine) and not (a[0] == "const" or (a[0] == "convert" and not is_float(a[2]))):
-        value, kind = canonical_bits(w, value, machine), f"i{width(machine)}"
-    w.emit(f"store {kind} {value}, ptr {pointer}, align {align}{scope}")
+        bad, good, after = w.label("x"), w.label(), w.label()
+        w.emit(f"br i1 {w.new(f'fcmp uno {kind} {value}, {value}')}, label %{bad}, label %{good}, {RARE}")
+        with w.aside(bad):
+            w.emit(f"store {kind} {w.new(f'load {kind}, ptr {w.field(machine)}')}, ptr {pointer}, {how}")
+            w.emit(f"br label %{after}")
+        w.begin(good)
+        w.emit(f"store {kind} {value}, ptr {pointer}, {how}")
+        w.jump(after)
+        w.begin(after)
+        return
+    w.emit(f"store {kind} {value}, ptr {pointer}, {how}")
 
 
 def _store_bit(w: Writer, address: Address, bit: int, a: Node) -> None:
@@ -51,6 +60,7 @@ def _store_bit(w: Writer, address: Address, bit: int, a: Node) -> None:
     cleared = w.new(f"and i8 {byte}, {~(1 << bit)}")
     moved = w.new(f"shl i8 {w.new(f'zext i1 {value} to i8')}, {bit}")
     w.emit(f"store i8 {w.new(f'or i8 {cleared}, {moved}')}, ptr {pointer}{scope}")
+    w.reload(scope)
 
 
 def _store_flag(w: Writer, address: Address, a: Node) -> None:
@@ -65,6 +75,7 @@ def _store_flag(w: Writer, address: Address, a: Node) -> None:
     changed = w.new(f"select i1 {value}, i8 {w.new(f'or i8 {byte}, {mask}')}, i8 {cleared}")
     full = w.new(f"zext i1 {value} to i8")
     w.emit(f"store i8 {w.new(f'select i1 {whole}, i8 {full}, i8 {changed}')}, ptr {pointer}")
+    w.reload("")
 
 
 def _store_text(w: Writer, address: Address, capacity: int, a: Node) -> None:
@@ -73,11 +84,13 @@ def _store_text(w: Writer, address: Address, capacity: int, a: Node) -> None:
     length = w.new(f"call i64 @llvm.umin.i64(i64 {text.length}, i64 {capacity})")
     w.emit(f"call void @llvm.memmove.p0.p0.i64(ptr {pointer}, ptr {text.at}, i64 {length}, i1 false)")
     w.emit(f"store i8 0, ptr {w.new(f'getelementptr inbounds i8, ptr {pointer}, i64 {length}')}")
+    w.reload(w.scope(address, capacity + 1))
 
 
 def _copy(w: Writer, to: Address, source: Address, size: int) -> None:
     target, origin = w.pointer(to, size), w.pointer(source, size)
     w.emit(f"call void @llvm.memmove.p0.p0.i64(ptr {target}, ptr {origin}, i64 {size}, i1 false)")
+    w.reload(w.scope(to, size))
 
 
 def _fill(w: Writer, address: Address, pattern: bytes) -> None:
@@ -87,6 +100,7 @@ def _fill(w: Writer, address: Address, pattern: bytes) -> None:
     else:
         origin = w.module.constant(pattern)
         w.emit(f"call void @llvm.memcpy.p0.p0.i64(ptr {pointer}, ptr {origin}, i64 {len(pattern)}, i1 false)")
+    w.reload(w.scope(address, len(pattern)))
 
 
 def _let(w: Writer, number: int, machine: str, a: Node) -> None:
@@ -169,29 +183,37 @@ def _next(w: Writer) -> None:
 
 
 def _return(w: Writer) -> None:
-    w.emit("ret i32 0")
-    w.dead = True
+    w.give_back()
 
 
 def _call(w: Writer, pou: int, address: Address | None) -> None:
     size = w.module.image.bodies[pou].instance_size
     place = w.offset(address, max(1, size)) if address else "0"
-    point = w.new(f"call i32 @b{pou}(ptr %m, ptr %c, i64 {place})")
+    left = w.new("load i64, ptr %budget")
+    result = w.new(f"call fastcc i64 @b{pou}(ptr %m, ptr %c, i64 {place}, i64 {left})")
     bad, good = w.label("x"), w.label()
-    w.emit(f"br i1 {w.new(f'icmp ne i32 {point}, 0')}, label %{bad}, label %{good}, {RARE}")
-    w.cold += [f"{bad}:", f"ret i32 {point}"]
+    w.emit(f"br i1 {w.new(f'icmp slt i64 {result}, {TRAPPED}')}, label %{bad}, label %{good}, {RARE}")
+    with w.aside(bad):
+        w.emit(f"ret i64 {result}")
     w.begin(good)
+    w.emit(f"store i64 {result}, ptr %budget")
 
 
 def _charge(w: Writer, count: int, site: int) -> None:
-    left = w.new(f"sub i64 {w.system(BUDGET)}, {count}")
+    left = w.new(f"sub i64 {w.new('load i64, ptr %budget')}, {count}")
+    w.emit(f"store i64 {left}, ptr %budget")
     w.put_system(BUDGET, left)
     w.trap_if(w.new(f"icmp slt i64 {left}, 0"), "R0104", site)
 
 
 def _due(w: Writer, a: Node) -> None:
     value = w.value(a)
-    w.put_system(DUE, w.new(f"call i64 @llvm.smin.i64(i64 {value}, i64 {w.system(DUE)})"))
+    sooner, after = w.label(), w.label()
+    w.branch(w.new(f"icmp slt i64 {value}, {w.system(DUE)}"), sooner, after)
+    w.begin(sooner)
+    w.put_system(DUE, value)
+    w.jump(after)
+    w.begin(after)
 
 
 def _stop(w: Writer, code: str, site: int) -> None:

@@ -89,6 +89,9 @@ _INLINE = {
     "free_text": ("{u}p = inttoptr i64 {0} to ptr", "call void @fbvm_free(ptr {u}p)"),
 }
 """The functions above as instructions: {u} begins the names of one use, {u}r is what it yields."""
+OUTSIDE = ("declare ptr @fbvm_double_to_string(double, i8 signext, i32, i32, ptr)",
+           "declare double @fbvm_string_to_double(ptr, ptr, ptr)", "declare void @fbvm_free(ptr)")
+"""Functions outside that these instructions call."""
 _SIGNS: dict[type, str] = {
     ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.FloorDiv: "udiv", ast.Mod: "urem", ast.BitAnd: "and",
     ast.BitOr: "or", ast.BitXor: "xor", ast.LShift: "shl", ast.RShift: "lshr",
@@ -115,7 +118,7 @@ class Routine:
         self.block(self.function.body)
         if not self.dead:
             self.lines.append("ret i64 0")
-        head = f"define internal i64 @{self.function.name}({', '.join(f'i64 %a.{name}' for name in arguments)}) #1 {{"
+        head = f"define i64 @{self.function.name}({', '.join(f'i64 %a.{name}' for name in arguments)}) #1 {{"
         start = [f"%{name} = alloca i64" for name in self.variables]
         start += [f"store i64 %a.{name}, ptr %{name}" for name in arguments]
         return [head, *start, *self.lines, "}"]
@@ -149,7 +152,9 @@ class Routine:
         if isinstance(node, ast.Assign | ast.AugAssign):
             target = node.target if isinstance(node, ast.AugAssign) else node.targets[0]
             assert isinstance(target, ast.Name)
-            value = ast.BinOp(ast.Name(target.id, ast.Load()), node.op, node.value) if isinstance(node, ast.AugAssign) else node.value
+            value = node.value
+            if isinstance(node, ast.AugAssign):
+                value = ast.BinOp(ast.Name(target.id, ast.Load()), node.op, value)
             number = self.value(value)
             self.variables[target.id] = None
             self.lines.append(f"store i64 {number}, ptr %{target.id}")
@@ -210,6 +215,7 @@ class Routine:
 
     def value(self, node: ast.expr) -> str:
         if isinstance(node, ast.Constant):
+            assert isinstance(node.value, int)
             return str(int(node.value))
         if isinstance(node, ast.Name):
             if node.id in self.variables:
@@ -232,6 +238,7 @@ class Routine:
         if name == "data":
             content = operands[0]
             value = content.value if isinstance(content, ast.Constant) else self.names[ast.unparse(content)]
+            assert isinstance(value, bytes)
             return self.new(f"ptrtoint ptr {self.constant(value)} to i64")
         numbers = [self.value(operand) for operand in operands]
         if name not in _INLINE:

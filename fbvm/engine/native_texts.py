@@ -266,7 +266,7 @@ def from_text(w: Writer, machine: str, data_type: str, a: Node, site: int) -> st
     at = w.integer(text.at)
     kind = KINDS[SHORT_NAMES.get(data_type, data_type)]
     status = w.call("read_value", w.integer(result), str(kind), at, text.length)
-    shown = ("text", at, text.length), ("const", data_type)
+    shown: tuple[tuple[Any, ...], ...] = (("text", at, text.length), ("const", data_type))
     w.trap_if(w.new(f"icmp eq i64 {status}, 1"), "R0111", site, *shown)
     w.trap_if(w.new(f"icmp eq i64 {status}, 2"), "R0105", site, *shown)
     number = w.new(f"load i64, ptr {result}, align 8")

@@ -1,35 +1,32 @@
 """What the rows of native code write with: names, blocks, addresses, traps and constants of one body in LLVM's language.
 
-A body is a function `i32 (ptr %m, ptr %c, i64 %self)`: the flat memory, the context (see `native_context`), the place of
-its instance.  It returns 0, or the number of the point at which the run has to end, whose values are in the context."""
+A body is a function `i64 (ptr %m, ptr %c, i64 %self, i64 %left)`: the flat memory, the context (see `native_context`), the
+place of its instance, the step budget.  It returns what is left of the budget; or, far below 0, the point at which the
+run has to end, whose values are in the context.  The budget is stored whenever it changes, but not read back, which would
+make each charge wait for the one before."""
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from fbvm.base.areas import PAGE_BYTES
+from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import single, width
 from fbvm.code.image import Image
 from fbvm.code.operations import Address, Block, Node
+from fbvm.engine.native_calls import Range
 from fbvm.engine.native_context import FIELDS, SCRATCH, Point, Shown
+from fbvm.engine.native_regions import SYSTEM, Regions
 from fbvm.engine.ranges import is_float, span
 
 NAN_BITS = {"f32": "0x7FF8000000000000", "f64": "0x7FF8000000000000"}
 """The canonical NaN as LLVM writes it; a float's digits are those of the double of that value."""
-SYSTEM, PROGRAM = ", !alias.scope !2, !noalias !3", ", !alias.scope !3, !noalias !2"
-"""What marks accesses to words of the system page, and to memory that no such word lies in."""
-METADATA = """\
-!0 = !{!"branch_weights", i32 1, i32 4000}
-!1 = !{}
-!2 = !{!4}
-!3 = !{!5}
-!4 = distinct !{!4, !6, !"system page"}
-!5 = distinct !{!5, !6, !"program"}
-!6 = distinct !{!6, !"memory"}
-"""
+ENDED = -(1 << 63)
+"""What a body returns for point 0; below `TRAPPED` there are points, above it budgets."""
+TRAPPED = -(1 << 62)
 RARE = "!prof !0"
 """What marks a branch whose first way is hardly ever taken."""
 
@@ -76,6 +73,8 @@ class Module:
 
     image: Image
     bases: Mapping[int, int]
+    instances: Mapping[int, Range]
+    heights: Mapping[int, int]
     points: list[Point]
     constants: dict[bytes, str]
     routines: set[str]
@@ -107,6 +106,7 @@ class Writer:
     def __init__(self, module: Module, number: int) -> None:
         self.module, self.body = module, module.image.bodies[number]
         self.base = module.bases.get(number)
+        self.regions = Regions(module.instances[number])
         self.lines: list[str] = []
         self.cold: list[str] = []
         self.here = "entry"
@@ -156,6 +156,14 @@ class Writer:
             if self.dead:
                 return
             self.statements[node[0]](self, *node[1:])
+
+    @contextmanager
+    def aside(self, label: str) -> Iterator[None]:
+        """What is written meanwhile becomes a block at the end of the body, out of the way."""
+        hot, self.lines = self.lines, [f"{label}:"]
+        yield
+        self.cold += self.lines
+        self.lines = hot
 
     # --- operands
 
@@ -212,32 +220,45 @@ class Writer:
         return self.new(f"getelementptr inbounds i8, ptr %m, i64 {offset}")
 
     def scope(self, address: Address, count: int) -> str:
-        """What marks an access that cannot meet the words that charge, due and now use."""
-        base, offset, _ = address
-        return "" if isinstance(base, tuple) or (base == "abs" and offset < PAGE_BYTES) else PROGRAM
+        """What marks an access, so that LLVM knows what it cannot meet."""
+        if self.loose(address):
+            return ""
+        base, offset, terms = address
+        if base == "self" and self.base is not None:
+            base, offset = "abs", offset + self.base
+        return self.regions.mark(base == "self", (base, offset, terms), count)
 
     @staticmethod
     def loose(address: Address) -> bool:
         """True for an address behind a reference, which may lie anywhere."""
         return isinstance(address[0], tuple)
 
+    def reload(self, scope: str) -> None:
+        """Behind a store without mark, which may have met the step budget: read it anew."""
+        if not scope:
+            self.emit(f"store i64 {self.system(BUDGET)}, ptr %budget")
+
     # --- traps
 
-    def trap_if(self, condition: str, code: str, site: int, *shown: tuple[str, str] | Shown) -> None:
+    def trap_if(self, condition: str, code: str, site: int, *shown: tuple[Any, ...]) -> None:
         """End the run if the condition is TRUE.
 
         `shown` are the values of the trap: (machine type, operand), ("text", at, length) or ("const", value)."""
         bad, good = self.label("x"), self.label()
         self.emit(f"br i1 {condition}, label %{bad}, label %{good}, {RARE}")
-        hot, self.lines = self.lines, [f"{bad}:"]
-        self._end(code, site, shown)
-        self.cold += self.lines
-        self.lines = hot
+        with self.aside(bad):
+            self._end(code, site, shown)
         self.begin(good)
 
     def trap(self, code: str, site: int) -> None:
         """End the run."""
         self._end(code, site, ())
+        self.dead = True
+
+    def give_back(self) -> None:
+        """Leave the body."""
+        left = self.new("load i64, ptr %budget")
+        self.emit(f"ret i64 {left}")
         self.dead = True
 
     def _end(self, code: str, site: int, shown: tuple[Any, ...]) -> None:
@@ -251,7 +272,7 @@ class Writer:
                 at = self.new(f"getelementptr inbounds i8, ptr %c, i64 {FIELDS['values'] + 8 * place}")
                 self.emit(f"store i64 {number}, ptr {at}")
                 place += 1
-        self.emit(f"ret i32 {self.module.point(code, site, tuple(kinds))}")
+        self.emit(f"ret i64 {ENDED + self.module.point(code, site, tuple(kinds))}")
 
     def _raw(self, kind: str, operand: str) -> str:
         """The 64 bits in which a value of a trap is told."""

@@ -1,0 +1,76 @@
+"""Who calls whom in an image: which bodies are executed at all, how many calls are inside one another, for which instances."""
+
+from __future__ import annotations
+
+from fbvm.code.image import Image
+from fbvm.code.operations import Address
+from fbvm.code.shapes import statements
+from fbvm.engine.ranges import span
+
+Range = tuple[int, int]
+"""First byte, and first byte behind."""
+ANYWHERE: Range = (-(1 << 62), 1 << 62)
+Calls = dict[int, list[tuple[int, Address | None]]]
+"""For each body that is executed, those after it that call it come last: its calls and their instances' addresses."""
+
+
+def call_graph(image: Image) -> Calls:
+    """The calls of every body that a task reaches; a body stands behind all that it calls."""
+    graph: Calls = {}
+    waiting = [run.body for task in image.tasks for run in task.programs]
+    known: Calls = {}
+    while waiting:
+        number = waiting[-1]
+        if number not in known:
+            known[number] = [(node[1], node[2]) for node in statements(image.bodies[number].code) if node[0] == "call"]
+        missing = [called for called, _ in known[number] if called not in graph]
+        if missing:
+            waiting += missing
+            continue
+        waiting.pop()
+        graph[number] = known[number]
+    return graph
+
+
+def heights(graph: Calls) -> dict[int, int]:
+    """For each body how many calls are at most inside one another below it."""
+    found: dict[int, int] = {}
+    for number, called in graph.items():
+        found[number] = max((found[other] + 1 for other, _ in called), default=0)
+    return found
+
+
+def instance_places(image: Image, graph: Calls) -> dict[int, Range]:
+    """For each body the bytes of the buffer among which its instances begin."""
+    places: dict[int, Range] = {}
+    for task in image.tasks:
+        for run in task.programs:
+            _add(places, run.body, (run.offset, run.offset + 1))
+    for caller, calls in reversed(graph.items()):
+        for called, address in calls:
+            _add(places, called, _called_at(address, places[caller]))
+    return places
+
+
+def _add(places: dict[int, Range], number: int, more: Range) -> None:
+    low, high = places.get(number, more)
+    places[number] = min(low, more[0]), max(high, more[1])
+
+
+def _called_at(address: Address | None, caller: Range) -> Range:
+    if address is None:
+        return 0, 1
+    if isinstance(address[0], tuple):
+        return ANYWHERE
+    low, high = reached(address, 1)
+    return (low + caller[0], high + caller[1] - 1) if address[0] == "self" else (low, high)
+
+
+def reached(address: Address, count: int) -> Range:
+    """The bytes that an address without reference can reach, counted as it counts."""
+    _, low, terms = address
+    high = low + count
+    for stride, term in terms:
+        edges = [stride * edge for edge in span(term)]
+        low, high = low + min(edges), high + max(edges)
+    return low, high

@@ -1,0 +1,63 @@
+"""The library: routines of native code, compiled once for all images, each part when the first image calls for it."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+from collections.abc import Iterable, Mapping
+from functools import cache
+from types import ModuleType
+
+from fbvm.engine import native_literals, native_reading, native_routines, native_times
+from fbvm.engine.native_subset import OUTSIDE, Routine
+
+PARTS: tuple[tuple[ModuleType, ...], ...] = ((native_routines,), (native_reading, native_times, native_literals))
+"""Modules of routines that are compiled together; a part may call those before it."""
+
+
+@cache
+def _functions(part: int) -> dict[str, tuple[ast.FunctionDef, ModuleType]]:
+    """The routines of a part by name."""
+    return {node.name: (node, module) for module in PARTS[part] for node in ast.parse(inspect.getsource(module)).body
+            if isinstance(node, ast.FunctionDef)}
+
+
+def parts_of(routines: Iterable[str]) -> list[int]:
+    """The parts that hold routines, and those that these call."""
+    last = max((part for part in range(len(PARTS)) for name in routines if name in _functions(part)), default=-1)
+    return list(range(last + 1))
+
+
+def routines_of(part: int) -> list[str]:
+    """The names of a part's routines."""
+    return list(_functions(part))
+
+
+def declaration(name: str) -> str:
+    """What a module says that calls a routine."""
+    function = next(_functions(part)[name][0] for part in range(len(PARTS)) if name in _functions(part))
+    return f"declare i64 @{name}({', '.join('i64' for _ in function.args.args)}) #1"
+
+
+def module_text(part: int) -> str:
+    """A part as a module of LLVM's language."""
+    constants: dict[bytes, str] = {}
+    own = _functions(part)
+    lines: list[str] = []
+    called: set[str] = set()
+    for function, source in own.values():
+        routine = Routine(function, vars(source), lambda value: constants.setdefault(value + b"\0", f"@k{len(constants)}"))
+        lines += routine.translate()
+        called |= routine.calls
+    declared = [declaration(name) for name in sorted(called - set(own))]
+    return "\n".join([*definitions(constants), *lines, *declared, *OUTSIDE, "attributes #1 = { nounwind }"])
+
+
+def definitions(constants: Mapping[bytes, str]) -> list[str]:
+    """Constant bytes by their names."""
+    return [f"{name} = private unnamed_addr constant [{len(value)} x i8] {_bytes(value)}"
+            for value, name in constants.items()]
+
+
+def _bytes(value: bytes) -> str:
+    return 'c"' + "".join(f"\\{byte:02X}" for byte in value) + '"'

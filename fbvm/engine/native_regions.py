@@ -1,0 +1,107 @@
+"""Which accesses of a body cannot meet: told to LLVM, which then keeps values in registers across stores elsewhere.
+
+LLVM sees by itself that two constant places of one base differ.  Told are the ranges that computed subscripts reach, that
+an instance lies apart from the areas, and that no variable lies among the words of the system page."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+from fbvm.base.areas import PAGE_BYTES
+from fbvm.code.operations import Address
+from fbvm.engine.native_calls import Range, reached
+
+Access = tuple[bool, int, int, bool]
+"""Whether it counts from the instance, first byte, first byte behind, whether its place is computed."""
+MOST = 16
+"""Ranges of computed subscripts that are told apart in one body."""
+SYSTEM = ", !alias.scope !2, !noalias !3"
+"""What marks accesses to words of the system page."""
+METADATA = """\
+!0 = !{!"branch_weights", i32 1, i32 4000}
+!1 = !{}
+!2 = !{!4}
+!3 = !{!5}
+!4 = distinct !{!4, !6, !"system page"}
+!5 = distinct !{!5, !6, !"program"}
+!6 = distinct !{!6, !"memory"}
+"""
+FIRST_NUMBER = 7
+"""Of metadata that bodies add."""
+_MARK = re.compile(r" §(\d+)")
+
+
+@dataclass
+class Regions:
+    """The accesses of one body.  `instances` is where its instances begin, in bytes of the buffer."""
+
+    instances: Range
+    accesses: dict[Access, int] = field(default_factory=dict)
+
+    def mark(self, from_instance: bool, address: Address, count: int) -> str:
+        """A mark for an access, which `resolve` replaces; "" if it could meet the words of the system page."""
+        low, high = reached(address, count)
+        low_in_buffer = low + (self.instances[0] if from_instance else 0)
+        if low_in_buffer < PAGE_BYTES or high > 1 << 40:
+            return ""
+        access = (from_instance, low, high, bool(address[2]))
+        return f" §{self.accesses.setdefault(access, len(self.accesses))}"
+
+    def resolve(self, text: str, number: int) -> tuple[str, list[str]]:
+        """The text with what the marks stand for, and definitions whose numbers begin with `number`."""
+        groups = self._groups()
+        count = max(groups, default=-1) + 1
+        if count < 2:
+            return _MARK.sub(", !alias.scope !3, !noalias !2", text), []
+        apart = [[other for other in range(count) if other != group and self._apart(groups, group, other)]
+                 for group in range(count)]
+        lines = [f"!{number} = distinct !{{!{number}}}"]
+        lines += [f"!{number + 1 + group} = distinct !{{!{number + 1 + group}, !{number}}}" for group in range(count)]
+        at = number + 1 + count
+        for group in range(count):
+            lines.append(f"!{at + 2 * group} = !{{!5, !{number + 1 + group}}}")
+            others = "".join(f", !{number + 1 + other}" for other in apart[group])
+            lines.append(f"!{at + 2 * group + 1} = !{{!4{others}}}")
+        marks = [f", !alias.scope !{at + 2 * group}, !noalias !{at + 2 * group + 1}" for group in groups]
+        return _MARK.sub(lambda match: marks[int(match[1])], text), lines
+
+    def _groups(self) -> list[int]:
+        """The number of each access's group: one for each run of computed places, then the constant ones apart from
+        them all by base; a constant place among computed ones belongs to those."""
+        runs: list[list[Access]] = []
+        for access in self.accesses:
+            if access[3]:
+                meeting = [run for run in runs if any(self._meet(access, other) for other in run)]
+                runs = [run for run in runs if run not in meeting] + [[access, *(a for run in meeting for a in run)]]
+        if len(runs) > MOST:
+            runs = [[access for run in runs for access in run]]
+        changed = True
+        while changed:  # a constant place that meets two runs makes them one
+            changed = False
+            for access in self.accesses:
+                meeting = [run for run in runs if any(self._meet(access, other) for other in run)]
+                if len(meeting) > 1:
+                    runs = [run for run in runs if run not in meeting] + [[a for run in meeting for a in run]]
+                    changed = True
+        self._members: list[list[Access]] = [list(run) for run in runs] + [[], []]
+        groups = []
+        for access in self.accesses:
+            group = next((place for place, run in enumerate(runs) if any(self._meet(access, other) for other in run)),
+                         len(runs) + access[0])
+            self._members[group].append(access)
+            groups.append(group)
+        return groups
+
+    def _apart(self, groups: list[int], a: int, b: int) -> bool:
+        return not any(self._meet(one, other) for one in self._members[a] for other in self._members[b])
+
+    def _meet(self, a: Access, b: Access) -> bool:
+        """True if two accesses can touch the same byte."""
+        first, second = self._bytes(a, a[0] == b[0]), self._bytes(b, a[0] == b[0])
+        return first[0] < second[1] and second[0] < first[1]
+
+    def _bytes(self, access: Access, one_base: bool) -> Range:
+        if one_base or not access[0]:
+            return access[1], access[2]
+        return access[1] + self.instances[0], access[2] + self.instances[1] - 1

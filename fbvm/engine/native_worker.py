@@ -1,0 +1,96 @@
+"""The compiler's helper process: optimises while this process goes on scanning, and ends with it.
+
+Optimising a large program takes seconds, which would hold LLVM for others in this process and could not be broken off.
+One thread, the only one in the house, waits for the answers."""
+
+from __future__ import annotations
+
+import atexit
+import os
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable
+from typing import IO
+
+_SIZE_BYTES = 8
+
+
+def serve(jobs: IO[bytes], answers: IO[bytes]) -> None:
+    """Compile one module after the other until nobody asks any more; an answer of no bytes tells that it failed."""
+    from fbvm.engine.native_compiler import compile_text
+
+    while len(head := jobs.read(_SIZE_BYTES)) == _SIZE_BYTES:
+        text = jobs.read(int.from_bytes(head, "little")).decode()
+        try:
+            compiled = compile_text(text, 2)
+        except RuntimeError:
+            compiled = b""
+        answers.write(len(compiled).to_bytes(_SIZE_BYTES, "little") + compiled)
+        answers.flush()
+
+
+class Worker:
+    """The helper process of this process, started with the first job."""
+
+    def __init__(self) -> None:
+        self._jobs: deque[tuple[Callable[[], str], Callable[[bytes], None]]] = deque()
+        self._lock = threading.Lock()
+        self._busy = False
+        self._process: subprocess.Popen[bytes] | None = None
+        self._owner = os.getpid()
+
+    def compile(self, text: Callable[[], str], done: Callable[[bytes], None]) -> None:
+        """Have a module optimised; `done` is told its object, in the thread.  If that is not possible, it never is."""
+        with self._lock:
+            self._jobs.append((text, done))
+            if not self._busy:
+                self._busy = True
+                threading.Thread(target=self._work, name="fbvm compiler", daemon=True).start()
+
+    def _work(self) -> None:
+        while True:
+            with self._lock:
+                if not self._jobs:
+                    self._busy = False
+                    return
+                text, done = self._jobs.popleft()
+            compiled = self._answer(text().encode())
+            if compiled:
+                done(compiled)
+
+    def _answer(self, text: bytes) -> bytes:
+        try:
+            process = self._started()
+            assert process.stdin and process.stdout
+            process.stdin.write(len(text).to_bytes(_SIZE_BYTES, "little") + text)
+            process.stdin.flush()
+            head = process.stdout.read(_SIZE_BYTES)
+            return process.stdout.read(int.from_bytes(head, "little")) if len(head) == _SIZE_BYTES else b""
+        except (OSError, ValueError):
+            return b""
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        if self._process is None or self._process.poll() is not None or self._owner != os.getpid():
+            program = (f"import sys; sys.path[:] = {sys.path!r}\n"
+                       "from fbvm.engine.native_worker import serve\nserve(sys.stdin.buffer, sys.stdout.buffer)")
+            self._process = subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE,
+                                             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+            self._owner = os.getpid()
+            atexit.register(self.stop)
+        return self._process
+
+    def stop(self) -> None:
+        """End the helper process, whatever it is doing."""
+        process, self._process = self._process, None
+        if process is None or self._owner != os.getpid():
+            return
+        process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout):
+            if pipe:
+                pipe.close()
+
+
+worker = Worker()
