@@ -21,6 +21,8 @@ from fbvm.wire.tap import Happening, Tap, What
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 TCP, UDP = "tcp", "udp"
 FD_SETSIZE = 1024
+MAX_CALLERS = 64
+"""Callers that a listener looks at in one scan; the others wait in the host."""
 MAX_ORPHANS = 64
 ORPHAN_LIMIT_NS = 10_000_000_000
 """A closed connection gets so long to send its rest and to hear the peer's FIN, then it is reset."""

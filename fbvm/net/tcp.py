@@ -18,7 +18,7 @@ from contextlib import suppress
 
 from fbvm.net.addresses import AddressMap, fits, impossible
 from fbvm.net.channels import ANYBODY, MAX_DATAGRAM_BYTES, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink
-from fbvm.net.switchboard import READ, TCP, UDP, WRITE, Switchboard, Watcher, errno_name
+from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, UDP, WRITE, Switchboard, Watcher, errno_name
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import What
 
@@ -181,7 +181,9 @@ class _Door(_OnHost):
         self.network.watch(sock, READ, self)
 
     def ready(self, ready: int, now_ns: int) -> None:
-        while self.sock:
+        for _ in range(MAX_CALLERS):
+            if self.sock is None:
+                return
             try:
                 conn, name = self.sock.accept()
             except (BlockingIOError, ConnectionAbortedError):
