@@ -1,0 +1,13 @@
+"""Tests of function blocks with pytest: the fixtures `fb`, `plc` and `network`, and tests written in ST.
+
+The plugin is found by pytest when the package is installed.  `Rig` is what the fixtures give; `ns` turns `"50ms"` into
+nanoseconds, as which TIME values are read.
+"""
+
+from __future__ import annotations
+
+from fbvm.testing.rig import Rig, Trapped
+from fbvm.testing.values import Values
+from fbvm.watch.values import parse_time_ns as ns
+
+__all__ = ["Rig", "Trapped", "Values", "ns"]

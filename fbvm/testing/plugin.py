@@ -1,0 +1,170 @@
+"""The pytest plugin: fixtures for blocks, programs and networks, failures that explain themselves, tests in ST.
+
+    def test_the_pump_waits(fb):
+        pump = fb("src/pump.st::Pump", cycle="10ms")
+        pump.run("50ms", Start=True)
+        assert pump.Running
+
+Files are looked for beside the test, then from the folder where pytest.ini or pyproject.toml lies.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+
+import pytest
+
+if TYPE_CHECKING:
+    from fbvm.net.loop import LoopNetwork
+    from fbvm.testing.rig import Rig
+    from fbvm.testing.st_items import StFile
+    from fbvm.testing.subject import Stub
+
+RIGS: pytest.StashKey[list[Rig]] = pytest.StashKey()
+"""The rigs that a test has made."""
+SOURCE_FOLDER = "src"
+"""Where a project keeps its blocks, below the folder of its pytest.ini or pyproject.toml."""
+
+
+class RigMaker(Protocol):
+    """What the fixtures `fb` and `plc` are: called, they give a rig."""
+
+    def __call__(self, what: str, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
+                 sources: Sequence[str] = (), text: str = "", libraries: Sequence[str] = (),
+                 **given: Any) -> Rig: ...  # fmt: skip
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addini("fbvm_libraries", "folders of libraries of function blocks", type="paths", default=[])
+
+
+@pytest.fixture
+def fb(request: pytest.FixtureRequest) -> RigMaker:
+    """One function block, function or program on a test rig: `fb("src/pump.st::Pump", cycle="10ms")`, `fb("TON")`.
+
+    `stubs` put ST or a Python function in place of blocks by name; `text` is ST to compile with it, `sources` are more
+    files, `libraries` folders with blocks in files of their names; `etn21` is the address of an Ethernet unit,
+    `network` what it is on, `units` are other units."""
+    return _maker(request, block=True)
+
+
+@pytest.fixture
+def plc(request: pytest.FixtureRequest) -> RigMaker:
+    """A whole program on a test rig: `plc("src/main.st")`, with its tasks; the rest is as for `fb`."""
+    return _maker(request, block=False)
+
+
+@pytest.fixture
+def network() -> Iterator[LoopNetwork]:
+    """A network in memory and in virtual time, for `fb(..., etn21="192.168.250.21", network=network)`.
+
+    `network.place(Peer(...), ModbusPeer())` puts a server there, `network.faults.append(Fault(...))` a fault."""
+    from fbvm.net.loop import LoopNetwork
+
+    made = LoopNetwork()
+    yield made
+    made.close()
+
+
+def _rigs(node: pytest.Item) -> list[Rig]:
+    return node.stash.setdefault(RIGS, [])
+
+
+def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
+    rigs = _rigs(request.node)
+    folders = [request.path.parent, request.config.rootpath]
+
+    def make(what: str, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
+             sources: Sequence[str] = (), text: str = "", libraries: Sequence[str] = (), **given: Any) -> Rig:  # fmt: skip
+        from fbvm.testing.rig import Rig
+        from fbvm.testing.subject import subject
+
+        __tracebackhide__ = True
+        file, mark, name = what.partition("::")
+        if not mark and block and not file.lower().endswith(".st"):
+            file, name = "", what
+        files = [_file(path, folders) for path in (*([file] if file else []), *sources)]
+        shelves = [_file(path, folders) for path in libraries] + library_folders(request.config, files)
+        rig = Rig(subject(files, name if name or block else None, shelves, stubs, text), cycle, stubs=stubs, **given)
+        rigs.append(rig)
+        return rig
+
+    return make
+
+
+def _file(path: str, folders: Sequence[Path]) -> Path:
+    for folder in folders:
+        if (folder / path).exists():
+            return folder / path
+    raise FileNotFoundError(f"{path} is neither in {' nor in '.join(str(folder) for folder in folders)}")
+
+
+def library_folders(config: pytest.Config, files: Sequence[Path]) -> list[Path]:
+    """Folders in which blocks are found by the names of their files: those of pytest's ini, `src`, those of the files."""
+    root = config.rootpath
+    near = [file.parent for file in files if file.parent != root]
+    chosen = [*config.getini("fbvm_libraries"), *([root / SOURCE_FOLDER] if (root / SOURCE_FOLDER).is_dir() else []), *near]
+    return list(dict.fromkeys(chosen))
+
+
+# --- failures ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
+    """A test that leaves forces behind has failed."""
+    yield
+    left = [name.removeprefix(rig.subject.prefix) for rig in _rigs(item) for name in rig.plc.forces]
+    if left:
+        pytest.fail(f"left forced: {', '.join(left)}; end a force with unforce(), or hold it by `with rig.force(...):`",
+                    pytrace=False)  # fmt: skip
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """A failed test says what became of the variables that it asked for."""
+    report = yield
+    if report.failed and call.when == "call" and call.excinfo is not None:
+        for rig, lines in _asking(call.excinfo, _rigs(item)):
+            if text := rig.explain(lines):
+                report.sections.append((f"fbvm {rig!r}", text))
+    return report
+
+
+def _asking(excinfo: pytest.ExceptionInfo[BaseException], rigs: Sequence[Rig]) -> list[tuple[Rig, tuple[str, range] | None]]:
+    """Rigs that the failed statement asked for something, with its file and lines; all rigs if it asked none."""
+    for entry in reversed(excinfo.traceback):
+        file, lines = str(entry.path), _statement(str(entry.path), entry.lineno + 1)
+        asked = [rig for rig in rigs if any(name == file and line in lines for name, line, _ in rig.asked)]
+        if asked:
+            return [(rig, (file, lines)) for rig in asked]
+    return [(rig, None) for rig in rigs]
+
+
+def _statement(file: str, line: int) -> range:
+    """The lines of the smallest statement around a line."""
+    try:
+        tree = ast.parse(Path(file).read_text(encoding="utf-8"))
+    except (OSError, SyntaxError, ValueError):
+        return range(line, line + 1)
+    found = [range(node.lineno, (node.end_lineno or node.lineno) + 1) for node in ast.walk(tree)
+             if isinstance(node, ast.stmt) and node.lineno <= line <= (node.end_lineno or node.lineno)]  # fmt: skip
+    return min(found, key=len, default=range(line, line + 1))
+
+
+# --- tests in ST ------------------------------------------------------------------------------------------------------
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> StFile | None:
+    """`test_*.st`: each PROGRAM is a test."""
+    if file_path.suffix.lower() != ".st" or not file_path.name.startswith("test_"):
+        return None
+    from fbvm.testing.st_items import StFile
+
+    made: StFile = StFile.from_parent(parent, path=file_path)
+    return made

@@ -1,0 +1,90 @@
+"""What a failed test shows: when each variable changed last and by which line, and the scan table around the end."""
+
+from __future__ import annotations
+
+from fbvm.base.types import StructType
+from fbvm.plc import Plc
+from fbvm.record.history import History
+from fbvm.record.names import Names, is_single
+from fbvm.record.recorder import Signal
+from fbvm.record.table import ScanTable, Writer
+from fbvm.testing.reads import Reads
+from fbvm.testing.subject import Subject
+from fbvm.watch.paths import Place
+from fbvm.watch.values import show_time
+
+LOOKED_BACK = 400
+"""Scans that are done again to find who changed a variable."""
+BANDS = 4
+"""Scans with changes that the table shows."""
+MOST_COLUMNS = 8
+
+
+class Report:
+    """Writes reports about one PLC."""
+
+    def __init__(self, plc: Plc, subject: Subject, history: History, reads: Reads) -> None:
+        self._plc, self._subject, self._history, self._reads = plc, subject, history, reads
+        self.names = Names(plc.image.symbols, plc.memory.areas)
+
+    def names_in(self, prefix: str) -> list[str]:
+        """The variables of the block or program whose path, with its dot, is `prefix`."""
+        kind = self._plc.find(prefix.rstrip(".")) if prefix else None
+        fields = kind.type.fields.values() if isinstance(kind, Place) and isinstance(kind.type, StructType) else ()
+        return [field.name for field in fields]
+
+    def text(self, lines: tuple[str, range] | None = None) -> str:
+        """The report for the variables that some lines asked for, "" if they asked for none."""
+        places = self._reads.places(*lines) if lines else self._reads.places()
+        signals = self._signals(places)
+        if not signals or not self._plc.scans:
+            return ""
+        table = self._again(signals, LOOKED_BACK)
+        told = "\n".join(self._told(table, signal) for signal in signals)
+        moved = [band for band in table.bands if band.moved][-BANDS:]
+        last = table.bands[-1:] if table.bands and table.bands[-1] not in moved else []
+        return f"{told}\n\n{table.draw([*moved, *last])}" if table.bands else told
+
+    def table(self, places: list[Place], scans: int) -> str:
+        """The scan table of the last scans."""
+        return self._again(self._signals(places), scans).draw()
+
+    def _signals(self, places: list[Place]) -> list[Signal]:
+        prefix = self._subject.prefix
+        return [Signal(place, place.name.removeprefix(prefix)) for place in places if is_single(place)][:MOST_COLUMNS]
+
+    def _again(self, signals: list[Signal], scans: int) -> ScanTable:
+        table = ScanTable(self._plc.image, self.names, signals)
+        end = self._plc.scans
+        self._history.again(range(max(0, end - scans), end), table)
+        return table
+
+    def _told(self, table: ScanTable, signal: Signal) -> str:
+        """`Running is TRUE since scan 5 (50ms), by pump.st:12: Running := Delay.Q;  with Delay.Q = TRUE`"""
+        value = self._plc.read(signal.place)
+        now = f"{signal.label} is {signal.text(value)}"
+        change, writer = table.last_change(signal), table.writers.get(signal)
+        if change is None:
+            first = table.bands[0].scan if table.bands else self._plc.scans
+            now += f" since {'power-on' if first == 0 else f'before scan {first}'}"
+        elif change.new != value:
+            return f"{now}, written after the last scan"
+        else:
+            at_ns = next(band.now_ns for band in table.bands if band.scan == change.scan)
+            now += f" since scan {change.scan} ({show_time(at_ns)[2:]})"
+            if change.site is None and change.instance == "":
+                return f"{now}, written from outside the program"
+        if writer is None:
+            return f"{now}; no statement wrote it"
+        last = f", written last in scan {writer.scan}" if change is None or change.scan != writer.scan else ""
+        return f"{now}{last}, by {self._by(writer)}"
+
+    def _by(self, writer: Writer) -> str:
+        if writer.site is None:
+            return "a stub"
+        site, prefix = writer.site, self._subject.prefix
+        where = writer.instance.removeprefix(prefix.rstrip(".")).lstrip(".")
+        line = self._subject.line(site.file, site.line)
+        reads = ", ".join(f"{name.removeprefix(prefix)} = {text}" for name, text in writer.reads)
+        return (f"{site.file}:{site.line}" + (f" in {where}" if where else "") + (f":  {line}" if line else "")
+                + (f"  with {reads}" if reads else ""))  # fmt: skip

@@ -1,0 +1,313 @@
+"""The test rig: a block or a program on a PLC in virtual time, moved and asked by name.
+
+    pump = fb("src/pump.st::Pump", cycle="10ms")
+    pump.scan(Start=True)
+    pump.until("Running", max="2s")
+    assert pump["Delay.Q"] and pump.Delay.ET == ns("50ms")
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import TracebackType
+from typing import Any
+
+from fbvm.base.types import fold
+from fbvm.engine.trap import Trap
+from fbvm.net.loop import LoopNetwork
+from fbvm.plc import Mode, Plc
+from fbvm.record.chart import Chart, draw
+from fbvm.record.history import History
+from fbvm.record.recorder import Recorder
+from fbvm.testing.reads import Reads
+from fbvm.testing.report import Report
+from fbvm.testing.subject import Stub, Subject
+from fbvm.testing.values import Values, value_of, write
+from fbvm.units.etn21 import Etn21
+from fbvm.units.unit import Unit
+from fbvm.watch.conditions import parse_condition
+from fbvm.watch.paths import Place, Span, UnknownPlace, find, find_place
+from fbvm.watch.values import Value, parse_time_ns, show_time
+
+PATIENCE = "1m"
+"""How long `until` waits if nobody says, in virtual time."""
+
+
+class Trapped(AssertionError):
+    """The program was stopped; `trap` says where and why."""
+
+    def __init__(self, trap: Trap) -> None:
+        super().__init__(trap.message)
+        self.trap = trap
+
+
+class Forced:
+    """Forces that end with a `with` block."""
+
+    def __init__(self, rig: Rig, names: Sequence[str]) -> None:
+        self._rig, self._names = rig, names
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self._rig.unforce(*self._names)
+
+
+class Ambiguous:
+    """A word of the rig that is the name of a variable, too: it can be called, and is no value."""
+
+    def __init__(self, method: Callable[..., Any], name: str) -> None:
+        self._method, self._said = method, f"a variable is called {name}, too: write rig[{name!r}] for its value"
+
+    def __call__(self, *args: Any, **named: Any) -> Any:
+        return self._method(*args, **named)
+
+    def __bool__(self) -> bool:
+        raise TypeError(self._said)
+
+    def __eq__(self, other: object) -> bool:
+        raise TypeError(self._said)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+class Rig:
+    """One PLC with a subject.  Names are looked for in the block, or the program, first, then in the whole PLC.
+
+    Variables are attributes (`rig.Done`, `rig.Start = True`) and items (`rig["m.ET"]`, `rig["D200"]`); an item is
+    needed where the name is a word of this class.  Times are text ("50ms") or integers of nanoseconds."""
+
+    plc: Plc
+    subject: Subject
+    network: LoopNetwork
+    _history: History
+    _reads: Reads
+    _timed: list[tuple[int, str, object]]
+    _report: Report
+
+    def __init__(self, subject: Subject, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
+                 units: Sequence[Unit] = (), etn21: str = "", network: LoopNetwork | None = None) -> None:  # fmt: skip
+        set_ = object.__setattr__
+        plc = Plc(subject.image, to_ns(cycle))
+        set_(self, "plc", plc)
+        set_(self, "subject", subject)
+        set_(self, "_history", History(plc))
+        set_(self, "_reads", Reads())
+        set_(self, "_timed", [])
+        set_(self, "network", network or LoopNetwork())
+        set_(self, "_report", Report(plc, subject, self._history, self._reads))
+        for name, stub in (stubs or {}).items():
+            if callable(stub):
+                self._stub(name, stub)
+        for unit in (*units, *([Etn21(0, etn21)] if etn21 else ())):
+            plc.attach(unit, self.network)
+        for name in self._report.names_in(subject.prefix):
+            if callable(method := getattr(type(self), name, None)):
+                set_(self, name, Ambiguous(method.__get__(self), name))
+
+    def _stub(self, name: str, stub: Callable[[Any], None]) -> None:
+        numbers = [number for number, body in enumerate(self.plc.image.bodies) if fold(body.name) == fold(name)]
+        if not numbers or self.plc.image.bodies[numbers[0]].kind != "FUNCTION_BLOCK":
+            raise ValueError(f"{name} is no function block of this program; Python takes the place of blocks only")
+
+        def run(base: int) -> None:
+            place = self.plc.find(self._report.names.instance(base))
+            assert isinstance(place, Place)
+            stub(Values(self.plc, place, lambda place: None, lambda: None))
+
+        self._history.substitute(numbers[0], run)
+
+    def __repr__(self) -> str:
+        return f"<{self.subject.name}, {self.plc.scans} scans, {show_time(self.plc.elapsed_ns)[2:]}>"
+
+    # --- values
+
+    def find(self, name: str) -> Place | Span:
+        """The place that a name means.  Raises UnknownPlace."""
+        symbols, areas = self.plc.image.symbols, self.plc.memory.areas
+        try:
+            return find_place(symbols, areas, self.subject.path(name.strip()))
+        except UnknownPlace as inner:
+            try:
+                return find(symbols, areas, name)
+            except UnknownPlace as outer:
+                raise (inner if self.subject.prefix else outer) from None
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except UnknownPlace as error:
+            raise AttributeError(str(error)) from None
+
+    def __getitem__(self, name: str) -> Any:
+        return value_of(self.plc, self.find(name), self._reads.add, self._history.touch)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        try:
+            self[name] = value
+        except UnknownPlace as error:
+            raise AttributeError(str(error)) from None
+
+    def __setitem__(self, name: str, value: object) -> None:
+        self._history.touch()
+        write(self.plc, self.find(name), value)
+
+    def write(self, inputs: Mapping[str, object] | None = None, /, **named: object) -> Rig:
+        """Writes variables by name; those whose name is no word of Python by a mapping: `{"CIO 0.00": True}`."""
+        for name, value in {**(inputs or {}), **named}.items():
+            self[name] = value
+        return self
+
+    # --- time
+
+    def scan(self, inputs: Mapping[str, object] | None = None, /, **named: object) -> Rig:
+        """Writes inputs, then one scan.  Raises Trapped."""
+        __tracebackhide__ = True
+        self.write(inputs, **named)
+        self._scan()
+        return self
+
+    def run(self, time: str | int | None = None, /, *, scans: int | None = None, **named: object) -> Rig:
+        """Writes inputs, then scans for a time, or so many times.  Raises Trapped."""
+        __tracebackhide__ = True
+        self.write(named)
+        if (time is None) == (scans is None):
+            raise TypeError('say how long: run("1s") or run(scans=10)')
+        end_ns = self.plc.elapsed_ns + to_ns(time) if time is not None else 0
+        end = self.plc.scans + (scans or 0)
+        while self.plc.scans < end or self.plc.elapsed_ns < end_ns:
+            self._scan()
+        return self
+
+    def until(self, condition: str | Callable[[Rig], object], /, *, max: str | int = PATIENCE, **named: object) -> Rig:
+        """Writes inputs, then scans until a condition holds after a scan: `"m.Done AND Count > 5"` or a function.
+
+        Raises AssertionError if it does not hold within `max`, Trapped after a trap."""
+        __tracebackhide__ = True
+        self.write(named)
+        holds = self._holds(condition)
+        end_ns = self.plc.elapsed_ns + to_ns(max)
+        while True:
+            self._scan()
+            if holds():
+                return self
+            if self.plc.elapsed_ns >= end_ns:
+                said = condition if isinstance(condition, str) else getattr(condition, "__name__", "the condition")
+                raise AssertionError(f"{said} does not hold within {show_time(to_ns(max))[2:]}")
+
+    def at(self, time: str | int, inputs: Mapping[str, object] | None = None, /, **named: object) -> Rig:
+        """Writes inputs later: before the first scan at or after a time since power-on."""
+        for name, value in {**(inputs or {}), **named}.items():
+            self.find(name)
+            self._timed.append((to_ns(time), name, value))
+        self._timed.sort(key=lambda row: row[0])
+        return self
+
+    def _holds(self, condition: str | Callable[[Rig], object]) -> Callable[[], bool]:
+        if callable(condition):
+            function = condition
+            return lambda: bool(function(self))
+        parsed = parse_condition(condition, self.find)
+
+        def read(place: Place) -> Value:
+            self._reads.add(place)
+            return self.plc.read(place)
+
+        return lambda: parsed.holds(read)
+
+    def _scan(self) -> None:
+        __tracebackhide__ = True
+        while self._timed and self._timed[0][0] <= self.plc.elapsed_ns:
+            _, name, value = self._timed.pop(0)
+            self[name] = value
+        self._reads.clear()
+        self._history.before_scan()
+        trap = self.plc.scan()
+        if trap:
+            raise Trapped(trap)
+
+    @property
+    def scans(self) -> int:
+        """Scans since power-on."""
+        return self.plc.scans
+
+    @property
+    def elapsed_ns(self) -> int:
+        """Time since power-on."""
+        return self.plc.elapsed_ns
+
+    # --- power, mode, forces
+
+    def power_on(self) -> Rig:
+        """Power off and on: what is retained keeps its values."""
+        self._history.touch()
+        self.plc.warm_start()
+        return self
+
+    def cold_start(self) -> Rig:
+        """Power on as new: everything has its initial value."""
+        self._history.touch()
+        self.plc.cold_start()
+        return self
+
+    def mode(self, mode: str) -> Rig:
+        """"PROGRAM": units are refreshed, the program stands.  "RUN" after it clears what is not retained."""
+        self._history.touch()
+        self.plc.mode = Mode(mode.upper())
+        return self
+
+    def force(self, values: Mapping[str, object] | None = None, /, **named: object) -> Forced:
+        """Holds variables until `unforce`, or to the end of a `with` block.  What is left forced fails the test."""
+        given = {**(values or {}), **named}
+        self._history.touch()
+        for name, value in given.items():
+            place = self.find(name)
+            write(self.plc, place, value)
+            self.plc.force(place.name, self.plc.read(place))
+        return Forced(self, list(given))
+
+    def unforce(self, *names: str) -> Rig:
+        """Ends forces, all of them if none is named."""
+        self._history.touch()
+        for name in names:
+            self.plc.unforce(self.find(name).name)
+        if not names:
+            self.plc.unforce()
+        return self
+
+    # --- pictures
+
+    def chart(self, *signals: str, scans: int) -> Chart:
+        """Runs so many scans and draws the signals, as `fbvm.chart` does."""
+        places = [self.find(name) for name in signals]
+        recorder = Recorder(self.plc, [place.name for place in places])
+        try:
+            self.run(scans=scans)
+        finally:
+            recorder.stop()
+        prefix = self.subject.prefix
+        return Chart(draw(recorder).replace(prefix, "") if prefix else draw(recorder))
+
+    def table(self, *signals: str, scans: int = 10) -> str:
+        """The scan table of the last scans: what changed these variables, statement by statement."""
+        places = [self.find(name) for name in signals]
+        return self._report.table([place for place in places if isinstance(place, Place)], scans)
+
+    @property
+    def asked(self) -> list[tuple[str, int, Place]]:
+        """What the test asked for since the last scan: file, line, place."""
+        return self._reads.rows
+
+    def explain(self, lines: tuple[str, range] | None = None) -> str:
+        """What a failed test wants to know: the variables it asked for, when they changed last and by which line.
+
+        `lines` are a file and the lines in it that asked; without, all that was asked for since the last scan."""
+        return self._report.text(lines)
+
+
+def to_ns(time: str | int) -> int:
+    """Nanoseconds of "50ms", or of an integer that is some."""
+    return parse_time_ns(time) if isinstance(time, str) else time

@@ -1,0 +1,154 @@
+"""Tests written in Structured Text: each PROGRAM of a `test_*.st` is one, and calls ASSERT(condition).
+
+A program is executed in one scan, or, if it declares a BOOL called Done, scan by scan until Done is TRUE.  The first
+ASSERT with a FALSE condition ends it.  Blocks are found by the names of their files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import BOOL, fold
+from fbvm.code.image import Site
+from fbvm.plc import Phase, Plc
+from fbvm.record.history import History, looking
+from fbvm.record.inside import Began, Event, Frame, Read, Statement, Write
+from fbvm.record.names import Names, is_single
+from fbvm.record.recorder import Signal
+from fbvm.record.table import ScanTable
+from fbvm.syntax.text import read
+from fbvm.testing.plugin import library_folders
+from fbvm.testing.rig import Trapped
+from fbvm.testing.subject import Subject, SubjectError, pous, subject
+from fbvm.watch.paths import Place
+from fbvm.watch.values import Value, show_time
+
+LIBRARY = Path(__file__).parent / "library"
+CYCLE_NS = 10_000_000
+PATIENCE_NS = 60_000_000_000
+BANDS, LOOKED_BACK = 4, 100
+
+
+class AssertFailed(AssertionError):
+    """An ASSERT found its condition FALSE: where, in which scan, what it read, and the scan table before it."""
+
+    def __init__(self, site: Site, scan: int, now_ns: int, values: list[tuple[Signal, Value]]) -> None:
+        super().__init__(f"{site}: ASSERT failed in scan {scan}")
+        self.site, self.scan, self.now_ns, self.values = site, scan, now_ns, values
+        self.table = ""
+
+
+class StFile(pytest.File):
+    """One file of tests."""
+
+    def collect(self) -> Iterator[StItem]:
+        source = read(self.path, self.path.name)
+        if not isinstance(source, Source):
+            raise self.CollectError(source.render())
+        try:
+            programs = [node for node in pous(source) if node.kind == "PROGRAM"]
+        except SubjectError as error:
+            raise self.CollectError(str(error)) from None
+        for node in programs:
+            yield StItem.from_parent(self, name=node.name.text, line=source.place(node.start)[0])
+
+
+class StItem(pytest.Item):
+    """One program."""
+
+    def __init__(self, *, line: int, **given: Any) -> None:
+        super().__init__(**given)
+        self.line = line
+        self.subject: Subject | None = None
+
+    def runtest(self) -> None:
+        shelves = [LIBRARY, *library_folders(self.config, [self.path])]
+        made = self.subject = subject([self.path], self.name, shelves)
+        plc = Plc(made.image, CYCLE_NS)
+        watch = Assertions(plc, made.prefix)
+        history = History(plc)
+        try:
+            with looking(plc, watch):
+                _run(plc, history, f"{made.prefix}Done")
+        except AssertFailed as failed:
+            table = ScanTable(plc.image, watch.names, [signal for signal, _ in failed.values])
+            history.again(range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1), table)
+            failed.table = table.draw([band for band in table.bands if band.moved][-BANDS:]) if failed.values else ""
+            raise
+        if not watch.asserted:
+            raise AssertionError(f"{self.name} ended without one ASSERT")
+
+    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
+        error = excinfo.value
+        if isinstance(error, AssertFailed) and self.subject:
+            site, name = error.site, error.site.file
+            lines = [f"{name}:{site.line}: in {site.pou}, scan {error.scan} ({show_time(error.now_ns)[2:]})",
+                     f">   {self.subject.line(name, site.line)}",
+                     *(f"E   {signal.label} = {signal.text(value)}" for signal, value in error.values)]  # fmt: skip
+            return "\n".join([*lines, *(["", error.table] if error.table else [])])
+        if isinstance(error, Trapped | AssertionError | SubjectError):
+            return str(error)
+        return super().repr_failure(excinfo, style)
+
+    def reportinfo(self) -> tuple[Path, int | None, str]:
+        return self.path, self.line - 1, self.name
+
+
+def _run(plc: Plc, history: History, done: str) -> None:
+    """One scan, or as many as it takes until Done."""
+    program = plc.find(done.rpartition(".")[0])
+    assert isinstance(program, Place)
+    field = program.type.member("Done")  # type: ignore[attr-defined]
+    waits = field is not None and field.type is BOOL
+    while True:
+        history.before_scan()
+        trap = plc.scan()
+        if trap:
+            raise Trapped(trap)
+        if not waits or plc.read(done):
+            return
+        if plc.elapsed_ns >= PATIENCE_NS:
+            raise AssertionError(f"Done is still FALSE after {show_time(PATIENCE_NS)[2:]}")
+
+
+class Assertions:
+    """Listens to a test and raises AssertFailed at the first ASSERT that fails."""
+
+    def __init__(self, plc: Plc, prefix: str) -> None:
+        self.asserted = 0
+        self._prefix = prefix
+        self.names = Names(plc.image.symbols, plc.memory.areas)
+        self._bodies = {number for number, body in enumerate(plc.image.bodies) if fold(body.name) == "ASSERT"}
+        self._reads: dict[Frame, list[Place]] = {}
+        self._seen: dict[Place, None] = {}
+        self._last: Write | None = None
+
+    def phase(self, plc: Plc, phase: Phase) -> None:
+        self._reads.clear()
+
+    def event(self, plc: Plc, event: Event) -> None:
+        if isinstance(event, Statement):
+            self._reads[event.frame] = []
+        elif isinstance(event, Read):
+            place = self.names.at(event.offset, event.bit if event.bit < 8 else None)
+            if place is not None and is_single(place):
+                self._reads.setdefault(event.frame, []).append(place)
+        elif isinstance(event, Write):
+            self._last = event
+        elif isinstance(event, Began) and event.frame.body in self._bodies:
+            self.asserted += 1
+            assert self._last is not None and event.frame.caller is not None
+            if self._last.value == b"\0":
+                self._fail(plc, event.frame)
+
+    def _fail(self, plc: Plc, frame: Frame) -> None:
+        assert frame.caller is not None
+        places = self._reads.get(frame.caller, [])
+        signals = [Signal(place, place.name.removeprefix(self._prefix)) for place in dict.fromkeys(places)]
+        values = [(signal, plc.read(signal.place)) for signal in signals]
+        raise AssertFailed(plc.image.sites[frame.site], plc.scans, plc.now_ns, values)

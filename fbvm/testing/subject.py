@@ -1,0 +1,205 @@
+"""What a test runs: one POU with a program around it, or a whole program, with stubs in place of blocks.
+
+A stub in ST takes the place of the whole declaration, or of the body alone if it declares nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from fbvm.base.diagnostics import Source, errors
+from fbvm.base.types import fold
+from fbvm.check.facts import Report
+from fbvm.check.library import Libraries
+from fbvm.code.compiler import compile_sources
+from fbvm.code.image import Image
+from fbvm.syntax import tree
+from fbvm.syntax.parser import parse
+from fbvm.syntax.text import read
+
+Stub: TypeAlias = "str | Callable[[Any], None]"
+"""ST, or a function that is called with the variables of the instance."""
+WRAPPER, INSTANCE = "Test", "Block"
+"""The program around a block, and the instance in it."""
+_DECLARES = re.compile(r"\s*(FUNCTION|FUNCTION_BLOCK|PROGRAM)\b", re.I)
+_FIRST = re.compile(r"\w+")
+_images: dict[tuple[object, ...], Subject] = {}
+
+
+class SubjectError(Exception):
+    """What a test wants to run cannot be run; the message says why, with all diagnostics."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A compiled program, what is tested, where names of a test begin (`prefix`, with its dot), the sources by name."""
+
+    name: str
+    image: Image
+    prefix: str
+    sources: Mapping[str, Source]
+    in_outs: frozenset[str] = frozenset()
+    """In-outs of a block by folded name: the test sees the variables of the program that are passed."""
+
+    def path(self, name: str) -> str:
+        """Where a name of the test leads if it is one of the subject."""
+        first = _FIRST.match(name)
+        if first and fold(first[0]) in self.in_outs:
+            return f"{WRAPPER}.{INSTANCE}_{name}"
+        return f"{self.prefix}{name}"
+
+    def line(self, file: str, number: int) -> str:
+        """A line of the source without its margin, "" if it is not known."""
+        source = self.sources.get(file)
+        return source.line(number).strip() if source and 0 < number <= len(source.line_starts) else ""
+
+
+def subject(files: Sequence[Path], name: str | None, libraries: Sequence[Path] = (), stubs: Mapping[str, Stub] | None = None,
+            text: str = "") -> Subject:  # fmt: skip
+    """The POU `name` of some files (or of a library, without files); the only one if it is "", the program if None.
+
+    `text` is ST that is compiled with them.  Raises SubjectError."""
+    __tracebackhide__ = True
+    sources = [_read(path) for path in files] + ([Source("test.st", text)] if text else [])
+    stubs = stubs or {}
+    written = {fold(stubbed): stub for stubbed, stub in stubs.items() if isinstance(stub, str)}
+    key = (tuple((source.name, source.text) for source in sources), name, tuple(libraries), tuple(written.items()))
+    if key not in _images:
+        _images[key] = _build(sources, name, libraries, written)
+    return _images[key]
+
+
+def _build(sources: list[Source], name: str | None, libraries: Sequence[Path], stubs: Mapping[str, str]) -> Subject:
+    __tracebackhide__ = True
+    if name == "":
+        name = _only(sources)
+    for stubbed, stub in stubs.items():
+        sources = _stubbed(sources, stubbed, stub, libraries)
+    if name is None:
+        return _compiled(sources, None, libraries, "")
+    node, source = _declared(sources, name, libraries)
+    if node.kind == "PROGRAM":
+        return _compiled(sources, node.name.text, libraries, f"{node.name.text}.")
+    wrapper = Source(f"<test of {node.name.text}>", _wrapper(node, source))
+    if node.kind == "FUNCTION":
+        return _compiled([*sources, wrapper], WRAPPER, libraries, f"{WRAPPER}.", node.name.text)
+    made = _compiled([*sources, wrapper], WRAPPER, libraries, f"{WRAPPER}.{INSTANCE}.", node.name.text)
+    return replace(made, in_outs=frozenset(fold(each) for each, _ in _variables(node, "VAR_IN_OUT", source)))
+
+
+def _only(sources: Sequence[Source]) -> str:
+    """The name of the only POU of some sources, or of that which is called like the first file."""
+    names = [node.name.text for source in sources for node in pous(source)]
+    stem = fold(Path(sources[0].name).stem) if sources else ""
+    chosen = names if len(names) == 1 else [name for name in names if fold(name) == stem]
+    if len(chosen) != 1:
+        raise SubjectError(f"say which: {sources[0].name}::NAME; there is {', '.join(names) or 'nothing'}")
+    return chosen[0]
+
+
+def _compiled(sources: list[Source], program: str | None, libraries: Sequence[Path], prefix: str,
+              name: str = "") -> Subject:  # fmt: skip
+    __tracebackhide__ = True
+    made = compile_sources(sources, program, libraries, runnable=True)
+    if made.image is None:
+        raise SubjectError("\n".join(message.render() for message in made.errors))
+    if not prefix and len(made.image.tasks) == 1 and len(made.image.tasks[0].programs) == 1:
+        prefix = f"{made.image.tasks[0].programs[0].name}."
+    return Subject(name or prefix.rstrip(".") or "PLC", made.image, prefix, {source.name: source for source in sources})
+
+
+def _read(path: Path) -> Source:
+    source = read(path, os.path.relpath(path) if path.is_relative_to(Path.cwd()) else str(path))
+    if not isinstance(source, Source):
+        raise SubjectError(source.render())
+    return source
+
+
+def pous(source: Source) -> list[tree.Pou]:
+    """The POUs that a text declares.  Raises SubjectError if it cannot be read."""
+    text, diagnostics = parse(source)
+    if wrong := errors(diagnostics):
+        raise SubjectError("\n".join(message.render() for message in wrong))
+    return [node for node in text.declarations if isinstance(node, tree.Pou)]
+
+
+def _declared(sources: Sequence[Source], name: str, libraries: Sequence[Path]) -> tuple[tree.Pou, Source]:
+    known = [(node, source) for source in sources for node in pous(source)]
+    for node, source in known:
+        if fold(node.name.text) == fold(name):
+            return node, source
+    found = _in_libraries(name, libraries)
+    if found is None:
+        there = ", ".join(node.name.text for node, _ in known)
+        raise SubjectError(f"there is no {name}" + (f"; there is {there}" if there else " in any library"))
+    return found
+
+
+def _in_libraries(name: str, libraries: Sequence[Path]) -> tuple[tree.Pou, Source] | None:
+    shelves, report = Libraries(libraries), Report()
+    for owner in shelves.names:
+        for source, text in shelves.load(name, owner, report):
+            for node in text.declarations:
+                if isinstance(node, tree.Pou) and fold(node.name.text) == fold(name):
+                    return node, source
+    return None
+
+
+# --- the program around a POU -----------------------------------------------------------------------------------------
+
+
+def _variables(pou: tree.Pou, kind: str, source: Source) -> list[tuple[str, str]]:
+    """Names and types, as written, of the variables of a section."""
+    return [(name.text, source.text[row.spec.start : row.spec.end]) for section in pou.sections
+            if section.kind == kind for row in section.variables for name in row.names]  # fmt: skip
+
+
+def _wrapper(pou: tree.Pou, source: Source) -> str:
+    """A program that calls a block, or a function with inputs and outputs of the same names.
+
+    In-outs are connected to variables of the program, which the block shows under its own names."""
+    name = pou.name.text
+    in_outs = _variables(pou, "VAR_IN_OUT", source)
+    if pou.kind == "FUNCTION_BLOCK":
+        declared = [(INSTANCE, name), *((f"{INSTANCE}_{each}", kind) for each, kind in in_outs)]
+        call = f"{INSTANCE}({', '.join(f'{each} := {INSTANCE}_{each}' for each, _ in in_outs)})"
+    else:
+        inputs, outputs = _variables(pou, "VAR_INPUT", source), _variables(pou, "VAR_OUTPUT", source)
+        declared = [*inputs, *in_outs, *outputs]
+        given = [f"{each} := {each}" for each, _ in (*inputs, *in_outs)] + [f"{each} => {each}" for each, _ in outputs]
+        call = f"{name}({', '.join(given)})"
+        if pou.result is not None:
+            declared.append(("Result", source.text[pou.result.start : pou.result.end]))
+            call = f"Result := {call}"
+    lines = "".join(f"    {each} : {kind};\n" for each, kind in declared)
+    return f"PROGRAM {WRAPPER}\nVAR\n{lines}END_VAR\n    {call};\nEND_PROGRAM\n"
+
+
+# --- stubs ------------------------------------------------------------------------------------------------------------
+
+
+def _stubbed(sources: list[Source], name: str, stub: str, libraries: Sequence[Path]) -> list[Source]:
+    """The sources with another POU, or another body, under a name.  Lines of the rest keep their numbers."""
+    node, source = _declared(sources, name, libraries)
+    whole = source.text[node.start : node.end]
+    text = stub
+    if not _DECLARES.match(stub):
+        start, end = _body(node, source)
+        text = f"{source.text[node.start : start]}\n{stub}\n{source.text[end : node.end]}"
+    text = text.strip().removesuffix(";") + "\n"
+    blank = re.sub(r"[^\n]", " ", whole)
+    kept = [Source(each.name, each.text[: node.start] + blank + each.text[node.end :])
+            if each is source else each for each in sources]  # fmt: skip
+    return [*kept, Source(f"<stub of {node.name.text}>", text)]
+
+
+def _body(node: tree.Pou, source: Source) -> tuple[int, int]:
+    """Where the statements of a POU begin and end."""
+    heads = [section.end for section in node.sections] + [node.name.end] + ([node.result.end] if node.result else [])
+    closing = list(re.finditer(r"\bEND_(FUNCTION_BLOCK|FUNCTION|PROGRAM)\b", source.text[: node.end], re.I))
+    return max(heads), closing[-1].start()

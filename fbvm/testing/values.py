@@ -1,0 +1,96 @@
+"""Variables by name, as attributes and by path: `pump.Done`, `pump["m.ET"]`, `pump.m.ET = "50ms"`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from fbvm.base.types import StringType, StructType, base
+from fbvm.plc import Plc
+from fbvm.watch.paths import Place, Span, UnknownPlace
+from fbvm.watch.values import Value, parse_value
+
+Told = Callable[[Place], None]
+"""Who is told that a variable was read."""
+
+
+def write(plc: Plc, place: Place | Span, value: object) -> None:
+    """Writes a value; text is read as the program would write it (`"50ms"`, `"16#FF"`).
+
+    Raises ValueError (out of range) or TypeError (a value of another kind)."""
+    if isinstance(place, Place) and isinstance(value, str) and not isinstance(base(place.type), StringType):
+        value = parse_value(place.type, value, place.name)
+    plc.write(place, value)
+
+
+class Values:
+    """The variables of one structure or instance.  Structures in it are `Values` again, arrays are lists.
+
+    Where a variable is called like something of Python's, write `values["name"]`."""
+
+    __slots__ = ("_place", "_plc", "_read", "_touched")
+    _place: Place
+    _plc: Plc
+    _read: Told
+    _touched: Callable[[], None]
+
+    def __init__(self, plc: Plc, place: Place, read: Told, touched: Callable[[], None]) -> None:
+        set_ = object.__setattr__
+        set_(self, "_plc", plc)
+        set_(self, "_place", place)
+        set_(self, "_read", read)
+        set_(self, "_touched", touched)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except UnknownPlace as error:
+            raise AttributeError(str(error)) from None
+
+    def __setattr__(self, name: str, value: object) -> None:
+        try:
+            self[name] = value
+        except UnknownPlace as error:
+            raise AttributeError(str(error)) from None
+
+    def __getitem__(self, path: str) -> Any:
+        return value_of(self._plc, self._find(path), self._read, self._touched)
+
+    def __setitem__(self, path: str, value: object) -> None:
+        self._touched()
+        write(self._plc, self._find(path), value)
+
+    def __dir__(self) -> list[str]:
+        kind = self._place.type
+        return [field.name for field in kind.fields.values()] if isinstance(kind, StructType) else []
+
+    def __eq__(self, other: object) -> bool:
+        return as_dict(self) == (as_dict(other) if isinstance(other, Values) else other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return f"{self._place.type.name} {as_dict(self)!r}"
+
+    def _find(self, path: str) -> Place:
+        found = self._plc.find(f"{self._place.name}.{path}")
+        if not isinstance(found, Place):
+            raise UnknownPlace(f"{path} is a range; name one member after the other")
+        return found
+
+
+def value_of(plc: Plc, found: Place | Span, read: Told, touched: Callable[[], None]) -> Any:
+    """The value at a place; of a structure or instance, its variables."""
+    if isinstance(found, Place):
+        if isinstance(base(found.type), StructType):
+            return Values(plc, found, read, touched)
+        read(found)
+    return plc.read(found)
+
+
+def as_dict(values: Values) -> Value:
+    """All variables of an instance as Python's own values."""
+    return values._plc.read(values._place)
+
