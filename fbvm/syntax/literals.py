@@ -123,9 +123,10 @@ def _typed_number(prefix: str, rest: str) -> Decoded:
     if negative:
         value = -value
     if prefix in REALS:
-        if abs(value) >= REALS[prefix]:
+        real = _float(value)
+        if abs(real) >= REALS[prefix]:
             raise OutOfRange(f"`{prefix}#{rest}` is out of the range of {prefix}", "")
-        return "real", float(value), prefix
+        return "real", real, prefix
     if kind != "int":
         raise Malformed(f"`{prefix}#{rest}`: {prefix} takes whole numbers only", "")
     bits = SIGNED.get(prefix) or UNSIGNED[prefix]
@@ -133,6 +134,14 @@ def _typed_number(prefix: str, rest: str) -> Decoded:
     if not low <= value <= high:
         raise OutOfRange(f"`{prefix}#{rest}` is out of the range of {prefix}, {low} to {high}", "")
     return "int", value, prefix
+
+
+def _float(value: float) -> float:
+    """The nearest float; infinite beyond the range."""
+    try:
+        return float(value)
+    except OverflowError:
+        return float("inf") if value > 0 else float("-inf")
 
 
 # --- strings ---
