@@ -7,7 +7,9 @@
 
 from __future__ import annotations
 
+from array import array
 from functools import cache
+from random import Random
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
@@ -16,6 +18,7 @@ from fbvm.plc import Plc
 from fbvm.units.etn21 import Etn21
 from fbvm.wire.link import Broken, Close, Connect, Event, Failed, Grant, Opened, Peer, PeerClosed, Received, Send
 from fbvm.wire.modbus import Adu, Splitter
+from fbvm.wire.modbus_server import ModbusServer
 
 SERVER = Peer("192.168.250.1", 502)
 CYCLE_NS = 10_000_000
@@ -30,6 +33,11 @@ def image_of(text: str) -> Image:
     made = compile_text(text)
     assert made.image is not None and not made.diagnostics, [message.message for message in made.diagnostics]
     return made.image
+
+
+OWN_CIO, OWN_DM = range(1500, 1525), range(30000, 30100)
+"""Words of the unit."""
+AREAS = ("CIO", "W", "H", "A", "D")
 
 
 class Rig:
@@ -61,6 +69,23 @@ class Rig:
     def words(self, area: str) -> memoryview:
         return self.plc.memory.words(area)
 
+    def fill(self, seed: int) -> None:
+        """Any values in all words that a client can reach, but for those of the unit."""
+        dice = Random(seed)
+        for area, count, own in (("CIO", 5801, OWN_CIO), ("D", 32768, OWN_DM)):
+            words = self.words(area)
+            for start, end in ((0, own.start), (own.stop, count)):
+                words[start:end] = memoryview(array("H", dice.randbytes(2 * (end - start))))
+
+    def foreign_words(self) -> dict[str, list[int]]:
+        """All words that belong neither to the sheet's program nor to the unit nor to the clock."""
+        found = {area: self.words(area).tolist() for area in AREAS}
+        for area, own in (("CIO", OWN_CIO), ("CIO", range(5801, 6144)), ("W", range(480, 512)), ("D", OWN_DM),
+                          ("A", range(2)), ("A", range(200, 201)), ("A", range(262, 266))):  # fmt: skip
+            for word in own:
+                found[area][word] = 0
+        return found
+
 
 class Client:
     """Somebody who connects to the server and says bytes."""
@@ -78,10 +103,7 @@ class Client:
 
     def connect(self, scans: int = 400) -> bool:
         """Try until it is let in; False if nobody has done so."""
-        for _ in range(scans):
-            if self.dial():
-                return True
-        return False
+        return any(self.dial() for _ in range(scans))
 
     def dial(self) -> bool:
         """One try."""
@@ -151,3 +173,60 @@ class Client:
     def ask(self, pdu: str) -> str:
         """The same in hexadecimal."""
         return self.exchange(bytes.fromhex(pdu)).hex(" ").upper()
+
+
+class Model:
+    """What the sheet says, by our own Modbus server: its tables are a copy of the words of a rig, coils and inputs are the
+    same bits of CIO, and the address at which 10 begins ends at 17FF."""
+
+    def __init__(self, rig: Rig, *, fn0f: bool = False, full_dm: bool = False) -> None:
+        codes = (1, 2, 3, 4, 5, 6, 8, 16, *((15,) if fn0f else ()))
+        self.full_dm = full_dm
+        self.exceptions = 0
+        self.server = ModbusServer(
+            discrete_inputs=5120, holding_registers=32768, input_registers=5801, functions=codes
+        )
+        self.cio = rig.words("CIO").tolist()
+        for word, value in enumerate(self.cio[:4096]):
+            self.server.coils[16 * word : 16 * word + 16] = bytes(value >> bit & 1 for bit in range(16))
+        self.server.discrete_inputs[:] = self.server.coils[:5120]
+        self.server.input_registers[:] = array("H", self.cio[:5801])
+        self.server.holding_registers[:] = array("H", rig.words("D").tolist())
+
+    def answer(self, pdu: bytes) -> bytes:
+        """The reply PDU."""
+        reply = self._answer(pdu)
+        self.exceptions += reply[0] >> 7
+        return reply
+
+    def _answer(self, pdu: bytes) -> bytes:
+        registers = self.server.holding_registers
+        start = int.from_bytes(pdu[1:3], "big")
+        before = registers[start : start + 123]
+        if pdu[:2] == b"\x08\x00" and len(pdu) >= 3 and pdu[2]:
+            return b"\x88\x01"  # our model knows more than sub-function 0
+        reply = self.server.answer_pdu(pdu)
+        if pdu[0] == 0x10 and reply[0] == 0x10 and start > 0x17FF and not self.full_dm:
+            registers[start : start + 123] = before
+            return b"\x90\x02"
+        if reply[0] in (0x05, 0x0F):
+            self._bits_written(start // 16, (start + int.from_bytes(pdu[3:5], "big") if reply[0] == 0x0F else start) // 16)
+        return reply
+
+    def _bits_written(self, first: int, last: int) -> None:
+        for word in range(first, min(last, 4095) + 1):
+            bits = self.server.coils[16 * word : 16 * word + 16]
+            self.cio[word] = self.server.input_registers[word] = sum(bit << number for number, bit in enumerate(bits))
+            if word < 320:
+                self.server.discrete_inputs[16 * word : 16 * word + 16] = bits
+
+    def agrees(self, rig: Rig) -> bool:
+        """True if the words of the rig are these, but for those of the unit and of the program."""
+        cio, d = rig.words("CIO").tolist(), rig.words("D").tolist()
+        registers = self.server.holding_registers.tolist()
+        return (
+            cio[: OWN_CIO.start] == self.cio[: OWN_CIO.start]
+            and cio[OWN_CIO.stop : 5801] == self.cio[OWN_CIO.stop : 5801]
+            and d[: OWN_DM.start] == registers[: OWN_DM.start]
+            and d[OWN_DM.stop :] == registers[OWN_DM.stop :]
+        )
