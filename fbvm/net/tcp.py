@@ -1,7 +1,6 @@
 """The host's own network: units talk to real devices and programs over real TCP and UDP, and nothing ever blocks.
 
-One selector for all connections.  Work is done when a link is asked for its events or given requests; `wait` lets a
-run sleep until there is some.  The only module of the project that uses sockets.
+One selector for all; work is done when a link is asked for events or given requests.  Only this module uses sockets.
 """
 
 from __future__ import annotations
