@@ -31,7 +31,7 @@ from fbvm.base.types import (
     string,
 )
 from fbvm.check.constants import convert, limits
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
 from fbvm.check.fitting import assignable, conversion_hint, is_untyped, literal_hint
 from fbvm.check.operators import Operators
 from fbvm.check.subscripts import Subscripts
@@ -106,8 +106,9 @@ class Expressions:
             if value is not None:
                 return self._in_range(expr, value, target)
             return True
+        known = code in _KNOWN and not is_block(kind)
         self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
-                   conversion_hint(kind, target))
+                   literal_hint(self.facts.constants.get(expr), base(target)) if known else conversion_hint(kind, target))
         return False
 
     def _in_range(self, expr: tree.Expr, value: Value, target: Type) -> bool:
@@ -346,6 +347,8 @@ class Expressions:
         return self.operators.binary(expr, want)
 
 
+_KNOWN = ("S0503", "S0705", "S0801")
+"""Codes of places whose values must be known before the program runs: a conversion does not help there."""
 READABLE = ("", "VAR_INPUT", "VAR_OUTPUT")
 """Kinds of members that may be named from outside."""
 

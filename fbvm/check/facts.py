@@ -155,6 +155,8 @@ class Facts:
     """Expressions that mean the same as another one (ADD(a, b) is a + b)."""
     guards: dict[tree.Call, Guard] = field(default_factory=dict)
     labels: dict[tree.CaseBranch, tuple[tuple[int, int], ...]] = field(default_factory=dict)
+    text_cases: set[tree.Case] = field(default_factory=set)
+    """CASE statements that choose by a STRING."""
     sources: dict[tree.Node, Source] = field(default_factory=dict)
 
 

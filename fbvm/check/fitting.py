@@ -1,10 +1,12 @@
-"""What may stand where: assignment, in-outs, and the hints for what does not fit."""
+"""What may stand where: assignment, in-outs, conversions, and the hints for what does not fit."""
 
 from __future__ import annotations
 
 from fbvm.base.types import (
+    BOOL,
     ArrayType,
     Elementary,
+    EnumType,
     OpenArrayType,
     StringType,
     StructType,
@@ -14,6 +16,7 @@ from fbvm.base.types import (
     families,
 )
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
+from fbvm.check.values import is_any
 
 
 def is_untyped(kind: Type | None) -> bool:
@@ -42,18 +45,80 @@ def same(kind: Type, other: Type) -> bool:
     return kind == other
 
 
+# --- conversions ----------------------------------------------------------------------------------------------------
+
+_TIMES = ("ANY_DURATION", "ANY_DATE")
+_DATES = {
+    ("DATE_AND_TIME", "DATE"), ("DATE_AND_TIME", "TIME_OF_DAY"), ("LDATE_AND_TIME", "LDATE"),
+    ("LDATE_AND_TIME", "LTIME_OF_DAY"), ("LDATE_AND_TIME", "DATE"), ("LDATE_AND_TIME", "TIME_OF_DAY"),
+    ("DATE_AND_TIME", "LTIME_OF_DAY"), ("DATE_AND_TIME", "LDATE"),
+}
+
+
+def convertible(form: str, source: Type, target: Type) -> bool:
+    """True if the tables (22 to 27, and our additions) have the conversion."""
+    if form == "TRUNC":
+        return is_any(source, "ANY_REAL") and is_any(target, "ANY_INT")
+    if form == "BCD_TO":
+        return is_any(source, "ANY_BIT") and is_any(target, "ANY_INT") and source.name != "BOOL"
+    if form == "TO_BCD":
+        return is_any(source, "ANY_INT") and is_any(target, "ANY_BIT") and target.name != "BOOL"
+    if not isinstance(source, Elementary | StringType | EnumType):
+        return False
+    if isinstance(source, EnumType) or isinstance(target, EnumType):
+        return is_any(source, "ANY_INT", "ANY_BIT", "ANY_STRING") or is_any(target, "ANY_INT", "ANY_BIT", "ANY_STRING")
+    if isinstance(source, StringType) or isinstance(target, StringType):
+        return True
+    timed = [is_any(kind, *_TIMES) for kind in (source, target)]
+    if all(timed):
+        short = [kind.name.removeprefix("L") for kind in (source, target)]
+        return short[0] == short[1] or (source.name, target.name) in _DATES
+    if any(timed):
+        return is_any(target if timed[0] else source, "ANY_NUM", "ANY_BIT")
+    if is_any(source, "ANY_REAL") and is_any(target, "ANY_BIT") or is_any(source, "ANY_BIT") and is_any(target, "ANY_REAL"):
+        return "BOOL" in (source.name, target.name) or source.size == target.size
+    return True
+
+
+# --- advice ---------------------------------------------------------------------------------------------------------
+
+
 def conversion_hint(kind: Type, target: Type) -> str:
-    """How to write the conversion, "" if there is none."""
+    """How to turn a value of one type into another, "" if there is no conversion."""
     source, wanted = base(kind), base(target)
-    names = [ "STRING" if isinstance(t, StringType) else t.name for t in (source, wanted)]
-    if all(isinstance(t, Elementary | StringType) for t in (source, wanted)):
-        return f"write {names[0]}_TO_{names[1]}(...)"
-    return ""
+    if wanted == BOOL:
+        return comparison_hint(source)
+    if isinstance(source, StructType) and source.block:
+        return "name one of its outputs"
+    if not all(isinstance(t, Elementary | StringType) for t in (source, wanted)) or not convertible("TO", source, wanted):
+        return ""
+    names = ["STRING" if isinstance(t, StringType) else t.name for t in (source, wanted)]
+    return f"write {names[0]}_TO_{names[1]}(...)"
 
 
-def literal_hint(value: Value, kind: Type) -> str:
-    if "ANY_DURATION" in families(kind):
-        return "a duration is written T#500ms"
+def comparison_hint(kind: Type) -> str:
+    """What to write where a BOOL is needed."""
+    if is_any(kind, "ANY_NUM", "ANY_BIT"):
+        return "compare it, for example with <> 0"
+    return "compare it" if is_any(kind, "ANY_ELEMENTARY") or isinstance(kind, EnumType) else ""
+
+
+def literal_hint(value: Value | None, kind: Type) -> str:
+    """How a literal of `kind` is written, where another one does not fit."""
+    if kind == BOOL:
+        return "write TRUE or FALSE, or a comparison"
     if isinstance(kind, StringType):
         return "a text is written 'text'"
-    return "write TRUNC(...) or a literal without a point" if isinstance(value, float) else ""
+    if isinstance(kind, EnumType):
+        return f"name a member, such as {kind}#{next(iter(kind.shown.values()))}"
+    for name, written in (("DURATION", "a duration is written T#500ms"), ("DATE", f"a literal is written {_dated(kind)}")):
+        if f"ANY_{name}" in families(kind):
+            return written
+    if is_any(kind, "ANY_INT") and isinstance(value, float):
+        return "write a number without a point"
+    return "write a number" if is_any(kind, "ANY_NUM", "ANY_BIT") else ""
+
+
+def _dated(kind: Type) -> str:
+    day, time = "2024-12-31", "23:59:59"
+    return {"DATE": f"D#{day}", "TIME_OF_DAY": f"TOD#{time}"}.get(kind.name.removeprefix("L"), f"DT#{day}-{time}")

@@ -1,7 +1,8 @@
 """The standard functions: names, parameters, types.  What each does is lowered by `code.functions`, under the same key.
 
 Parameter types: a data type, a generic type, or `T`, a type variable bound to one type for all its places; `T` is limited
-to the generic types in `limits`.  A last parameter with `..` may repeat.  Sources: IEC 61131-3 ed. 3 tables 22 to 38.
+to the generic types in `limits`; ENUMERATION adds enumerations, ANY also arrays and structures.  A last parameter with
+`..` may repeat.  Sources: IEC 61131-3 ed. 3 tables 22 to 38.
 """
 
 from __future__ import annotations
@@ -33,8 +34,9 @@ SEL                                    G:BOOL IN0:T IN1:T           -> T      AN
 MAX MIN                                IN1:T ..                     -> T      ANY_ELEMENTARY
 LIMIT                                  MN:T IN:T MX:T               -> T      ANY_ELEMENTARY
 MUX                                    K:ANY_INT IN0:T ..           -> T      ANY
-GT GE EQ LE LT                         IN1:T IN2:T ..               -> BOOL   ANY
-NE                                     IN1:T IN2:T                  -> BOOL   ANY
+GT GE LE LT                            IN1:T IN2:T ..               -> BOOL   ANY_ELEMENTARY
+EQ                                     IN1:T IN2:T ..               -> BOOL   ANY_ELEMENTARY ENUMERATION
+NE                                     IN1:T IN2:T                  -> BOOL   ANY_ELEMENTARY ENUMERATION
 LEN                                    IN:STRING                    -> INT
 LEFT RIGHT                             IN:STRING L:ANY_INT          -> STRING
 MID                                    IN:STRING L:ANY_INT P:ANY_INT -> STRING
@@ -46,6 +48,7 @@ FIND                                   IN1:STRING IN2:STRING        -> INT
 TRUNC                                  IN:T                         -> DINT   ANY_REAL
 TIME                                                                -> TIME
 IS_VALID                               IN:T                         -> BOOL   ANY_REAL
+IS_VALID_BCD                           IN:T                         -> BOOL   ANY_BIT
 __DUE                                  AT:TIME                      ->
 """
 

@@ -16,11 +16,13 @@ from fbvm.base.types import (
     common,
     converts,
     families,
+    machine,
     string,
 )
 from fbvm.check import functions, references
 from fbvm.check.arguments import Arguments, callee
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, StandardCall
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
+from fbvm.check.fitting import convertible, same
 from fbvm.check.functions import Conversion, Signature
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 
 RESULT_STRING = 255
 """Characters that the result of a string function can have (as CODESYS)."""
+_SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations"}
 UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
 
 
@@ -123,6 +126,9 @@ class StandardCalls:
             if kind is None or not self.expressions.fit(value, kind, "S0405"):
                 return None
             arguments.append((value, kind))
+        whole = [value for value, kind in arguments if kind == variable and not machine(kind)]
+        if whole and not self._as_a_whole(call, whole):
+            return None
         self.facts.calls[call] = StandardCall(row.key, arguments, (variable,) if variable else ())
         if row.result == "STRING":
             return string(RESULT_STRING)
@@ -130,6 +136,27 @@ class StandardCalls:
             assert variable is not None
             return string(RESULT_STRING) if isinstance(variable, StringType) else variable
         return ELEMENTARY[row.result] if row.result else ""
+
+    def _as_a_whole(self, call: tree.Call, values: list[tree.Expr]) -> bool:
+        """True if a function can pass on arrays or structures; else a diagnostic.
+
+        The results of two calls of a function would lie in the same memory."""
+        if call in self.facts.guards:
+            self.error("S0405", call, f"{callee(call)} of an array or structure takes no EN and ENO", "write IF instead")
+            return False
+        made = [value for value in values if self._is_result(value)]
+        if made and callee(call).upper() != "MOVE":
+            self.error("S0405", made[0], f"{callee(call)} chooses among variables, not among results of that size",
+                       "assign the result to a variable first")
+            return False
+        return True
+
+    def _is_result(self, value: tree.Expr) -> bool:
+        """True for a value that lies in the memory of a user's function."""
+        called = self.facts.calls.get(value) if isinstance(value, tree.Call) else None
+        if isinstance(called, StandardCall) and called.key == "MOVE":
+            return self._is_result(called.arguments[0][0])
+        return isinstance(called, PouCall)
 
     def _parameter(self, value: tree.Expr, name: str) -> Type | None:
         """The type in which an argument is wanted whose parameter has its own type."""
@@ -153,7 +180,7 @@ class StandardCalls:
             assert kind is not None
             if kind in UNTYPED:
                 continue
-            met = base(kind) if bound is None else common(bound, kind)
+            met = base(kind) if bound is None or same(kind, bound) else common(bound, kind)
             if isinstance(kind, EnumType) or isinstance(bound, EnumType):
                 met = kind if bound in (None, kind) else None
             if isinstance(met, StringType):
@@ -185,12 +212,13 @@ class StandardCalls:
         return bound
 
     def _limited(self, call: tree.Call, bound: Type, row: Signature) -> Type | None:
-        good = set(row.limits) & families(bound) or isinstance(bound, EnumType) and "ANY" in row.limits
+        good = set(row.limits) & families(bound) or isinstance(bound, EnumType) and "ENUMERATION" in row.limits
         if row.limits == ("ANY_REAL",) and not good and converts(bound, LREAL):
             return LREAL
-        if not good or not isinstance(bound, Elementary | StringType | EnumType):
-            shown = " or ".join(limit for limit in row.limits if limit != "ANY") or "an elementary type"
-            self.error("S0405", call, f"{callee(call)} is defined for {shown}, not for {bound}")
+        if not good or is_block(bound):
+            shown = " or ".join(_SHOWN.get(limit, limit) for limit in row.limits)
+            self.error("S0405", call, f"{callee(call)} is defined for {shown}, not for {bound}",
+                       "an instance cannot be copied" if is_block(bound) else "")
             return None
         return bound
 
@@ -224,36 +252,3 @@ class StandardCalls:
         if name == "STRING":
             return string(RESULT_STRING)
         return ELEMENTARY.get(name) or self.expressions.checker.specs.named_type(name, self.expressions.source)
-
-
-_TIMES = ("ANY_DURATION", "ANY_DATE")
-_DATES = {
-    ("DATE_AND_TIME", "DATE"), ("DATE_AND_TIME", "TIME_OF_DAY"), ("LDATE_AND_TIME", "LDATE"),
-    ("LDATE_AND_TIME", "LTIME_OF_DAY"), ("LDATE_AND_TIME", "DATE"), ("LDATE_AND_TIME", "TIME_OF_DAY"),
-    ("DATE_AND_TIME", "LTIME_OF_DAY"), ("DATE_AND_TIME", "LDATE"),
-}
-
-
-def convertible(form: str, source: Type, target: Type) -> bool:
-    """True if the tables (22 to 27, and our additions) have the conversion."""
-    if form == "TRUNC":
-        return is_any(source, "ANY_REAL") and is_any(target, "ANY_INT")
-    if form == "BCD_TO":
-        return is_any(source, "ANY_BIT") and is_any(target, "ANY_INT") and source.name != "BOOL"
-    if form == "TO_BCD":
-        return is_any(source, "ANY_INT") and is_any(target, "ANY_BIT") and target.name != "BOOL"
-    if not isinstance(source, Elementary | StringType | EnumType):
-        return False
-    if isinstance(source, EnumType) or isinstance(target, EnumType):
-        return is_any(source, "ANY_INT", "ANY_BIT", "ANY_STRING") or is_any(target, "ANY_INT", "ANY_BIT", "ANY_STRING")
-    if isinstance(source, StringType) or isinstance(target, StringType):
-        return True
-    timed = [is_any(kind, *_TIMES) for kind in (source, target)]
-    if all(timed):
-        short = [kind.name.removeprefix("L") for kind in (source, target)]
-        return short[0] == short[1] or (source.name, target.name) in _DATES
-    if any(timed):
-        return is_any(target if timed[0] else source, "ANY_NUM", "ANY_BIT")
-    if is_any(source, "ANY_REAL") and is_any(target, "ANY_BIT") or is_any(source, "ANY_BIT") and is_any(target, "ANY_REAL"):
-        return "BOOL" in (source.name, target.name) or source.size == target.size
-    return True

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, EnumType, StringType, Type, base, fold
 from fbvm.check import references
-from fbvm.check.facts import Pou
+from fbvm.check.facts import Pou, Value
 from fbvm.check.fitting import assignable, conversion_hint
 from fbvm.check.values import is_any
 from fbvm.check.writes import note_count, place, writable
@@ -93,17 +93,44 @@ class Statements:
 
     def _case(self, node: tree.Case) -> None:
         kind = self.expressions.settle(node.selector)
-        if kind is not None and not is_any(kind, "ANY_INT", "ANY_BIT") and not isinstance(kind, EnumType):
-            what = "texts are" if isinstance(kind, StringType) else f"{kind} is"
-            self.error("S0503", node.selector, f"CASE chooses by an integer, a bit string or an enumeration; {what} none")
+        if kind is not None and not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_STRING") and not isinstance(kind, EnumType):
+            self.error("S0503", node.selector,
+                       f"CASE chooses by an integer, a bit string, an enumeration or a STRING; {kind} is none",
+                       "write IF and ELSIF")
             kind = None
         taken: list[tuple[int, int]] = []
+        texts: set[Value] = set()
+        if isinstance(kind, StringType):
+            self.facts.text_cases.add(node)
         for branch in node.branches:
-            if kind is not None:
+            if isinstance(kind, StringType):
+                for label in branch.labels:
+                    self._text_label(label, kind, texts)
+            elif kind is not None:
                 self.facts.labels[branch] = tuple(
                     span for label in branch.labels if (span := self._label(label, kind, taken)) is not None)
             self.block(branch.body)
         self.block(node.otherwise or ())
+
+    def _text_label(self, label: tuple[tree.Expr, tree.Expr | None], kind: StringType, taken: set[Value]) -> None:
+        low, high = label
+        if high is not None:
+            self.error("S0503", low, "texts have no ranges", "write the labels one by one")
+        elif self.expressions.fit(low, kind, "S0503", "the label"):
+            value = self.facts.constants.get(low)
+            shown = self.expressions.text(low)
+            if not isinstance(value, bytes):
+                self._unknown_label(low)
+            elif value in taken:
+                self.error("S0503", low, f"the label {shown} is taken by a label above")
+            elif len(value) > kind.capacity:
+                self.error("S0503", low, f"the label {shown} has {len(value)} characters and never equals a {kind}")
+            else:
+                taken.add(value)
+
+    def _unknown_label(self, expr: tree.Expr) -> None:
+        self.error("S0503", expr, "a label must be known before the program runs",
+                   "write a literal or the name of a constant")
 
     def _label(self, label: tuple[tree.Expr, tree.Expr | None], kind: Type,
                taken: list[tuple[int, int]]) -> tuple[int, int] | None:
@@ -125,8 +152,7 @@ class Statements:
             return None
         value = self.facts.constants.get(expr)
         if value is None or not isinstance(value, int):
-            self.error("S0503", expr, "a label must be known before the program runs",
-                       "write a literal or the name of a constant")
+            self._unknown_label(expr)
             return None
         return int(value)
 

@@ -88,7 +88,7 @@ def _select(body: BodyLowering, a: list[Node], call: StandardCall, site: int) ->
 
 
 def _mux(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
-    return ("mux", machine(call.arguments[1][1]), as_count(a[0], call.arguments[0][1]), tuple(a[1:]), site)
+    return ("mux", _form(call), as_count(a[0], call.arguments[0][1]), tuple(a[1:]), site)
 
 
 def _text(name: str) -> Lowering:
@@ -103,6 +103,16 @@ def _finite(body: BodyLowering, a: Node, form: str) -> Node:
     """Neither NaN nor infinite: then only is x - x zero."""
     kept = body.keep(a)
     return ("eq", "b", form, ("sub", form, kept, kept), ("const", form, 0.0))
+
+
+def _valid_bcd(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+    """A nibble is above 9 if its bit 3 is set, and bit 2 or bit 1 too."""
+    form = _form(call)
+    wide = body.keep(a[0] if form == "u64" else ("convert", "u64", form, a[0]))
+    doubled: Node = ("mul", "u64", wide, ("const", "u64", 2))
+    lower = ("or", "u64", doubled, ("mul", "u64", wide, ("const", "u64", 4)))
+    above = ("and", "u64", ("and", "u64", wide, lower), ("const", "u64", 0x8888_8888_8888_8888))
+    return ("eq", "b", "u64", above, ("const", "u64", 0))
 
 
 def _due(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
@@ -207,6 +217,7 @@ FUNCTIONS: dict[str, Lowering] = {
     "FIND": lambda body, a, call, site: ("find", "i16", a[0], a[1]),
     "TIME": lambda body, a, call, site: ("now", "i64"), "__DUE": _due,
     "IS_VALID": lambda body, a, call, site: _finite(body, a[0], _form(call)),
+    "IS_VALID_BCD": _valid_bcd,
     "TO": _convert, "TRUNC": _truncate, "BCD_TO": _bcd("from_bcd"), "TO_BCD": _bcd("to_bcd"),
     **{name: _math(name) for name in _MATH},
     **{name: _shift(name.lower()) for name in ("SHL", "SHR", "ROL", "ROR")},

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import BOOL, Type, base, machine
+from fbvm.base.types import BOOL, NULL, Type, base, machine
 from fbvm.check.checker import Checker
-from fbvm.check.facts import Pou, PouCall
+from fbvm.check.facts import Pou, PouCall, StandardCall
 from fbvm.check.references import root_of
+from fbvm.code.functions import FUNCTIONS
 from fbvm.code.image import Body
 from fbvm.code.loops import LoopLowering
 from fbvm.code.operations import Block, Node
@@ -198,11 +200,24 @@ class BodyLowering:
         """The place of an array or structure, also when it is a function's result."""
         if isinstance(expr, tree.Call):
             called = self.facts.calls[expr]
-            assert isinstance(called, PouCall)
-            return self.calls.aggregate(expr, called)
+            if isinstance(called, PouCall):
+                return self.calls.aggregate(expr, called)
+            return self._chosen(called, expr)
         place = self.places.of(expr)
         self.note_read(place, expr)
         return place
+
+    def _chosen(self, called: StandardCall, call: tree.Call) -> Place:
+        """The place that MOVE, SEL or MUX of arrays or structures names."""
+        kind = self.facts.types[call]
+        if called.key == "MOVE":
+            return self.aggregate(called.arguments[0][0])
+        (chooser, wanted), *rest = called.arguments
+        places = [self.aggregate(expr) for expr, _ in rest]
+        arguments = [self.value(chooser, wanted), *(self.places.reference(place) for place in places)]
+        site = self.site(call)
+        chosen = FUNCTIONS[called.key](self, arguments, replace(called, detail=(NULL,)), site)
+        return Place((("ref", chosen, site), 0, ()), kind)
 
     def copy(self, to: Place, source: Place, site: int) -> None:
         self.out.append(("copy", to.address, source.address, to.type.size))
@@ -258,10 +273,25 @@ class BodyLowering:
         return made
 
     def _case(self, node: tree.Case, site: int) -> None:
+        if node in self.facts.text_cases:
+            self._text_case(node)
+            return
         form = machine(self.facts.types[node.selector])
         selector = self.value(node.selector)
         rows = tuple((self.facts.labels[branch], self.inner(branch.body)) for branch in node.branches)
         self.out.append(("case", form, selector, rows, self.inner(node.otherwise or ())))
+
+    def _text_case(self, node: tree.Case) -> None:
+        """CASE of a text: the first branch one of whose labels equals it."""
+        selector = self.keep(self.value(node.selector), always=True)
+        rows = []
+        for branch in node.branches:
+            fits, *more = (("eq", "b", "s8", selector, self.value(label)) for label, _ in branch.labels)
+            for fit in more:
+                fits = self.measured(("or", "b", fits, fit))
+            rows.append((fits, self.inner(branch.body)))
+        otherwise = self.inner(node.otherwise or ())
+        self.out += [("if", tuple(rows), otherwise)] if rows else otherwise
 
     def _for(self, node: tree.For, site: int) -> None:
         self.loops.for_(node, site)
