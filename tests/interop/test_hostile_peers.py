@@ -123,11 +123,11 @@ PLACES: dict[str, Callable[[], AbstractContextManager[int]]] = {
     **{name: (lambda name=name: real(RUDE_PEERS[name](held()))) for name in (
         "closes at once", "resets at once", "closes between requests", "never reads", "resets in mid-request",
         "drips for ever", "floods from the start",
-    )},  # fmt: skip
+    )},
     "silent": lambda: real(ModbusPeer(held(), MISDEEDS["silence"])),
     "slow": lambda: real(ModbusPeer(held(), MISDEEDS["byte by byte"])),
     "flooding": lambda: real(ModbusPeer(held(), MISDEEDS["flood behind"])),
-}  # fmt: skip
+}
 
 
 @pytest.mark.slow
