@@ -1,23 +1,24 @@
 """The same image on every build of every engine: memory to the bit and traps are equal after every run.
 
-The tests of the Python engine are executed once more, each image of theirs on machine code at both levels as well."""
+The tests of the Python engine and the programs of the language corpus are executed once more, each image on machine code
+at both levels as well."""
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
 from typing import Any
 
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parent.parent / "unit"))
 import hand_image
+import lang_check
+import lang_corpus
+import pytest
 import test_engine_expressions as expressions
 import test_engine_limits as limits
 import test_engine_statements as statements
 
+from fbvm.code.image import Image
 from fbvm.code.operations import Block
 from fbvm.engine import native
+from fbvm.plc import Plc
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
@@ -53,3 +54,24 @@ def _again(module: Any) -> None:
 
 for _module in (expressions, limits, statements):
     _again(_module)
+
+
+# --- the language corpus --------------------------------------------------------------------------------------------
+
+
+def build(level: int) -> Any:
+    """What makes a PLC that executes an image as machine code of a level."""
+
+    def make(image: Image, cycle_ns: int) -> Plc:
+        plc = Plc(image, cycle_ns, budget=lang_check.BUDGET)
+        plc.engine = native.NativeEngine(image, plc.memory, level)
+        return plc
+
+    return make
+
+
+@pytest.mark.parametrize("program", [pytest.param(p, id=f"{p.name}:{p.line}") for p in lang_corpus.programs() if p.runs])
+def test_program(program: lang_corpus.Program, monkeypatch: pytest.MonkeyPatch) -> None:
+    for level in LEVELS:
+        monkeypatch.setitem(lang_check.BUILDS, f"native {level}", build(level))
+    lang_check.check(program)

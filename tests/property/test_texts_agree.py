@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import struct
-import sys
 from functools import cache
-from pathlib import Path
 from typing import Any
 
+import hand_image
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "unit"))
-import hand_image
-
-from fbvm.base.arithmetic import Undefined, single
 from fbvm.base.areas import BUDGET
+from fbvm.base.arithmetic import Undefined, single
 from fbvm.base.memory import STRUCTS
 from fbvm.base.types import ELEMENTARY, Elementary
 from fbvm.engine import native, texts
@@ -114,8 +110,8 @@ def test_numbers_are_read(data_type: str, text: str) -> None:
 
 VALUES = {
     "f32": st.floats(width=32), "f64": st.floats(),
-    **{form: st.integers(-(1 << bits - 1), (1 << bits - 1) - 1) for form, bits in (("i8", 8), ("i16", 16), ("i32", 32), ("i64", 64))},
-    **{form: st.integers(0, (1 << bits) - 1) for form, bits in (("u8", 8), ("u16", 16), ("u32", 32), ("u64", 64))},
+    **{f"i{bits}": st.integers(-(1 << bits - 1), (1 << bits - 1) - 1) for bits in (8, 16, 32, 64)},
+    **{f"u{bits}": st.integers(0, (1 << bits) - 1) for bits in (8, 16, 32, 64)},
     "b": st.booleans(),
 }  # fmt: skip
 
