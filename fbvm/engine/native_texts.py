@@ -10,6 +10,7 @@ from typing import Any
 
 from fbvm.base.types import SHORT_NAMES
 from fbvm.code.operations import Address, Block, Node
+from fbvm.code.shapes import statements
 from fbvm.engine.native_expressions import as_double, chooser, cut
 from fbvm.engine.native_reading import KINDS
 from fbvm.engine.native_writer import Text, Unsupported, Writer
@@ -18,8 +19,6 @@ from fbvm.engine.ranges import is_float
 EMPTY = Text("%c", "0")
 LONGEST_NUMBER = 48
 """Bytes that hold any number, time or date as text."""
-LONGEST_TEXT = 1 << 24
-"""A text that could be longer has no bound: it grows in a loop."""
 
 
 # --- greatest lengths -----------------------------------------------------------------------------------------------
@@ -49,26 +48,22 @@ def kept(w: Writer) -> dict[int, tuple[int, int]]:
         return w.capacities
     lets = list(_text_lets(w.body.code))
     w.capacities = {number: (0, 0) for number, _ in lets}
-    while True:
+    for _ in range(len(lets) + 1):  # a text that needs longer depends on itself
         before = dict(w.capacities)
         for number, node in lets:
-            size = max(w.capacities[number][1], capacity(w, node))
-            if size > LONGEST_TEXT:
-                raise Unsupported(f"a text of {w.body.name} grows without bound")
-            w.capacities[number] = 0, size
+            w.capacities[number] = 0, max(w.capacities[number][1], capacity(w, node))
         if w.capacities == before:
             break
+    else:
+        raise Unsupported(f"a text of {w.body.name} grows without bound")
     w.capacities = {number: (w.module.room(size), size) for number, (_, size) in w.capacities.items()}
     return w.capacities
 
 
 def _text_lets(block: Block) -> Iterator[tuple[int, Node]]:
-    rest: list[Any] = [block]
-    while rest:
-        item = rest.pop()
-        if item[:1] == ("let",) and item[2] == "s8":
-            yield item[1], item[3]
-        rest += [part for part in item if isinstance(part, tuple)]
+    for node in statements(block):
+        if node[0] == "let" and node[2] == "s8":
+            yield node[1], node[3]
 
 
 def keep(w: Writer, number: int, a: Node) -> None:

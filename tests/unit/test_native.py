@@ -1,0 +1,251 @@
+"""The native engine's own: levels, sharing, many scans at once, traps with values.  That it agrees is tests/property."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hand_image import at, behind, const, image, load, own, power_on, store
+
+from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS, SLOTS_OFFSET
+from fbvm.base.arithmetic import FUNCTIONS, NAN, power
+from fbvm.base.memory import STRUCTS
+from fbvm.code.operations import EXPRESSIONS, STATEMENTS, Node
+from fbvm.engine import native
+from fbvm.engine.native import NativeEngine
+
+if not native.available():
+    pytest.skip("llvmlite is not installed", allow_module_level=True)
+
+from fbvm.engine import native_cache, native_compiler, native_entries
+from fbvm.engine.native_module import BodyWriter, translate
+from fbvm.engine.native_worker import worker
+
+ONE = const("i16", 1)
+COUNT = (store("i16", 0, ("add", "i16", load("i16", 0), ONE)),)
+LEVELS = [0, 2]
+
+
+def engine(*codes: Any, before: dict[int, bytes] | None = None, level: int = 0, budget: int = 100_000) -> NativeEngine:
+    program = image(*codes)
+    return NativeEngine(program, power_on(program, before, budget), level)
+
+
+def slot(e: NativeEngine, machine: str = "i16", offset: int = 0) -> Any:
+    return e.memory.read(SLOTS_OFFSET + offset, machine)
+
+
+def test_every_operation_has_a_row() -> None:
+    assert set(BodyWriter.values) | set(BodyWriter.texts) == set(EXPRESSIONS)
+    assert set(BodyWriter.statements) == set(STATEMENTS)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_a_task_runs(level: int) -> None:
+    e = engine(COUNT, level=level)
+    assert [e.run(0) for _ in range(3)] == [None] * 3
+    assert slot(e) == 3
+
+
+def test_a_memory_that_is_too_small_is_refused() -> None:
+    with pytest.raises(ValueError, match="the image needs"):
+        NativeEngine(image((), size=8192), power_on(image(())), 0)
+
+
+def test_source_is_the_module() -> None:
+    assert "define i32 @task0" in engine(COUNT).source
+
+
+# --- sharing --------------------------------------------------------------------------------------------------------
+
+
+def test_plcs_with_one_image_share_its_code() -> None:
+    program = image(COUNT)
+    engines = [NativeEngine(program, power_on(program), 0) for _ in range(3 * native_entries.BLOCK)]
+    for number, e in enumerate(engines):
+        for _ in range(number % 3):
+            e.run(0)
+    assert [slot(e) for e in engines] == [number % 3 for number in range(len(engines))]
+    assert len({id(e._code) for e in engines}) == 1
+
+
+def test_an_entry_is_used_again() -> None:
+    program = image(COUNT)
+    e: NativeEngine | None = NativeEngine(program, power_on(program), 0)
+    assert e is not None
+    slot_of = e._entries[0]._slot
+    where = ctypes.addressof(slot_of)
+    e = None
+    gc.collect()
+    others = [NativeEngine(program, power_on(program), 0) for _ in range(native_entries.BLOCK)]
+    assert where in [ctypes.addressof(other._entries[0]._slot) for other in others]
+
+
+def test_a_memory_stays_while_an_engine_runs_over_it() -> None:
+    e = engine(COUNT)
+    e.memory.close()
+    assert e.run(0) is None
+
+
+# --- many scans at once ---------------------------------------------------------------------------------------------
+
+
+def test_run_n_advances_time_and_counts_scans() -> None:
+    e = engine((*COUNT, ("due", ("add", "i64", ("now", "i64"), const("i64", 5))), ("charge", 7, 1)), budget=10)
+    assert e.run_n(0, 1000, 1_000_000) == (1000, None)
+    assert slot(e) == 1000
+    read = e.memory.read
+    assert (read(NOW, "i64"), read(SCANS, "i64")) == (1_005_000_000, 1000)
+    assert (read(DUE, "i64"), read(BUDGET, "i64")) == (1_005_000_005, 3)
+
+
+def test_run_n_ends_with_a_trap() -> None:
+    left = ("sub", "i16", const("i16", 5), load("i16", 0))
+    e = engine((*COUNT, store("i16", 2, ("div", "i16", ONE, left, 4))))
+    done, trap = e.run_n(0, 1000, 1000)
+    assert done == 5 and trap is not None
+    assert (trap.code, trap.values) == ("R0101", (1, 0))
+    assert e.memory.read(SCANS, "i64") == 5
+
+
+def test_run_n_of_nothing() -> None:
+    e = engine(COUNT)
+    assert e.run_n(0, 0, 1000) == (0, None)
+    assert slot(e) == 0 and e.memory.read(DUE, "i64") == NEVER
+
+
+# --- levels ---------------------------------------------------------------------------------------------------------
+
+
+def test_fast_code_follows_quick_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("FBVM_CACHE", str(tmp_path))
+    asked: list[Any] = []
+    monkeypatch.setattr(worker, "compile", lambda text, done: asked.append((text, done)))
+    program = image((*COUNT, store("i16", 2, ONE)))
+    engines = [NativeEngine(program, power_on(program)) for _ in range(2)]
+    assert not engines[0].optimised and len(asked) == 1
+    engines[0].run(0)
+    (text, done), = asked
+    done(native_compiler.compile_text(text(), 2))
+    engines[0].run(0)
+    assert engines[0].optimised and slot(engines[0]) == 2
+    again = NativeEngine(image((*COUNT, store("i16", 2, ONE))), power_on(program))
+    assert again.optimised and len(asked) == 1, "the cache has it"
+
+
+def test_the_helper_process_optimises() -> None:
+    try:
+        assert worker._answer(b"no module") == b""
+        linked = native_compiler.Linked(worker._answer(b"define i32 @f() { ret i32 7 }"), ["f"])
+        assert ctypes.CFUNCTYPE(ctypes.c_int32)(linked.address("f"))() == 7
+    finally:
+        worker.stop()
+
+
+# --- budget, references and the system page ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_a_budget_below_zero_is_no_trap_where_nothing_is_charged(level: int) -> None:
+    e = engine((("call", 1, at(0)), *COUNT), COUNT, budget=-5, level=level)
+    assert e.run(0) is None
+    assert slot(e) == 2 and e.memory.read(BUDGET, "i64") == -5
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_a_store_to_the_budget_counts(level: int) -> None:
+    reference = const("ref", 1 << 40 | BUDGET << 8 | 255)
+    e = engine((("charge", 1, 1), ("store", "i64", behind(reference), const("i64", 3)), ("charge", 2, 2),
+                ("store", "i64", ("abs", BUDGET, ()), const("i64", 1)), ("charge", 2, 3)), level=level)
+    trap = e.run(0)
+    assert trap is not None and (trap.code, trap.site.line) == ("R0104", 3)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_instances_of_one_body_do_not_mix(level: int) -> None:
+    inner = (("store", "i16", own(2), ("add", "i16", ("load", "i16", own(2)), ("load", "i16", own(0)))),)
+    calls = tuple(("call", 1, at(64 * number)) for number in range(4))
+    e = engine(calls, inner, before={64 * n: STRUCTS["i16"].pack(n + 1) for n in range(4)}, level=level)
+    e.run(0)
+    e.run(0)
+    assert [slot(e, "i16", 64 * n + 2) for n in range(4)] == [2, 4, 6, 8]
+
+
+def test_a_text_that_grows_without_bound_is_not_supported() -> None:
+    grow = ("let", 1, "s8", ("concat", "s8", ("tmp", "s8", 1), const("s8", b"x")))
+    with pytest.raises(native.Unsupported, match="grows without bound"):
+        engine((("let", 1, "s8", const("s8", b"x")), ("loop", (), (grow,), ())))
+
+
+# --- what LLVM must not do --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("machine", ["f32", "f64"])
+def test_a_product_and_a_sum_are_rounded_each(machine: str) -> None:
+    product = ("mul", machine, load(machine, 8), load(machine, 16))
+    program = image((store(machine, 0, ("add", machine, product, load(machine, 24))),))
+    _, assembly = native_compiler.assembly(translate(program).text, 2)
+    assert "mul" in assembly and "fma" not in assembly.lower() and "fmadd" not in assembly.lower()
+
+
+CRC = (
+    ("let", 2, "u16", const("u16", 0xFFFF)), store("i16", 100, const("i16", 0)),
+    ("loop", (("if", ((("ge", "b", "i16", load("i16", 100), const("i16", 64)), (("exit",),)),), ()),),
+     (("let", 2, "u16", ("xor", "u16", ("tmp", "u16", 2), ("convert", "u16", "u8", ("load", "u8", at(
+         0, (1, ("check", "i64", ("convert", "i64", "i16", load("i16", 100)), 0, 63, "R0102", 1))))))),
+      store("i16", 102, const("i16", 0)),
+      ("loop", (("if", ((("ge", "b", "i16", load("i16", 102), const("i16", 8)), (("exit",),)),), ()),),
+       (("if", ((("ne", "b", "u16", ("and", "u16", ("tmp", "u16", 2), const("u16", 1)), const("u16", 0)),
+                 (("let", 2, "u16", ("xor", "u16", ("shr", "u16", ("tmp", "u16", 2), const("i64", 1), 1),
+                                     const("u16", 0xA001))),)),),
+         (("let", 2, "u16", ("shr", "u16", ("tmp", "u16", 2), const("i64", 1), 1)),)),),
+       (store("i16", 102, ("add", "i16", load("i16", 102), ONE)),))),
+     (store("i16", 100, ("add", "i16", load("i16", 100), ONE)),)),
+    store("u16", 104, ("tmp", "u16", 2)),
+)  # fmt: skip
+"""CRC16 over 64 bytes, bit by bit, whose counters are read afterwards: LLVM 22.1.0 would miscompile it."""
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_crc_bit_by_bit(level: int) -> None:
+    data = bytes(range(7, 71))
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ 0xA001 if crc & 1 else crc >> 1
+    e = engine(CRC, before={0: data}, level=level)
+    assert e.run(0) is None
+    assert (slot(e, "u16", 104), slot(e, "i16", 100), slot(e, "i16", 102)) == (crc, 64, 8)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+def test_functions_are_those_of_python(level: int) -> None:
+    inputs = [0.0, -0.0, 1e-300, 0.1, 0.5, 1.0, 2.0, 3.7, 100.25, 1e5, 1e22, 1e300, math.inf, -math.inf, NAN]
+    inputs += [-x for x in inputs]
+    places = {name: 16 * number for number, name in enumerate((*FUNCTIONS, "pow"))}
+    code: list[Node] = [store("f64", 512 + at_, ("math", "f64", name, load("f64", 0))) for name, at_ in places.items()
+                        if name != "pow"]
+    code.append(store("f64", 512 + places["pow"], ("pow", "f64", load("f64", 0), load("f64", 8))))
+    e = engine(tuple(code), level=level)
+    for x in inputs:
+        for y in (0.0, -3.0, 0.5, 2.0, 1e300, -math.inf, NAN):
+            e.memory.write(SLOTS_OFFSET, "f64", x)
+            e.memory.write(SLOTS_OFFSET + 8, "f64", y)
+            e.run(0)
+            wanted = {name: function(x) for name, function in FUNCTIONS.items()} | {"pow": power(x, y)}
+            assert {name: repr(slot(e, "f64", 512 + at_)) for name, at_ in places.items()} == {
+                name: repr(value) for name, value in wanted.items()}, (x, y)
+
+
+def test_without_the_cache_all_is_the_same() -> None:
+    native_cache.switch(False)
+    try:
+        e = engine((*COUNT, store("i16", 4, ONE)))
+        assert e.run(0) is None and slot(e) == 1
+    finally:
+        native_cache.switch(True)

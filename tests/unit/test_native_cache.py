@@ -1,0 +1,91 @@
+"""Objects on disk: kept, trusted only when whole and the user's own, thrown away when there are too many."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from fbvm.engine import native
+
+if not native.available():
+    pytest.skip("llvmlite is not installed", allow_module_level=True)
+
+from fbvm.engine import native_cache
+from fbvm.engine.native_cache import Stored
+
+STORED = Stored({"points": [["R0101", 3, [["i64", None]]]], "context": 512}, b"object" * 100)
+NAME = "a" * 64
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("FBVM_CACHE", str(tmp_path))
+    return tmp_path / "native"
+
+
+def test_what_is_written_is_read() -> None:
+    assert native_cache.read(NAME) is None
+    native_cache.write(NAME, STORED)
+    assert native_cache.read(NAME) == STORED
+
+
+@pytest.mark.parametrize("at", [0, 20, 40, 300, -1])
+def test_a_damaged_file_is_passed_over(folder: Path, at: int) -> None:
+    native_cache.write(NAME, STORED)
+    content = bytearray((folder / NAME).read_bytes())
+    content[at] ^= 1
+    (folder / NAME).write_bytes(content)
+    assert native_cache.read(NAME) is None
+
+
+@pytest.mark.parametrize("size", [0, 1, 31, 32, 40, 100])
+def test_a_file_cut_short_is_passed_over(folder: Path, size: int) -> None:
+    native_cache.write(NAME, STORED)
+    (folder / NAME).write_bytes((folder / NAME).read_bytes()[:size])
+    assert native_cache.read(NAME) is None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="permissions are others there")
+def test_a_folder_that_others_can_write_is_not_trusted(folder: Path) -> None:
+    native_cache.write(NAME, STORED)
+    folder.chmod(0o777)
+    assert native_cache.read(NAME) is None
+    native_cache.write("b" * 64, STORED)
+    assert not (folder / ("b" * 64)).exists()
+
+
+def test_the_oldest_go_when_there_are_too_many(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = [letter * 64 for letter in "abcdef"]
+    for place, name in enumerate(names):
+        native_cache.write(name, STORED)
+        os.utime(folder / name, (place, place))
+    monkeypatch.setattr(native_cache, "LIMIT_BYTES", (folder / names[0]).stat().st_size * 4)
+    assert native_cache.read(names[0]) == STORED
+    native_cache.write("g" * 64, STORED)
+    assert sorted(path.name[0] for path in folder.iterdir()) == ["a", "f", "g"]
+
+
+def test_a_folder_that_cannot_be_made_does_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "file"))
+    native_cache.write(NAME, STORED)
+    assert native_cache.read(NAME) is None
+
+
+def test_names_depend_on_every_part() -> None:
+    names = {native_cache.name_of(*parts) for parts in (("a", "b"), ("ab", ""), ("", "ab"), ("a",), ("b", "a"))}
+    assert len(names) == 5
+
+
+def test_switched_off_nothing_is_read_or_written(folder: Path) -> None:
+    native_cache.write(NAME, STORED)
+    native_cache.switch(False)
+    try:
+        assert native_cache.read(NAME) is None
+        native_cache.write("b" * 64, STORED)
+    finally:
+        native_cache.switch(True)
+    assert not (folder / ("b" * 64)).exists()

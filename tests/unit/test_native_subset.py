@@ -1,0 +1,94 @@
+"""Routines written in the subset do the same in Python and in machine code."""
+
+from __future__ import annotations
+
+import ast
+import ctypes
+from typing import Any
+
+import pytest
+
+from fbvm.engine import native, native_routines
+
+if not native.available():
+    pytest.skip("llvmlite is not installed", allow_module_level=True)
+
+from fbvm.engine.native_compiler import Linked, compile_text
+from fbvm.engine.native_library import PARTS, parts_of, routines_of
+from fbvm.engine.native_subset import Routine
+
+
+def compiled(source: str, **names: Any) -> Any:
+    """A function of the subset as machine code; it stays for the test's time."""
+    function = ast.parse(source).body[0]
+    assert isinstance(function, ast.FunctionDef)
+    constants: list[bytes] = []
+    lines = Routine(function, names, lambda value: constants.append(value) or f"@k{len(constants) - 1}").translate()  # type: ignore[func-returns-value]
+    texts = [f'@k{n} = private constant [{len(v) + 1} x i8] c"{v.decode()}\\00"' for n, v in enumerate(constants)]
+    linked = Linked(compile_text("\n".join([*texts, *lines, "attributes #1 = { nounwind }"]), 0), [function.name])
+    count = len(function.args.args)
+    call = ctypes.CFUNCTYPE(ctypes.c_int64, *[ctypes.c_int64] * count)(linked.address(function.name))
+    call.linked = linked  # type: ignore[attr-defined]
+    return call
+
+
+COLLATZ = """
+def steps(n, most):
+    count = 0
+    while n != 1 and count < most:
+        if n % 2 == 0:
+            n //= 2
+        elif not n < 0 or n == 0:
+            n = 3 * n + 1
+        else:
+            break
+        count += 1
+        if count == 5:
+            continue
+    return count
+"""
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 27, 97])
+def test_control_flow(n: int) -> None:
+    space: dict[str, Any] = {}
+    exec(COLLATZ, space)
+    assert compiled(COLLATZ)(n, 1000) == space["steps"](n, 1000)
+
+
+@pytest.mark.parametrize("expression", [
+    "a + b * 2", "a - b", "a << b", "a | b ^ 1 & 7", "-a", "(a < b) + 1", "1 <= a <= 5", "1 <= a <= b <= 7", "LIMIT",
+    "ord('x')", "a // 2", "a % 3", "a >> 1", "(a == b) + (a != b) * 2 + (a >= 5) * 4 + (b > a) * 8",
+])  # fmt: skip
+def test_expressions(expression: str) -> None:
+    values = {"a": 5, "b": 8, "LIMIT": 99}
+    assert compiled(f"def f(a, b):\n    return {expression}", LIMIT=99)(5, 8) == eval(expression, values)
+
+
+def test_division_takes_numbers_as_unsigned() -> None:
+    assert compiled("def f(a):\n    return a // 10")(-6) == (2**64 - 6) // 10
+
+
+def test_bytes_are_reached() -> None:
+    buffer = ctypes.create_string_buffer(b"hello")
+    upper = compiled("def f(at):\n    poke(at, peek(at) - 32)\n    return peek(data(b'q') + 0)")
+    assert upper(ctypes.addressof(buffer)) == ord("q")
+    assert buffer.value == b"Hello"
+
+
+def test_what_falls_off_the_end_yields_zero() -> None:
+    assert compiled("def f(a):\n    a = 3")(1) == 0
+
+
+def test_routines_run_in_python_too() -> None:
+    out = ctypes.create_string_buffer(64)
+    at = ctypes.addressof(out)
+    assert native_routines.put_time(at, -90_061_000_000_000) == len(b"T#-1d1h1m1s") and out.value == b"T#-1d1h1m1s"
+    ctypes.memset(at, 0, 64)
+    assert native_routines.put_real(at, 0x3FB99999A0000000) == 3 and out.value == b"0.1"
+
+
+def test_a_part_calls_only_parts_before_it() -> None:
+    assert parts_of([]) == [] and parts_of(["put_real"]) == [0] and parts_of(["read_value", "put_real"]) == [0, 1]
+    assert len({name for part in range(len(PARTS)) for name in routines_of(part)}) == sum(
+        len(routines_of(part)) for part in range(len(PARTS)))
