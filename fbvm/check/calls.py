@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import BOOL, DEFAULT_STRING, StringType, StructType, Type, base, fold
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.facts import Pou, PouCall, Variable, is_block
-from fbvm.check.fitting import assignable, conversion_hint, same
+from fbvm.check.fitting import assignable, holds, same
 from fbvm.check.standard import StandardCalls
 from fbvm.check.writes import note_count, writable
 from fbvm.syntax import tree
@@ -212,9 +212,9 @@ class Calls:
         if argument.negated and base(kind) != BOOL:
             self.error("S0405", value, f"NOT needs a BOOL output; {name} is {kind}")
             return False
-        if not assignable(kind, target):
+        if not assignable(kind, target) and not holds(target, kind):
             self.error("S0405", value, f"the output {name} is {kind} and does not fit {target}",
-                       conversion_hint(kind, target))
+                       f"let a variable of {base(kind)} take it, and convert that afterwards")
             return False
         note_count(self.expressions, value)
         return writable(self.expressions, value, f"take the output {name}")

@@ -10,11 +10,13 @@ from fbvm.base.types import (
     OpenArrayType,
     StringType,
     StructType,
+    SubrangeType,
     Type,
     base,
     converts,
     families,
 )
+from fbvm.check.constants import limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
 from fbvm.check.values import is_any
 
@@ -32,6 +34,14 @@ def assignable(kind: Type, target: Type) -> bool:
     if isinstance(target, StructType) or isinstance(kind, StructType):
         return kind == target and not (isinstance(target, StructType) and target.block)
     return converts(kind, target)
+
+
+def holds(target: Type, kind: Type) -> bool:
+    """True if an integer type has room for every value of a subrange, as for the parts that SPLIT_DATE gives."""
+    if not isinstance(kind, SubrangeType) or not is_any(target, "ANY_INT"):
+        return False
+    low, high = limits(target) or (1, 0)
+    return low <= kind.low and kind.high <= high
 
 
 def same(kind: Type, other: Type) -> bool:

@@ -49,6 +49,8 @@ TRUNC                                  IN:T                         -> DINT   AN
 TIME                                                                -> TIME
 IS_VALID                               IN:T                         -> BOOL   ANY_REAL
 IS_VALID_BCD                           IN:T                         -> BOOL   ANY_BIT
+TO_BIG_ENDIAN TO_LITTLE_ENDIAN         IN:T                         -> T      ANY_INT ANY_BIT
+FROM_BIG_ENDIAN FROM_LITTLE_ENDIAN     IN:T                         -> T      ANY_INT ANY_BIT
 __DUE                                  AT:TIME                      ->
 """
 

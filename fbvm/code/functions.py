@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import DAY_NS, DINT, EnumType, StringType, Type, base, machine
 from fbvm.check.facts import StandardCall
 from fbvm.check.values import is_any
-from fbvm.code.operations import FLOATS, Node
+from fbvm.code.operations import FLOATS, SIZES, Node
 
 if TYPE_CHECKING:
     from fbvm.code.lower import BodyLowering
@@ -115,6 +115,28 @@ def _valid_bcd(body: BodyLowering, a: list[Node], call: StandardCall, site: int)
     return ("eq", "b", "u64", above, ("const", "u64", 0))
 
 
+_SWAPS = ((8, 0x00FF_00FF_00FF_00FF), (16, 0x0000_FFFF_0000_FFFF), (32, 0x0000_0000_FFFF_FFFF))
+"""Neighbours of so many bits change places; the mask has the lower ones."""
+
+
+def _swapped(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+    """The bytes of a number in the other order: values lie in memory with the lowest byte first."""
+    form = _form(call)
+    width = SIZES[form] * 8
+    if width == 8:
+        return a[0]
+    word = f"u{width}"
+    node = a[0] if form == word else ("convert", word, form, a[0])
+    for bits, mask in _SWAPS:
+        if bits < width:
+            node = body.keep(node)
+            lower: Node = ("const", word, mask & (1 << width) - 1)
+            count = ("const", "i64", bits)
+            node = ("or", word, ("and", word, ("shr", word, node, count, site), lower),
+                    ("shl", word, ("and", word, node, lower), count, site))
+    return node if form == word else ("convert", form, word, node)
+
+
 def _due(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
     body.out.append(("due", a[0]))
     return ("const", "b", 0)
@@ -218,6 +240,8 @@ FUNCTIONS: dict[str, Lowering] = {
     "TIME": lambda body, a, call, site: ("now", "i64"), "__DUE": _due,
     "IS_VALID": lambda body, a, call, site: _finite(body, a[0], _form(call)),
     "IS_VALID_BCD": _valid_bcd,
+    "TO_BIG_ENDIAN": _swapped, "FROM_BIG_ENDIAN": _swapped,
+    "TO_LITTLE_ENDIAN": lambda body, a, call, site: a[0], "FROM_LITTLE_ENDIAN": lambda body, a, call, site: a[0],
     "TO": _convert, "TRUNC": _truncate, "BCD_TO": _bcd("from_bcd"), "TO_BCD": _bcd("to_bcd"),
     **{name: _math(name) for name in _MATH},
     **{name: _shift(name.lower()) for name in ("SHL", "SHR", "ROL", "ROR")},

@@ -63,9 +63,10 @@ def _string(text: str) -> str:
 
 
 def _time(text: str) -> int:
-    """Nanoseconds of `T#1s500ms`, `D#2024-02-29`, `TOD#10:20:30.5` and `DT#2024-02-29-10:20:30.5`."""
+    """Nanoseconds of `T#1s500ms`, `D#2024-02-29`, `TOD#10:20:30.5` and `DT#2024-02-29-10:20:30.5`, and their L forms."""
     prefix, _, rest = text.partition("#")
-    if prefix in ("T", "LT"):
+    prefix = prefix.removeprefix("L")
+    if prefix == "T":
         total = sum(int(n) * _NS[unit] for n, unit in re.findall(r"(\d+)(ms|us|ns|[dhms])", rest))
         return -total if rest.startswith("-") else total
     if prefix == "TOD":
