@@ -92,7 +92,7 @@ class Names:
         for place in sorted(fitting, key=lambda place: (place.type.size, place.bit is None)):
             inner: Place | None = place
             while inner is not None and isinstance(base(inner.type), ArrayType | StructType):
-                inner = _part(inner, offset, bit)
+                inner = _part(inner, offset)
             if inner is not None and (inner.bit is not None or bit is None):
                 return inner
         area = next((area for area in self._areas.values() if area.offset <= offset < _end(area)), None)
@@ -116,17 +116,13 @@ def _located_in(place: Place) -> Iterator[Place]:
                 yield from _located_in(inner)
 
 
-def _part(place: Place, offset: int, bit: int | None = None) -> Place | None:
+def _part(place: Place, offset: int) -> Place | None:
     """The element or member of a place that holds a byte; None for what lies between members."""
     kind = base(place.type)
     if isinstance(kind, ArrayType):
         size = kind.element.size
         number = (offset - place.offset) // size
-        if place.bit is not None:
-            number = (offset - place.offset) * 8 + (bit or 0) - place.bit
         name = f"{place.name}[{', '.join(map(str, _subscripts(kind, number)))}]"
-        if place.bit is not None:
-            return place.inner(name, kind.element, (place.bit + number) // 8, (place.bit + number) % 8)
         return place.inner(name, kind.element, number * size)
     assert isinstance(kind, StructType)
     for field in kind.fields.values():

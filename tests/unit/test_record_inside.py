@@ -1,0 +1,307 @@
+"""What happens inside a scan, the names of places, states to go back to, and the scan table."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from fbvm.code.compiler import compile_text
+from fbvm.code.image import Image
+from fbvm.plc import Phase, Plc
+from fbvm.record.history import History, looking
+from fbvm.record.inside import Began, Ended, Event, Inside, Read, Statement, Write
+from fbvm.record.names import Names
+from fbvm.record.recorder import Signal, signals_of
+from fbvm.record.table import ScanTable
+
+TEXT = """\
+TYPE Pair : STRUCT a, b : INT; END_STRUCT END_TYPE
+VAR_GLOBAL Total : DINT; END_VAR
+FUNCTION_BLOCK Step
+VAR_INPUT Go : BOOL; END_VAR
+VAR_IN_OUT n : INT; END_VAR
+VAR Inner : R_TRIG; END_VAR
+    Inner(CLK := Go);
+    IF Inner.Q THEN
+        n := n + 1;
+    END_IF
+END_FUNCTION_BLOCK
+FUNCTION Double : INT VAR_INPUT x : INT; END_VAR
+    Double := 2 * x;
+END_FUNCTION
+PROGRAM Main
+VAR
+    Steps : ARRAY[1..2] OF Step;
+    Go : BOOL;
+    n, m : INT;
+    Pairs : ARRAY[0..1, 1..2] OF Pair;
+    Lamp AT CIO 100.03 : BOOL;
+    Words AT D10 : ARRAY[0..3] OF WORD;
+END_VAR
+    Steps[1](Go := Go, n := n);
+    m := Double(n);
+    Pairs[1, 2].b := m;
+    Lamp := NOT Lamp;
+    Words[2] := 7;
+    %D200 := 5;
+END_PROGRAM
+"""
+
+
+@pytest.fixture(scope="module")
+def image() -> Image:
+    made = compile_text(TEXT, "steps.st").image
+    assert made is not None
+    return made
+
+
+@pytest.fixture
+def plc(image: Image) -> Plc:
+    return Plc(image)
+
+
+@pytest.fixture
+def names(plc: Plc) -> Names:
+    return Names(plc.image.symbols, plc.memory.areas)
+
+
+class Log:
+    """Writes down phases and events."""
+
+    def __init__(self) -> None:
+        self.rows: list[Any] = []
+
+    def phase(self, plc: Plc, phase: Phase) -> None:
+        self.rows.append(phase)
+
+    def event(self, plc: Plc, event: Event) -> None:
+        self.rows.append(event)
+
+    def of(self, kind: type) -> list[Any]:
+        return [row for row in self.rows if isinstance(row, kind)]
+
+
+def look(plc: Plc) -> Log:
+    log = Log()
+    with looking(plc, log):
+        plc.scan()
+    return log
+
+
+# --- inside -----------------------------------------------------------------------------------------------------------
+
+
+def test_bodies_begin_and_end_as_they_call_each_other(plc: Plc, names: Names) -> None:
+    shown = [(type(row).__name__, names.instance(row.frame.base)) for row in look(plc).rows if isinstance(row, Began | Ended)]
+    assert shown == [
+        ("Began", "Main"), ("Began", "Main.Steps[1]"), ("Began", "Main.Steps[1].Inner"), ("Ended", "Main.Steps[1].Inner"),
+        ("Ended", "Main.Steps[1]"), ("Began", ""), ("Ended", ""), ("Ended", "Main"),
+    ]  # fmt: skip
+
+
+def test_a_frame_knows_the_statement_that_called(plc: Plc, image: Image) -> None:
+    inner = look(plc).of(Began)[2].frame
+    assert image.sites[inner.site].line == 7
+    assert image.sites[inner.caller.site].line == 24
+    assert inner.caller.caller.site == -1
+
+
+def test_statements_in_the_order_of_execution(plc: Plc, image: Image) -> None:
+    plc.write("Main.Go", True)
+    sites = [image.sites[row.site] for row in look(plc).of(Statement)]
+    lines = [site.line for site in sites if site.file == "steps.st"]
+    assert lines == [24, 7, 8, 9, 25, 13, 26, 27, 28, 29]
+
+
+def test_writes_with_what_was_there_before(plc: Plc, names: Names) -> None:
+    plc.write("Main.Go", True)
+    plc.write("D12", 3)
+    writes = {place.name: (row.old, row.value) for row in look(plc).of(Write)
+              if (place := names.at(row.offset, row.bit if row.bit < 8 else None))}  # fmt: skip
+    assert writes["Main.Lamp"] == (b"\0", b"\1")
+    assert writes["Main.Words[2]"] == (b"\3\0", b"\7\0")
+    assert writes["D200"] == (b"\0\0", b"\5\0")
+    assert writes["Main.Pairs[1, 2].b"] == (b"\0\0", b"\2\0")
+    assert writes["Main.n"] == (b"\0\0", b"\1\0")
+
+
+def test_reads_with_their_values(plc: Plc, names: Names) -> None:
+    plc.write("CIO 100.03", True)
+    reads = [(names.at(row.offset, row.bit if row.bit < 8 else None), row.value) for row in look(plc).of(Read)]
+    assert (("Main.Lamp"), b"\1") in [(place.name, value) for place, value in reads if place]
+
+
+def test_phases_stand_between_the_events(plc: Plc) -> None:
+    rows = look(plc).rows
+    assert (rows[0], rows[-2:]) == (Phase.INPUTS, [Phase.PROGRAM, Phase.REFRESH])
+
+
+def test_a_trap_comes_back_and_nothing_returns() -> None:
+    made = compile_text("PROGRAM Main VAR a : INT; END_VAR a := 1 / a; END_PROGRAM").image
+    assert made is not None
+    plc = Plc(made)
+    log = look(plc)
+    assert plc.trap and plc.trap.code == "R0101"
+    assert not log.of(Ended)
+
+
+def test_the_engine_is_given_back(plc: Plc) -> None:
+    engine = plc.engine
+    with looking(plc, Log()):
+        assert isinstance(plc.engine, Inside)
+    assert plc.engine is engine
+    assert not plc.phases
+
+
+def test_looking_changes_nothing(image: Image) -> None:
+    plain, seen = Plc(image), Plc(image)
+    with looking(seen, Log()):
+        for scan in range(5):
+            for plc in (plain, seen):
+                plc.write("Main.Go", scan % 2 == 1)
+                plc.scan()
+    assert bytes(plain.memory.snapshot()) == bytes(seen.memory.snapshot())
+
+
+# --- names ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("path", [
+    "Main.n", "Main.Steps[2].Inner.CLK", "Main.Pairs[0, 2].a", "Total", "Main.Words[3]", "D9", "CIO 100", "W5", "A200", "%MB7",
+])  # fmt: skip
+def test_a_place_is_found_back(plc: Plc, names: Names, path: str) -> None:
+    place = plc.find(path)
+    found = names.at(place.offset)  # type: ignore[union-attr]
+    assert found is not None and found.name == path
+
+
+@pytest.mark.parametrize("path", ["Main.Lamp", "CIO 100.04", "W5.09", "%MX7.3", "A200.11", "CF113"])
+def test_a_bit_is_found_back(plc: Plc, names: Names, path: str) -> None:
+    place = plc.find(path)
+    found = names.at(place.offset, place.bit)  # type: ignore[union-attr]
+    assert found is not None and found.name == path
+
+
+def test_an_in_out_is_a_reference(plc: Plc, names: Names) -> None:
+    steps = plc.find("Main.Steps[1]")
+    field = steps.type.fields["N"]  # type: ignore[union-attr]
+    place = names.at(steps.offset + field.offset)  # type: ignore[union-attr]
+    assert place is not None and (place.name, place.type.name) == ("Main.Steps[1].n", "reference")
+
+
+def test_what_has_no_name(names: Names, plc: Plc) -> None:
+    assert names.at(0) is None
+    assert names.at(plc.memory.size - 1) is None
+    assert names.instance(0) == ""
+
+
+def test_the_values_within_some_bytes(plc: Plc, names: Names) -> None:
+    pair = plc.find("Main.Pairs[1, 1]")
+    inside = names.within(pair.offset, pair.type.size)  # type: ignore[union-attr]
+    assert [place.name for place in inside] == ["Main.Pairs[1, 1].a", "Main.Pairs[1, 1].b"]
+
+
+# --- history ----------------------------------------------------------------------------------------------------------
+
+
+def steps(plc: Plc, history: History, count: int) -> None:
+    for _ in range(count):
+        if plc.scans % 7 == 3:
+            history.touch()
+            plc.write("Main.Go", not plc.read("Main.Go"))
+        history.before_scan()
+        plc.scan()
+
+
+def test_any_scan_is_found_again(plc: Plc) -> None:
+    history, seen = History(plc, every=5), []
+    for _ in range(40):
+        seen.append(plc.snapshot())
+        steps(plc, history, 1)
+    for scan in (0, 1, 13, 39):
+        twin = history.at(scan)
+        assert (twin.scans, twin.read("Main.n")) == (scan, int.from_bytes(_at(plc, seen[scan]), "little"))
+
+
+def _at(plc: Plc, state: Any) -> bytes:
+    place = plc.find("Main.n")
+    return bytes(state.memory)[place.offset : place.offset + 2]  # type: ignore[union-attr]
+
+
+def test_only_so_many_states_are_kept(plc: Plc) -> None:
+    history = History(plc, every=2, keep=3)
+    steps(plc, history, 30)
+    assert history.scans.stop == 30
+    assert history.scans.start > 10
+    with pytest.raises(ValueError, match="scan 2 is not kept"):
+        history.at(2)
+    with pytest.raises(ValueError, match="scan 31 is not kept"):
+        history.at(31)
+
+
+def test_nothing_is_kept_before_the_first_scan(plc: Plc) -> None:
+    history, log = History(plc), Log()
+    history.again(range(5), log)
+    assert history.scans == range(0)
+    assert log.rows == []
+
+
+def test_a_scan_is_run_again_with_other_inputs(plc: Plc) -> None:
+    history = History(plc)
+    steps(plc, history, 20)
+    twin = history.at(3)
+    twin.write("Main.Go", False)
+    twin.scan()
+    assert twin.read("Main.n") == 0
+    assert plc.read("Main.n") == 2
+
+
+# --- scan table -------------------------------------------------------------------------------------------------------
+
+
+def table(plc: Plc, names: Names, *signals: str, every: bool = False) -> ScanTable:
+    chosen = [signal for name in signals for signal in signals_of(plc, name)]
+    return ScanTable(plc.image, names, chosen, every)
+
+
+def test_a_row_where_something_changed(plc: Plc, names: Names) -> None:
+    made = table(plc, names, "Main.Go", "Main.n", "Main.m")
+    with looking(plc, made):
+        plc.scan()
+        plc.write("Main.Go", True)
+        plc.scan()
+    assert made.draw() == """\
+scan 0   0s     Main.Go   Main.n   Main.m
+  inputs        FALSE     0        0
+scan 1   10ms
+  inputs       >TRUE      0        0
+  steps.st:9             >1
+  steps.st:25                     >2"""
+
+
+def test_every_statement_if_wanted(plc: Plc, names: Names) -> None:
+    made = table(plc, names, "D200", every=True)
+    with looking(plc, made):
+        plc.scan()
+    labels = [row.label for row in made.bands[0].rows]
+    assert labels[:4] == ["inputs", "steps.st:24", "steps.st:7", "R_TRIG.st:13"]
+    assert labels[-2:] == ["steps.st:28", "steps.st:29"]
+
+
+def test_who_wrote_last_also_if_nothing_changed(plc: Plc, names: Names) -> None:
+    made = table(plc, names, "Main.m", "Main.Lamp")
+    with looking(plc, made):
+        plc.run(scans=3)
+    m, lamp = made.signals
+    assert made.last_change(m) is None
+    assert (made.writers[m].scan, made.writers[m].site.line, made.writers[m].instance) == (2, 25, "Main")  # type: ignore[union-attr]
+    assert made.writers[lamp].reads == (("Main.Lamp", "FALSE"),)
+    assert made.last_change(lamp).new is True  # type: ignore[union-attr]
+
+
+def test_bits_of_a_word_are_told_apart(plc: Plc, names: Names) -> None:
+    made = table(plc, names, "CIO 100.03", "CIO 100.04", "CIO 100")
+    with looking(plc, made):
+        plc.scan()
+    assert [isinstance(signal, Signal) and signal in made.writers for signal in made.signals] == [True, False, True]

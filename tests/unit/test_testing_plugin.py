@@ -1,0 +1,287 @@
+"""The pytest plugin, tried by running pytest on small projects."""
+
+from __future__ import annotations
+
+import re
+from importlib.metadata import entry_points
+from pathlib import Path
+
+import pytest
+
+pytest_plugins = ["pytester"]
+
+INSTALLED = any(entry.value == "fbvm.testing.plugin" for entry in entry_points(group="pytest11"))
+ARGUMENTS = ["-p", "no:cacheprovider"] + ([] if INSTALLED else ["-p", "fbvm.testing.plugin"])
+
+PUMP = """\
+FUNCTION_BLOCK Pump
+VAR_INPUT
+    Start : BOOL;
+END_VAR
+VAR_OUTPUT
+    Running : BOOL;
+    Starts : INT;
+END_VAR
+VAR
+    Delay : TON;
+    Edge : R_TRIG;
+END_VAR
+    Delay(IN := Start, PT := T#50ms);
+    Running := Delay.Q;
+    Edge(CLK := Running);
+    IF Edge.Q THEN
+        Starts := Starts + 1;
+    END_IF
+END_FUNCTION_BLOCK
+"""
+README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def project(pytester: pytest.Pytester) -> pytest.Pytester:
+    """A folder with `src/pump.st`."""
+    pytester.makeini("[pytest]\n")
+    folder = pytester.mkdir("src")
+    (folder / "pump.st").write_text(PUMP, encoding="utf-8")
+    return pytester
+
+
+def run(project: pytest.Pytester, *arguments: str) -> pytest.RunResult:
+    return project.runpytest(*ARGUMENTS, *arguments)
+
+
+def test_one_block_on_a_rig(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        from fbvm.testing import ns
+
+        def test_waits(fb):
+            pump = fb("src/pump.st::Pump", cycle="10ms")
+            pump.run("50ms", Start=True)
+            assert not pump.Running
+            assert pump.scan().Running
+            assert pump.Delay.ET == ns("50ms")
+
+        def test_without_a_file(fb):
+            assert fb("TON").run(scans=2, IN=True).Q
+    """)
+    run(project).assert_outcomes(passed=2)
+
+
+def test_a_failure_explains_itself(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        def test_wrong(fb):
+            pump = fb("src/pump.st::Pump")
+            other = fb("TON").scan()
+            pump.at("30ms", Start=True).run("200ms")
+            assert pump.Delay.IN
+            assert (pump.Start and
+                    not pump.Running)
+    """)
+    result = run(project)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines([
+        "*fbvm <Pump, 20 scans, 200ms>*",
+        "Start is TRUE since scan 3 (30ms), written from outside the program",
+        "Running is TRUE since scan 8 (80ms), written last in scan 19, by src/pump.st:14:  Running := Delay.Q;  "
+        "with Delay.Q = TRUE",
+        "scan 3   30ms     Start   Running",
+        "  pump.st:14*>TRUE",
+    ])  # fmt: skip
+    result.stdout.no_fnmatch_line("*TON,*")
+    result.stdout.no_fnmatch_line("Delay.IN is*")
+
+
+def test_what_a_function_of_the_test_asked_for_counts(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        def check(pump):
+            assert pump.Running
+
+        def test_wrong(fb):
+            check(fb("src/pump.st").scan(Start=True))
+    """)
+    run(project).stdout.fnmatch_lines(["Running is FALSE since power-on, written last in scan 0, by src/pump.st:14*"])
+
+
+def test_a_condition_that_never_holds(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        def test_wrong(fb):
+            fb("src/pump.st").until("Running", max="70ms")
+    """)
+    result = run(project)
+    result.stdout.fnmatch_lines(["E*Running does not hold within 70ms", "Running is FALSE since power-on*"])
+    result.stdout.no_fnmatch_line("*__tracebackhide__*")
+
+
+def test_forces_left_behind_fail(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        def test_left(fb):
+            fb("src/pump.st").force({"Delay.Q": True})
+
+        def test_ended(fb):
+            with fb("src/pump.st").force(Start=True):
+                pass
+    """)
+    result = run(project)
+    result.assert_outcomes(failed=1, passed=1)
+    result.stdout.fnmatch_lines(["left forced: Delay.Q; end a force with unforce()*"])
+
+
+def test_a_program_with_stubs_on_a_network(project: pytest.Pytester) -> None:
+    project.makepyfile(test_net="""
+        from fbvm import ModbusPeer, Peer
+
+        def test_reads(plc, network):
+            network.place(Peer("192.168.250.1", 502), ModbusPeer())
+            main = plc("main.st", etn21="192.168.250.21", network=network)
+            main.until("Link.ENO", max="5s")
+            assert main.Main.Seconds == 3
+
+        def test_without_the_link(plc):
+            main = plc("main.st", stubs={"MTCP_ETN_Connect": "ENO := EN;"}).scan()
+            assert main.Link.ENO and main["Main.Link.ENO"]
+    """)
+    (project.path / "main.st").write_text("""\
+PROGRAM Main
+VAR Link : MTCP_ETN_Connect; Seconds : INT := 3; END_VAR
+    Link(EN := TRUE, Connect := TRUE, IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 1);
+END_PROGRAM
+""", encoding="utf-8")  # fmt: skip
+    run(project).assert_outcomes(passed=2)
+
+
+def test_what_cannot_be_had_says_why(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        def test_no_file(fb):
+            fb("src/fan.st")
+
+        def test_no_block(fb):
+            fb("src/pump.st::Fan")
+    """)
+    result = run(project, "--tb=short")
+    result.assert_outcomes(failed=2)
+    result.stdout.fnmatch_lines(["E*FileNotFoundError: src/fan.st is neither in*", "E*there is no Fan; there is Pump"])
+
+
+def test_libraries_of_the_project(project: pytest.Pytester) -> None:
+    project.makeini("[pytest]\nfbvm_libraries = blocks\n")
+    (project.mkdir("blocks") / "Twice.st").write_text(
+        "FUNCTION Twice : INT VAR_INPUT x : INT; END_VAR Twice := 2 * x; END_FUNCTION", encoding="utf-8")  # fmt: skip
+    project.makepyfile("""
+        def test_by_name(fb):
+            assert fb("Twice").scan(x=4).Result == 8
+
+        def test_a_block_finds_its_neighbours(fb):
+            user = fb("User", text="FUNCTION_BLOCK User VAR P : Pump; n : INT; END_VAR P(); n := Twice(3); END_FUNCTION_BLOCK")
+            assert user.scan().n == 6
+    """)
+    run(project).assert_outcomes(passed=2)
+
+
+def test_with_xdist(project: pytest.Pytester) -> None:
+    pytest.importorskip("xdist")
+    project.makepyfile("""
+        def test_one(fb):
+            assert fb("src/pump.st").scan(Start=True).Running
+    """)
+    project.makefile(".st", test_pump="PROGRAM Test_two VAR P : Pump; END_VAR P(); ASSERT(NOT P.Running); END_PROGRAM")
+    result = project.runpytest_subprocess(*ARGUMENTS, "-n", "2", f"--rootdir={project.path}")
+    result.assert_outcomes(passed=1, failed=1)
+    result.stdout.fnmatch_lines(["Running is FALSE since power-on*"])
+
+
+# --- tests in ST ------------------------------------------------------------------------------------------------------
+
+
+def test_programs_are_tests(project: pytest.Pytester) -> None:
+    project.makefile(".st", test_pump="""\
+PROGRAM Test_starts_late
+VAR P : Pump; n : INT; Done : BOOL; END_VAR
+    P(Start := TRUE);
+    ASSERT(P.Running = (n >= 5));
+    n := n + 1;
+    Done := n = 8;
+END_PROGRAM
+
+PROGRAM Test_once
+VAR P : Pump; END_VAR
+    P(Start := TRUE);
+    ASSERT(NOT P.Running);
+END_PROGRAM
+""")  # fmt: skip
+    result = run(project, "-v")
+    result.assert_outcomes(passed=2)
+    result.stdout.fnmatch_lines(["test_pump.st::Test_starts_late PASSED*", "test_pump.st::Test_once PASSED*"])
+
+
+def test_a_failed_assert_shows_line_and_values(project: pytest.Pytester) -> None:
+    project.makefile(".st", test_pump="""\
+PROGRAM Test_wrong
+VAR P : Pump; n : INT; Done : BOOL; END_VAR
+    P(Start := n > 2);
+    ASSERT(n < 3 OR NOT P.Running);
+    n := n + 1;
+    ASSERT(n < 100);
+END_PROGRAM
+""")  # fmt: skip
+    result = run(project)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines([
+        "test_pump.st:4: in Test_wrong, scan 8 (80ms)",
+        ">   ASSERT(n < 3 OR NOT P.Running);",
+        "E   n = 8",
+        "E   P.Running = TRUE",
+        "scan 8*",
+        "  pump.st:14*>TRUE",
+        "FAILED test_pump.st::Test_wrong*",
+    ])  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("PROGRAM Test_nothing VAR n : INT; END_VAR n := 1; END_PROGRAM", "Test_nothing ended without one ASSERT"),
+    ("PROGRAM Test_late VAR Done : BOOL; END_VAR ASSERT(TRUE); END_PROGRAM", "Done is still FALSE after 1m"),
+    ("PROGRAM Test_trap VAR n : INT; END_VAR n := 1 / n; ASSERT(TRUE); END_PROGRAM", "R0101*1 divided by 0"),
+    ("PROGRAM Test_unknown VAR n : INT; END_VAR ASSERT(m); END_PROGRAM", "*error S0201*"),
+], ids=["no assert", "never done", "trap", "unknown name"])  # fmt: skip
+def test_what_else_fails(project: pytest.Pytester, text: str, said: str) -> None:
+    project.makefile(".st", test_it=text)
+    result = run(project)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines([said])
+
+
+def test_a_file_that_cannot_be_read_is_an_error(project: pytest.Pytester) -> None:
+    project.makefile(".st", test_it="PROGRAM Test IF END_PROGRAM")
+    result = run(project)
+    result.assert_outcomes(errors=1)
+    result.stdout.fnmatch_lines(["*test_it.st:1:*error S01*"])
+
+
+def test_other_files_are_left_alone(project: pytest.Pytester, tmp_path: Path) -> None:
+    result = run(project, "--collect-only")
+    assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
+
+
+# --- the README -------------------------------------------------------------------------------------------------------
+
+
+def in_readme(language: str, part: str) -> str:
+    """The block of the README that contains a text."""
+    blocks = re.findall(rf"^```{language}\n(.*?)^```", README, re.M | re.S)
+    return next(str(block) for block in blocks if part in block)
+
+
+def test_the_tests_of_the_readme_pass(project: pytest.Pytester) -> None:
+    project.makepyfile(in_readme("python", "def test_the_pump_waits_50_ms"))
+    project.makefile(".st", test_pump=in_readme("iecst", "PROGRAM Test_the_pump_waits"))
+    run(project).assert_outcomes(passed=2)
+
+
+def test_the_failure_of_the_readme_looks_like_that(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        def test_starts(fb):
+            pump = fb("src/pump.st").at("30ms", Start=True).run("200ms")
+            assert pump.Starts == 2
+    """)
+    lines = run(project).outlines
+    shown = in_readme("text", "assert pump.Starts == 2").splitlines()
+    assert [line for line in shown if line not in lines] == []
