@@ -101,12 +101,14 @@ class Client:
         """"FIN" or an errno name when the connection has ended."""
         self.is_open = False
 
-    def connect(self, scans: int = 400) -> bool:
+    def connect(self, tries: int = 400) -> bool:
         """Try until it is let in; False if nobody has done so."""
-        return any(self.dial() for _ in range(scans))
+        return any(self.dial() for _ in range(tries))
 
     def dial(self) -> bool:
-        """One try."""
+        """One try, after leaving what there was."""
+        self.leave()
+        self.fetch()
         self.data, self.end, self.is_open = b"", "", False
         self.link.submit([Connect(1, SERVER, self.port), Grant(1, 65536)], self.rig.plc.elapsed_ns)
         for _ in range(3):
