@@ -10,13 +10,12 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import Enum
-from typing import Protocol
 
 from fbvm import flags
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
 from fbvm.base.memory import Memory, Snapshot
 from fbvm.code.image import Image
-from fbvm.engine.python import PythonEngine
+from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
@@ -55,13 +54,6 @@ class Stopped(RuntimeError):
         self.trap = trap
 
 
-class Engine(Protocol):
-    """What executes the tasks of an image on a memory."""
-
-    def run(self, task_index: int) -> Trap | None:
-        """Executes the programs of one task once."""
-
-
 def fingerprint(image: Image) -> str:
     """A number in hexadecimal that another program, or the same in another layout, does not have."""
     said = (image.layout, image.bodies, image.tasks, image.initial, image.retained)
@@ -95,7 +87,8 @@ class Plc:
     """One PLC with a compiled program, in RUN mode at time 0, before its first scan.
 
     `cycle_ns` is how far a scan advances virtual time; `budget` the statements a scan may execute; `observed` runs the
-    build that reports each statement; `journal` is told every input.  Raises nothing that a program, a file or a peer
+    build that reports each statement; `engine` is "auto" (Python first, machine code when that pays), "python" or
+    "native"; `journal` is told every input.  Raises nothing that a program, a file or a peer
     could cause: look at `trap`."""
 
     def __init__(
@@ -105,6 +98,7 @@ class Plc:
         *,
         budget: int = STEP_BUDGET,
         observed: bool = False,
+        engine: str = "auto",
         journal: Journal | None = None,
     ) -> None:
         if cycle_ns <= 0:
@@ -113,7 +107,8 @@ class Plc:
         self.cycle_ns = cycle_ns
         self.budget = budget
         self.memory = Memory(image.layout.size, image.layout.areas)
-        self.engine: Engine = PythonEngine(image, self.memory, observed=observed)
+        self._choice = engine
+        self.engine: Engine = engine_for(image, self.memory, engine, observed)
         cio = self.memory.areas["CIO"]
         self._cio = self.memory.u8[cio.offset : cio.offset + cio.size_bytes]
         self.units: list[Attached] = []
@@ -378,6 +373,6 @@ class Plc:
 
     def fork(self) -> Plc:
         """A second PLC in the same state, without units, watchers and connections."""
-        twin = Plc(self.image, self.cycle_ns, budget=self.budget)
+        twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self._choice)
         twin.restore(self.snapshot())
         return twin

@@ -8,10 +8,13 @@ import click
 
 from fbvm.cli.sources import compiled, source_arguments
 from fbvm.code.listing import listing
+from fbvm.engine.native_module import translate
 
 
 @click.command("list")
 @source_arguments
-def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...]) -> None:
+@click.option("--native", "as_native", is_flag=True, help="Print the LLVM code instead.")
+def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], as_native: bool) -> None:
     """Print what the files compile to: tasks, layout, symbols and the code of each POU."""
-    click.echo(listing(compiled(files, program, libraries, runnable=False)))
+    image = compiled(files, program, libraries, runnable=False)
+    click.echo(translate(image).text if as_native else listing(image))

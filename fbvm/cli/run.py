@@ -14,6 +14,9 @@ from fbvm.cli.journals import start_journal
 from fbvm.cli.options import Mapping, Setting, mapping, setting, split_names, time_ns
 from fbvm.cli.outcome import Outcome, Progress
 from fbvm.cli.sources import compiled, source_arguments
+from fbvm.code.image import Image
+from fbvm.engine.tiers import CHOICES
+from fbvm.net.journal import Journal
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
@@ -57,6 +60,8 @@ UNIT_ADDRESS = "192.168.250.21"
               help="Write every input of every scan, for `fbvm replay`.")
 @click.option("--timing", type=click.Choice(["exact", "real"]), default="exact", show_default=True,
               help="exact: the unit answers in fixed scans.  real: late and out of step, as the device may.")
+@click.option("--engine", type=click.Choice(CHOICES), default="auto", show_default=True,
+              help="auto: Python first, machine code when that pays.")
 @click.option("--seed", type=int, default=0, metavar="N", help="What chance begins with: the same again with the same N.")
 @click.option("--scan-time", is_flag=True,
               help="Say how long scans took; a run over tcp on a terminal does so by itself.")
@@ -76,13 +81,20 @@ def command(
         stack.callback(network.close)
         path = options["journal"]
         journal = start_journal(stack, path, files, program, libraries) if path else None
-        plc = Plc(image, cycle_ns, journal=journal)
+        plc = _plc(image, cycle_ns, options["engine"], journal)
         if options["pcap"]:
             network.tap = _capture(stack, options["pcap"], network).tap
         plc.attach(Etn21(0, UNIT_ADDRESS, timing=options["timing"], seed=options["seed"]), network)
         outcome = _run(plc, as_json, **options)
         outcome.print()
     sys.exit(outcome.status)
+
+
+def _plc(image: Image, cycle_ns: int, engine: str, journal: Journal | None) -> Plc:
+    try:
+        return Plc(image, cycle_ns, engine=engine, journal=journal)
+    except ValueError as error:  # an engine that this machine does not have
+        raise click.UsageError(str(error)) from None
 
 
 def _run(

@@ -62,6 +62,22 @@ class Code:
             self._waiting = True
             worker.compile(lambda: self.translation.text, self._improve)
 
+    @property
+    def ready(self) -> bool:
+        """True if there is fast code."""
+        return FAST in self._linked
+
+    def request(self) -> None:
+        """Have fast code as soon as it can be had without waiting for it."""
+        if self.ready or self._waiting:
+            return
+        known = self._known(FAST)
+        if known:
+            self._load(FAST, known)
+            return
+        self._waiting = True
+        worker.compile(lambda: self.translation.text, self._improve)
+
     def _improve(self, compiled: bytes) -> None:
         """Take fast code while quick code runs: all that follows is pointed to it.  The worker's thread does it."""
         stored = Stored(self._facts(), compiled)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Protocol
 
-from fbvm.engine.python import PythonEngine
+from fbvm.engine.tiers import python_of, substitutes_of
 from fbvm.plc import Phase, Plc, State
 from fbvm.record.inside import Event, Inside
 
@@ -68,9 +68,7 @@ class History:
             function(base)
             self._played.append((self._plc.scans, base, bytes(memory.map[base : base + size])))
 
-        if not isinstance(engine, PythonEngine):
-            raise ValueError("Python in place of a block needs the Python engine")
-        engine.substitute(body, noted)
+        python_of(engine).substitute(body, noted)
 
     @property
     def scans(self) -> range:
@@ -100,10 +98,8 @@ class History:
     def _twin(self) -> Plc:
         plc = self._plc
         twin = Plc(plc.image, plc.cycle_ns, budget=plc.budget)
-        substitutes = plc.engine.substitutes if isinstance(plc.engine, PythonEngine) else {}
-        for body in substitutes:
-            assert isinstance(twin.engine, PythonEngine)
-            twin.engine.substitute(body, self._player(twin))
+        for body in substitutes_of(plc.engine):
+            python_of(twin.engine).substitute(body, self._player(twin))
         return twin
 
     def _player(self, twin: Plc) -> Callable[[int], None]:

@@ -14,6 +14,7 @@ from typing import TypeAlias
 from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
 from fbvm.code.image import Image
 from fbvm.engine.python import PythonEngine
+from fbvm.engine.tiers import substitutes_of
 from fbvm.engine.runtime import NO_SITE, Observation
 from fbvm.engine.trap import Trap
 
@@ -96,9 +97,8 @@ class Inside:
         self.tell = tell
         self.program = program
         self._engine = PythonEngine(image, memory, observed=True)
-        if isinstance(program, PythonEngine):
-            for body, function in program.substitutes.items():
-                self._engine.substitute(body, function)
+        for body, function in substitutes_of(program).items():
+            self._engine.substitute(body, function)
         self._shadow = bytearray(memory.size)
 
     def run(self, task_index: int) -> Trap | None:

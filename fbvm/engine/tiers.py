@@ -1,0 +1,100 @@
+"""Which engine runs an image: Python at once, machine code when it pays and is there.
+
+A run begins in Python, which needs no compiling.  When a program has executed enough statements for machine code to be
+worth while, it is compiled beside the run, and a later scan begins with it; nobody notices, because all state is in the
+memory.  What is looked into statement by statement stays in Python.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from fbvm.base.areas import BUDGET
+from fbvm.base.memory import Memory
+from fbvm.code.image import Image
+from fbvm.engine import native
+from fbvm.engine.native_code import code_of
+from fbvm.engine.python import PythonEngine
+from fbvm.engine.trap import Trap
+
+CHOICES = ("auto", "python", "native")
+PAYS = 300_000
+"""Statements after which machine code is asked for: about a tenth of a second in Python."""
+
+
+class Engine(Protocol):
+    """What executes the tasks of an image on a memory."""
+
+    def run(self, task_index: int) -> Trap | None:
+        """Executes the programs of one task once; time and budget are in the memory's system page."""
+
+
+def engine_for(image: Image, memory: Memory, choice: str = "auto", observed: bool = False) -> Engine:
+    """The engine of that name; "auto" begins in Python and goes on as machine code.
+
+    Raises ValueError for another name, or for "native" where llvmlite is missing or observations are wanted."""
+    if choice not in CHOICES:
+        raise ValueError(f"there is no engine {choice!r}; engines are {', '.join(CHOICES)}")
+    if choice == "native":
+        if observed:
+            raise ValueError("machine code tells nothing about statements: observe with the python engine")
+        if not native.available():
+            raise ValueError("the native engine needs the package llvmlite, which is not installed")
+        return native.NativeEngine(image, memory)
+    if choice == "python" or observed or not native.available():
+        return PythonEngine(image, memory, observed=observed)
+    return Tiers(image, memory)
+
+
+def substitutes_of(engine: object) -> Mapping[int, Callable[[int], None]]:
+    """What stands in place of bodies, by their numbers."""
+    return python_of(engine).substitutes if isinstance(engine, PythonEngine | Tiers) else {}
+
+
+def python_of(engine: object) -> PythonEngine:
+    """The Python engine of a run, which stays in Python from now on if it gets substitutes.
+
+    Raises ValueError for a run that is all machine code."""
+    if isinstance(engine, Tiers):
+        return engine.python
+    if not isinstance(engine, PythonEngine):
+        raise ValueError("Python in place of a block needs the Python engine")
+    return engine
+
+
+class Tiers:
+    """Python first, machine code later."""
+
+    def __init__(self, image: Image, memory: Memory) -> None:
+        self._image, self._memory = image, memory
+        self.python = PythonEngine(image, memory)
+        self._engine: Engine = self.python
+        self._code = code_of(image)
+        self._budget = memory.views["i64"]
+        self._done = 0
+        self._asked = False
+        self.native = False
+        """True once machine code runs."""
+
+    def run(self, task_index: int) -> Trap | None:
+        """Execute the programs of a task once, in whatever tier the run is."""
+        if self.native:
+            if not self.python.substitutes:
+                return self._engine.run(task_index)
+            self._engine, self.native = self.python, False
+        if self._asked:
+            self._change()
+        before = self._budget[BUDGET // 8]
+        trap = self._engine.run(task_index)
+        self._done += before - self._budget[BUDGET // 8]
+        if self._done >= PAYS and not self._asked:
+            self._asked = True
+            self._code.request()
+        return trap
+
+    def _change(self) -> None:
+        """Go over to machine code if it is there."""
+        if self._code.ready and not self.python.substitutes:
+            self._engine = native.NativeEngine(self._image, self._memory, level=2)
+            self.native = True

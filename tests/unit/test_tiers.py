@@ -1,0 +1,85 @@
+"""A run begins in Python and goes on as machine code, and nobody can tell."""
+
+from __future__ import annotations
+
+import pytest
+
+from fbvm.code.compiler import compile_text
+from fbvm.code.image import Image
+from fbvm.engine import native, tiers
+from fbvm.engine.native_code import code_of
+from fbvm.engine.python import PythonEngine
+from fbvm.engine.tiers import Tiers, engine_for
+from fbvm.plc import Plc
+
+TEXT = """
+PROGRAM Main
+VAR i : INT; sum : DINT; t : TON; x : REAL; s : STRING; END_VAR
+FOR i := 1 TO 100 DO sum := sum + i; END_FOR
+t(IN := sum MOD 2 = 0, PT := T#30ms);
+x := x * 0.5 + DINT_TO_REAL(sum);
+s := DINT_TO_STRING(sum);
+END_PROGRAM
+"""
+needs_native = pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
+
+
+def image() -> Image:
+    made = compile_text(TEXT).image
+    assert made is not None
+    return made
+
+
+@needs_native
+def test_a_run_changes_to_machine_code_and_its_memory_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tiers, "PAYS", 500)
+    code = image()
+    auto, python = Plc(code), Plc(code, engine="python")
+    assert isinstance(auto.engine, Tiers)
+    changed = 0
+    for number in range(60):
+        if number == 20:
+            kept = code_of(code)
+            kept.prepare(2)  # as if the helper process had answered
+        auto.scan()
+        python.scan()
+        assert bytes(auto.memory.u8) == bytes(python.memory.u8)
+        changed += auto.engine.native
+    assert changed >= 39
+
+
+@needs_native
+def test_python_in_place_of_a_block_brings_a_run_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tiers, "PAYS", 1)
+    code = image()
+    kept = code_of(code)
+    kept.prepare(2)
+    plc = Plc(code)
+    assert isinstance(plc.engine, Tiers)
+    for _ in range(3):
+        plc.scan()
+    assert plc.engine.native
+    calls: list[int] = []
+    number = next(n for n, body in enumerate(code.bodies) if body.name == "TON")
+    tiers.python_of(plc.engine).substitute(number, calls.append)
+    plc.scan()
+    assert len(calls) == 1 and not plc.engine.native
+
+
+def test_choices() -> None:
+    code = image()
+    assert isinstance(Plc(code, engine="python").engine, PythonEngine)
+    assert isinstance(Plc(code, observed=True).engine, PythonEngine)
+    with pytest.raises(ValueError, match="no engine 'quick'"):
+        Plc(code, engine="quick")
+    with pytest.raises(ValueError, match="observe with the python engine"):
+        Plc(code, engine="native", observed=True)
+
+
+def test_without_llvmlite_auto_is_python_and_native_says_what_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native, "available", lambda: False)
+    code = image()
+    memory = Plc(code).memory
+    assert isinstance(engine_for(code, memory), PythonEngine)
+    with pytest.raises(ValueError, match="llvmlite, which is not installed"):
+        engine_for(code, memory, "native")
