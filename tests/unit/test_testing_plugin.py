@@ -8,10 +8,12 @@ from pathlib import Path
 
 import pytest
 
+import fbvm.testing.rig  # noqa: F401 - what is loaded before pytest runs within pytest stays loaded
+
 pytest_plugins = ["pytester"]
 
 INSTALLED = any(entry.value == "fbvm.testing.plugin" for entry in entry_points(group="pytest11"))
-ARGUMENTS = ["-p", "no:cacheprovider"] + ([] if INSTALLED else ["-p", "fbvm.testing.plugin"])
+ARGUMENTS = ["-p", "no:cacheprovider", "-p", "no:hypothesispytest"] + ([] if INSTALLED else ["-p", "fbvm.testing.plugin"])
 
 PUMP = """\
 FUNCTION_BLOCK Pump
