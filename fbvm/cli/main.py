@@ -17,6 +17,7 @@ VERBS = {
     "run": "Run a program, in virtual time or over real TCP.",
     "replay": "Do a run again from its journal.",
     "check": "Say what is wrong with a program; silent when nothing is.",
+    "fmt": "Rewrite a program in canonical Structured Text.",
     "list": "Print the compiled program, readable.",
     "explain": "Print the page of a diagnostic.",
     "peer": "Start a Modbus TCP server to talk to.",

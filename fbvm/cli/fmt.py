@@ -1,0 +1,144 @@
+"""`fbvm fmt`: programs as everybody would write them."""
+
+from __future__ import annotations
+
+import codecs
+import os
+import shutil
+import sys
+from collections.abc import Iterator
+from difflib import unified_diff
+from functools import cache
+from pathlib import Path
+
+import click
+
+from fbvm.base.data import data_folder
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import fold
+from fbvm.check.functions import OPERATORS, SIGNATURES, conversion, typed_name
+from fbvm.cli import status
+from fbvm.cli.sources import show
+from fbvm.syntax.format import formatted
+from fbvm.syntax.format_names import Outside
+from fbvm.syntax.parser import parse
+from fbvm.syntax.text import decode, read
+from fbvm.syntax.tree import Declaration, Pou, TypeDecl
+
+STREAM = Path("-")
+ENCODINGS = (("utf-8", codecs.BOM_UTF8), ("utf-16-le", codecs.BOM_UTF16_LE), ("utf-16-be", codecs.BOM_UTF16_BE),
+             ("utf-8", b""), ("cp1252", b""), ("latin-1", b""))
+"""Encodings and their marks, in the order in which they are recognised."""
+
+
+@click.command("fmt")
+@click.argument("files", nargs=-1, required=True, metavar="FILE...",
+                type=click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path))
+@click.option("--check", is_flag=True, help="Write nothing; status 1 if a file would change.")
+@click.option("--diff", is_flag=True, help="Write nothing; show what would change.")
+def command(files: tuple[Path, ...], check: bool, diff: bool) -> None:
+    """Rewrite the files in canonical Structured Text, and print the names of those that change.
+
+    The program means the same.  FILE - reads the standard input and writes the standard output.  A file with syntax errors
+    is left alone, and the status is 3."""
+    results = [_one(path, check, diff) for path in files]
+    if None in results:
+        sys.exit(status.PROGRAM_ERRORS)
+    if check and any(results):
+        sys.exit(status.FAILED)
+
+
+def _one(path: Path, check: bool, diff: bool) -> bool | None:
+    """Format one file; whether it changes, None if it has errors."""
+    source, data = _read(path)
+    if source is None:
+        return None
+    text, wrong = formatted(source, OUTSIDE)
+    for diagnostic in wrong:
+        show(diagnostic)
+    if wrong:
+        return None
+    changes = text != source.text
+    if diff:
+        click.echo("".join(_difference(source, text)), nl=False)
+    elif check:
+        if changes:
+            click.echo(str(path))
+    elif path == STREAM:
+        sys.stdout.buffer.write(_encoded(source.text, text, data))
+    elif changes:
+        _replace(path, _encoded(source.text, text, data))
+        click.echo(str(path))
+    return changes
+
+
+def _read(path: Path) -> tuple[Source | None, bytes]:
+    """A file's text and its bytes; what is no text is reported."""
+    if path == STREAM:
+        data = sys.stdin.buffer.read()
+        source = decode(data, "stdin")
+    else:
+        source = read(path, str(path))
+        data = path.read_bytes() if isinstance(source, Source) else b""
+    if isinstance(source, Source):
+        return source, data
+    show(source)
+    return None, data
+
+
+def _encoded(before: str, after: str, data: bytes) -> bytes:
+    """The new text in the encoding of the old one's bytes, and with its mark."""
+    for encoding, mark in ENCODINGS:
+        if data.startswith(mark):
+            try:
+                if mark + before.encode(encoding) == data:
+                    return mark + after.encode(encoding)
+            except UnicodeEncodeError:
+                continue
+    raise AssertionError("a text has the encoding with which it was read")
+
+
+def _replace(path: Path, data: bytes) -> None:
+    """Write a file through one beside it, so that nobody ever finds half of it."""
+    target = path.resolve()
+    part = target.with_name(f"{target.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(data)
+        shutil.copymode(target, part)
+        os.replace(part, target)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise click.ClickException(f"{path} cannot be written: {(error.strerror or str(error)).lower()}") from None
+
+
+def _difference(source: Source, text: str) -> Iterator[str]:
+    """What changes, as a unified diff."""
+    before, after = source.text.splitlines(keepends=True), text.splitlines(keepends=True)
+    for line in unified_diff(before, after, source.name, source.name):
+        yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
+
+
+# --- what files use without declaring it ---
+
+
+@cache
+def _library_files() -> dict[str, Path]:
+    return {fold(path.stem): path for path in sorted(data_folder("fblib").rglob("*.st"))}
+
+
+@cache
+def _library_declaration(key: str) -> Declaration | None:
+    path = _library_files().get(key)
+    source = read(path, path.name) if path else None
+    if not isinstance(source, Source):
+        return None
+    found = (d for d in parse(source)[0].declarations if isinstance(d, (Pou, TypeDecl)) and fold(d.name.text) == key)
+    return next(found, None)
+
+
+def _standard(name: str) -> bool:
+    """Whether a name in capitals is that of a standard function."""
+    return name in SIGNATURES or name in OPERATORS or bool(conversion(name) or typed_name(name))
+
+
+OUTSIDE = Outside(lambda name: _library_declaration(fold(name)), _standard)

@@ -1,0 +1,54 @@
+"""Text to canonical text: `formatted` writes a program as everybody would, and means the same.
+
+Names are written as they are declared first, words and names of elementary types in capitals; the values of literals,
+comments and pragmas stay as they are.  A line end within a statement is only kept where a comment needs it; up to one
+empty line between statements stays.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.syntax.automaton import Automaton, Mender
+from fbvm.syntax.format_comments import Comments
+from fbvm.syntax.format_declarations import DeclarationLayout
+from fbvm.syntax.format_layout import Doc, Printer
+from fbvm.syntax.format_names import NOTHING, Outside, Spelling
+from fbvm.syntax.lexer import Lexer
+from fbvm.syntax.parser import parse
+
+REFUSED = {"S0901", "S0902"}
+"""Errors of texts that are understood, so that they can be written too."""
+
+
+def formatted(source: Source, outside: Outside = NOTHING) -> tuple[str, list[Diagnostic]]:
+    """The canonical text, with the line ends of the source; and the syntax errors.  With any of them it is the text of the
+    source, untouched.  `outside` knows the spelling of names that the text does not declare."""
+    tree, diagnostics = parse(source)
+    wrong = [d for d in errors(diagnostics) if d.code not in REFUSED]
+    if wrong:
+        return source.text, wrong
+    windows = source.text.count("\r\n") * 2 > source.text.count("\n")
+    if "\r\n" in source.text:
+        source = Source(source.name, source.text.replace("\r\n", "\n"), source.library)
+        tree, _ = parse(source)
+    text = _printed(source, Spelling(tree, outside))
+    return text.replace("\n", "\r\n") if windows else text, []
+
+
+def _printed(source: Source, spelling: Spelling) -> str:
+    """The canonical text of one without errors."""
+    tokens = list(Lexer(source.text, _silent).tokens())
+    comments = Comments(source.text, tokens)
+    layout = DeclarationLayout(comments, spelling)
+    doc: Doc = Automaton(layout, iter(tokens), source.text).run(_no_mender)
+    return Printer(comments).print(doc)
+
+
+def _silent(*message: Any) -> None:
+    """What there is to say was said by the parser."""
+
+
+def _no_mender(stuck: Automaton) -> Mender:
+    raise AssertionError("a text without errors needs no mending")

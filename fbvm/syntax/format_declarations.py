@@ -1,0 +1,100 @@
+"""Lays out declarations: the rules of grammar/declarations.lark, with pieces of layout in place of nodes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fbvm.syntax.format_expressions import Phrase
+from fbvm.syntax.format_layout import BLANK, HARD, Doc, Indent, Leaf
+from fbvm.syntax.format_statements import Row, lines
+from fbvm.syntax.format_types import TypeLayout
+from fbvm.syntax.lexer import Token
+
+
+class DeclarationLayout(TypeLayout):
+    """The functions of the rules of declarations; with those it inherits, the whole grammar's."""
+
+    def source_text(self, declarations: list[Phrase]) -> Doc:
+        """The whole text: at least one empty line between declarations."""
+        rows: list[Row] = []
+        for declaration in declarations:
+            new = self.rows([declaration])
+            if rows and not any(row.blank for row in new):
+                new[0] = new[0]._replace(blank=True)
+            rows += new
+        rows += self.remarks(self.comments.claim(len(self.comments.text)))
+        parts: list[Doc] = []
+        for row in rows:
+            parts += (BLANK if row.blank else HARD, row.doc)
+        return tuple(parts[1:])
+
+    # --- POUs ---
+
+    def add_inheritance(self, parts: list[Doc], word: Token, names: list[Phrase]) -> list[Doc]:
+        return [*parts, " ", self.leaf(word), " ", self.listed(names, fill=True)]
+
+    def pou_head(self, modifiers: list[Leaf], token: Token, inheritance: list[Doc]) -> Doc:
+        words = tuple(part for word in modifiers for part in (word, " "))
+        return (*words, self.leaf(token), *inheritance)
+
+    def pou(self, word: Token, head: Doc, sections: list[Phrase], items: list[Phrase], end: Token) -> Phrase:
+        return self.function(word, head, None, None, sections, items, end)
+
+    def function(self, word: Token, head: Doc, colon: Token | None, result: Phrase | None, sections: list[Phrase],
+                 items: list[Phrase], end: Token) -> Phrase:
+        phrase = Phrase(word.start, self.leaf(word), " ", head)
+        if colon and result:
+            phrase.parts += (" ", self.leaf(colon), " ", result.doc)
+        declared, body = self.rows(sections), self.rows(items) + self.before_end(end)
+        phrase.parts += (lines(declared), Indent(lines(body, bool(declared))), HARD, self.leaf(end))
+        return phrase
+
+    # --- variables ---
+
+    def var_section(self, word: Token, qualifiers: list[Leaf], variables: list[Phrase], end: Token) -> Phrase:
+        words = tuple(part for qualifier in qualifiers for part in (" ", qualifier))
+        return Phrase(word.start, self.leaf(word), words, self.members(variables, end), HARD, self.leaf(end))
+
+    def global_vars(self, section: Phrase) -> Phrase:
+        return section
+
+    # --- configuration ---
+
+    def configuration(self, word: Token, token: Token, items: list[Phrase], end: Token) -> Phrase:
+        return self.resource(word, token, None, None, items, end)
+
+    def resource(self, word: Token, token: Token, on: Token | None, processor: Token | None, items: list[Phrase],
+                 end: Token) -> Phrase:
+        phrase = Phrase(word.start, self.leaf(word), " ", self.leaf(token))
+        if on and processor:
+            phrase.parts += (" ", self.leaf(on), " ", self.leaf(processor))
+        phrase.parts += (self.block(items, end), HARD, self.leaf(end))
+        return phrase
+
+    def task(self, word: Token, token: Token, opener: Token, arguments: list[Phrase] | None, closer: Token,
+             end: Token) -> Phrase:
+        for argument in arguments or ():
+            key = argument.parts[0]
+            if isinstance(key, Leaf):
+                argument.parts[0] = replace(key, text=key.text.upper())
+        return Phrase(word.start, self.leaf(word), " ", self.leaf(token), self.leaf(opener), self.listed(arguments),
+                      self.closer(closer), self.closer(end))
+
+    def program_instance(self, word: Token, qualifiers: list[Leaf], token: Token, with_: Token | None,
+                         task: Token | None, colon: Token, type_name: Phrase, end: Token) -> Phrase:
+        phrase = Phrase(word.start, self.leaf(word), " ")
+        phrase.parts += (part for qualifier in qualifiers for part in (qualifier, " "))
+        phrase.parts.append(self.leaf(token))
+        if with_ and task:
+            phrase.parts += (" ", self.leaf(with_), " ", self.leaf(task))
+        phrase.parts += (" ", self.leaf(colon), " ", type_name.doc, self.closer(end))
+        return phrase
+
+    def program_connected(self, word: Token, qualifiers: list[Leaf], token: Token, with_: Token | None,
+                          task: Token | None, colon: Token, type_name: Phrase, opener: Token,
+                          connections: list[Phrase] | None, closer: Token, end: Token) -> Phrase:
+        program = Phrase(type_name.start, type_name.doc, self.leaf(opener), self.listed(connections), self.closer(closer))
+        return self.program_instance(word, qualifiers, token, with_, task, colon, program, end)
+
+    def fb_task(self, instance: Phrase, with_: Token, task: Token) -> Phrase:
+        return Phrase(instance.start, instance.doc, " ", self.leaf(with_), " ", self.leaf(task))

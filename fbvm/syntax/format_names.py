@@ -1,0 +1,223 @@
+"""How names are spelt: as they are declared first, wherever they are used.
+
+Only what a text itself, and `Outside` it, declares is known.  A name that nobody declares stays as it is, so nothing here
+needs to be complete; the checker is who decides what a name means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import fields
+from typing import Any, NamedTuple
+
+from fbvm.base.types import ELEMENTARY, GENERIC, SHORT_NAMES, fold
+from fbvm.syntax.format_scopes import Entry, Scope, declared_in, element, global_scope, members
+from fbvm.syntax.tree import (
+    Argument,
+    ArrayInit,
+    Call,
+    Declaration,
+    Deref,
+    EnumLiteral,
+    EnumSpec,
+    Expr,
+    Index,
+    Member,
+    Name,
+    NamedType,
+    NameRef,
+    Node,
+    Part,
+    Pou,
+    ProgramInstance,
+    SourceText,
+    StructInit,
+    TypeDecl,
+    TypeSpec,
+    VarDecl,
+    VarSection,
+)
+
+TYPE_WORDS = frozenset(ELEMENTARY) | GENERIC | set(SHORT_NAMES) | {"STRING", "WSTRING"}
+Shape = TypeSpec | Pou | None
+"""What is known of a value's type."""
+
+
+class Outside(NamedTuple):
+    """What a text may use without declaring it."""
+
+    declaration: Callable[[str], Declaration | None]
+    """The declaration of a block, function or type of a library."""
+    standard: Callable[[str], bool]
+    """Whether a name is that of a standard function; those are written in capitals."""
+
+
+NOTHING = Outside(lambda name: None, lambda name: False)
+
+
+class Spelling:
+    """Called with the place of a name and its text: the name as it is to be written."""
+
+    def __init__(self, tree: SourceText, outside: Outside = NOTHING) -> None:
+        self.outside = outside
+        self.globals = global_scope(tree)
+        self.at: dict[int, str] = {}
+        self.shapes: dict[Expr, Shape] = {}
+        self.members: dict[Shape, Scope] = {}
+        self._walk(tree)
+
+    def __call__(self, start: int, text: str) -> str:
+        known = self.at.get(start, text)
+        return known if fold(known) == fold(text) else text
+
+    # --- the walk ---
+
+    def _walk(self, tree: SourceText) -> None:
+        """Visit every node; those of a POU in its scope."""
+        todo: list[tuple[Node, Scope]] = [(tree, {})]
+        while todo:
+            node, scope = todo.pop()
+            if isinstance(node, Pou):
+                scope = declared_in(node, self.globals)
+            self._visit(node, scope)
+            todo.extend((child, scope) for child in _children(node))
+
+    def _visit(self, node: Node, scope: Scope) -> None:
+        if isinstance(node, NameRef):
+            self.at[node.start] = self._name(node.text, scope)
+        elif isinstance(node, NamedType):
+            self._type_name(node)
+        elif isinstance(node, Member):
+            self._field(node.name, self._shape(node.of, scope))
+        elif isinstance(node, EnumLiteral):
+            self._enum_literal(node)
+        elif isinstance(node, Call):
+            self._arguments(node.arguments, self._called(node.callee, scope))
+        elif isinstance(node, ProgramInstance):
+            self._program(node)
+        elif isinstance(node, VarSection) and node.kind == "VAR_EXTERNAL":
+            for name in (name for variable in node.variables for name in variable.names):
+                self.at[name.start] = self.globals.get(fold(name.text), Entry(name.text, None)).text
+        elif isinstance(node, (VarDecl, TypeDecl)) and isinstance(node.initial, (StructInit, ArrayInit)):
+            self._initial(node.initial, node.spec)
+
+    def _program(self, node: ProgramInstance) -> None:
+        for name in (node.task, node.type_name):
+            if name and fold(name.text) in self.globals:
+                self.at[name.start] = self.globals[fold(name.text)].text
+        self._arguments(node.connections, self._named(node.type_name.text))
+
+    # --- names ---
+
+    def _name(self, text: str, scope: Scope) -> str:
+        """The spelling of a plain name."""
+        key = fold(text)
+        entry = scope.get(key) or self.globals.get(key)
+        if entry:
+            return entry.text
+        if key in TYPE_WORDS or self.outside.standard(key):
+            return key
+        outside = self.outside.declaration(text)
+        return outside.name.text if isinstance(outside, (Pou, TypeDecl)) else text
+
+    def _type_name(self, node: NamedType) -> None:
+        if "." not in node.text:
+            self.at[node.start] = self._name(node.text, {})
+
+    def _field(self, name: Name, shape: Shape) -> None:
+        entry = self._members(shape).get(fold(name.text))
+        if entry:
+            self.at[name.start] = entry.text
+
+    def _enum_literal(self, node: EnumLiteral) -> None:
+        self.at[node.type_name.start] = self._name(node.type_name.text, {})
+        spec = self._resolved(self._named(node.type_name.text))
+        names = [name.text for name, _ in spec.members] if isinstance(spec, EnumSpec) else []
+        for text in names:
+            if fold(text) == fold(node.member.text):
+                self.at[node.member.start] = text
+
+    def _arguments(self, arguments: Iterable[Argument], shape: Shape) -> None:
+        for argument in arguments:
+            if argument.name:
+                self._field(argument.name, shape)
+
+    def _initial(self, initial: Any, spec: Shape) -> None:
+        """The names of fields in an initial value."""
+        todo = [(initial, spec)]
+        while todo:
+            value, shape = todo.pop()
+            if isinstance(value, StructInit):
+                known = self._members(shape)
+                for name, inner in value.fields:
+                    entry = known.get(fold(name.text), Entry(name.text, None))
+                    self.at[name.start] = entry.text
+                    todo.append((inner, entry.shape))
+            elif isinstance(value, ArrayInit):
+                todo += [(inner, element(self._resolved(shape))) for _, inner in value.items]
+
+    # --- types ---
+
+    def _named(self, text: str) -> Shape:
+        """What a type's name stands for."""
+        entry = self.globals.get(fold(text))
+        if entry:
+            return entry.shape
+        found = self.outside.declaration(text)
+        return found if isinstance(found, Pou) else found.spec if isinstance(found, TypeDecl) else None
+
+    def _resolved(self, shape: Shape) -> Shape:
+        """The type behind names of types."""
+        for _ in range(100):
+            if not isinstance(shape, NamedType):
+                return shape
+            shape = self._named(shape.text)
+        return None
+
+    def _members(self, shape: Shape) -> Scope:
+        shape = self._resolved(shape)
+        if shape not in self.members:
+            self.members[shape] = members(shape)
+        return self.members[shape]
+
+    def _called(self, callee: Expr, scope: Scope) -> Shape:
+        """Whose parameters a call has: those of an instance's block, or of a function."""
+        shape = self._resolved(self._shape(callee, scope))
+        if isinstance(shape, Pou) or not isinstance(callee, NameRef):
+            return shape
+        return self._named(callee.text)
+
+    def _shape(self, value: Expr, scope: Scope) -> Shape:
+        """What is known of the type of a variable, found from its first name on."""
+        chain: list[Expr] = []
+        while value not in self.shapes and isinstance(value, (Member, Index, Deref, Part, Call)):
+            chain.append(value)
+            value = value.callee if isinstance(value, Call) else value.of
+        if value not in self.shapes:
+            key = fold(value.text) if isinstance(value, NameRef) else ""
+            entry = scope.get(key) or self.globals.get(key)
+            self.shapes[value] = entry.shape if entry else None
+        shape = self.shapes[value]
+        for link in reversed(chain):
+            shape = self.shapes[link] = self._behind(link, self._resolved(shape))
+        return shape
+
+    def _behind(self, link: Expr, shape: Shape) -> Shape:
+        """The type that a member, an index, `^` or a call leads to."""
+        if isinstance(link, Member):
+            entry = self._members(shape).get(fold(link.name.text))
+            return entry.shape if entry else None
+        if isinstance(link, Call):
+            return shape.result if isinstance(shape, Pou) else None
+        return element(shape) if isinstance(link, (Index, Deref)) else None
+
+
+def _children(node: Node) -> Iterator[Node]:
+    """The nodes directly below a node."""
+    todo: list[Any] = [getattr(node, f.name) for f in fields(node)]
+    while todo:
+        value = todo.pop()
+        if isinstance(value, Node):
+            yield value
+        elif isinstance(value, tuple):
+            todo.extend(value)
