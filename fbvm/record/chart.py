@@ -13,7 +13,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Sequence
 
 from fbvm.plc import Plc
-from fbvm.record.recorder import Recorder, Signal, Track, default_signals
+from fbvm.record.recorder import Recorder, Recording, Signal, Track, default_signals
 from fbvm.watch.values import Value
 
 QUIET_SCANS = 12
@@ -78,7 +78,7 @@ def _moved(track: Track, before: dict[Signal, Value]) -> bool:
 
 
 def draw(
-    recorder: Recorder,
+    recorder: Recording,
     tracks: Sequence[Track] | None = None,
     *,
     width: int | None = None,

@@ -14,14 +14,14 @@ from typing import TypeAlias
 from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
 from fbvm.code.image import Image
 from fbvm.engine.python import PythonEngine
-from fbvm.engine.tiers import substitutes_of
 from fbvm.engine.runtime import NO_SITE, Observation
+from fbvm.engine.tiers import substitutes_of
 from fbvm.engine.trap import Trap
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """A body that is being executed: its number in the image, where its instance begins, and who called it.
+    """One execution of a body: its number in the image, where its instance begins, and who called it.
 
     `site` is the statement of the caller, NO_SITE for a program."""
 

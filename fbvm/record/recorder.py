@@ -5,7 +5,7 @@ Sees what the memory holds at the end of a scan and nothing of what happened ins
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from fbvm.base.types import BOOL, Elementary, EnumType, StringType, base
@@ -60,23 +60,29 @@ class Track:
             yield self.changes[at][1]
 
 
-class Recorder:
+@dataclass
+class Recording:
+    """What some signals did from scan number `first` on, and the time of each scan."""
+
+    tracks: list[Track]
+    first: int
+    times_ns: list[int] = field(default_factory=list)
+
+    @property
+    def scans(self) -> range:
+        """Numbers of the scans that are recorded, counted from 0 at power-on."""
+        return range(self.first, self.first + len(self.times_ns))
+
+
+class Recorder(Recording):
     """Records from the next scan of `plc` until `stop`.  `signals` are names, addresses, ranges or (one, description).
 
     Raises UnknownPlace for a name that is none, TypeError for an array or structure."""
 
     def __init__(self, plc: Plc, signals: Iterable[str | tuple[str, str] | Signal]) -> None:
-        self.tracks = [Track(signal) for given in signals for signal in signals_of(plc, given)]
-        self.first = plc.scans
-        """Number of the first recorded scan, counted from 0 at power-on."""
-        self.times_ns: list[int] = []
+        super().__init__([Track(signal) for given in signals for signal in signals_of(plc, given)], plc.scans)
         self._plc = plc
         plc.watchers.append(self._watch)
-
-    @property
-    def scans(self) -> range:
-        """Numbers of the scans that are recorded."""
-        return range(self.first, self.first + len(self.times_ns))
 
     def stop(self) -> None:
         """Ends the recording; what was recorded stays."""
@@ -97,8 +103,18 @@ def signals_of(plc: Plc, given: str | tuple[str, str] | Signal) -> list[Signal]:
     text, description = given if isinstance(given, tuple) else (given, "")
     found = plc.find(text)
     places = found.places if isinstance(found, Span) else (found,)
-    return [Signal(place, place.name.replace("CIO ", "CIO"), description or described(plc, place))
-            for place in map(_single, places)]  # fmt: skip
+    return [signal(place, description or described(plc, place)) for place in places]
+
+
+def signals_at(found: Place | Span, descriptions: Mapping[str, str]) -> list[Signal]:
+    """The signals at a place or in a span, with descriptions by address."""
+    places = found.places if isinstance(found, Span) else (found,)
+    return [signal(place, descriptions.get(place.name, "") if place.area else "") for place in places]
+
+
+def signal(place: Place, description: str = "") -> Signal:
+    """The signal of one place.  Raises TypeError for an array or structure."""
+    return Signal(_single(place), place.name.replace("CIO ", "CIO"), description)
 
 
 def _single(place: Place) -> Place:

@@ -1,0 +1,37 @@
+"""Which statement stands inside which: for each statement of an image the one that decides whether it is executed."""
+
+from __future__ import annotations
+
+from fbvm.code.image import Image
+from fbvm.code.operations import Block
+
+NONE = -1
+
+
+def outer_statements(image: Image) -> list[int]:
+    """For each site the site of the IF, CASE or loop around it, NONE for statements of a body itself."""
+    outer = [NONE] * len(image.sites)
+    for body in image.bodies:
+        _walk(body.code, NONE, outer)
+    return outer
+
+
+def _walk(block: Block, around: int, outer: list[int]) -> None:
+    """Notes what stands around each statement of a block."""
+    here = around
+    for node in block:
+        name, *operands = node
+        if name == "observe" and operands[0] in ("statement", "rung"):
+            here = operands[1]
+            outer[here] = around
+        elif name == "if":
+            for _, inner in operands[0]:
+                _walk(inner, here, outer)
+            _walk(operands[1], here, outer)
+        elif name == "case":
+            for _, inner in operands[2]:
+                _walk(inner, here, outer)
+            _walk(operands[3], here, outer)
+        elif name == "loop":
+            for inner in operands:
+                _walk(inner, here, outer)

@@ -1,0 +1,118 @@
+"""What of the memory a trace keeps: path patterns (`Main.*.Q`, `Main.Pump`), addresses and ranges (`D200..D299`)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from fbvm.base.areas import Area
+from fbvm.base.memory import WHOLE_BYTES
+from fbvm.base.types import ArrayType, Field, StructType
+from fbvm.watch.paths import Place, Span, UnknownPlace, find, member
+
+MOST_ELEMENTS = 4096
+"""Elements of an array of structures that a pattern with a star is tried on."""
+
+FEW_ELEMENTS = 32
+"""Elements of an array that are shown if nobody names them."""
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Some values; `everything` if no pattern was given."""
+
+    places: tuple[Place, ...]
+    everything: bool
+
+    def covers(self, offset: int, size: int, bit: int) -> bool:
+        """True if an access to some bytes, or one bit, concerns a selected value."""
+        return self.everything or any(
+            place.offset < offset + size and offset < place.offset + place.type.size
+            and (place.bit is None or bit in (place.bit, WHOLE_BYTES)) for place in self.places)  # fmt: skip
+
+    def extents(self, start: int, end: int, step: int) -> list[tuple[int, int]]:
+        """Where the selected values lie, in whole steps and without overlap."""
+        if self.everything:
+            return [(start, end)]
+        steps = sorted({number for place in self.places
+                        for number in range(place.offset // step, (place.offset + place.type.size - 1) // step + 1)})  # fmt: skip
+        extents: list[tuple[int, int]] = []
+        for number in steps:
+            if extents and extents[-1][1] == number * step:
+                extents[-1] = extents[-1][0], (number + 1) * step
+            else:
+                extents.append((number * step, (number + 1) * step))
+        return extents
+
+
+def select(symbols: Mapping[str, Field], areas: Mapping[str, Area], patterns: Sequence[str]) -> Selection:
+    """The values that patterns name; a structure or an instance stands for all in it.
+
+    Raises UnknownPlace for a pattern that fits nothing."""
+    places: dict[Place, None] = {}
+    for pattern in patterns:
+        places.update(dict.fromkeys(_fitting(symbols, areas, pattern)))
+    inner = [part for place in places for part in (place, *_located(place))]
+    return Selection(tuple(inner), not patterns)
+
+
+def _fitting(symbols: Mapping[str, Field], areas: Mapping[str, Area], pattern: str) -> Iterator[Place]:
+    if "*" not in pattern:
+        found = find(symbols, areas, pattern)
+        yield from found.places if isinstance(found, Span) else (found,)
+        return
+    fits = re.compile(".*".join(re.escape(part.strip()) for part in pattern.split("*")), re.I).fullmatch
+    chosen = [place for field in symbols.values()
+              for place in _matching(Place(field.name, field.type, field.offset, field.bit), fits)]  # fmt: skip
+    if not chosen:
+        raise UnknownPlace(f"no variable is called like {pattern}")
+    yield from chosen
+
+
+def _matching(place: Place, fits: object) -> Iterator[Place]:
+    assert callable(fits)
+    if fits(place.name):
+        yield place
+    elif isinstance(place.type, StructType):
+        for inner in _members(place):
+            yield from _matching(inner, fits)
+    elif isinstance(place.type, ArrayType):
+        low = place.type.bounds[0][0]
+        if not isinstance(place.type.element, StructType | ArrayType):
+            if fits(f"{place.name}[{low}]"):
+                yield place
+            return
+        for number in range(min(place.type.count, MOST_ELEMENTS)):
+            element = place.inner(f"{place.name}[{low + number}]", place.type.element, number * place.type.element.size)
+            yield from _matching(element, fits)
+
+
+def _members(place: Place) -> Iterator[Place]:
+    assert isinstance(place.type, StructType)
+    for field in place.type.fields.values():
+        inner = member(place, field.name)
+        if not inner.hops:
+            yield inner
+
+
+def singles(place: Place) -> Iterator[Place]:
+    """All single values in a place; of arrays only those that have few elements."""
+    if isinstance(place.type, StructType):
+        for inner in _members(place):
+            yield from singles(inner)
+    elif isinstance(place.type, ArrayType):
+        if len(place.type.bounds) == 1 and place.type.count <= FEW_ELEMENTS:
+            low, size = place.type.bounds[0][0], place.type.element.size
+            for number in range(place.type.count):
+                yield from singles(place.inner(f"{place.name}[{low + number}]", place.type.element, number * size))
+    else:
+        yield place
+
+
+def _located(place: Place) -> Iterator[Place]:
+    """Variables of an instance that lie elsewhere, in an area."""
+    if isinstance(place.type, StructType):
+        for inner in _members(place):
+            outside = not place.offset <= inner.offset < place.offset + place.type.size
+            yield from (inner,) if outside else _located(inner)

@@ -1,0 +1,131 @@
+"""Symbols as plain data and back: what a trace keeps of an image, so that it can be shown without the source.
+
+Structures are written once and named by number.  A type that a reader does not know is bytes of some size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from fbvm.base.types import (
+    ELEMENTARY,
+    ArrayType,
+    Elementary,
+    EnumType,
+    Field,
+    RefType,
+    StringType,
+    StructType,
+    SubrangeType,
+    Type,
+    array,
+    fold,
+    string,
+)
+
+
+class SymbolError(ValueError):
+    """The data are no symbols."""
+
+
+def to_data(symbols: Mapping[str, Field]) -> dict[str, Any]:
+    """Symbols as JSON can write them."""
+    writer = _Writer()
+    fields = [writer.field(field) for field in symbols.values()]
+    return {"types": writer.structures, "symbols": fields}
+
+
+def from_data(data: Mapping[str, Any]) -> dict[str, Field]:
+    """The symbols again, by folded name.  Raises SymbolError for what `to_data` did not write."""
+    try:
+        reader = _Reader(data["types"])
+        return {fold(field.name): field for field in map(reader.field, data["symbols"])}
+    except (KeyError, TypeError, ValueError, IndexError, AttributeError, RecursionError) as error:
+        raise SymbolError(f"no symbols: {type(error).__name__} {error}") from None
+
+
+class _Writer:
+    def __init__(self) -> None:
+        self.structures: list[Any] = []
+        self._numbers: dict[int, int] = {}
+
+    def field(self, field: Field) -> list[Any]:
+        flags = field.absolute | field.reference << 1 | field.constant << 2
+        return [field.name, self.type(field.type), field.offset, field.kind, field.bit, flags]
+
+    def type(self, kind: Type) -> Any:
+        """An elementary type is its name, any other a list that begins with what it is."""
+        if isinstance(kind, Elementary):
+            return kind.name
+        if isinstance(kind, StringType):
+            return ["wstring" if kind.wide else "string", kind.capacity]
+        if isinstance(kind, ArrayType):
+            return ["array", [list(pair) for pair in kind.bounds], self.type(kind.element)]
+        if isinstance(kind, StructType):
+            return ["struct", self._structure(kind)]
+        if isinstance(kind, EnumType):
+            return ["enum", kind.name, kind.base.name, {str(value): name for value, name in kind.shown.items()}]
+        if isinstance(kind, SubrangeType):
+            return ["subrange", kind.name, kind.base.name, kind.low, kind.high]
+        if isinstance(kind, RefType):
+            return ["ref", kind.name, None if kind.target is None else kind.target.name]
+        return ["bytes", kind.name, kind.size, kind.align]
+
+    def _structure(self, kind: StructType) -> int:
+        number = self._numbers.get(id(kind))
+        if number is None:
+            number = self._numbers[id(kind)] = len(self.structures)
+            self.structures.append(None)
+            fields = [self.field(field) for field in kind.fields.values()]
+            self.structures[number] = [kind.name, kind.size, kind.align, kind.block, fields]
+        return number
+
+
+class _Reader:
+    def __init__(self, structures: list[Any]) -> None:
+        self._rows = structures
+        self._made: dict[int, StructType] = {}
+
+    def field(self, row: list[Any]) -> Field:
+        name, kind, offset, section, bit, flags = row
+        return Field(str(name), self.type(kind), int(offset), str(section), bit, bool(flags & 1), bool(flags & 2),
+                     bool(flags & 4))  # fmt: skip
+
+    def type(self, data: Any) -> Type:
+        if isinstance(data, str):
+            return ELEMENTARY[data]
+        made: Type = _MAKERS[data[0]](self, *data[1:])
+        return made
+
+    def structure(self, number: int) -> Type:
+        if number not in self._made:
+            name, size, align, block, fields = self._rows[number]
+            made = self._made[number] = StructType(str(name), int(size), int(align), {}, bool(block))
+            for row in fields:
+                field = self.field(row)
+                made.fields[fold(field.name)] = field
+        return self._made[number]
+
+    def array(self, bounds: list[list[int]], element: Any) -> Type:
+        return array(tuple((int(low), int(high)) for low, high in bounds), self.type(element))
+
+    def enumeration(self, name: str, base: str, shown: dict[str, str]) -> Type:
+        kind, names = ELEMENTARY[base], {int(value): text for value, text in shown.items()}
+        members = {fold(text): value for value, text in names.items()}
+        return EnumType(name, kind.size, kind.align, kind, members, names)
+
+    def subrange(self, name: str, base: str, low: int, high: int) -> Type:
+        kind = ELEMENTARY[base]
+        return SubrangeType(name, kind.size, kind.align, kind, low, high)
+
+    def reference(self, name: str, target: str | None) -> Type:
+        return RefType(name, 8, 8, None if target is None else Type(target, 0, 1))
+
+
+_MAKERS: dict[str, Any] = {
+    "string": lambda reader, capacity: string(capacity),
+    "wstring": lambda reader, capacity: string(capacity, wide=True),
+    "array": _Reader.array, "struct": _Reader.structure, "enum": _Reader.enumeration, "subrange": _Reader.subrange,
+    "ref": _Reader.reference, "bytes": lambda reader, name, size, align: Type(name, size, align),
+}  # fmt: skip

@@ -1,0 +1,195 @@
+"""Why a variable has its value: the statement that gave it, what that statement read, and so on back through scans.
+
+Needs a trace of statements.  What the conditions around a statement read counts as read by it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from fbvm.base.memory import Snapshot, compare
+from fbvm.code.image import Site
+from fbvm.plc import Phase
+from fbvm.record.inside import Event, Frame, Read, Statement, Write
+from fbvm.record.recorder import Signal
+from fbvm.record.trace import Moment, Trace
+from fbvm.watch.paths import Place
+from fbvm.watch.values import show_time
+
+DEEPEST = 6
+"""Causes of causes that are looked for if nobody says how deep."""
+WINDOWS = (100, 2000)
+"""Scans that are read at first, and if they do not suffice; then all."""
+LARGEST_BYTES = 4096
+"""What copies at once is not followed byte by byte if it is larger."""
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A place was read at some moment, and what it held; `guard` if a condition around the statement read it."""
+
+    place: Place
+    value: str
+    order: int
+    guard: bool = False
+
+
+@dataclass(frozen=True)
+class Change:
+    """A value changed: by a statement of an instance that had read `facts`, or from outside in a phase."""
+
+    scan: int
+    now_ns: int
+    order: int
+    site: Site | None = None
+    instance: str = ""
+    facts: tuple[Fact, ...] = ()
+    phase: Phase | None = None
+
+
+@dataclass
+class Cause:
+    """A value and what gave it; `change` is None if nothing did in what was read."""
+
+    place: Place
+    value: str
+    change: Change | None
+    guard: bool = False
+    repeated: bool = False
+    """It is explained at another place of the answer."""
+    causes: list[Cause] = field(default_factory=list)
+
+
+class _Past:
+    """Every change in some scans, by byte and bit."""
+
+    def __init__(self, trace: Trace, scans: range) -> None:
+        self._trace = trace
+        self._changes: dict[int, list[tuple[int, Change]]] = {}
+        self._reads: dict[tuple[Frame, int], list[Fact]] = {}
+        self._known: Snapshot | None = None
+        self.order = 0
+        trace.follow(self, scans)
+
+    def phase(self, moment: Moment, phase: Phase) -> None:
+        self.order += 1
+        now = moment.memory.snapshot()
+        if phase is not Phase.PROGRAM and self._known is not None:
+            change = Change(moment.scans, moment.now_ns, self.order, phase=phase)
+            old, new = bytes(self._known), bytes(now)
+            for offset, size in compare(self._known, now):
+                for at in range(offset, offset + size):
+                    self._changes.setdefault(at, []).append((old[at] ^ new[at], change))
+        self._known = now
+        if phase is Phase.REFRESH:
+            self._reads.clear()
+
+    def event(self, moment: Moment, event: Event) -> None:
+        self.order += 1
+        if isinstance(event, Statement):
+            self._reads[event.frame, event.site] = []
+        elif isinstance(event, Read):
+            place = self._trace.names.at(event.offset, event.bit if event.bit < 8 else None)
+            if place is not None:
+                text = Signal(place, place.name).text(moment.read(place))
+                self._reads.setdefault((event.frame, event.site), []).append(Fact(place, text, self.order))
+        elif isinstance(event, Write) and event.old != event.value and len(event.value) <= LARGEST_BYTES:
+            site = self._trace.sites[event.site] if event.site >= 0 else None
+            change = Change(moment.scans, moment.now_ns, self.order, site, self._trace.names.instance(event.frame.base),
+                            tuple(self._facts(event.frame, event.site)))  # fmt: skip
+            for at, (old, new) in enumerate(zip(event.old, event.value, strict=True), event.offset):
+                if old != new:
+                    bits = 1 << event.bit if event.bit < 8 else old ^ new
+                    self._changes.setdefault(at, []).append((bits, change))
+
+    def _facts(self, frame: Frame, site: int) -> Iterator[Fact]:
+        """What a statement read, then what the conditions around it did."""
+        yield from self._reads.get((frame, site), ())
+        while site >= 0 and (site := self._trace.outer[site]) >= 0:
+            for fact in self._reads.get((frame, site), ()):
+                yield Fact(fact.place, fact.value, fact.order, True)
+
+    def last(self, place: Place, before: int) -> Change | None:
+        """The last change of a place before some moment."""
+        found: Change | None = None
+        for at in range(place.offset, place.offset + max(1, place.type.size)):
+            mask = 0xFF if place.bit is None else 1 << place.bit
+            for bits, change in reversed(self._changes.get(at, [])):
+                if change.order < before and bits & mask:
+                    if found is None or change.order > found.order:
+                        found = change
+                    break
+        return found
+
+
+def why(trace: Trace, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
+    """What gave a place its value at the end of a scan.  Raises ValueError for a scan that is not recorded."""
+    value = Signal(place, place.name).text(trace.at(scan).read(place))
+    start = trace.scans.start
+    for window in (*WINDOWS, scan - start + 1):
+        first = max(start, scan - window + 1)
+        past = _Past(trace, range(first, scan + 1))
+        cause = _explain(past, place, value, past.order + 1, deepest, set())
+        if first == start or not _open(cause):
+            break
+    return cause
+
+
+def _explain(past: _Past, place: Place, value: str, before: int, deepest: int, known: set[object]) -> Cause:
+    change = past.last(place, before)
+    cause = Cause(place, value, change)
+    key = place, change.order if change else -1
+    if key in known:
+        cause.repeated = bool(change and change.facts)
+        return cause
+    known.add(key)
+    for fact in _once(change.facts) if change and deepest else ():
+        inner = _explain(past, fact.place, fact.value, fact.order, deepest - 1, known)
+        inner.guard = fact.guard
+        cause.causes.append(inner)
+    return cause
+
+
+def _once(facts: tuple[Fact, ...]) -> Iterator[Fact]:
+    seen: set[Place] = set()
+    for fact in facts:
+        if fact.place not in seen:
+            seen.add(fact.place)
+            yield fact
+
+
+def _open(cause: Cause) -> bool:
+    """True if somewhere nothing was found that an earlier scan may hold."""
+    return cause.change is None or any(_open(inner) for inner in cause.causes)
+
+
+# --- as text ----------------------------------------------------------------------------------------------------------
+
+
+def told(trace: Trace, cause: Cause) -> str:
+    """The answer as a tree of lines."""
+    return "\n".join(_lines(trace, cause, "", ""))
+
+
+def _lines(trace: Trace, cause: Cause, first: str, rest: str) -> Iterator[str]:
+    yield f"{first}{'if ' if cause.guard else ''}{cause.place.name} = {cause.value}{_since(trace, cause)}"
+    for number, inner in enumerate(cause.causes):
+        last = number == len(cause.causes) - 1
+        yield from _lines(trace, inner, rest + ("└ " if last else "├ "), rest + ("  " if last else "│ "))
+
+
+def _since(trace: Trace, cause: Cause) -> str:
+    change = cause.change
+    if change is None:
+        return " since the trace begins" if trace.scans.start else " since power-on"
+    when = f" since scan {change.scan} ({show_time(change.now_ns).removeprefix('T#')})"
+    if change.phase is Phase.REFRESH:
+        return f"{when}, by a unit in the I/O refresh"
+    if change.phase is not None:
+        return f"{when}, from outside the program"
+    if change.site is None:
+        return f"{when}, by a stub"
+    line = trace.line(change.site)
+    where = f"{change.site.file}:{change.site.line}" + (f" in {change.instance}" if change.instance else "")
+    return f"{when}, by {where}" + (f":  {line}" if line else "") + ("  (see above)" if cause.repeated else "")
