@@ -56,8 +56,17 @@ class Stopped(RuntimeError):
 
 def fingerprint(image: Image) -> str:
     """A number in hexadecimal that another program, or the same in another layout, does not have."""
-    said = (image.layout, image.bodies, image.tasks, image.initial, image.retained)
-    return hashlib.sha256(repr(said).encode()).hexdigest()[:32]
+    said = hashlib.sha256()
+    bodies = tuple((body.name, body.code, body.instance_size) for body in image.bodies)
+    left: list[object] = [(image.layout, image.tasks, image.initial, image.retained, bodies)]
+    while left:  # code may be nested deeper than the host recurses
+        item = left.pop()
+        if isinstance(item, tuple):
+            said.update(b"(%d" % len(item))
+            left += item
+        else:
+            said.update(repr(item).encode())
+    return said.hexdigest()[:32]
 
 
 @dataclass(frozen=True)
@@ -88,8 +97,8 @@ class Plc:
 
     `cycle_ns` is how far a scan advances virtual time; `budget` the statements a scan may execute; `observed` runs the
     build that reports each statement; `engine` is "auto" (Python first, machine code when that pays), "python" or
-    "native"; `journal` is told every input.  Raises nothing that a program, a file or a peer
-    could cause: look at `trap`."""
+    "native"; `journal` is told every input.  Raises nothing that a program, a file or a peer could cause: look at
+    `trap`."""
 
     def __init__(
         self,

@@ -48,7 +48,8 @@ class Replay:
     """A journal on its way: `plc` stands where it stood after the scan that was done last.
 
     `header` and `entries` come from `open_journal`; `image` is the program that ran, `units` make the units by class
-    name.  Raises JournalError if another program wrote the journal, and later if the file is damaged."""
+    name, and `engine` need not be that of the first time.  Raises JournalError if another program wrote the journal,
+    and later if the file is damaged."""
 
     def __init__(
         self,
@@ -58,11 +59,12 @@ class Replay:
         *,
         units: Mapping[str, Callable[..., Unit]] = UNITS,
         observed: bool = False,
+        engine: str = "auto",
     ) -> None:
         if fingerprint(image) != header.image:
             raise JournalError("the journal was written by another program, or by another version of fbvm")
         self._entries = entries
-        self.plc = Plc(image, header.cycle_ns, budget=header.budget, observed=observed)
+        self.plc = Plc(image, header.cycle_ns, budget=header.budget, observed=observed, engine=engine)
         self.differs: int | None = None
         """Number of the first scan after which the memory was not what the journal says; None if there is none."""
         self.complete = False

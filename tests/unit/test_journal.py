@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -233,13 +234,26 @@ def test_a_replay_stops_where_one_wants_to_look() -> None:
     assert (replay.run(), replay.plc.scans, replay.complete) == ("end", 60, True)
 
 
-def test_the_observed_build_replays_too() -> None:
+@pytest.mark.parametrize("options", [{"observed": True}, {"engine": "python"}, {"engine": "native"}], ids=str)
+def test_any_engine_replays(options: dict[str, Any]) -> None:
+    if options.get("engine") == "native":
+        pytest.importorskip("llvmlite")
     run = Run()
-    run.plc.run(scans=30)
+    run.plc.run(scans=300)
     header, entries = open_journal(run.text().splitlines(keepends=True))
-    replay = Replay(header, entries, POLL_IMAGE, observed=True)
+    replay = Replay(header, entries, POLL_IMAGE, **options)
     assert replay.run() == "end"
     assert replay.differs is None
+
+
+def test_a_program_nested_deeper_than_the_host_recurses() -> None:
+    image = image_of(f"PROGRAM Main VAR n, one : LINT := 1; END_VAR n := n{' + one' * 900}; END_PROGRAM")
+    file = io.StringIO()
+    journal = Journal(file)
+    plc = Plc(image, journal=journal)
+    plc.run(scans=3)
+    journal.close()
+    assert same_again(plc, file.getvalue(), image).plc.read("Main.n") == 2701
 
 
 # --- what is written --------------------------------------------------------------------------------------------------
