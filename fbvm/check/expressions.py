@@ -284,6 +284,8 @@ class Expressions:
             self.error("S0304", expr.of, f"this is {whole} and has no members")
             return None
         member = whole.member(expr.name.text)
+        if member is None and whole.block and self.checker.is_damaged(self.checker.block_of(whole), expr.name.text):
+            return None
         if member is None:
             readable = [f.name for f in whole.fields.values() if not whole.block or f.kind in READABLE]
             self.error("S0210", expr.name, f"{whole} has no {expr.name.text}",

@@ -5,6 +5,7 @@ A user's own POU or type shadows a library's of the same name, but not inside li
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -75,6 +76,7 @@ class Project:
             self.report.add(refused.code, source, refused, _refusal(refused))
         if not self._twice(key, declaration.name, source, "POU"):
             self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
+            pou.damaged |= {name for refused in declaration.refused if (name := _refused_name(refused, source))}
             self.new_pous.append(pou)
 
     def _twice(self, key: tuple[str, str], name: tree.Name, source: Source, what: str) -> bool:
@@ -129,6 +131,15 @@ class Project:
         shown = {fold(c): c for c in candidates}
         close = difflib.get_close_matches(fold(name), list(shown), n=3, cutoff=0.7)
         return "did you mean " + " or ".join(shown[c] for c in close) + "?" if close else ""
+
+
+_PART = re.compile(r"\w+\s+(?:(?:PUBLIC|PRIVATE|PROTECTED|INTERNAL|FINAL|ABSTRACT|OVERRIDE)\s+)*(\w+)", re.I)
+
+
+def _refused_name(node: tree.Refused, source: Source) -> str:
+    """The name of an ACTION or METHOD that is refused, folded: calls of it are not complained about again."""
+    match = _PART.match(source.text, node.start)
+    return fold(match[1]) if match else ""
 
 
 def _refusal(node: tree.Refused) -> str:

@@ -72,6 +72,9 @@ class StandardCalls:
         for argument in call.arguments:
             if argument.value is not None:
                 self.expressions.infer(argument.value)
+        pou = self.expressions.pou
+        if pou is not None and name in pou.damaged:
+            return None
         project = self.expressions.project
         known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]
         self.error("S0401", call.callee, f"there is no function or instance {callee(call)}",

@@ -27,3 +27,8 @@ def test_names_of_a_damaged_declaration_are_not_unknown() -> None:
 def test_names_of_a_damaged_type_are_not_unknown_elsewhere() -> None:
     assert found("TYPE T : STRUCT x : ; END_STRUCT END_TYPE\nPROGRAM Main\nVAR t : T; i : INT; END_VAR\n"
                  "t.x := 1; i := TRUE;\nEND_PROGRAM") == [("S0101", 1), ("S0301", 4)]
+
+
+def test_calls_of_a_refused_action_are_not_complained_about_again() -> None:
+    assert found("FUNCTION_BLOCK B\nVAR a : INT; END_VAR\nAct();\nACTION Act:\na := 1;\nEND_ACTION\nEND_FUNCTION_BLOCK\n"
+                 "PROGRAM Main\nVAR f : B; END_VAR\nf.Act();\nf.M();\nEND_PROGRAM") == [("S0901", 4), ("S0210", 11)]
