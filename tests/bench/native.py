@@ -1,0 +1,216 @@
+"""Prints how fast native code is: python tests/bench/native.py.  All figures of one table are of one run; nothing is gated.
+
+The limit is C by hand, `cc -O2`: it holds its state in variables of their own, checks nothing and charges nothing.  Native
+code stores every input of a block where a watch can see it, checks what can trap, makes NaN canonical and keeps the step
+budget in memory; it wins where C calls functions and LLVM sees through the calls."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+HOUSE = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(HOUSE))
+
+from fbvm.base.areas import BUDGET, DUE, NEVER  # noqa: E402
+from fbvm.base.diagnostics import Source  # noqa: E402
+from fbvm.base.memory import Memory  # noqa: E402
+from fbvm.code.compiler import compile_sources  # noqa: E402
+from fbvm.code.image import Image  # noqa: E402
+from fbvm.engine import native_cache, native_statements  # noqa: E402
+from fbvm.engine.native import NativeEngine  # noqa: E402
+from fbvm.engine.native_writer import Writer  # noqa: E402
+from fbvm.engine.python import PythonEngine  # noqa: E402
+
+BENCH = Path(__file__).resolve().parent
+PROGRAMS = {"logic": 10_000_000, "pid": 1_000_000, "crc": 1_000_000, "mtcp": 1_000_000}
+"""The four programs, and how many nanoseconds a scan advances the time."""
+ROUND_S = 0.0005
+"""How long one of many rounds takes; the shortest counts, so that others on the machine do not."""
+ROUNDS = 400
+
+
+def compiled(path: Path, more: str = "") -> Image:
+    compilation = compile_sources([Source(path.name, path.read_text(encoding="utf-8") + more)], runnable=True)
+    assert compilation.image, [diagnostic.render() for diagnostic in compilation.diagnostics]
+    return compilation.image
+
+
+def power_on(image: Image) -> Memory:
+    memory = Memory(image.layout.size, image.layout.areas)
+    for offset, content in image.initial:
+        memory.u8[offset:offset + len(content)] = content
+    memory.write(DUE, "i64", NEVER)
+    memory.write(BUDGET, "i64", 1 << 60)
+    return memory
+
+
+def shortest_ns(work: Callable[[int], object], rounds: int = ROUNDS) -> float:
+    """Nanoseconds of one of n pieces of work, in the shortest round."""
+    work(100)  # what is done once only
+    n, taken = 1, 0.0
+    while taken < ROUND_S:
+        n *= 2
+        began = time.perf_counter()
+        work(n)
+        taken = time.perf_counter() - began
+    best = taken / n
+    for _ in range(rounds):
+        began = time.perf_counter()
+        work(n)
+        best = min(best, (time.perf_counter() - began) / n)
+    return best * 1e9
+
+
+def by_hand(name: str, folder: Path, step_ns: int) -> Callable[[int], object]:
+    """The same logic in C."""
+    library = folder / f"{name}.so"
+    sources = [str(BENCH / "programs" / source) for source in (f"{name}.c", "drv.c")]
+    subprocess.run(["cc", "-O2", "-shared", "-fPIC", "-o", str(library), *sources], check=True)
+    run = ctypes.CDLL(str(library)).run
+    run.argtypes = [ctypes.c_int64] * 3
+    now_ns = 0
+
+    def scans(n: int) -> None:
+        nonlocal now_ns
+        run(now_ns, step_ns, n)
+        now_ns += n * step_ns
+
+    return scans
+
+
+def natively(image: Image, level: int, step_ns: int) -> Callable[[int], object]:
+    engine = NativeEngine(image, power_on(image), level)
+
+    def scans(n: int) -> None:
+        engine.memory.write(BUDGET, "i64", 1 << 60)
+        assert engine.run_n(0, n, step_ns) == (n, None)
+
+    return scans
+
+
+def in_python(image: Image, step_ns: int) -> Callable[[int], object]:
+    memory = power_on(image)
+    engine = PythonEngine(image, memory)
+    now = memory.views["i64"]
+
+    def scans(n: int) -> None:
+        for _ in range(n):
+            now[0] += step_ns
+            engine.run(0)
+
+    return scans
+
+
+@contextmanager
+def without(what: str) -> Iterator[None]:
+    """New code is made without checks or without the budget, to see what they cost."""
+    trap_if, charge = Writer.trap_if, native_statements.EMITTERS["charge"]
+    native_cache.switch(False)
+    if what == "checks":
+        Writer.trap_if = lambda self, *operands: None  # type: ignore[method-assign]
+    native_statements.EMITTERS["charge"] = lambda w, count, site: None
+    try:
+        yield
+    finally:
+        Writer.trap_if, native_statements.EMITTERS["charge"] = trap_if, charge  # type: ignore[method-assign]
+        native_cache.switch(True)
+
+
+def programs() -> None:
+    print("time per scan: C by hand in ns, all else as a ratio to it")
+    print(f"{'':<8}{'C, ns':>10}{'O2':>8}{'O0':>8}{'python':>9}{'O2 without budget':>20}{'and checks':>12}")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, step_ns in PROGRAMS.items():
+            path = BENCH / "programs" / f"{name}.st"
+            image = compiled(path)
+            hand = shortest_ns(by_hand(name, Path(folder), step_ns))
+            ratios = [shortest_ns(natively(image, 2, step_ns)) / hand, shortest_ns(natively(image, 0, step_ns), 50) / hand,
+                      shortest_ns(in_python(image, step_ns), 3) / hand]
+            for what in ("budget", "checks"):
+                with without(what):
+                    ratios.append(shortest_ns(natively(compiled(path), 2, step_ns)) / hand)
+            print(f"{name:<8}{hand:>10,.1f}{ratios[0]:>8.2f}{ratios[1]:>8.1f}{ratios[2]:>9.0f}{ratios[3]:>20.2f}{ratios[4]:>12.2f}",
+                  flush=True)
+
+
+def took_ms(work: Callable[[], Any]) -> tuple[float, Any]:
+    began = time.process_time()
+    made = work()
+    return (time.process_time() - began) * 1e3, made
+
+
+def large_program() -> None:
+    """A cold start is what O0 takes, a warm one what the object on disk takes; O2 comes from the helper process."""
+    print("\n5,195 lines, processor time in ms")
+    more = "VAR_GLOBAL NOW : TIME; D : ARRAY [0..1023] OF WORD; END_VAR\n"
+    text_ms, image = took_ms(lambda: compiled(BENCH / "lines5000.st", more))
+    print(f"  text to image                             {text_ms:>9,.0f}")
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["FBVM_CACHE"] = folder
+        for level in (0, 2):
+            for state in ("cold", "warm"):
+                image = compiled(BENCH / "lines5000.st", more)
+                taken_ms, _ = took_ms(lambda image=image, level=level: NativeEngine(image, power_on(image), level))
+                print(f"  image to code, O{level}, {state}                  {taken_ms:>9,.0f}")
+            scan_ns = shortest_ns(natively(image, level, 1_000_000))
+            print(f"  scan, O{level}, microseconds                  {scan_ns / 1e3:>9,.2f}")
+
+
+EMPTY = "PROGRAM Main\nEND_PROGRAM\n"
+
+
+def calls() -> None:
+    print("\ncalls from Python, ns")
+    compilation = compile_sources([Source("empty.st", EMPTY)], runnable=True)
+    assert compilation.image
+    engine = NativeEngine(compilation.image, power_on(compilation.image), 2)
+    entry, run = engine._calls[0], engine.run
+
+    def repeated(what: Callable[..., object], *operands: int) -> Callable[[int], None]:
+        def work(n: int) -> None:
+            for _ in range(n):
+                what(*operands)
+
+        return work
+
+    print(f"  entry of an empty program                 {shortest_ns(repeated(entry)):>9,.0f}")
+    print(f"  NativeEngine.run                          {shortest_ns(repeated(run, 0)):>9,.0f}")
+    print(f"  one of many scans inside                  {shortest_ns(natively(compilation.image, 2, 1)):>9,.1f}")
+
+
+def many() -> None:
+    """Code is shared; a PLC costs the pages that it touches."""
+    print("\n1,000 PLCs with the logic of one image")
+    image = compiled(BENCH / "programs" / "logic.st")
+    NativeEngine(image, power_on(image), 2)
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    taken_ms, engines = took_ms(lambda: [NativeEngine(image, power_on(image), 2) for _ in range(1000)])
+    for engine in engines:
+        engine.run(0)
+    kilobytes = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1000
+    print(f"  a PLC, KiB of memory                      {kilobytes:>9,.1f}")
+    print(f"  a PLC, microseconds to make               {taken_ms:>9,.0f}")
+
+    def all_scans(n: int) -> None:
+        for _ in range(n):
+            for engine in engines:
+                engine.run(0)
+
+    print(f"  a scan of all, microseconds               {shortest_ns(all_scans, 20) / 1e3:>9,.0f}")
+
+
+if __name__ == "__main__":
+    programs()
+    large_program()
+    calls()
+    many()
