@@ -101,7 +101,9 @@ WIDTH = 160
 
 
 def caret_lines(source: Source, start: int, end: int) -> list[str]:
-    """The source line of `start` and a line of carets below the span."""
+    """The source line of `start` and a line of carets below the span; nothing for a text that could not be read."""
+    if not source.text:
+        return []
     number, column = source.place(start)
     text = source.line(number)
     first = max(0, column - 1 - WIDTH // 2) if len(text) > WIDTH else 0

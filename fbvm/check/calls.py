@@ -164,7 +164,7 @@ class Calls:
         elif name not in pou.damaged:
             known = [v.name for v in pou.order if v.kind in PARAMETER_KINDS]
             self.error("S0402", argument.name, f"{pou.name} has no parameter {argument.name.text}",
-                       self.project.nearest(argument.name.text, known))
+                       self.project.choices(argument.name.text, known))
             if argument.value is not None:
                 self.expressions.infer(argument.value)
 

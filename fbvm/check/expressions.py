@@ -32,7 +32,7 @@ from fbvm.base.types import (
 )
 from fbvm.check.constants import convert, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
-from fbvm.check.fitting import assignable, conversion_hint, is_untyped, literal_hint
+from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, is_untyped, literal_hint
 from fbvm.check.operators import Operators
 from fbvm.check.subscripts import Subscripts
 from fbvm.check.values import is_any
@@ -108,7 +108,7 @@ class Expressions:
             return True
         known = code in _KNOWN and not is_block(kind)
         self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
-                   literal_hint(self.facts.constants.get(expr), base(target)) if known else conversion_hint(kind, target))
+                   literal_hint(self.facts.constants.get(expr), base(target)) if known else fitting_hint(expr, kind, target))
         return False
 
     def _in_range(self, expr: tree.Expr, value: Value, target: Type) -> bool:
@@ -124,7 +124,7 @@ class Expressions:
             kind = self.adopt(expr, BOOL, "S0303")
         if kind is not None and base(kind) != BOOL:
             self.error("S0303", expr, f"the condition of {what} is {kind}, not BOOL",
-                       "compare it, for example with <> 0" if is_any(kind, "ANY_NUM", "ANY_BIT") else "")
+                       conversion_hint(kind, BOOL))
 
     def adopt(self, expr: tree.Expr, target: Type, code: str = "S0301") -> Type | None:
         """Give an expression of nothing but untyped literals the type `target`."""
@@ -141,7 +141,8 @@ class Expressions:
             return None
         span = limits(target)
         if span is not None and not span[0] <= value <= span[1]:
-            self.error("S0702", expr, f"{value} does not fit {target}, which holds {span[0]} to {span[1]}")
+            self.error("S0702", expr, f"{value} does not fit {target}, which holds {span[0]} to {span[1]}",
+                       literal_hint(value, kind) if kind == BOOL else "")
             return None
         self.facts.constants[expr] = convert(value, kind)
         self.facts.types[expr] = target
@@ -202,7 +203,7 @@ class Expressions:
         value = kind.members.get(fold(member.text))
         if value is None:
             self.error("S0210", member, f"{kind} has no member {member.text}",
-                       self.project.nearest(member.text, kind.shown.values()))
+                       self.project.choices(member.text, kind.shown.values()))
             return None
         self.facts.constants[expr] = value
         return kind
@@ -251,12 +252,11 @@ class Expressions:
         except AddressError:
             known = [v.name for v in self.pou.order] if self.pou else []
             hint = self.project.nearest(name, [*known, *(v.name for v in self.project.globals.values())])
-        if self.project.pou(name, self.source):
-            message = f"{name} is a POU and has no value here"
-            hint = "call it with (), or declare an instance of it"
+        pou = self.project.pou(name, self.source)
+        if pou is None:
+            self.error("S0201", expr, f"{name} is not declared", hint)
         else:
-            message = f"{name} is not declared"
-        self.error("S0201", expr, message, hint)
+            self.error("S0201", expr, f"{name} is a {pou.kind} and has no value", _USES[pou.kind].format(pou.name))
 
     def _direct(self, expr: tree.Direct, want: Type | None) -> Type | None:
         try:
@@ -289,7 +289,7 @@ class Expressions:
         if member is None:
             readable = [f.name for f in whole.fields.values() if not whole.block or f.kind in READABLE]
             self.error("S0210", expr.name, f"{whole} has no {expr.name.text}",
-                       self.project.nearest(expr.name.text, readable))
+                       self.project.choices(expr.name.text, readable))
             return None
         if whole.block and member.kind not in READABLE:
             what = "an in-out of" if member.kind == "VAR_IN_OUT" else "internal to"
@@ -351,6 +351,12 @@ class Expressions:
 
 _KNOWN = ("S0503", "S0705", "S0801")
 """Codes of places whose values must be known before the program runs: a conversion does not help there."""
+_USES = {
+    "FUNCTION": "call it: {}(...)",
+    "FUNCTION_BLOCK": "declare an instance, such as  my_{0} : {0};  and name an output of it",
+    "PROGRAM": "a task runs it; what others need of it belongs in a VAR_GLOBAL",
+}
+"""What to do with a POU of each kind that is named where a value is needed."""
 READABLE = ("", "VAR_INPUT", "VAR_OUTPUT")
 """Kinds of members that may be named from outside."""
 

@@ -19,6 +19,7 @@ from fbvm.base.types import (
 from fbvm.check.constants import limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
 from fbvm.check.values import is_any
+from fbvm.syntax import tree
 
 
 def is_untyped(kind: Type | None) -> bool:
@@ -93,16 +94,27 @@ def convertible(form: str, source: Type, target: Type) -> bool:
 # --- advice ---------------------------------------------------------------------------------------------------------
 
 
+def fitting_hint(expr: tree.Expr, kind: Type, target: Type) -> str:
+    """What to write where `expr` of type `kind` stands and `target` is needed: a literal another way, else a conversion."""
+    if isinstance(expr, tree.Literal):
+        return literal_hint(expr.value if isinstance(expr.value, int | float) else None, base(target))
+    return conversion_hint(kind, target)
+
+
 def conversion_hint(kind: Type, target: Type) -> str:
     """How to turn a value of one type into another, "" if there is no conversion."""
     source, wanted = base(kind), base(target)
-    if wanted == BOOL:
+    if wanted == BOOL and not isinstance(source, StructType):
         return comparison_hint(source)
     if isinstance(source, StructType) and source.block:
-        return "name one of its outputs"
-    if not all(isinstance(t, Elementary | StringType) for t in (source, wanted)) or not convertible("TO", source, wanted):
+        outputs = [field.name for field in source.fields.values() if field.kind == "VAR_OUTPUT"]
+        return f"name an output of the instance: {' or '.join(outputs[:4])}" if outputs else ""
+    if not all(isinstance(t, Elementary | StringType | EnumType) for t in (source, wanted)) or \
+            source == wanted or not convertible("TO", source, wanted):
         return ""
     names = ["STRING" if isinstance(t, StringType) else t.name for t in (source, wanted)]
+    if isinstance(source, EnumType):
+        return f"write TO_{names[1]}(...)"
     return f"write {names[0]}_TO_{names[1]}(...)"
 
 
@@ -110,6 +122,8 @@ def comparison_hint(kind: Type) -> str:
     """What to write where a BOOL is needed."""
     if is_any(kind, "ANY_NUM", "ANY_BIT"):
         return "compare it, for example with <> 0"
+    if isinstance(kind, StringType):
+        return "compare it, for example with = 'text'"
     return "compare it" if is_any(kind, "ANY_ELEMENTARY") or isinstance(kind, EnumType) else ""
 
 

@@ -26,6 +26,7 @@ from fbvm.base.types import (
 )
 from fbvm.check import constants
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
+from fbvm.check.fitting import conversion_hint, convertible
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
@@ -78,7 +79,7 @@ class Operators:
             good = kind in (UNTYPED_INT, UNTYPED_REAL) or is_any(kind, "ANY_NUM", "ANY_DURATION")
         if not good:
             self.expressions.error("S0302", expr, f"{expr.op} is not defined for {kind}",
-                                   _bit_hint(kind) if expr.op == "NOT" else "")
+                                   _bit_hint(kind, want) if expr.op == "NOT" else "")
             return None
         kind = base(kind)
         value = self.facts.constants.get(expr.operand)
@@ -150,7 +151,10 @@ class Operators:
     def _undefined(self, expr: tree.Binary, left: Type, right: Type) -> None:
         hint = ""
         if expr.op in ("AND", "OR", "XOR"):
-            hint = _bit_hint(left if not is_any(left, "ANY_BIT") else right)
+            wrong, other = (right, left) if is_any(left, "ANY_BIT") else (left, right)
+            hint = _bit_hint(wrong, other)
+        elif expr.op == "+" and isinstance(left, StringType):
+            hint = "CONCAT(...) joins texts"
         elif isinstance(left, StructType) or isinstance(right, StructType):
             hint = "compare or combine the members"
         elif expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
@@ -216,7 +220,10 @@ class Operators:
         return result
 
 
-def _bit_hint(kind: Type) -> str:
+def _bit_hint(kind: Type, other: Type | None) -> str:
+    """How to make bits of a number; a BOOL if the other operand or the place of the result is one."""
+    if other == BOOL:
+        return conversion_hint(kind, BOOL)
     names = {1: "BYTE", 2: "WORD", 4: "DWORD", 8: "LWORD"}
     if kind is UNTYPED_INT:
         return "write a typed literal such as WORD#16#FF"
@@ -224,5 +231,5 @@ def _bit_hint(kind: Type) -> str:
 
 
 def _meeting_hint(left: Type, right: Type) -> str:
-    named = all(isinstance(k, Elementary) and k.bits for k in (left, right))
+    named = all(isinstance(k, Elementary) and k.bits for k in (left, right)) and convertible("TO", right, left)
     return f"convert one side, for example with {right}_TO_{left}(...)" if named else ""

@@ -29,6 +29,8 @@ class TypeEntry:
     """References to the type that were met while it was being resolved."""
 
 
+LISTED = 8
+"""How many names a hint lists."""
 T = TypeVar("T")
 
 
@@ -125,6 +127,12 @@ class Project:
             if (owner, folded) in self.globals:
                 return self.globals[owner, folded]
         return None
+
+    def choices(self, name: str, candidates: Iterable[str]) -> str:
+        """A hint that names the candidates most like a misspelt name, or the first ones if none is like it."""
+        known = list(candidates)
+        more = " ..." if len(known) > LISTED else ""
+        return self.nearest(name, known) or (f"it has {', '.join(known[:LISTED])}{more}" if known else "it has none")
 
     def nearest(self, name: str, candidates: Iterable[str]) -> str:
         """A hint that names the candidates most like a misspelt name, "" if none is."""

@@ -33,6 +33,13 @@ from fbvm.syntax import tree
 
 MAX_SIZE = 64 << 20
 """Largest variable in bytes."""
+FOREIGN = {
+    "BOOLEAN": "BOOL", "BIT": "BOOL", "INTEGER": "INT", "SHORT": "INT", "INT16": "INT", "LONG": "DINT", "INT32": "DINT",
+    "LONGINT": "DINT", "INT64": "LINT", "INT8": "SINT", "UINT8": "USINT", "UINT16": "UINT", "UINT32": "UDINT",
+    "UINT64": "ULINT", "FLOAT": "REAL", "FLOAT32": "REAL", "SINGLE": "REAL", "DOUBLE": "LREAL", "FLOAT64": "LREAL",
+    "LONGREAL": "LREAL", "CARDINAL": "UDINT", "QWORD": "LWORD", "TEXT": "STRING",
+}
+"""Names of other languages for elementary types."""
 MAX_STRING = 65534
 Resolved = tuple[Type, bytes]
 
@@ -121,11 +128,16 @@ class Specs:
         if folded in ("CHAR", "WCHAR") or folded in GENERIC:
             self.report.add("S0901", source, spec, f"{folded} is understood but not executed by this version")
             return None
-        hint = self.project.nearest(spec.text, [*ELEMENTARY, "STRING", *(n for _, n in self.project.types),
-                                                *(p.name for p in self.project.pous.values()),
-                                                *self.project.libraries.block_names()])
-        self.report.add("S0204", source, spec, f"there is no type or block {spec.text}", hint)
+        self.report.add("S0204", source, spec, f"there is no type or block {spec.text}", self._meant(spec.text))
         return None
+
+    def _meant(self, name: str) -> str:
+        """A hint for a type that there is not."""
+        if fold(name) in FOREIGN:
+            return f"its name here is {FOREIGN[fold(name)]}"
+        project = self.project
+        return project.nearest(name, [*ELEMENTARY, "STRING", *(entry.tree.name.text for entry in project.types.values()),
+                                      *(pou.name for pou in project.pous.values()), *project.libraries.block_names()])
 
     def named_type(self, name: str, source: Source) -> Type | None:
         """The type of that name, elementary or declared, without any complaint."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, Type
-from fbvm.check.fitting import conversion_hint
+from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, StringType, Type
+from fbvm.check.fitting import fitting_hint
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
@@ -30,16 +30,14 @@ class Subscripts:
         if isinstance(whole, OpenArrayType):
             return self._open(expr, whole, kinds)
         if not isinstance(whole, ArrayType):
-            self.error("S0304", expr.of, f"this is {whole}, not an array")
-            return None
-        if len(kinds) < len(whole.bounds):
-            self.error("S0305", expr, f"{whole} needs {len(whole.bounds)} subscripts, {len(kinds)} are written")
+            self.error("S0304", expr.of, f"this is {whole}, not an array",
+                       "MID(s, 1, n) is character n of a text" if isinstance(whole, StringType) else "")
             return None
         element: Type = whole
         rest = list(zip(expr.subscripts, kinds, strict=True))
         while rest:
             if not isinstance(element, ArrayType) or len(rest) < len(element.bounds):
-                self.error("S0305", expr, f"{whole} has fewer dimensions than subscripts are written")
+                self._wrong_number(expr, whole, len(whole.bounds))
                 return None
             for (subscript, kind), (low, high) in zip(rest, element.bounds, strict=False):
                 if not self._fits(subscript, kind, low, high, element):
@@ -51,7 +49,7 @@ class Subscripts:
     def _open(self, expr: tree.Index, whole: OpenArrayType, kinds: list[Type | None]) -> Type | None:
         """Subscripts of ARRAY [*]: their bounds are known when the program runs."""
         if len(kinds) != whole.dimensions:
-            self.error("S0305", expr, f"{whole} needs {whole.dimensions} subscripts, {len(kinds)} are written")
+            self._wrong_number(expr, whole, whole.dimensions)
             return None
         least, most = -(1 << 63), (1 << 63) - 1
         for subscript, kind in zip(expr.subscripts, kinds, strict=True):
@@ -59,10 +57,15 @@ class Subscripts:
                 return None
         return whole.element
 
+    def _wrong_number(self, expr: tree.Index, whole: Type, needed: int) -> None:
+        written = len(expr.subscripts)
+        self.error("S0305", expr, f"{whole} needs {needed} subscript{'s' if needed > 1 else ''}, "
+                                  f"{written} {'are' if written > 1 else 'is'} written")
+
     def _fits(self, expr: tree.Expr, kind: Type | None, low: int, high: int, whole: Type) -> bool:
         assert kind is not None
         if not is_any(kind, "ANY_INT") and not isinstance(kind, EnumType):
-            self.error("S0305", expr, f"a subscript is an integer, not {kind}", conversion_hint(kind, DINT))
+            self.error("S0301", expr, f"a subscript is an integer, not {kind}", fitting_hint(expr, kind, DINT))
             return False
         value = self.facts.constants.get(expr)
         if isinstance(value, int) and not low <= value <= high:

@@ -36,6 +36,7 @@ class Values:
         if isinstance(value, bool) or not isinstance(value, int):
             what = f"{kind}" if value is not None else "not known before the program runs"
             self.report.add("S0701", source, expr, f"a constant integer is needed here; this is {what}",
+                            "write a number" if value is not None else
                             "write a literal, or declare the name in a VAR CONSTANT section")
             return None
         return value
@@ -106,7 +107,8 @@ class Values:
             member = kind.member(name.text)
             if member is None or not initialisable(kind, member):
                 self.report.add("S0210", source, name, f"{kind} has no {name.text} that can be initialised",
-                                self.project.nearest(name.text, (f.name for f in kind.fields.values())))
+                                self.project.choices(name.text, (f.name for f in kind.fields.values()
+                                                                 if initialisable(kind, f))))
                 continue
             if fold(name.text) in seen:
                 self.report.add("S0705", source, name, f"{name.text} is initialised twice")

@@ -39,7 +39,7 @@ class Expressions(Builder):
         kind = "wstring" if wide else "string"
         if not wide and not token.text.isascii() and any(ord(c) > 255 for c in token.text):
             self.report("S0192", token.start, token.end, "characters beyond Latin-1 become several bytes (UTF-8) each",
-                        'write a WSTRING, ".."')
+                        "LEN and the functions with positions count bytes")
         return self._decoded(token, lambda: literals.text_literal(token.text), (kind, "", None))
 
     def truth(self, token: Token) -> Literal:

@@ -57,4 +57,4 @@ def _older(data: bytes) -> str:
 
 def _refusal(name: str, why: str) -> Diagnostic:
     return Diagnostic("S0107", Source(name, ""), 0, 0, f"{name} cannot be read: {why}",
-                      "a source is a text file in UTF-8, UTF-16 with a mark, or Latin-1")
+                      "a source is a text file in UTF-8, UTF-16 with a mark, or Windows-1252")
