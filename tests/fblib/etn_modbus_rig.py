@@ -43,7 +43,9 @@ AREAS = ("CIO", "W", "H", "A", "D")
 class Rig:
     """One PLC whose program calls the server with these pins, at 192.168.250.1 port 502 of a network in memory."""
 
-    def __init__(self, pins: str = "", *, timing: str = "exact", seed: int = 0, network: LoopNetwork | None = None) -> None:
+    def __init__(
+        self, pins: str = "", *, timing: str = "exact", seed: int = 0, network: LoopNetwork | None = None
+    ) -> None:
         self.network = network or LoopNetwork(seed)
         self.unit = Etn21(0, SERVER.host, timing=timing, seed=seed)
         text = f"PROGRAM Main VAR Server : ETN_Modbus_Server; END_VAR Server({pins}); END_PROGRAM"
@@ -178,8 +180,8 @@ class Client:
 
 
 class Model:
-    """What the sheet says, by our own Modbus server: its tables are a copy of the words of a rig, coils and inputs are the
-    same bits of CIO, and the address at which 10 begins ends at 17FF."""
+    """What the sheet says, by our own Modbus server: its tables are a copy of the words of a rig, coils and inputs are
+    the same bits of CIO, and the address at which 10 begins ends at 17FF."""
 
     def __init__(self, rig: Rig, *, fn0f: bool = False, full_dm: bool = False) -> None:
         codes = (1, 2, 3, 4, 5, 6, 8, 16, *((15,) if fn0f else ()))
@@ -212,11 +214,12 @@ class Model:
             registers[start : start + 123] = before
             return b"\x90\x02"
         if reply[0] in (0x05, 0x0F):
-            self._bits_written(start // 16, (start + int.from_bytes(pdu[3:5], "big") if reply[0] == 0x0F else start) // 16)
+            count = int.from_bytes(pdu[3:5], "big") if reply[0] == 0x0F else 1
+            self._bits_written(start // 16, (start + count - 1) // 16)
         return reply
 
     def _bits_written(self, first: int, last: int) -> None:
-        for word in range(first, min(last, 4095) + 1):
+        for word in range(first, last + 1):
             bits = self.server.coils[16 * word : 16 * word + 16]
             self.cio[word] = self.server.input_registers[word] = sum(bit << number for number, bit in enumerate(bits))
             if word < 320:

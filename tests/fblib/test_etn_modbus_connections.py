@@ -166,17 +166,6 @@ def test_a_client_that_does_not_take_its_replies_is_left() -> None:
     assert second.ask(ECHO) == ECHO
 
 
-def test_a_half_closed_client_gets_its_answers() -> None:
-    rig = Rig()
-    client = rig.client()
-    client.say(5 * ECHO_FRAME)
-    end = next(iter(client.link._ends.values()))
-    end.finish(rig.plc.elapsed_ns)
-    assert client.hear() == 5 * ECHO_FRAME
-    assert client.end
-    assert rig.client().ask(ECHO) == ECHO
-
-
 @pytest.mark.parametrize("said", [b"", b"\0", b"\0\1\0\0\0\6\xff\6\0\0"])
 @pytest.mark.parametrize("reset", [False, True])
 @pytest.mark.parametrize("pins", ["", "Sockets := 3"])
@@ -441,11 +430,8 @@ def test_a_client_writes_all_words_of_the_unit_at_once() -> None:
         assert client.ask(ECHO) == ECHO
 
 
-HAPPENINGS = st.lists(
-    st.tuples(st.sampled_from(["connect", "say", "half", "leave", "reset", "mode", "restart", "silence", "fault"]), st.integers(0, 12)),
-    min_size=3,
-    max_size=25,
-)
+NAMES_OF_HAPPENINGS = ["connect", "say", "half", "leave", "reset", "mode", "restart", "silence", "fault"]
+HAPPENINGS = st.lists(st.tuples(st.sampled_from(NAMES_OF_HAPPENINGS), st.integers(0, 12)), min_size=3, max_size=25)
 
 
 def happen(rig: Rig, client: Client, what: str) -> None:
@@ -471,7 +457,7 @@ def happen(rig: Rig, client: Client, what: str) -> None:
 
 
 @given(st.sampled_from(["exact", "real"]), st.integers(0, 10**6), st.sampled_from(["", ", Sockets := 2"]), HAPPENINGS)
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 def test_any_life(timing: str, seed: int, pins: str, happenings: list[tuple[str, int]]) -> None:
     rig = Rig(f"Idle_Time := T#2s{pins}", timing=timing, seed=seed)
     clients = [rig.client(connected=False), rig.client(connected=False)]

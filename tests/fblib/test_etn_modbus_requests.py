@@ -1,4 +1,4 @@
-"""What the server answers: the sheet's examples to the byte, each function code at its limits, counters and switches."""
+"""What the server answers: the examples of the sheet to the byte, all functions at their limits, counters, switches."""
 
 from __future__ import annotations
 
@@ -158,7 +158,8 @@ def test_all_other_function_codes_are_refused(pins: str, codes: set[int]) -> Non
 
 
 @pytest.mark.parametrize(
-    ("address", "quantity"), [*limits(65536, 1968), *[(bit, 40) for bit in range(16)], *[(3, count) for count in range(1, 34)]]
+    ("address", "quantity"),
+    [*limits(65536, 1968), *[(bit, 40) for bit in range(16)], *[(3, count) for count in range(1, 34)]],
 )
 def test_0f_where_it_is_switched_on(address: int, quantity: int) -> None:
     rig = Rig("Fn0F := TRUE")

@@ -1,0 +1,402 @@
+"""The client program: the request of its user, every end that a command may have, and the server as its peer."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from etn_modbus_rig import SECOND_NS, image_of
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fbvm import compile_files
+from fbvm.net.faults import Fault
+from fbvm.net.loop import LoopNetwork
+from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS
+from fbvm.net.peers import Action, ModbusPeer, Say, Station
+from fbvm.plc import Mode, Plc
+from fbvm.record.chart import chart
+from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21 import Fault as UnitFault
+from fbvm.wire.link import Peer
+from fbvm.wire.modbus import Adu
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+SERVER = Peer("192.168.250.1", 502)
+TEXT = """
+PROGRAM Main
+VAR
+    Client : ETN_Modbus_Client;
+    Request : ARRAY[0..252] OF BYTE;
+    Octet : UINT := 192;
+    Command : BOOL;
+    Connect : BOOL := TRUE;
+    Size : UINT;
+    Id : BYTE := 16#FF;
+END_VAR
+    Client(IP_Address1 := Octet, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 1, Connect := Connect,
+           Command := Command, PDU := Request, PDU_Size := Size, Unit_ID := Id);
+END_PROGRAM
+"""
+
+
+class Rig:
+    """The client block on a PLC, and somebody at 192.168.250.1 port 502 (None: nobody)."""
+
+    def __init__(self, peer: Station | None = None, *, timing: str = "exact", seed: int = 0) -> None:
+        self.peer = peer if isinstance(peer, ModbusPeer) else ModbusPeer()
+        self.network = LoopNetwork(seed)
+        if peer:
+            self.network.place(SERVER, peer)
+        self.unit = Etn21(0, "192.168.250.2", timing=timing, seed=seed)
+        self.plc = Plc(image_of(TEXT))
+        self.plc.attach(self.unit, self.network)
+
+    def scan(self, count: int = 1) -> None:
+        for _ in range(count):
+            assert self.plc.scan() is None
+
+    def until(self, condition: str, max_s: float = 20) -> float:
+        """Seconds that it took."""
+        start_ns = self.plc.now_ns
+        assert self.plc.run(until=condition, max_ns=start_ns + int(max_s * SECOND_NS)) == "until", condition
+        return (self.plc.now_ns - start_ns) / SECOND_NS
+
+    def connect(self) -> Rig:
+        self.until("Main.Client.Connected")
+        return self
+
+    def command(self, pdu: bytes) -> None:
+        """Give the command; its end is another matter."""
+        for number, byte in enumerate(pdu):
+            self.plc.write(f"Main.Request[{number}]", byte)
+        self.plc.write("Main.Size", len(pdu))
+        self.plc.write("Main.Command", True)
+        self.scan()
+        self.plc.write("Main.Command", False)
+
+    def ask(self, pdu: str | bytes, max_s: float = 20) -> str:
+        """Reply in hexadecimal, or the error code if there is none."""
+        self.command(bytes.fromhex(pdu) if isinstance(pdu, str) else pdu)
+        self.until("Main.Client.Done OR Main.Client.Error", max_s)
+        error, code = self.plc.read("Main.Client.Error"), self.plc.read("Main.Client.Error_Code")
+        assert error == (code != 0) != self.plc.read("Main.Client.Done")
+        return f"error {code:04X}" if code else self.reply()
+
+    def reply(self) -> str:
+        size = self.plc.read("Main.Client.Reply_Size")
+        return bytes(self.plc.read("Main.Client.Reply")[:size]).hex(" ").upper()  # type: ignore[index, misc]
+
+    def counters(self) -> object:
+        return self.plc.read("W491..W495")
+
+
+def answering(reply: Callable[[bytes], list[Action]]) -> ModbusPeer:
+    return ModbusPeer(None, reply)
+
+
+@pytest.mark.parametrize("timing", ["exact", "real"])
+def test_the_sheets_own_request(timing: str) -> None:
+    """03 for several D registers, byte for byte on the wire."""
+    rig = Rig(ModbusPeer(), timing=timing).connect()
+    rig.peer.server.holding_registers[1000:1003] = array("H", [0xAB12, 0x5678, 0x9713])
+    assert rig.ask("03 03 E8 00 03") == "03 06 AB 12 56 78 97 13"
+    assert rig.peer.heard == [bytes.fromhex("00 01 00 00 00 06 FF 03 03 E8 00 03")]
+    assert rig.plc.read("CIO 5804..CIO 5808") == [0xFF03, 0x06AB, 0x1256, 0x7897, 0x1300]
+    assert rig.counters() == [0, 1, 1, 0, 0]
+
+
+def test_a_request_scan_by_scan() -> None:
+    rig = Rig(ModbusPeer()).connect()
+    rig.plc.write("Main.Size", 5)
+    rig.plc.write("Main.Request[0]", 3)
+    rig.plc.write("Main.Request[4]", 1)
+    rig.plc.write("Main.Command", True)
+    signals = [("CIO 1519.03", "Send"), ("CIO 1519.04", "Receive"), "Main.Client.Done", "W492", "W493"]
+    assert chart(rig.plc, 6, signals) == """
+        CIO1519.03        #.....       Send
+        CIO1519.04        ..#...       Receive
+        Main.Client.Done  ....##
+        W492              |   |0001h   = 0000h, 0001h
+        W493              | |0001h     = 0000h, 0001h
+    """  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 6, 100, 251, 252, 253])
+def test_requests_and_replies_of_any_size(size: int) -> None:
+    rig = Rig(answering(lambda frame: [Say(heard())])).connect()
+
+    def heard() -> bytes:
+        return rig.peer.heard[-1]
+
+    pdu = bytes((0x41 + value) & 0xFF for value in range(size))
+    assert rig.ask(pdu) == pdu.hex(" ").upper()
+    assert rig.peer.heard == [Adu(1, 255, pdu).to_bytes()]
+
+
+def test_exceptions_of_the_server() -> None:
+    rig = Rig(ModbusPeer()).connect()
+    got = [rig.ask(pdu) for pdu in ("2C", "03 FF FF 00 02", "03 00 00 00 00")]
+    assert got == ["error 0001", "error 0002", "error 0003"]
+    assert rig.reply() == "83 03"
+    assert rig.counters() == [3, 3, 3, 0, 0]
+    assert rig.ask("08 00 00 12 34") == "08 00 00 12 34"
+
+
+@pytest.mark.parametrize(("unit", "sent"), [(0, 0), (1, 1), (255, 255)])
+def test_the_unit_identifier(unit: int, sent: int) -> None:
+    rig = Rig(ModbusPeer()).connect()
+    rig.plc.write("Main.Id", unit)
+    rig.ask("03 00 00 00 01")
+    assert rig.peer.heard[-1][6] == sent
+
+
+def test_commands_that_cannot_be() -> None:
+    rig = Rig(ModbusPeer())
+    assert rig.ask("03 00 00 00 01") == "error 2210"
+    rig.connect()
+    assert rig.ask(b"") == "error 1100"
+    rig.plc.write("Main.Size", 254)
+    rig.plc.write("Main.Command", True)
+    rig.scan()
+    assert rig.plc.read("Main.Client.Error_Code") == 0x1100
+    rig.plc.write("Main.Command", False)
+    rig.scan()
+    assert rig.peer.heard == []
+
+
+def test_a_command_while_one_runs() -> None:
+    rig = Rig(answering(lambda frame: [Say(frame, SECOND_NS)])).connect()
+    rig.command(bytes.fromhex("03 00 00 00 01"))
+    rig.scan(5)
+    rig.command(bytes.fromhex("04 00 00 00 01"))
+    assert rig.plc.read("Main.Client.Error_Code") == 0x110C
+    rig.until("Main.Client.Done")
+    assert rig.reply() == "03 02 00 00"
+    assert len(rig.peer.heard) == 1
+
+
+def test_an_octet_above_ff() -> None:
+    rig = Rig(ModbusPeer())
+    rig.plc.write("Main.Octet", 256)
+    rig.scan(50)
+    assert rig.plc.read("Main.Client.Error_Code") == 0x1100
+    rig.plc.write("Main.Octet", 192)
+    assert rig.connect().ask("08 00 00 00 01") == "08 00 00 00 01"
+
+
+def test_nobody_there() -> None:
+    rig = Rig()
+    rig.until("Main.Client.Error")
+    assert rig.plc.read("Main.Client.Error_Code") == 0x004A
+    rig.network.place(SERVER, rig.peer)
+    assert rig.connect().ask("08 00 00 00 01") == "08 00 00 00 01"
+
+
+def test_a_silent_network() -> None:
+    rig = Rig(ModbusPeer())
+    rig.network.faults.append(Fault(silent=True))
+    assert 10 <= rig.until("Main.Client.Error") < 10.2
+    assert rig.plc.read("Main.Client.Error_Code") == 0x0053
+    rig.network.faults.clear()
+    rig.until("Main.Client.Connected", 30)
+    assert rig.ask("08 00 00 00 01") == "08 00 00 00 01"
+
+
+ENDS = {
+    "late": "error 0080", "two pieces": "", "byte by byte": "", "twice": "", "wrong transaction": "error 0080",
+    "wrong unit": "error 0080", "wrong function": "error 0080", "wrong content": "passed on",
+    "one byte short": "passed on",
+    "server failure": "error 0004", "wrong protocol": "error 0080", "impossible length": "error 0045",
+    "garbage": "error 0045", "silence": "error 0080", "half": "error 0080", "half, then fin": "error 0081",
+    "fin": "error 0081", "reset": "error 004B", "half, then reset": "error 004B",
+}  # fmt: skip
+
+
+READ = "03 00 00 00 01"
+
+
+def recovers(rig: Rig) -> None:
+    """With a good server the right reply comes, at the latest after what is left of the bad one has been found out."""
+    rig.network.place(SERVER, ModbusPeer(rig.peer.server))
+    rig.peer.reply = lambda frame: [Say(frame)]
+    rig.peer.server.holding_registers[0] = 0x4321
+    for _ in range(4):
+        rig.until("Main.Client.Connected", 100)
+        if rig.ask(READ) == "03 02 43 21":
+            return
+    raise AssertionError("it does not recover")
+
+
+@pytest.mark.parametrize("timing", ["exact", "real"])
+@pytest.mark.parametrize("misdeed", MISDEEDS)
+def test_a_server_that_misbehaves(misdeed: str, timing: str) -> None:
+    """What the PDU of a reply says is the user's to judge; everything around it the block's."""
+    rig = Rig(ModbusPeer(None, MISDEEDS[misdeed]), timing=timing).connect()
+    rig.peer.server.holding_registers[0] = 0x1234
+    got = rig.ask(READ)
+    expected = ENDS.get(misdeed, "any")
+    if expected == "passed on":
+        assert got.startswith("03")
+    elif expected != "any":
+        broken = timing == "real" and expected == "error 004B"
+        assert got in (expected or "03 02 12 34", "error 0081" if broken else "")
+    recovers(rig)
+
+
+@pytest.mark.parametrize("timing", ["exact", "real"])
+@pytest.mark.parametrize(
+    "rude", [pytest.param(name, marks=[pytest.mark.slow] * ("flood" in name)) for name in RUDE_PEERS]
+)
+def test_a_rude_server(rude: str, timing: str) -> None:
+    rig = Rig(timing=timing)
+    rig.peer.server.holding_registers[0] = 0x1234
+    rig.network.place(SERVER, RUDE_PEERS[rude](rig.peer.server))
+    for _ in range(3):
+        rig.scan(100)
+        assert rig.ask(READ) == "03 02 12 34" or rig.plc.read("Main.Client.Error")
+    recovers(rig)
+
+
+def test_the_connection_is_opened_again_when_the_server_has_closed_it() -> None:
+    rig = Rig(ModbusPeer(None, MISDEEDS["fin"])).connect()
+    rig.ask("03 00 00 00 01")
+    rig.peer.reply = lambda frame: [Say(frame)]
+    assert rig.connect().ask("03 00 00 00 01") == "03 02 00 00"
+
+
+def test_connect_false_closes() -> None:
+    rig = Rig(answering(lambda frame: [])).connect()
+    rig.command(b"\3\0\0\0\1")
+    rig.scan(5)
+    rig.plc.write("Main.Connect", False)
+    rig.until("Main.Client.Error")
+    assert rig.plc.read("Main.Client.Error_Code") == 0x0081
+    rig.scan(200)
+    assert rig.plc.read("CIO 1509") == 0
+    rig.peer.reply = lambda frame: [Say(frame)]
+    rig.plc.write("Main.Connect", True)
+    assert rig.connect().ask("03 00 00 00 01") == "03 02 00 00"
+
+
+NAMES_OF_HAPPENINGS = ["ask", "mode", "restart", "silence", "fault", "connect"]
+HAPPENINGS = st.lists(st.tuples(st.sampled_from(NAMES_OF_HAPPENINGS), st.integers(0, 12)), max_size=20)
+
+
+@given(st.sampled_from(["exact", "real"]), st.integers(0, 10**6), HAPPENINGS)
+@settings(max_examples=50, deadline=None)
+def test_any_life(timing: str, seed: int, happenings: list[tuple[str, int]]) -> None:
+    rig = Rig(ModbusPeer(), timing=timing, seed=seed)
+    for what, scans in happenings:
+        match what:
+            case "ask":
+                rig.command(b"\3\0\0\0\1")
+            case "mode":
+                rig.plc.mode = Mode.PROGRAM if rig.plc.mode is Mode.RUN else Mode.RUN
+            case "restart":
+                attached = rig.plc.units[0]
+                attached.link.submit(attached.unit.reset(rig.plc.memory), rig.plc.elapsed_ns)
+            case "silence":
+                rig.network.faults[:] = [] if rig.network.faults else [Fault(silent=True)]
+            case "fault":
+                rig.unit.faults.append(UnitFault(0x2211))
+            case "connect":
+                rig.plc.write("Main.Connect", not rig.plc.read("Main.Connect"))
+        rig.scan(scans)
+    rig.plc.mode = Mode.RUN
+    rig.network.faults.clear()
+    rig.unit.faults.clear()
+    rig.plc.write("Main.Connect", True)
+    rig.scan(100)
+    rig.until("Main.Client.Connected", 100)
+    rig.scan(1000)
+    rig.until("Main.Client.Connected", 100)
+    assert rig.ask("08 00 00 12 34") == "08 00 00 12 34"
+
+
+# --- two PLCs of our own ----------------------------------------------------------------------------------------------
+
+
+def plc_of(source: str | Path, network: LoopNetwork, address: str, timing: str, seed: int = 0) -> Plc:
+    """A PLC with that program or example on the network."""
+    if isinstance(source, Path):
+        made = compile_files([source])
+        assert made.image is not None and not made.diagnostics
+        plc = Plc(made.image)
+    else:
+        plc = Plc(image_of(source))
+    plc.attach(Etn21(0, address, timing=timing, seed=seed), network)
+    return plc
+
+
+@pytest.mark.parametrize("timing", ["exact", "real"])
+def test_the_two_programs_of_the_project(timing: str) -> None:
+    network = LoopNetwork()
+    server = plc_of(EXAMPLES / "server.st", network, "192.168.250.1", timing)
+    client = plc_of(EXAMPLES / "client.st", network, "192.168.250.2", timing, 1)
+    server.write("D1000..D1002", [0xAB12, 0x5678, 0x9713])
+    for _ in range(400):
+        server.scan()
+        client.scan()
+    assert client.read("D0..D2") == [0xAB12, 0x5678, 0x9713]
+    replies = client.read("Main.Replies")
+    assert isinstance(replies, int) and replies > 5
+    assert server.read("W491..W495") == [0, replies, replies, 0, 0]
+
+
+MTCP = """
+PROGRAM Main
+VAR
+    conn : MTCP_ETN_Connect;
+    r1 : MTCP_ETN_Fn01; r2 : MTCP_ETN_Fn02; r3 : MTCP_ETN_Fn03; r4 : MTCP_ETN_Fn04;
+    w5 : MTCP_ETN_Fn05; w6 : MTCP_ETN_Fn06; w15 : MTCP_ETN_Fn0F; w16 : MTCP_ETN_Fn10;
+    Step, Code : UINT;
+    Done, Before : BOOL;
+END_VAR
+    conn(IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 1, Connect := TRUE);
+    w5(EN := conn.ENO, Coil_Address := 34, Value := TRUE, Cmd_Write := Step = 1);
+    w6(EN := conn.ENO, Register_Address := 2000, Value := 16#3AC5, Cmd_Write := Step = 2);
+    w16(EN := conn.ENO, Register_Address := 1000, Register_Qty := 123, DataAddress_DM := 500, Cmd_Write := Step = 3);
+    r1(EN := conn.ENO, Coil_Address := 20, Coil_Qty := 19, RespData_DM := 100, Cmd_Read := Step = 4);
+    r2(EN := conn.ENO, Coil_Address := 20, Coil_Qty := 2000, RespData_DM := 110, Cmd_Read := Step = 5);
+    r3(EN := conn.ENO, Register_Address := 999, Register_Qty := 125, RespData_DM := 300, Cmd_Read := Step = 6);
+    r4(EN := conn.ENO, Register_Address := 1, Register_Qty := 2, RespData_DM := 450, Cmd_Read := Step = 7);
+    w15(EN := conn.ENO, Coil_Address := 20, Coil_Qty := 10, DataAddress_DM := 500, Cmd_Write := Step = 8);
+    IF conn.ENO AND (Step = 0
+        OR w5.Rcv_Counter + w6.Rcv_Counter + w16.Rcv_Counter + r1.Rcv_Counter + r2.Rcv_Counter + r3.Rcv_Counter
+           + r4.Rcv_Counter + w15.Rcv_Counter = Step) THEN
+        Step := Step + 1;
+    END_IF;
+    Done := Step = 9;
+    Code := w15.Error_Code;
+END_PROGRAM
+"""
+
+
+@pytest.mark.parametrize("timing", ["exact", "real"])
+@pytest.mark.parametrize("cut", [0, 7])
+@pytest.mark.parametrize("fn0f", [False, True])
+def test_the_mtcp_etn_blocks_against_the_server_program(timing: str, cut: int, fn0f: bool) -> None:
+    network = LoopNetwork(faults=[Fault(segment_bytes=cut)] if cut else [])
+    text = f"PROGRAM Main VAR Server : ETN_Modbus_Server; END_VAR Server(Fn0F := {fn0f}); END_PROGRAM"
+    server = plc_of(text, network, "192.168.250.1", timing)
+    client = plc_of(MTCP, network, "192.168.250.2", timing, 1)
+    server.write("CIO 1", 0xBCD0)
+    server.write("CIO 2", 0x0052)
+    client.write("D500..D622", list(range(1, 124)))
+    for _ in range(6000):
+        server.scan()
+        client.scan()
+        if client.read("Main.Done"):
+            break
+    assert client.read("Main.Done")
+    assert server.read("D2000") == 0x3AC5
+    assert server.read("D1000..D1122") == list(range(1, 124))
+    assert client.read("D100..D101") == [0x6BCD, 0x0005], "CIO 2.02 has been set before"
+    assert client.read("D300..D424") == [0, *range(1, 124), 0]
+    assert client.read("D450..D451") == [0xBCD0, 0x0056]
+    assert client.read("Main.Code") == (0 if fn0f else 1)
+    assert server.read("W491..W493") == [0 if fn0f else 1, 8, 8]
+    assert server.read("CIO 1") == (0x8010 if fn0f else 0xBCD0), "bits 4 to 13 of it from D500 = 0001"
