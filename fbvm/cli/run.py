@@ -14,6 +14,7 @@ from fbvm.cli.journals import start_journal
 from fbvm.cli.options import Mapping, Setting, mapping, setting, split_names, time_ns
 from fbvm.cli.outcome import Outcome, Progress
 from fbvm.cli.sources import compiled, source_arguments
+from fbvm.cli.traces import tracing
 from fbvm.code.image import Image
 from fbvm.engine.tiers import CHOICES
 from fbvm.net.journal import Journal
@@ -23,6 +24,7 @@ from fbvm.net.tcp import TcpNetwork
 from fbvm.plc import Plc
 from fbvm.record.pcapng import Capture
 from fbvm.record.recorder import Recorder
+from fbvm.record.trace_writer import Depth
 from fbvm.run import loop
 from fbvm.run.loop import TimedWrite
 from fbvm.units.etn21 import Etn21
@@ -58,6 +60,12 @@ UNIT_ADDRESS = "192.168.250.21"
               help="Write what passed the network, for Wireshark.")
 @click.option("--journal", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Write every input of every scan, for `fbvm replay`.")
+@click.option("--trace", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+              help="Record the run for `fbvm chart`, `table`, `why` and `convert`.")
+@click.option("--depth", type=click.Choice([depth.value for depth in Depth]), default="scans", show_default=True,
+              help="What the trace holds: values at scan ends, and every write, and every statement.")
+@click.option("--select", "selected", multiple=True, metavar="PATTERN",
+              help="What the trace keeps: 'Main.*.Q', D200..D299; all if not given.  May be repeated.")
 @click.option("--timing", type=click.Choice(["exact", "real"]), default="exact", show_default=True,
               help="exact: the unit answers in fixed scans.  real: late and out of step, as the device may.")
 @click.option("--engine", type=click.Choice(CHOICES), default="auto", show_default=True,
@@ -85,7 +93,8 @@ def command(
         if options["pcap"]:
             network.tap = _capture(stack, options["pcap"], network).tap
         plc.attach(Etn21(0, UNIT_ADDRESS, timing=options["timing"], seed=options["seed"]), network)
-        outcome = _run(plc, as_json, **options)
+        with tracing(plc, options["trace"], options["depth"], options["selected"], files, libraries):
+            outcome = _run(plc, as_json, **options)
         outcome.print()
     sys.exit(outcome.status)
 

@@ -11,17 +11,29 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 from fbvm.base.memory import WHOLE_BYTES
-from fbvm.code.image import Image, Site
-from fbvm.plc import Phase, Plc
+from fbvm.code.image import Site
+from fbvm.plc import Phase
 from fbvm.record.inside import Ended, Event, Frame, Read, Statement, Write
 from fbvm.record.names import Names
 from fbvm.record.recorder import Signal
+from fbvm.watch.paths import Place
 from fbvm.watch.values import Value, show_time
 
 MARK = ">"
 WIDEST_CELL = 24
+
+
+class Scanned(Protocol):
+    """What is listened to: a PLC, or the moment of a trace."""
+
+    @property
+    def scans(self) -> int: ...
+    @property
+    def now_ns(self) -> int: ...
+    def read(self, where: Place) -> Value: ...
 
 
 @dataclass(frozen=True)
@@ -69,20 +81,22 @@ class Band:
 
 
 class ScanTable:
-    """Listens to scans and writes down what happened to some variables.  `every` keeps statements that changed none."""
+    """Listens to scans, of a PLC or of a trace, and writes down what happened to some variables.
 
-    def __init__(self, image: Image, names: Names, signals: Sequence[Signal], every: bool = False) -> None:
+    `every` keeps statements that changed none."""
+
+    def __init__(self, sites: Sequence[Site], names: Names, signals: Sequence[Signal], every: bool = False) -> None:
         self.signals = list(signals)
         self.bands: list[Band] = []
         self.changes: list[Change] = []
         self.writers: dict[Signal, Writer] = {}
         """Who wrote each variable last."""
-        self._image, self._names, self._every = image, names, every
+        self._sites, self._names, self._every = sites, names, every
         self._values: list[Value] | None = None
         self._statement: Statement | None = None
         self._reads: dict[Frame, dict[str, str]] = {}
 
-    def phase(self, plc: Plc, phase: Phase) -> None:
+    def phase(self, plc: Scanned, phase: Phase) -> None:
         if phase is Phase.INPUTS or not self.bands or self.bands[-1].scan != plc.scans:
             self.bands.append(Band(plc.scans, plc.now_ns))
         self._finish(plc)
@@ -94,7 +108,7 @@ class ScanTable:
         if phase is Phase.INPUTS or any(changed):
             self.bands[-1].rows.append(Row(phase.value, values, changed))
 
-    def event(self, plc: Plc, event: Event) -> None:
+    def event(self, plc: Scanned, event: Event) -> None:
         if isinstance(event, Statement):
             self._finish(plc)
             self._statement = event
@@ -113,7 +127,7 @@ class ScanTable:
                 self._row(plc, event.site, event.frame)
 
     def _site(self, number: int) -> Site | None:
-        return self._image.sites[number] if number >= 0 else None
+        return self._sites[number] if number >= 0 else None
 
     def _concerned(self, event: Write) -> list[Signal]:
         end = event.offset + len(event.value)
@@ -121,15 +135,15 @@ class ScanTable:
                 or place.offset < end and event.offset < place.offset + place.type.size]  # fmt: skip
         return [signal for signal in near if signal.place.bit is None or event.bit in (signal.place.bit, WHOLE_BYTES)]
 
-    def _finish(self, plc: Plc) -> None:
+    def _finish(self, plc: Scanned) -> None:
         """The last statement is over; if it changed nothing its row is kept only where every row is."""
         statement, self._statement = self._statement, None
         if statement and self._every and self._values is not None:
-            label = _place(self._image.sites[statement.site])
+            label = _place(self._sites[statement.site])
             if not self.bands[-1].rows or self.bands[-1].rows[-1].label != label:
                 self.bands[-1].rows.append(Row(label, self._values, [False] * len(self.signals)))
 
-    def _row(self, plc: Plc, site: int, frame: Frame) -> None:
+    def _row(self, plc: Scanned, site: int, frame: Frame) -> None:
         values, changed = self._look(plc)
         if not any(changed):
             return
@@ -142,7 +156,7 @@ class ScanTable:
         self.bands[-1].rows.append(Row(_place(place) if place else "stub", values, changed))
         self._statement = None
 
-    def _look(self, plc: Plc) -> tuple[list[Value], list[bool]]:
+    def _look(self, plc: Scanned) -> tuple[list[Value], list[bool]]:
         values = [plc.read(signal.place) for signal in self.signals]
         before = self._values
         return values, [before is not None and now != before[at] for at, now in enumerate(values)]

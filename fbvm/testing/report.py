@@ -54,7 +54,7 @@ class Report:
         return [Signal(place, place.name.removeprefix(prefix)) for place in places if is_single(place)][:MOST_COLUMNS]
 
     def _again(self, signals: list[Signal], scans: int) -> ScanTable:
-        table = ScanTable(self._plc.image, self.names, signals)
+        table = ScanTable(self._plc.image.sites, self.names, signals)
         end = self._plc.scans
         self._history.again(range(max(0, end - scans), end), table)
         return table

@@ -76,7 +76,7 @@ class StItem(pytest.Item):
             with looking(plc, watch):
                 _run(plc, history, f"{made.prefix}Done")
         except AssertFailed as failed:
-            table = ScanTable(plc.image, watch.names, [signal for signal, _ in failed.values])
+            table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])
             history.again(range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1), table)
             failed.table = table.draw([band for band in table.bands if band.moved][-BANDS:]) if failed.values else ""
             raise

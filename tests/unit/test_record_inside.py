@@ -262,7 +262,7 @@ def test_a_scan_is_run_again_with_other_inputs(plc: Plc) -> None:
 
 def table(plc: Plc, names: Names, *signals: str, every: bool = False) -> ScanTable:
     chosen = [signal for name in signals for signal in signals_of(plc, name)]
-    return ScanTable(plc.image, names, chosen, every)
+    return ScanTable(plc.image.sites, names, chosen, every)
 
 
 def test_a_row_where_something_changed(plc: Plc, names: Names) -> None:

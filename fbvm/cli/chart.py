@@ -1,0 +1,28 @@
+"""`fbvm chart`: the time chart of a trace."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from fbvm.cli.options import split_names
+from fbvm.cli.outcome import chart_width
+from fbvm.cli.traces import opened, recorded, scans_option, trace_argument
+from fbvm.record.chart import draw
+
+
+@click.command("chart")
+@trace_argument
+@click.argument("names", nargs=-1, metavar="[NAME|ADDRESS|FIRST..LAST]...")
+@scans_option
+@click.option("--width", type=click.IntRange(min=20), help="Columns of text; the terminal's if not given.")
+@click.option("--whole", is_flag=True, help="Draw every scan, also where nothing changes for long.")
+def command(path: Path, names: tuple[str, ...], scans: range | None, width: int | None, whole: bool) -> None:
+    """Draw variables of a TRACE, one column a scan.  Without names, those that changed.
+
+    A trace can be drawn while it is still being written."""
+    with opened(path) as trace:
+        chosen = [name for text in names for name in split_names(text)]
+        made = recorded(trace, chosen, scans)
+        click.echo(draw(made, width=width or chart_width(), ruler=True, compress=not whole), nl=False)

@@ -1,0 +1,38 @@
+"""`fbvm table`: the scan table of a trace, statement by statement."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from fbvm.cli import status
+from fbvm.cli.options import split_names
+from fbvm.cli.traces import opened, scans_option, trace_argument
+from fbvm.record.recorder import signals_at
+from fbvm.record.table import ScanTable
+from fbvm.record.trace_writer import Depth
+
+
+@click.command("table")
+@trace_argument
+@click.argument("names", nargs=-1, required=True, metavar="NAME|ADDRESS|FIRST..LAST...")
+@scans_option
+@click.option("--every", is_flag=True, help="Also the statements and the scans that changed none of these.")
+def command(path: Path, names: tuple[str, ...], scans: range | None, every: bool) -> None:
+    """Show which statement changed variables of a TRACE, and in which phase of the scan.
+
+    The trace must have been written with --depth writes or statements.  Status 1 if nothing changed."""
+    with opened(path) as trace:
+        if trace.depth is Depth.SCANS:
+            raise click.UsageError(f"{path} holds values at scan ends only; write it with --depth statements")
+        signals = [signal for text in names for name in split_names(text)
+                   for signal in signals_at(trace.find(name), trace.described)]  # fmt: skip
+        table = ScanTable(trace.sites, trace.names, signals, every)
+        trace.follow(table, scans)
+    bands = [band for band in table.bands if every or band.moved]
+    if not bands:
+        click.echo("none of these changed", err=True)
+        sys.exit(status.FAILED)
+    click.echo(table.draw(bands))

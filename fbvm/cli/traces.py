@@ -1,0 +1,116 @@
+"""Traces from files, as verbs take them, and traces that a run writes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fbvm.base.data import data_folder
+from fbvm.base.diagnostics import Source
+from fbvm.code.image import Image
+from fbvm.plc import Plc
+from fbvm.record.recorder import Recording
+from fbvm.record.trace import Trace
+from fbvm.record.trace_format import TraceError
+from fbvm.record.trace_signals import recording
+from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
+from fbvm.syntax.text import read
+from fbvm.watch.paths import UnknownPlace
+
+SUFFIX = ".fbtrace"
+
+
+class ScanRange(click.ParamType[range]):
+    """`41`, `10..60`, `10..`: numbers of scans, both ends with them."""
+
+    name = "FIRST..LAST"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
+        """The scans that a text names."""
+        if isinstance(value, range):
+            return value
+        first, dots, last = str(value).partition("..")
+        try:
+            start = int(first or 0)
+            end = int(last) if last else start if not dots else 1 << 62
+        except ValueError:
+            self.fail(f"{value!r} is not scans such as 41 or 10..60", param, ctx)
+        if start < 0 or end < start:
+            self.fail(f"{value!r} has no scan in it", param, ctx)
+        return range(start, end + 1)
+
+
+def trace_argument(function: Callable[..., Any]) -> Callable[..., Any]:
+    """TRACE, a file that `fbvm run --trace` wrote."""
+    return click.argument("path", metavar="TRACE", type=click.Path(exists=True, dir_okay=False, path_type=Path))(function)
+
+
+def scans_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """--scans, the part of a trace."""
+    return click.option("--scans", type=ScanRange(), help="Only these scans.")(function)
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Trace]:
+    """The trace in a file.  What is no trace, and names it does not have, are mistakes of usage."""
+    try:
+        with Trace.open(path) as trace:
+            yield trace
+    except (OSError, TraceError) as error:
+        raise click.UsageError(f"{path}: {error}") from None
+    except (UnknownPlace, TypeError) as error:
+        raise click.UsageError(str(error)) from None
+
+
+def recorded(trace: Trace, names: Sequence[str], scans: range | None) -> Recording:
+    """The recording of some variables in some scans; a usage error if there are no such scans."""
+    made = recording(trace, names, scans)
+    if not made.times_ns:
+        held = f"scans {trace.scans[0]} to {trace.scans[-1]}" if trace.scans else "no scans yet"
+        raise click.UsageError(f"the trace has {held}")
+    return made
+
+
+# --- written by a run -------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def tracing(
+    plc: Plc, path: Path | None, depth: str, selected: Sequence[str], files: Sequence[Path], libraries: Sequence[Path]
+) -> Iterator[None]:
+    """Records a run into a file, if there is one to write."""
+    if path is None:
+        if selected:
+            raise click.UsageError("--select chooses what --trace keeps, which is not given")
+        yield
+        return
+    try:
+        file = path.open("wb")
+    except OSError as error:
+        raise click.UsageError(f"{path} cannot be written: {error.strerror}") from None
+    with file:
+        try:
+            writer = TraceWriter(plc, file, Depth(depth), selected, _lines(plc.image, files, libraries))
+        except UnknownPlace as error:
+            raise click.UsageError(str(error)) from None
+        try:
+            yield
+        finally:
+            writer.close()
+
+
+def _lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:
+    """The source's lines, as far as the files are there."""
+    own = {str(path): path for path in files}
+    texts = {}
+    for name in {site.file for site in image.sites}:
+        for path in (own.get(name), *(folder / name for folder in (*libraries, data_folder("fblib")))):
+            source = read(path, name) if path and path.is_file() else None
+            if isinstance(source, Source):
+                texts[name] = source.text
+                break
+    return source_lines(image, texts)

@@ -1,0 +1,44 @@
+"""`fbvm why`: which statement gave a variable its value, and what led to that."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from fbvm.cli.traces import SUFFIX, opened
+from fbvm.record.trace_writer import Depth
+from fbvm.record.why import DEEPEST, told, why
+from fbvm.watch.paths import Place
+
+
+@click.command("why")
+@click.argument("name", metavar="NAME|ADDRESS")
+@click.argument("path", metavar="[TRACE]", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("--scan", type=click.IntRange(min=0), metavar="N", help="At the end of this scan; the last one if not given.")
+@click.option("--deep", type=click.IntRange(min=0), default=DEEPEST, show_default=True, metavar="N",
+              help="Causes of causes to look for.")
+def command(name: str, path: Path | None, scan: int | None, deep: int) -> None:
+    """Say why a variable has its value: the statement that gave it, what it had read, and so on back through scans.
+
+    The TRACE must have been written with --depth statements; it may be left out where the folder has only one."""
+    with opened(path or _only_trace()) as trace:
+        if trace.depth is not Depth.STATEMENTS:
+            raise click.UsageError("the trace does not hold what statements read; write it with --depth statements")
+        place = trace.find(name)
+        if not isinstance(place, Place):
+            raise click.UsageError(f"{name} is a range; name one place")
+        if not trace.scans:
+            raise click.UsageError("the trace has no scans yet")
+        try:
+            click.echo(told(trace, why(trace, place, trace.scans[-1] if scan is None else scan, deep)))
+        except ValueError as error:
+            raise click.UsageError(str(error)) from None
+
+
+def _only_trace() -> Path:
+    found = sorted(Path().glob(f"*{SUFFIX}"))
+    if len(found) != 1:
+        held = f"there are {', '.join(map(str, found))}" if found else "there is none here"
+        raise click.UsageError(f"name a trace; {held}")
+    return found[0]
