@@ -64,6 +64,8 @@ _TOKEN = re.compile(
     r"\s*(?:(?P<name>[^\W\d]\w*)|(?P<bit>\.\s*%?X?\d+)|(?P<dot>\.)|\[(?P<index>[^\]]*)\]|(?P<hat>\^))", re.I
 )
 _FIRST = re.compile(r"\s*([^\W\d]\w*)")
+_SPACED = re.compile(r"\s*[A-Z]\w*\s+\d+(\.\d+)?\s*", re.I)
+"""`D 10`: a name with a space before a number is an address, whatever is called D."""
 _ADDRESS_TYPES = {8: BYTE, 16: WORD, 32: DWORD, 64: LWORD}
 
 
@@ -72,7 +74,7 @@ def find(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> 
     if ".." in text:
         return _span(symbols, areas, text)
     first = _FIRST.match(text)
-    if first and first[1].upper() in symbols:
+    if first and first[1].upper() in symbols and not _SPACED.fullmatch(text):
         return _walk(symbols, text)
     try:
         address = parse_address(text)

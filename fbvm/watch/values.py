@@ -13,7 +13,8 @@ from typing import TypeAlias
 
 from fbvm.base.types import (
     BOOL,
-    LREAL,
+    ELEMENTARY,
+    REAL,
     TIME,
     ArrayType,
     Elementary,
@@ -24,8 +25,10 @@ from fbvm.base.types import (
     SubrangeType,
     Type,
     base,
+    families,
     fold,
 )
+from fbvm.syntax import literals
 
 Value: TypeAlias = "bool | int | float | str | list[Value] | dict[str, Value] | None"
 """What a place holds, as a Python value; None is a null reference."""
@@ -67,6 +70,41 @@ def show_time(time_ns: int) -> str:
     return "T#" + ("-" if time_ns < 0 else "") + "".join(pieces)
 
 
+def sort_of(kind: Type) -> str:
+    """What a value is when it is compared: BOOL, number, time, text, enumeration, or one of DATES; "" for others."""
+    plain = base(kind)
+    if isinstance(plain, EnumType):
+        return "enumeration"
+    if isinstance(plain, StringType):
+        return "text"
+    if not isinstance(plain, Elementary):
+        return ""
+    if plain is BOOL:
+        return "BOOL"
+    if "ANY_DATE" in plain.families:
+        return plain.name.removeprefix("L")
+    return "time" if "ANY_DURATION" in plain.families else "number"
+
+
+DATES = ("DATE", "TIME_OF_DAY", "DATE_AND_TIME")
+_EXAMPLES = {
+    "BOOL": "TRUE or FALSE", "time": "a time such as 10ms", "text": "a text such as 'abc'",
+    "DATE": "a date such as D#2024-01-31", "TIME_OF_DAY": "a time of day such as TOD#12:30:00",
+    "DATE_AND_TIME": "a date and time such as DT#2024-01-31-12:30:00",
+}  # fmt: skip
+
+
+def refusal(kind: Type, name: str, text: str) -> TypeError:
+    """That `name` does not take `text`, and what it takes."""
+    number = "a number" if "ANY_REAL" in families(kind) else "a whole number"
+    return TypeError(f"{name} is {kind.name} and takes {_EXAMPLES.get(sort_of(kind), number)}, not {text}")
+
+
+def nearest_real(value: float) -> float:
+    """The REAL (32 bits) that is nearest.  Raises OverflowError."""
+    return float(struct.unpack("<f", struct.pack("<f", value))[0])
+
+
 # --- in: a Python value for a type ------------------------------------------------------------------------------------
 
 
@@ -83,28 +121,33 @@ def conform(kind: Type, value: object, name: str) -> Value:
     if plain is BOOL:
         if isinstance(value, bool) or (isinstance(value, int) and value in (0, 1)):
             return bool(value)
-        raise _wrong(name, kind, value, "TRUE or FALSE")
+        raise refusal(kind, name, repr(value))
     if plain.machine in ("f32", "f64"):
         return _real(plain, value, name)
     if isinstance(value, bool) or not isinstance(value, int):
-        raise _wrong(name, kind, value, "a whole number")
+        raise refusal(kind, name, repr(value))
     if not (plain.low if low is None else low) <= value <= (plain.high if high is None else high):
         limits = f"{plain.low if low is None else low}..{plain.high if high is None else high}"
-        raise ValueError(f"{name}: {value} is out of range of {kind.name}, which holds {limits}")
+        wrong = f"{name}: {value} is out of range of {kind.name}, which holds {limits}"
+        raise ValueError(wrong + _unsigned(plain, value))
     return value
 
 
-def _wrong(name: str, kind: Type, value: object, wanted: str) -> TypeError:
-    return TypeError(f"{name} is {kind.name} and takes {wanted}, not {value!r}")
+def _unsigned(kind: Elementary, value: int) -> str:
+    """How to write the bits of a negative number for a bit string."""
+    if "ANY_BIT" not in kind.families or not -(1 << kind.bits - 1) <= value < 0:
+        return ""
+    bits = value + (1 << kind.bits)
+    return f"; for these bits write {bits} or 16#{bits:X}"
 
 
 def _real(kind: Elementary, value: object, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _wrong(name, kind, value, "a number")
+        raise refusal(kind, name, repr(value))
     try:
         number = float(value)
         if kind.machine == "f32" and math.isfinite(number):
-            struct.pack("<f", number)
+            return nearest_real(number)
     except OverflowError:
         raise ValueError(f"{name}: {value} is out of range of {kind.name}") from None
     return number
@@ -112,7 +155,7 @@ def _real(kind: Elementary, value: object, name: str) -> float:
 
 def _text(kind: StringType, value: object, name: str) -> str:
     if not isinstance(value, str):
-        raise _wrong(name, kind, value, "text")
+        raise refusal(kind, name, repr(value))
     if len(value) > kind.capacity:
         raise ValueError(f"{name}: {len(value)} characters are out of range of {kind.name}")
     highest = 0xFFFF if kind.wide else 0xFF
@@ -138,44 +181,83 @@ def _enumerated(kind: EnumType, value: object, name: str) -> int:
 
 
 def literal(text: str) -> tuple[Value, Type | None]:
-    """The value that `text` writes, and its type where the text shows one (BOOL, TIME, LREAL; None for the others).
+    """The value that `text` writes, and its type where the text shows one: BOOL, TIME, and what stands before a #.
 
-    Knows TRUE, 16#FF, 0xFF, 12, 1.5, T#10ms, 10ms, 'text', also with a type in front (INT#5).  Raises ValueError."""
+    Knows TRUE, ON, 16#FF, 0xFF, 12, 1.5, T#10ms, 10ms, 'text', INT#5, DT#2024-01-31-12:30:00.  Raises ValueError."""
     text = text.strip()
-    if fold(text) in ("TRUE", "FALSE"):
-        return fold(text) == "TRUE", BOOL
-    if len(text) >= 2 and text[0] == text[-1] and text[0] in "'\"":
-        return text[1:-1], None
+    if fold(text) in _BITS:
+        return _BITS[fold(text)], BOOL
     if match := _INTEGER.fullmatch(text):
         digits, radix = (match[3], int(match[2])) if match[2] else (match[4], 16) if match[4] else (match[5], 10)
         number = int(digits.replace("_", ""), radix)
         return (-number if match[1] == "-" else number), None
     if _REAL.fullmatch(text):
-        return float(text.replace("_", "")), LREAL
-    if _PREFIX.match(text) or _PIECE.match(text.lstrip("-")):
-        return parse_time_ns(text), TIME
+        return float(text.replace("_", "")), None
     prefix, mark, rest = text.partition("#")
-    if mark and prefix.isalpha():
-        return literal(rest)
+    if _PIECE.match(text.lstrip("-")) or fold(prefix) in literals.TIMES:
+        return parse_time_ns(text), TIME
+    try:
+        if mark and fold(prefix) in literals.ELEMENTARY:
+            _, value, name = literals.typed(fold(prefix), rest)
+            shown = ELEMENTARY.get(name or "")
+            return (nearest_real(float(value)) if shown is REAL else value), shown
+        if len(text) >= 2 and text[0] == text[-1] and text[0] in "'\"":
+            return literals.text_literal(text)[1], None
+    except (literals.Malformed, literals.OutOfRange) as error:
+        raise ValueError(str(error.args[0])) from None
+    except IndexError:
+        raise ValueError(f"{text!r} ends within an escape") from None
     raise ValueError(f"{text!r} is no literal")
 
 
+_QUOTED = re.compile(r"(W?STRING#)?['\"]", re.I)
+_BITS = {"TRUE": True, "FALSE": False, "ON": True, "OFF": False}
+
+
 def parse_value(kind: Type, text: str, name: str) -> Value:
-    """The value of type `kind` that `text` writes.  Raises ValueError or TypeError with `name` in the message."""
+    """The value of type `kind` that `text` writes; of an array a list, `1,2,3` or `[1, 2, 3]`.
+
+    Raises ValueError or TypeError with `name` in the message."""
     plain = base(kind)
-    if isinstance(plain, EnumType) and not _INTEGER.fullmatch(text.strip()):
-        return conform(kind, text.strip(), name)
-    if isinstance(plain, StringType) and text[:1] not in ("'", '"'):
+    text = text.strip()
+    if isinstance(plain, ArrayType):
+        texts = split_list(text)
+        if len(texts) != plain.count:
+            raise ValueError(f"{name} is {kind.name} and takes {plain.count} values parted by commas, not {len(texts)}")
+        return [parse_value(plain.element, part, f"{name}[{at}]") for at, part in enumerate(texts)]
+    if isinstance(plain, EnumType) and not _INTEGER.fullmatch(text):
+        front, dot, member = text.rpartition(".")
+        return conform(kind, member if dot and fold(front) == fold(kind.name) else text, name)
+    if isinstance(plain, StringType) and not _QUOTED.match(text):
         return conform(kind, text, name)
     try:
-        value, shown = literal(text)
+        value, shown = literal(text if sort_of(kind) not in DATES or "#" in text else f"{plain.name}#{text}")
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
-    duration = isinstance(plain, Elementary) and "ANY_DURATION" in plain.families
-    if duration != (shown is TIME) and plain is not BOOL:
-        wanted = "a time such as 10ms" if duration else "no time"
-        raise ValueError(f"{name} is {kind.name} and takes {wanted}, not {text}")
+    sort = sort_of(shown) if shown else "text" if isinstance(value, str) else "number"
+    wanted = sort_of(kind)
+    if wanted and sort != wanted and (wanted, value) not in (("BOOL", 0), ("BOOL", 1), ("enumeration", value)):
+        raise refusal(kind, name, text)
+    if wanted == "number" and isinstance(value, float) and "ANY_REAL" not in families(kind):
+        raise refusal(kind, name, text)
     return conform(kind, value, name)
+
+
+def split_list(text: str) -> list[str]:
+    """The parts of `1,2,3` or `[1, 2, 3]`: commas within brackets and quotes do not part."""
+    text = text.strip()
+    if text.startswith("[") and text.endswith("]"):
+        text = text[1:-1]
+    parts, depth, quote = [""], 0, ""
+    for character in text:
+        if quote or character in "'\"":
+            quote = "" if character == quote else quote or character
+        depth += {"[": 1, "]": -1}.get(character, 0) if not quote else 0
+        if character == "," and depth == 0 and not quote:
+            parts.append("")
+        else:
+            parts[-1] += character
+    return [part.strip() for part in parts]
 
 
 # --- out --------------------------------------------------------------------------------------------------------------

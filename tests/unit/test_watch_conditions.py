@@ -3,24 +3,26 @@
 import pytest
 
 from fbvm.base import types as t
-from fbvm.base.areas import AREAS
+from fbvm.base.areas import AREAS, SLOTS_OFFSET, e_bank
 from fbvm.base.types import EnumType, Field
 from fbvm.watch.conditions import ConditionError, parse_condition
 from fbvm.watch.paths import Place, Span, find
-from fbvm.watch.values import Value
+from fbvm.watch.values import Value, nearest_real
 
 COLOUR = EnumType("Colour", 2, 2, t.INT, {"RED": 0, "GREEN": 5}, {0: "Red", 5: "Green"})
-KINDS = {"done": t.BOOL, "n": t.INT, "r": t.REAL, "wait": t.TIME, "text": t.string(), "c": COLOUR,
+KINDS = {"tenth": t.REAL, "long": t.LREAL, "when": t.DT, "day": t.DATE,
+         "done": t.BOOL, "n": t.INT, "r": t.REAL, "wait": t.TIME, "text": t.string(), "c": COLOUR,
          "list": t.array(((0, 2),), t.INT)}
 SYMBOLS = {name.upper(): Field(name, kind, 180224 + 16 * at) for at, (name, kind) in enumerate(KINDS.items())}
 VALUES: dict[str, Value] = {
+    "tenth": nearest_real(0.1), "long": 0.1, "when": 86_400_000_000_000, "day": 0, "W0": 0, "D10": 0, "W0.00": True,
     "done": True, "n": -7, "r": 0.5, "wait": 1_500_000_000, "text": "ok", "c": 5, "list[1]": 3, "D200": 513,
     "CIO 1509.15": True, "E0_5": 9, "n.0": True,
 }  # fmt: skip
 
 
 def resolve(text: str) -> Place | Span:
-    return find(SYMBOLS, AREAS, text)
+    return find(SYMBOLS, {**AREAS, "E0": e_bank("E0", 2 * SLOTS_OFFSET)}, text)
 
 
 def holds(text: str) -> bool:
@@ -39,7 +41,77 @@ def test_holds(text: str) -> None:
     assert holds(text)
 
 
-@pytest.mark.parametrize("text", ["NOT done", "n > 0", "c = Colour#Red", "1 / 0 = 1", "text < 'a'", "done AND n = 0"])
+@pytest.mark.parametrize("text", [
+    "tenth = 0.1", "0.1 = tenth", "tenth + 0.1 = 0.2", "long = 0.1", "tenth = REAL#0.1", "tenth > -0.1", "tenth * 10 = 1",
+])  # fmt: skip
+def test_a_number_beside_a_real_is_rounded_to_32_bits_as_in_a_program(text: str) -> None:
+    assert holds(text)
+
+
+@pytest.mark.parametrize("text", ["tenth = LREAL#0.1", "tenth = long", "long + 0.1 = 0.3"])
+def test_64_bits_are_not_rounded(text: str) -> None:
+    assert not holds(text)
+
+
+@pytest.mark.parametrize("text", [
+    "W 0 = 0", "D 10 = 0", "D  10=0 AND W 0 = 0", "W 0.00", "NOT (D 10 <> 0)", "E0 : 5 = 9", "e0_5 = 9", "% D 10 = 0",
+    "DM 10 = 0",
+])
+def test_an_address_may_have_a_space_within(text: str) -> None:
+    assert holds(text)
+
+
+@pytest.mark.parametrize("text", [
+    "c = Green", "green = c", "c = Colour.Green", "c <> Red", "c = Colour#green", "(c = Green) = TRUE",
+])
+def test_a_name_beside_an_enumeration_is_its_member(text: str) -> None:
+    assert holds(text)
+
+
+@pytest.mark.parametrize("text", [
+    "done = ON", "CIO 1509.15 = on", "done <> OFF", "when = DT#1970-01-02-00:00:00", "when > DT#1970-01-01-00:00:00",
+    "day < D#2024-01-31", "wait + 500ms = 2s", "wait * 2 = 3s", "when - DT#1970-01-01-00:00:00 = 1d", "text = 'o$6B'",
+])
+def test_literals_are_those_of_a_program(text: str) -> None:
+    assert holds(text)
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("wait > 10", "wait is TIME and takes a time such as 10ms, not 10"),
+    ("10 < wait", "wait is TIME and takes a time such as 10ms, not 10"),
+    ("wait + 5 > 1s", "+ needs numbers"),
+    ("wait + 5s > 10", "> compares TIME with a number"),
+    ("n = 'a'", "n is INT and takes a whole number, not 'a'"),
+    ("text = 5", "text is STRING[80] and takes a text such as 'abc', not 5"),
+    ("n = text", "= compares INT with STRING[80]"),
+    ("n = wait", "= compares INT with TIME"),
+    ("n = 40000", "n: 40000 is out of range of INT, which holds -32768..32767"),
+    ("n < 1e9", "out of range of INT"),
+    ("D200 = -1", "D200: -1 is out of range of WORD, which holds 0..65535; for these bits write 65535 or 16#FFFF"),
+    ("D200 = TRUE", "D200 is WORD and takes a whole number, not TRUE"),
+    ("tenth = 1e39", "out of range of REAL"),
+    ("n / 0 = 1", "division by zero"),
+    ("n MOD (1 - 1) = 1", "division by zero"),
+    ("1 / 0 = 1", "division by zero"),
+    ("c = Blue", "there is no Blue; known here"),
+    ("c = Blue", "c is Colour, which has Red, Green"),
+    ("c = Colour#Blue", "Colour has no member Colour#Blue"),
+    ("c = 7", "7 is no member of Colour"),
+    ("c = n", "= compares Colour with INT"),
+    ("n = Green", "there is no Green"),
+    ("n = Colour#Green", "Colour#Green stands beside nothing of its enumeration"),
+    ("day = when", "= compares DATE with DATE_AND_TIME"),
+    ("day = DT#2024-01-01-00:00:00", "day is DATE and takes a date such as"),
+    ("-text = 'a'", "- needs a number"),
+    ("INT#99999 = n", "out of the range of INT"),
+])  # fmt: skip
+def test_what_could_never_hold_is_refused(text: str, message: str) -> None:
+    with pytest.raises(ConditionError) as error:
+        parse_condition(text, resolve)
+    assert message in str(error.value)
+
+
+@pytest.mark.parametrize("text", ["NOT done", "n > 0", "c = Colour#Red", "1 / (n + 7) = 1", "text < 'a'", "done AND n = 0"])
 def test_does_not_hold(text: str) -> None:
     assert not holds(text)
 
@@ -51,7 +123,7 @@ def test_does_not_hold(text: str) -> None:
     ("n AND done", "AND joins conditions; one side is not BOOL"),
     ("NOT n", "NOT needs a BOOL"),
     ("done = 7", "takes TRUE or FALSE, not 7"),
-    ("done < n", "compares BOOL with something else"),
+    ("done < n", "< compares BOOL with INT"),
     ("done + 1 = 2", "+ needs numbers"),
     ("missing > 1", "there is no missing"),
     ("n = (1", "a parenthesis is not closed"),

@@ -10,7 +10,7 @@ from fbvm.base.memory import Memory
 from fbvm.base.types import EnumType, Field, StructType, SubrangeType, Type
 from fbvm.watch import places
 from fbvm.watch.paths import Place, UnknownPlace
-from fbvm.watch.values import conform, literal, parse_time_ns, parse_value, show, show_time
+from fbvm.watch.values import conform, literal, nearest_real, parse_time_ns, parse_value, show, show_time
 
 COLOUR = EnumType("Colour", 2, 2, t.INT, {"RED": 0, "GREEN": 5}, {0: "Red", 5: "Green"})
 LEVEL = SubrangeType("Level", 2, 2, t.INT, 0, 100)
@@ -53,7 +53,11 @@ def test_literals(text: str, value: object) -> None:
 @pytest.mark.parametrize(("kind", "text", "value"), [
     (t.INT, "-5", -5), (t.WORD, "16#FFFF", 65535), (t.BOOL, "TRUE", True), (t.BOOL, "1", True), (t.REAL, "2", 2.0),
     (t.TIME, "10ms", 10_000_000), (t.string(), "a, b", "a, b"), (t.string(), "'x'", "x"), (COLOUR, "green", 5),
-    (COLOUR, "Colour#Red", 0), (COLOUR, "5", 5), (LEVEL, "100", 100),
+    (COLOUR, "Colour#Red", 0), (COLOUR, "Colour.Red", 0), (t.BOOL, "on", True), (t.BOOL, "OFF", False),
+    (t.DT, "DT#2024-01-01-00:00:00", 1_704_067_200_000_000_000), (t.DATE, "2024-01-01", 1_704_067_200_000_000_000),
+    (t.TOD, "TOD#00:00:01", 1_000_000_000), (t.REAL, "0.1", nearest_real(0.1)), (t.string(), "'a$27b'", "a'b"),
+    (t.array(((1, 3),), t.INT), "1,2,3", [1, 2, 3]), (t.array(((1, 3),), t.INT), "[1, -2, 16#F]", [1, -2, 15]),
+    (t.array(((1, 2),), t.string()), "'a,b', c", ["a,b", "c"]), (COLOUR, "5", 5), (LEVEL, "100", 100),
 ])  # fmt: skip
 def test_text_becomes_a_value_of_the_type(kind: Type, text: str, value: object) -> None:
     assert parse_value(kind, text, "x") == value
@@ -88,11 +92,20 @@ def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
 
 @pytest.mark.parametrize(("kind", "text", "message"), [
     (t.TIME, "10", "x is TIME and takes a time such as 10ms, not 10"),
-    (t.INT, "10ms", "x is INT and takes no time, not 10ms"),
+    (t.INT, "10ms", "x is INT and takes a whole number, not 10ms"),
     (t.INT, "ten", "x: 'ten' is no literal"),
+    (t.WORD, "TRUE", "x is WORD and takes a whole number, not TRUE"),
+    (t.INT, "1.5", "x is INT and takes a whole number, not 1.5"),
+    (t.WORD, "-1", "x: -1 is out of range of WORD, which holds 0..65535; for these bits write 65535 or 16#FFFF"),
+    (t.BOOL, "2", "x is BOOL and takes TRUE or FALSE, not 2"),
+    (t.DATE, "DT#2024-01-01-00:00:00",
+     "x is DATE and takes a date such as D#2024-01-31, not DT#2024-01-01-00:00:00"),
+    (t.array(((1, 3),), t.INT), "1,2",
+     "x is ARRAY [1..3] OF INT and takes 3 values parted by commas, not 2"),
+    (t.string(), "'a$'", "x: \"'a$'\" ends within an escape"),
 ])
 def test_text_of_another_kind_is_refused(kind: Type, text: str, message: str) -> None:
-    with pytest.raises(ValueError) as error:
+    with pytest.raises((TypeError, ValueError)) as error:
         parse_value(kind, text, "x")
     assert str(error.value) == message
 

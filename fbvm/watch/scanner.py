@@ -1,0 +1,44 @@
+"""Cuts a condition into words: literals, places, operators.  An address is one word also with blanks: `W 0`, `E0 : 5`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+
+class ConditionError(ValueError):
+    """The text is no condition; the message says why."""
+
+
+ADDRESS = r"""
+    %?\s*(?:CIO|DM|D|W|H|A|TF|CNF|CF|T|C|E[0-9A-F]\s*[_:])\s*\d+(?:\.\d+)?(?![\w.\[^\#])
+    | %\s*(?:[IQM][XBWDL]?)?\d+(?:\.\d+)?(?![\w.])
+"""
+"""What `parse_address` reads, with a letter or a % in front: digits alone are a number here."""
+_TOKEN = re.compile(
+    rf"""\s*(?:
+    (?P<text>(?:W?(?:STRING|CHAR)\#)?(?:'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*"))
+    |(?P<literal>(?:[A-Z_]+\#)?(?:(?:2|8|16)\#[0-9A-F_]+|0x[0-9A-F_]+)
+      |(?:TIME|LTIME|LT|T)\#-?[\d._a-z]+
+      |(?:LDATE_AND_TIME|DATE_AND_TIME|LTIME_OF_DAY|TIME_OF_DAY|LDATE|DATE|LTOD|TOD|LDT|DT|LD|D)\#\d[\d:._-]*
+      |(?:[A-Z_]+\#[-+]?)?\d[\d_]*(?:\.\d[\d_]*)?(?:(?:ms|us|ns|d|h|m|s)[\d_.dhmsun]*|e[+-]?\d+)?)
+    |(?P<place>{ADDRESS}|[^\W\d]\w*(?:\s*\[[^\]]*\]|\s*\.\s*%?\w+|\s*\^|\#\w+)*)
+    |(?P<sign><=|>=|<>|:=|[-+*/=<>&()])
+    )""",
+    re.I | re.X,
+)
+_WORDS = frozenset(("AND", "OR", "XOR", "NOT", "MOD", "TRUE", "FALSE"))
+
+
+def tokens(text: str) -> Iterator[tuple[str, str]]:
+    """Kind (text, literal, place, sign, word) and the words themselves.  Raises ConditionError."""
+    at = 0
+    while at < len(text.rstrip()):
+        match = _TOKEN.match(text, at)
+        if not match:
+            raise ConditionError(f"{text[at:].strip()[:20]!r} is not understood in {text!r}")
+        kind, word = match.lastgroup or "", match[0].strip()
+        if kind == "place" and word.upper() in _WORDS:
+            kind, word = "word", word.upper()
+        yield kind, word
+        at = match.end()

@@ -1,0 +1,217 @@
+"""Parts of conditions: what may be compared and computed with what, and what a literal means beside a place.
+
+A literal takes the type of the other operand, as in a program: beside a REAL it is rounded to 32 bits, beside an
+enumeration a name is its member.  What could never hold is refused, in the words in which a write would be.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import cast
+
+from fbvm.base.types import BOOL, DATE, DINT, LREAL, REAL, TIME, EnumType, Type, base, common, fold
+from fbvm.watch.paths import Place
+from fbvm.watch.scanner import ConditionError
+from fbvm.watch.values import DATES, Value, conform, literal, nearest_real, parse_value, refusal, sort_of
+
+Read = Callable[[Place], Value]
+
+
+@dataclass(frozen=True)
+class Term:
+    """A part of a condition: its value as a function of reading, and of what sort it is (see `sort_of`).
+
+    `type` is None for what takes the type of the other operand; `constant` is the value of what reads nothing;
+    `unknown` says why a name names nothing, which matters only if it is no member of an enumeration either."""
+
+    text: str
+    value: Callable[[Read], Value]
+    sort: str
+    type: Type | None = None
+    constant: Value = None
+    literal: bool = False
+    place: bool = False
+    unknown: str = ""
+
+    def known(self) -> Term:
+        """The same term.  Raises ConditionError if its name names nothing."""
+        if self.unknown:
+            raise ConditionError(self.unknown)
+        return self
+
+    @property
+    def described(self) -> str:
+        """Type for messages, or what it is without one."""
+        return self.type.name if self.type else self.sort if self.sort == "BOOL" else f"a {self.sort.lower()}"
+
+
+def literal_term(text: str) -> Term:
+    """The term of a literal.  Raises ConditionError."""
+    try:
+        value, shown = literal(text)
+    except ValueError as error:
+        raise ConditionError(str(error)) from None
+    sort = sort_of(shown) if shown else "text" if isinstance(value, str) else "number"
+    return Term(text, lambda read: value, sort, shown if sort == "number" else None, value, literal=True)
+
+
+def _quotient(a: int | float, b: int | float) -> int | float:
+    if isinstance(a, int) and isinstance(b, int):
+        return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
+    return a / b
+
+
+def _remainder(a: int, b: int) -> int:
+    return abs(a) % abs(b) * (-1 if a < 0 else 1)
+
+
+LEVELS: tuple[dict[str, Callable[..., Value]], ...] = (
+    {"OR": operator.or_},
+    {"XOR": operator.xor},
+    {"AND": operator.and_, "&": operator.and_},
+    {"=": operator.eq, "<>": operator.ne},
+    {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge},
+    {"+": operator.add, "-": operator.sub},
+    {"*": operator.mul, "/": _quotient, "MOD": _remainder},
+)
+LEVEL_OF = {sign: number for number, signs in enumerate(LEVELS) for sign in signs}
+_LOGIC = frozenset(("OR", "XOR", "AND", "&"))
+_COMPARES = frozenset(("=", "<>", "<", "<=", ">", ">="))
+_COMPUTES: dict[tuple[str, str], tuple[str, Type]] = {
+    # sorts of the operands: signs, type of the result (that of numbers follows from the operands)
+    ("number", "number"): ("+ - * / MOD", DINT),
+    ("time", "time"): ("+ -", TIME),
+    ("date", "time"): ("+ -", DATE),
+    ("date", "date"): ("-", TIME),
+    ("time", "number"): ("* /", TIME),
+    ("number", "time"): ("*", TIME),
+}
+
+
+def pair(sign: str, left: Term, right: Term, whole: str) -> Term:
+    """`left sign right`.  Raises ConditionError if that means nothing, or could never be computed or hold."""
+    text = f"{left.text} {sign} {right.text}"
+    if sign in _LOGIC:
+        if not left.known().sort == right.known().sort == "BOOL":
+            raise ConditionError(f"{sign} joins conditions; one side is not BOOL in {whole!r}")
+        return _computed(text, sign, left, right, "BOOL", BOOL)
+    if sign in _COMPARES:
+        left, right = _fitted(left, right).known(), _fitted(right, left).known()
+        if left.sort != right.sort:
+            raise ConditionError(f"{sign} compares {left.described} with {right.described} in {whole!r}")
+        return _computed(text, sign, left, right, "BOOL", BOOL)
+    sorts = ["date" if term.known().sort in DATES else term.sort for term in (left, right)]
+    signs, kind = _COMPUTES.get((sorts[0], sorts[1]), ("", DINT))
+    if sign not in signs.split():
+        raise ConditionError(f"{sign} needs numbers in {whole!r}, not {left.described} and {right.described}")
+    if sign in ("/", "MOD") and right.constant == 0:
+        raise ConditionError(f"division by zero in {whole!r}")
+    left, right = _rounded(left, right), _rounded(right, left)
+    if sort_of(kind) == "number":
+        known = [term.type for term in (left, right) if term.type]
+        found = common(known[0], known[-1]) if known else None
+        return _computed(text, sign, left, right, "number", found)
+    return _computed(text, sign, left, right, sort_of(kind), left.type if kind is DATE else kind)
+
+
+def signed(sign: str, inner: Term, whole: str) -> Term:
+    """`-inner` or `+inner`."""
+    if inner.known().sort not in ("number", "time"):
+        raise ConditionError(f"{sign} needs a number in {whole!r}")
+    if sign == "+":
+        return inner
+    constant = None if inner.constant is None else -cast(float, inner.constant)
+    return replace(inner, text=f"-{inner.text}", value=lambda read: -cast(float, inner.value(read)), constant=constant,
+                   place=False)  # fmt: skip
+
+
+def inverted(inner: Term, whole: str) -> Term:
+    """`NOT inner`."""
+    if inner.known().sort != "BOOL":
+        raise ConditionError(f"NOT needs a BOOL in {whole!r}")
+    return Term(f"NOT {inner.text}", lambda read: not inner.value(read), "BOOL", BOOL)
+
+
+def _computed(text: str, sign: str, left: Term, right: Term, sort: str, kind: Type | None) -> Term:
+    function = LEVELS[LEVEL_OF[sign]][sign]
+    single = kind is not None and base(kind) is REAL
+
+    def value(read: Read) -> Value:
+        a, b = left.value(read), right.value(read)
+        if a is None or b is None:
+            raise TypeError("a reference on the way is null")
+        result = function(a, b)
+        return nearest_real(cast(float, result)) if single else result
+
+    constant = None
+    if left.constant is not None and right.constant is not None:
+        try:
+            constant = value(lambda place: None)
+        except (ArithmeticError, TypeError) as error:
+            raise ConditionError(f"{text} cannot be computed: {error}") from None
+    return Term(text, value, sort, kind, constant)
+
+
+def _rounded(term: Term, other: Term) -> Term:
+    """An untyped number beside a REAL is a REAL."""
+    if term.type or term.constant is None or other.type is None or base(other.type) is not REAL:
+        return term
+    try:
+        value = nearest_real(float(cast(float, term.constant)))
+    except OverflowError:
+        raise ConditionError(f"{term.text} is out of range of REAL") from None
+    return replace(term, value=lambda read: value, constant=value, type=REAL)
+
+
+def _fitted(term: Term, other: Term) -> Term:
+    """A constant in the type of what it is compared with."""
+    kind = other.type
+    if kind is None:
+        return term
+    plain = base(kind)
+    if isinstance(plain, EnumType):
+        return _member(term, plain, other)
+    if term.constant is None or term.type:
+        return term
+    if not other.place:
+        return _rounded(term, other)
+    try:
+        value = _as(kind, term, other.text)
+    except (TypeError, ValueError) as error:
+        raise ConditionError(str(error)) from None
+    return replace(term, value=lambda read: value, constant=value, sort=other.sort, type=kind)
+
+
+def _as(kind: Type, term: Term, name: str) -> Value:
+    """The value of a constant as a place of type `kind` holds it."""
+    if term.literal and not isinstance(term.constant, float) and (term.sort == "text" or sort_of(kind) != "text"):
+        return parse_value(kind, term.text, name)
+    if term.sort != sort_of(kind) and (term.sort, sort_of(kind)) != ("number", "BOOL"):
+        raise refusal(kind, name, term.text)
+    value = term.constant
+    if isinstance(value, float) and base(kind) not in (REAL, LREAL):
+        if not value.is_integer():
+            return value
+        value = int(value)
+    return conform(kind, value, name)
+
+
+def _member(term: Term, kind: EnumType, other: Term) -> Term:
+    """A name, with or without its type in front, or a number as the member of an enumeration."""
+    if term.sort == "enumeration":
+        return term
+    front, dot, last = term.text.rpartition(".")
+    name = last if dot and fold(front) == fold(kind.name) else term.text
+    if fold(name.rpartition("#")[2]) not in kind.members:
+        if term.unknown and "#" not in name:
+            members = ", ".join(kind.shown.values())
+            raise ConditionError(f"{term.unknown}; {other.text} is {kind.name}, which has {members}")
+        if not term.unknown and (term.constant is None or term.sort != "number"):
+            return term
+    try:
+        value = conform(kind, name if term.constant is None or term.sort != "number" else term.constant, other.text)
+    except (TypeError, ValueError) as error:
+        raise ConditionError(str(error)) from None
+    return Term(term.text, lambda read: value, "enumeration", kind, value)
