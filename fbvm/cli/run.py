@@ -93,6 +93,7 @@ def command(
         if options["pcap"]:
             network.tap = _capture(stack, options["pcap"], network).tap
         plc.attach(Etn21(0, UNIT_ADDRESS, timing=options["timing"], seed=options["seed"]), network)
+        _tell_doors(network, options["mappings"])
         with tracing(plc, options["trace"], options["depth"], options["selected"], files, libraries):
             outcome = _run(plc, as_json, **options)
         outcome.print()
@@ -150,6 +151,19 @@ def build_network(net: str, mappings: tuple[Mapping, ...], seed: int = 0) -> Loo
         return network
     try:
         return TcpNetwork({row.said: (row.host or "", row.port) for row in mappings})
+    except OSError as error:
+        click.echo(f"the network cannot be used: {error}", err=True)
+        sys.exit(status.NETWORK)
+
+
+def _tell_doors(network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...]) -> None:
+    """Says where others reach the unit on the host, once per row that is about the unit itself."""
+    if isinstance(network, LoopNetwork):
+        return
+    try:
+        for row in mappings:
+            if row.said.host == UNIT_ADDRESS and row.said.port:
+                click.echo(f"{row.said} is {network.host_endpoint(row.said)}", err=True)
     except OSError as error:
         click.echo(f"the network cannot be used: {error}", err=True)
         sys.exit(status.NETWORK)
