@@ -43,7 +43,7 @@ class Code:
     @cached_property
     def _fingerprint(self) -> str:
         """All of the image that its code depends on."""
-        with deep():
+        with deep(self.image):
             return repr(([(body.name, body.code, body.instance_size) for body in self.image.bodies],
                          [[(run.body, run.offset) for run in task.programs] for task in self.image.tasks]))
 

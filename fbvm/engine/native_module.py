@@ -21,14 +21,15 @@ from fbvm.engine.native_regions import FIRST_NUMBER, METADATA
 from fbvm.engine.native_statements import EMITTERS
 from fbvm.engine.native_texts import TEXTS, from_text
 from fbvm.engine.native_writer import RARE, TRAPPED, Module, Writer
+from fbvm.engine.python import height
 
 SMALL, LARGE = 40, 600
 """Lines of LLVM up to which a body that calls no other is always copied to where it is called, and from which on a body
 never is."""
 DEEP = 8
 """Calls inside one another that may become one function."""
-DEEPEST = 1_000_000
-"""Python frames that writing deeply nested code may take."""
+FRAMES_A_LEVEL, FRAMES_TO_SPARE = 12, 300
+"""Python frames that writing takes at most for a level of nested code, and around it."""
 _FUNCTIONS = """\
 declare void @llvm.memmove.p0.p0.i64(ptr, ptr, i64, i1)
 declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)
@@ -77,7 +78,7 @@ def translate(image: Image) -> Translation:
     graph = call_graph(image)
     module = Module(image, fixed_bases(image), instance_places(image, graph), heights(graph), [], {}, set())
     metadata: list[str] = []
-    with deep():
+    with deep(image):
         bodies = [_body(module, number, metadata) for number in module.heights]
     tasks = [_task(image, number) for number in range(len(image.tasks))]
     routines = [declaration(name) for name in sorted(module.routines)]
@@ -100,10 +101,16 @@ def _declarations() -> tuple[str, ...]:
 
 
 @contextmanager
-def deep() -> Iterator[None]:
-    """Lets the host recurse as deep as code can be nested, for a while."""
+def deep(image: Image) -> Iterator[None]:
+    """Lets the host recurse as deep as code is nested, for a while.
+
+    The limit is one for all threads, so it is left alone for code that needs no more."""
     before = sys.getrecursionlimit()
-    sys.setrecursionlimit(max(before, DEEPEST))
+    needed = FRAMES_TO_SPARE + FRAMES_A_LEVEL * max((height(body.code) for body in image.bodies), default=0)
+    if needed <= before:
+        yield
+        return
+    sys.setrecursionlimit(needed)
     try:
         yield
     finally:

@@ -61,7 +61,7 @@ def translate(image: Image, observed: bool = False, anywhere: bool = False) -> P
     lines: list[str] = []
     frames = 0
     name = f"<fbvm {'observed' if observed else 'plain'} {next(_NUMBERS)}>"
-    with _recursion(FRAMES_A_LEVEL * max((_height(body.code) for body in image.bodies), default=0)):
+    with _recursion(FRAMES_A_LEVEL * max((height(body.code) for body in image.bodies), default=0)):
         for number in range(len(image.bodies)):
             writer = BodyWriter(image, constants, observed, bases.get(number))
             lines += [*writer.write(number), ""]
@@ -74,7 +74,7 @@ def translate(image: Image, observed: bool = False, anywhere: bool = False) -> P
     return program
 
 
-def _height(code: Block) -> int:
+def height(code: Block) -> int:
     """Levels of tuples in each other."""
     height, level = 0, [code]
     while level:
