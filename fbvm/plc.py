@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import Enum
@@ -24,7 +24,7 @@ from fbvm.schedule import Schedule
 from fbvm.units.unit import Unit
 from fbvm.watch import places
 from fbvm.watch.paths import Place, Span, find, find_place
-from fbvm.watch.values import Value
+from fbvm.watch.values import Value, show_time
 from fbvm.wire.link import Link, Network
 
 STEP_BUDGET = 2_000_000
@@ -67,6 +67,15 @@ def fingerprint(image: Image) -> str:
         else:
             said.update(repr(item).encode())
     return said.hexdigest()[:32]
+
+
+def hurried(image: Image, cycle_ns: int) -> Iterator[str]:
+    """What to say of tasks with an INTERVAL that is shorter than the cycle."""
+    for task in image.tasks:
+        if 0 < task.interval_ns < cycle_ns:
+            wanted, cycle = show_time(task.interval_ns)[2:], show_time(cycle_ns)[2:]
+            yield (f"task {task.name} wants {wanted}, the PLC scans every {cycle}: it runs once a scan, what is between "
+                   f"is lost; a cycle of {wanted} gives all")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -128,6 +137,8 @@ class Plc:
         self.now_ns = 0
         """Time of the last scan; `elapsed_ns` is where the next one begins in virtual time."""
         self.scans = 0
+        self.warnings = tuple(hurried(image, cycle_ns))
+        """What the program asks and this PLC does not do, for people: tasks that want to be quicker than the cycle."""
         self.scan_times = ScanTimes()
         """How long scans took, where somebody with a clock measured it (`fbvm.run`)."""
         self.trap: Trap | None = None
@@ -362,7 +373,10 @@ class Plc:
             self.memory.u8[offset : offset + len(data)] = data
 
     def snapshot(self) -> State:
-        """The state of the PLC itself at this moment; pages that did not change are shared, not copied."""
+        """The state of the PLC itself at this moment; pages that did not change are shared, not copied.
+
+        With units attached it can be taken, its memory compared, and `fork` goes on from the same state without units;
+        only `restore` cannot."""
         return State(
             self.memory.snapshot(), self.now_ns, self.scans, self._schedule.state(), dict(self._forces),
             self._mode, self._first, self.trap,
@@ -381,7 +395,7 @@ class Plc:
         self._schedule.restore(state.schedule)
 
     def fork(self) -> Plc:
-        """A second PLC in the same state, without units, watchers and connections."""
+        """A second PLC in the same state, without units, watchers and connections, whether or not this one has them."""
         twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self._choice)
         twin.restore(self.snapshot())
         return twin

@@ -13,6 +13,7 @@ import click
 import fbvm
 from fbvm.base.diagnostics import Source
 from fbvm.cli import status
+from fbvm.cli.banks import with_banks
 from fbvm.cli.sources import report
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
@@ -22,8 +23,9 @@ from fbvm.syntax.text import read
 
 
 def start_journal(
-    stack: ExitStack, path: Path, files: Sequence[Path], program: str | None, libraries: Sequence[Path]
-) -> Journal:
+    stack: ExitStack, path: Path, files: Sequence[Path], program: str | None, libraries: Sequence[Path],
+    banks: Sequence[str],
+) -> Journal:  # fmt: skip
     """A journal to be written to a file; it holds the texts of the program, and ends with the stack."""
     try:
         file = stack.enter_context(path.open("w", encoding="utf-8", newline="\n"))
@@ -32,7 +34,7 @@ def start_journal(
     texts = [read(name, str(name)) for name in files]
     journal = Journal(file, {
         "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program,
-        "libraries": [str(folder) for folder in libraries],
+        "libraries": [str(folder) for folder in libraries], "banks": list(banks),
         "sources": [[text.name, text.text] for text in texts if isinstance(text, Source)],
     })  # fmt: skip
     stack.callback(journal.close)
@@ -64,6 +66,7 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
     try:
         sources = [Source(str(name), str(text)) for name, text in about["sources"]]
         folders = list(libraries) or [Path(folder) for folder in about["libraries"]]
+        banks = [str(name) for name in about.get("banks", ())]
         program = None if about["program"] is None else str(about["program"])
     except (KeyError, TypeError, ValueError):
         raise JournalError("it holds no program; one that Python wrote is done again from Python") from None
@@ -74,4 +77,4 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
     if compilation.image is None:
         report(compilation, as_json)
         sys.exit(status.PROGRAM_ERRORS)
-    return compilation.image
+    return with_banks(compilation.image, banks)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from click import BadParameter
@@ -30,6 +31,10 @@ class Setting:
     name: str
     value: str
     at_ns: int
+    time: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.name}={self.value}" + (f"@{self.time}" if self.time else "")
 
 
 def setting(value: str) -> Setting:
@@ -37,15 +42,17 @@ def setting(value: str) -> Setting:
     name, sign, text = value.partition("=")
     if not sign or not name.strip() or not text.strip():
         raise BadParameter(f"{value!r} is not NAME=VALUE")
-    at_ns = 0
+    at_ns, moment = 0, ""
     front, at, time = text.rpartition("@")
     if at and not text.rstrip().endswith(("'", '"')):
         try:
             at_ns = parse_time_ns(time)
         except ValueError as error:
             raise BadParameter(str(error)) from None
-        text = front
-    return Setting(name.strip(), text.strip(), at_ns)
+        if at_ns < 0:
+            raise BadParameter(f"{value}: nothing is before power-on; a time from 0s on is wanted, not {time}")
+        text, moment = front, time.strip()
+    return Setting(name.strip(), text.strip(), at_ns, moment)
 
 
 @dataclass(frozen=True)
@@ -76,6 +83,14 @@ def _endpoint(text: str) -> tuple[str, int]:
     if not colon or not host or not port.isdecimal() or int(port) > 65535:
         raise BadParameter(f"{text!r} is not an address and a port such as 192.168.250.1:502")
     return host, int(port)
+
+
+def charted_names(options: Iterable[str]) -> list[str]:
+    """The names that --chart options list.  Raises ValueError for one that lists none."""
+    found = [split_names(text) for text in options]
+    if not all(found):
+        raise ValueError("--chart names nothing to draw: write --chart NAME,ADDRESS,...")
+    return [name for names in found for name in names]
 
 
 def split_names(text: str) -> list[str]:

@@ -18,8 +18,9 @@ from fbvm.plc import Plc
 from fbvm.record.chart import draw
 from fbvm.record.recorder import Recorder
 from fbvm.watch.paths import Place, Span
-from fbvm.watch.values import Value, show, show_time
+from fbvm.watch.values import Value, plain_value, show, show_time
 
+MS_NS = 1_000_000
 PIPE_WIDTH = 100
 """Width of charts that do not go to a terminal."""
 _STATUS = {"max": status.FAILED, "differs": status.FAILED, "trap": status.STOPPED, "interrupted": status.INTERRUPTED}
@@ -57,7 +58,8 @@ class Outcome:
         if self.plc.trap:
             click.secho(str(self.plc.trap), fg="red", err=True)
         elif self.reason == "max":
-            click.secho(f"{self.until} did not hold in {show_time(self.plc.elapsed_ns)[2:]}", fg="yellow", err=True)
+            passed_ns = round(self.plc.elapsed_ns / MS_NS) * MS_NS
+            click.secho(f"{self.until} did not hold in {show_time(passed_ns)[2:]}", fg="yellow", err=True)
 
     def _as_dict(self) -> dict[str, object]:
         plc, trap = self.plc, self.plc.trap
@@ -66,7 +68,7 @@ class Outcome:
             "scans": plc.scans,
             "time_ms": plc.elapsed_ns // 1_000_000 if plc.elapsed_ns % 1_000_000 == 0 else plc.elapsed_ns / 1e6,
             "stopped": self.reason,
-            "values": {text: plc.read(place) for text, place in self.places.items()},
+            "values": {text: for_scripts(place, plc.read(place)) for text, place in self.places.items()},
             "trap": trap and site and {
                 "code": trap.code, "file": site.file, "pou": site.pou, "line": site.line, "column": site.column,
                 "message": trap.message,
@@ -84,6 +86,11 @@ def shown(place: Place | Span, value: Value) -> str:
     text = show(place.type, value)
     return f"{text} ({show(place.type, value, hexadecimal=True)})" if place.area and isinstance(value, int) \
         and not isinstance(value, bool) else text  # fmt: skip
+
+
+def for_scripts(place: Place | Span, value: Value) -> Value:
+    """A value as JSON has it."""
+    return plain_value(place.type, value) if isinstance(place, Place) else value
 
 
 def chart_width() -> int:

@@ -8,11 +8,11 @@ from pathlib import Path
 import click
 
 from fbvm.cli import journals
-from fbvm.cli.options import split_names
+from fbvm.cli.options import charted_names
 from fbvm.cli.outcome import Outcome
+from fbvm.net.journal import JournalError
 from fbvm.record.recorder import Recorder
 from fbvm.run.replay import Replay
-from fbvm.watch.conditions import ConditionError
 
 
 @click.command("replay")
@@ -36,10 +36,12 @@ def command(
         replay = Replay(header, entries, journals.program_of(header, libraries, as_json))
         try:
             places = {text: replay.plc.find(text) for text in shown}
-            names = [name for text in charted for name in split_names(text)]
+            names = charted_names(charted)
             recorder = Recorder(replay.plc, names) if names else None
             reason = replay.run(scans=scans, until=until)
-        except (LookupError, ConditionError) as error:
+        except JournalError:
+            raise
+        except (LookupError, TypeError, ValueError) as error:
             raise click.UsageError(str(error)) from None
     outcome = Outcome(replay.plc, _reason(replay, reason, until), places, recorder, as_json, until or "")
     outcome.print()

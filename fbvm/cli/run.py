@@ -10,8 +10,9 @@ from typing import Any
 import click
 
 from fbvm.cli import registers, status
+from fbvm.cli.banks import banks_in, with_banks
 from fbvm.cli.journals import start_journal
-from fbvm.cli.options import Mapping, Setting, mapping, setting, split_names, time_ns
+from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, time_ns
 from fbvm.cli.outcome import Outcome, Progress
 from fbvm.cli.sources import compiled, source_arguments
 from fbvm.cli.traces import tracing
@@ -29,7 +30,7 @@ from fbvm.run import loop
 from fbvm.run.loop import TimedWrite
 from fbvm.units.etn21 import Etn21
 from fbvm.watch.paths import Place
-from fbvm.watch.values import parse_value
+from fbvm.watch.values import parse_value, split_list
 
 CYCLE_NS = 10_000_000
 """Cycle of programs without a TASK, unless somebody says another."""
@@ -84,11 +85,14 @@ def command(
     trap stopped it, 5 if the network could not be used."""
     _check_usage(**options)
     image = compiled(files, program, libraries, runnable=True, as_json=as_json)
+    named = [given.name for given in options["settings"]]
+    banks = banks_in([*named, *options["shown"], *options["charted"], options["until"] or ""])
+    image = with_banks(image, banks)
     with ExitStack() as stack:
         network = build_network(options["net"], options["mappings"], options["seed"])
         stack.callback(network.close)
         path = options["journal"]
-        journal = start_journal(stack, path, files, program, libraries) if path else None
+        journal = start_journal(stack, path, files, program, libraries, banks) if path else None
         plc = _plc(image, cycle_ns, options["engine"], journal)
         if options["pcap"]:
             network.tap = _capture(stack, options["pcap"], network).tap
@@ -113,10 +117,12 @@ def _run(
     scan_time: bool, **_: Any,
 ) -> Outcome:  # fmt: skip
     """Runs to the end.  Names, values and conditions that do not fit the program are mistakes of usage."""
+    for warning in plc.warnings:
+        click.secho(warning, fg="yellow", err=True)
     try:
         writes = [_write(plc, given) for given in settings]
         places = {text: plc.find(text) for text in shown}
-        names = [name for text in charted for name in split_names(text)]
+        names = charted_names(charted)
         recorder = Recorder(plc, names) if names else None
         with Progress(None if as_json else plc, scans, for_ns or max_ns) as progress:
             reason = loop.run(
@@ -125,6 +131,9 @@ def _run(
             )  # fmt: skip
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
+    for write, given in zip(writes, settings, strict=True):
+        if not plc.scans or write.at_ns > plc.now_ns:
+            click.secho(f"--set {given} was never written: the run ended before", fg="yellow", err=True)
     wanted = scan_time or (net == "tcp" and not as_json and sys.stderr.isatty())
     return Outcome(plc, reason, places, recorder, as_json, until or "", wanted)
 
@@ -134,7 +143,7 @@ def _write(plc: Plc, given: Setting) -> TimedWrite:
     found = plc.find(given.name)
     if isinstance(found, Place):
         return TimedWrite(found, parse_value(found.type, given.value, given.name), given.at_ns)
-    texts = given.value.split(",")
+    texts = split_list(given.value)
     if len(texts) != len(found.places):
         raise ValueError(f"{given.name} takes {len(found.places)} values parted by commas, {len(texts)} given")
     values = [parse_value(place.type, text.strip(), place.name)

@@ -105,6 +105,20 @@ def nearest_real(value: float) -> float:
     return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
+def shortest_real(value: float) -> float:
+    """Of all numbers that are read as the same REAL the one with the shortest text: 0.1, not 0.10000000149011612."""
+    if not math.isfinite(value):
+        return value
+    for digits in range(1, 9):
+        short = float(f"{value:.{digits}g}")
+        if abs(short) <= _REAL_LARGEST and nearest_real(short) == value:
+            return short
+    return float(f"{value:.9g}")
+
+
+_REAL_LARGEST = 3.4028234663852886e38
+
+
 # --- in: a Python value for a type ------------------------------------------------------------------------------------
 
 
@@ -263,15 +277,29 @@ def split_list(text: str) -> list[str]:
 # --- out --------------------------------------------------------------------------------------------------------------
 
 
+_PINS = {"VAR_INPUT": 0, "VAR_IN_OUT": 1, "VAR_OUTPUT": 2}
+
+
+def plain_value(kind: Type, value: Value) -> Value:
+    """The same value for JSON: each REAL as the number that people see."""
+    plain = base(kind)
+    if isinstance(plain, ArrayType) and isinstance(value, list):
+        return [plain_value(plain.element, item) for item in value]
+    if isinstance(plain, StructType) and isinstance(value, dict):
+        return {f.name: plain_value(f.type, value[f.name]) for f in plain.fields.values() if f.name in value}
+    return shortest_real(value) if isinstance(value, float) and plain is REAL else value
+
+
 def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
-    """A value for people: TRUE, 12, 16#00FF, T#1s500ms, 'text', [1, 2], (a := 1)."""
+    """A value for people: TRUE, 12, 16#00FF, T#1s500ms, 'text', [1, 2], (a := 1); of an instance the pins first."""
     plain = base(kind)
     if value is None:
         return "NULL"
     if isinstance(plain, ArrayType) and isinstance(value, list):
         return "[" + ", ".join(show(plain.element, item, hexadecimal) for item in value) + "]"
     if isinstance(plain, StructType) and isinstance(value, dict):
-        members = [f for f in plain.fields.values() if f.name in value]
+        members = [f for f in plain.fields.values() if f.name in value and not (plain.block and f.constant)]
+        members.sort(key=lambda f: _PINS.get(f.kind, len(_PINS)))
         return "(" + ", ".join(f"{f.name} := {show(f.type, value[f.name], hexadecimal)}" for f in members) + ")"
     if isinstance(value, bool):
         return "TRUE" if value else "FALSE"
@@ -281,6 +309,8 @@ def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
         return f"'{value}'"
     if isinstance(plain, RefType):
         return f"reference {value}"
+    if isinstance(value, float) and plain is REAL:
+        return str(shortest_real(value))
     if isinstance(value, int) and plain.name in ("TIME", "LTIME"):
         return show_time(value)
     if hexadecimal and isinstance(value, int) and isinstance(plain, Elementary) and "ANY_BIT" in plain.families:

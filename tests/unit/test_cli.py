@@ -294,3 +294,100 @@ def test_an_unknown_verb_is_wrong_usage() -> None:
 ])  # fmt: skip
 def test_names_are_parted_outside_brackets(text: str, names: list[str]) -> None:
     assert split_names(text) == names
+
+
+# --- run: what is said of options that do nothing -----------------------------------------------------------------------
+
+
+def test_a_write_before_power_on_is_refused(counter: str) -> None:
+    result = run("--scans", "1", "--set", "Main.n=1@-5ms")
+    assert result.exit_code == 2
+    assert "nothing is before power-on" in result.stderr
+
+
+def test_a_write_that_was_never_reached_is_told(counter: str) -> None:
+    result = run("--scans", "3", "--set", "Main.n=1@20ms", "--set", "Main.n=7@30ms")
+    assert result.exit_code == 0
+    assert result.stderr.splitlines() == ["--set Main.n=7@30ms was never written: the run ended before"]
+
+
+def test_a_task_that_wants_to_be_quicker_than_the_cycle_is_told(counter: str) -> None:
+    Path("tasks.st").write_text(COUNTER + """
+CONFIGURATION C
+    TASK Fast (INTERVAL := T#10ms, PRIORITY := 1);
+    PROGRAM P WITH Fast : Main;
+END_CONFIGURATION
+""", encoding="utf-8")
+    slow = fbvm("run", "tasks.st", "--scans", "1", "--cycle", "20ms")
+    assert slow.stderr.startswith("task Fast wants 10ms, the PLC scans every 20ms: ")
+    assert fbvm("run", "tasks.st", "--scans", "1").stderr == ""
+
+
+@pytest.mark.parametrize("option", [["--chart", ""], ["--chart", "Main.n", "--chart", " , "]])
+def test_a_chart_of_nothing_is_refused(counter: str, option: list[str]) -> None:
+    result = run("--scans", "1", *option)
+    assert result.exit_code == 2
+    assert "--chart names nothing to draw" in result.stderr
+
+
+@pytest.mark.parametrize(("setting", "shown", "text"), [
+    ("Main.list=[1,2,3,4]", "Main.list", "[1, 2, 3, 4]"),
+    ("Main.list=1,2,3,4", "Main.list[2, 1]", "4"),
+    ("D5..D6=[7, 8]", "D5..D6", "7 8"),
+    ("Main.colour=Colour.Green", "Main.colour", "Green (1)"),
+    ("CIO 1.00=ON", "CIO 1.00", "TRUE"),
+    ("D 10=5", "D 10", "5 (16#0005)"),
+    ("E3_100=9", "E3 : 100", "9 (16#0009)"),
+])
+def test_what_is_set_is_shown(counter: str, setting: str, shown: str, text: str) -> None:
+    result = run("--scans", "1", "--set", setting, "--show", shown)
+    assert (result.stdout, result.stderr) == (f"{shown} = {text}\n", "")
+
+
+def test_e_banks_that_only_options_name_are_there(counter: str) -> None:
+    result = run("--until", "E2_5 = 3 AND E0:1 = 0", "--set", "E2_5=3@10ms", "--max", "1s", "--chart", "EC_0,E2_5")
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert Chart(result.stdout.partition("\n")[2]) == """
+        EC_0  0
+        E2_5  0|3
+    """
+
+
+def test_a_journal_knows_the_banks_of_its_options(counter: str) -> None:
+    run("--scans", "3", "--set", "E2_5=3@10ms", "--journal", "run.journal")
+    result = fbvm("replay", "run.journal", "--show", "E2_5")
+    assert (result.stdout, result.exit_code) == ("E2_5 = 3 (16#0003)\n", 0)
+
+
+@pytest.mark.parametrize("text", ["Main.n = 'a'", "Main.n = 40000", "Main.wait > 10", "Main.n / 0 = 1"])
+def test_what_never_holds_ends_before_the_first_scan(counter: str, text: str) -> None:
+    assert run("--until", text, "--max", "1s").exit_code == 2
+
+
+# --- run: how values are shown ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["0.1", "5.001221", "16777216.0", "1e-20", "-0.3333333"])
+def test_a_real_is_shown_as_the_shortest_text_that_is_read_as_it(counter: str, text: str) -> None:
+    setting = ("--set", f"Main.r={text}")
+    assert run("--scans", "1", *setting, "--show", "Main.r").stdout == f"Main.r = {text}\n"
+    assert values("--scans", "1", *setting, "--show", "Main.r")["values"] == {"Main.r": float(text)}
+    assert run("--scans", "1", *setting, "--chart", "Main.r").stdout.splitlines()[1].split() == ["Main.r", text]
+
+
+def test_of_an_instance_the_pins_come_first_and_no_constants(counter: str) -> None:
+    Path("block.st").write_text("""
+FUNCTION_BLOCK Half
+VAR CONSTANT Two : INT := 2; END_VAR
+VAR seen : INT; END_VAR
+VAR_OUTPUT Y : REAL; END_VAR
+VAR_INPUT X : REAL; END_VAR
+    Y := X / 2.0;
+    seen := seen + Two;
+END_FUNCTION_BLOCK
+PROGRAM Main VAR h : Half; END_VAR
+    h(X := 0.2);
+END_PROGRAM
+""", encoding="utf-8")
+    result = fbvm("run", "block.st", "--scans", "1", "--show", "Main.h")
+    assert result.stdout == "Main.h = (X := 0.2, Y := 0.1, seen := 2)\n"
