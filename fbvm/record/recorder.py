@@ -31,7 +31,7 @@ class Signal:
 
     def text(self, value: Value) -> str:
         """A value as a chart shows it: short, flag words in hexadecimal."""
-        if self.place.area in HEXADECIMAL_AREAS and isinstance(value, int):
+        if self.place.area in HEXADECIMAL_AREAS and isinstance(value, int) and not self.is_bit:
             return f"{value:04X}h"
         kind = base(self.place.type)
         if isinstance(kind, EnumType) and isinstance(value, int):

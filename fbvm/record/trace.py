@@ -158,12 +158,10 @@ class Trace:
 
     def at(self, scan: int) -> Moment:
         """The PLC at the end of a scan.  Raises ValueError if it is not recorded."""
-        last: Moment | None = None
-        for moment in self.moments(range(scan, scan + 1)):
-            last = moment
-        if last is None:
+        moment = next(self.moments(range(scan, scan + 1)), None)
+        if moment is None:
             raise ValueError(f"scan {scan} is not in the trace, which has {_shown(self.scans)}")
-        return last
+        return moment
 
     def moments(self, scans: range | None = None) -> Iterator[Moment]:
         """The PLC at the end of each scan; the same object every time."""
@@ -212,11 +210,11 @@ class _Player:
         while cursor.more:
             tag = cursor.number()
             if tag == SCAN:
-                moment.scans += cursor.number()
-                moment.now_ns += cursor.number()
-                self._frames.clear()
-                if moment.scans >= self._wanted.stop:
+                scan = moment.scans + cursor.number()
+                if scan >= self._wanted.stop:
                     return
+                moment.scans, moment.now_ns = scan, moment.now_ns + cursor.number()
+                self._frames.clear()
             elif tag == PHASE:
                 phase = PHASES[cursor.number()]
                 self._lines()

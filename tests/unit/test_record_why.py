@@ -1,0 +1,105 @@
+"""Why a variable has its value."""
+
+from __future__ import annotations
+
+import io
+
+import pytest
+from trace_rig import image, press, traced
+
+from fbvm.net.loop import LoopNetwork
+from fbvm.plc import Phase, Plc
+from fbvm.record.trace import Trace
+from fbvm.record.trace_writer import Depth, TraceWriter
+from fbvm.record.why import Cause, told, why
+from fbvm.units.etn21 import Etn21
+from fbvm.watch.paths import Place
+
+
+@pytest.fixture(scope="module")
+def trace() -> Trace:
+    return traced(300, Depth.STATEMENTS)
+
+
+def ask(trace: Trace, name: str, scan: int, deepest: int = 6) -> Cause:
+    place = trace.find(name)
+    assert isinstance(place, Place)
+    return why(trace, place, scan, deepest)
+
+
+def test_the_statement_and_what_it_read(trace: Trace) -> None:
+    cause = ask(trace, "Main.Pump", 41)
+    assert cause.value == "TRUE"
+    assert cause.change and cause.change.site
+    assert (cause.change.scan, cause.change.site.line, cause.change.instance) == (8, 17, "Main")
+    assert [(inner.place.name, inner.value, inner.guard) for inner in cause.causes] == [("Main.Delay.Q", "TRUE", False)]
+
+
+def test_conditions_around_a_statement_count(trace: Trace) -> None:
+    cause = ask(trace, "D200", 41)
+    assert [(inner.place.name, inner.value) for inner in cause.causes if inner.guard] == [
+        ("Main.Pump", "TRUE"), ("Main.Starts.CV", "1"),
+    ]  # fmt: skip
+
+
+def test_the_chain_goes_back_to_what_came_from_outside(trace: Trace) -> None:
+    text = told(trace, ask(trace, "Main.Pump", 41))
+    assert text.splitlines()[0] == "Main.Pump = TRUE since scan 8 (80ms), by pump.st:17 in Main:  Pump := Delay.Q;"
+    assert "Main.Start = TRUE since scan 3 (30ms), from outside the program" in text
+    assert "(see above)" in text
+
+
+def test_each_scan_has_its_own_answer(trace: Trace) -> None:
+    assert "FALSE since power-on" in told(trace, ask(trace, "Main.Pump", 7))
+    assert "FALSE since scan 150" in told(trace, ask(trace, "Main.Pump", 299))
+
+
+def test_only_so_deep(trace: Trace) -> None:
+    assert len(told(trace, ask(trace, "Main.Pump", 41, 0)).splitlines()) == 1
+    assert len(told(trace, ask(trace, "Main.Pump", 41, 1)).splitlines()) == 2
+
+
+def test_what_is_long_ago_is_found() -> None:
+    trace = traced(400, Depth.STATEMENTS)
+    assert "FALSE since scan 150" in told(trace, ask(trace, "Main.Pump", 399))
+
+
+def test_a_trace_that_begins_later_says_so() -> None:
+    plc, file = Plc(image()), io.BytesIO()
+    for _ in range(20):
+        press(plc)
+        plc.scan()
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    plc.run(scans=5)
+    writer.close()
+    trace = Trace(io.BytesIO(file.getvalue()))
+    assert told(trace, ask(trace, "Main.Pump", 24)) == "Main.Pump = TRUE since the trace begins"
+
+
+def test_a_unit_changes_words_in_the_refresh() -> None:
+    plc, file = Plc(image()), io.BytesIO()
+    plc.attach(Etn21(0, "192.168.250.21"), LoopNetwork())
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    plc.run(scans=3)
+    plc.write("CIO 1519.00", True)
+    plc.run(scans=3)
+    writer.close()
+    trace = Trace(io.BytesIO(file.getvalue()))
+    phases = {name: ask(trace, name, 5).change for name in ("CIO 1509.15", "CIO 1519.00")}
+    assert {name: change.phase for name, change in phases.items() if change} == {"CIO 1519.00": Phase.REFRESH}
+
+
+def test_a_bit_of_a_word_that_was_written_whole() -> None:
+    made = image("PROGRAM Main VAR n : INT; w : WORD; END_VAR n := n + 1; %W5 := INT_TO_WORD(n); w := %W5; END_PROGRAM")
+    plc, file = Plc(made), io.BytesIO()
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    plc.run(scans=10)
+    writer.close()
+    trace = Trace(io.BytesIO(file.getvalue()))
+    changes = [ask(trace, name, 9).change for name in ("W5.00", "W5.02", "W5.03")]
+    assert [change and change.scan for change in changes] == [9, 7, 7]
+
+
+def test_a_scan_that_is_not_there(trace: Trace) -> None:
+    with pytest.raises(ValueError, match="scan 300 is not in the trace"):
+        ask(trace, "D200", 300)

@@ -1,0 +1,348 @@
+"""Traces: what is written is what is read, at every depth, while it grows, and from damaged files."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from trace_rig import TEXT, image, press, record, traced
+
+from fbvm.base.types import ArrayType, EnumType, StringType, StructType, SubrangeType
+from fbvm.code.compiler import compile_text
+from fbvm.plc import Phase, Plc
+from fbvm.record import symbols
+from fbvm.record.chart import draw
+from fbvm.record.history import looking
+from fbvm.record.inside import Began, Ended, Event, Frame, Read, Statement, Write
+from fbvm.record.names import Names
+from fbvm.record.selection import select
+from fbvm.record.table import ScanTable
+from fbvm.record.trace import Trace
+from fbvm.record.trace_format import MAGIC, Cursor, TraceError, put, xor
+from fbvm.record.trace_signals import recording
+from fbvm.record.trace_writer import START, Depth, TraceWriter
+from fbvm.watch.paths import UnknownPlace
+
+# --- values at the end of each scan -----------------------------------------------------------------------------------
+
+
+def test_the_whole_memory_of_every_scan_comes_back() -> None:
+    plc, states = Plc(image()), []
+    plc.watchers.append(lambda plc: states.append(bytes(plc.memory.snapshot())[START:]))
+    trace = Trace(io.BytesIO(record(plc, 250)))
+    assert trace.scans == range(250)
+    for moment in trace.moments():
+        assert bytes(moment.memory.u8[START:]) == states[moment.scans]
+    for scan in (0, 99, 100, 101, 249):
+        assert bytes(trace.at(scan).memory.u8[START:]) == states[scan]
+
+
+def test_values_are_read_by_name() -> None:
+    trace = traced()
+    assert trace.at(41).read("Main.Delay.ET") == 50_000_000
+    assert trace.at(41).read("D199..D200") == [0, 7]
+    assert trace.at(41).read("Main.Both[2]") == {"a": 0, "b": 21.0}
+    assert trace.at(41).now_ns == 410_000_000
+    assert trace.at(2).read("CIO 0.00") is False
+
+
+def test_a_scan_that_is_not_there() -> None:
+    with pytest.raises(ValueError, match="scan 10 is not in the trace, which has scans 0 to 9"):
+        traced(10).at(10)
+    with pytest.raises(ValueError, match="which has no scans"):
+        traced(0).at(0)
+
+
+def test_a_recording_begins_where_it_begins() -> None:
+    plc = Plc(image())
+    plc.write("D5", 77)
+    plc.run(scans=7)
+    trace = Trace(io.BytesIO(record(plc, 3)))
+    assert trace.scans == range(7, 10)
+    assert trace.at(7).read("D5") == 77
+
+
+def test_time_travel_writes_over_what_was_undone() -> None:
+    plc, file = Plc(image()), io.BytesIO()
+    writer = TraceWriter(plc, file)
+    plc.run(scans=120)
+    state = plc.snapshot()
+    plc.write("D5", 1)
+    plc.run(scans=30)
+    plc.restore(state)
+    plc.write("D5", 2)
+    plc.run(scans=10)
+    writer.close()
+    trace = Trace(io.BytesIO(file.getvalue()))
+    assert [moment.scans for moment in trace.moments()] == list(range(130))
+    assert (trace.at(119).read("D5"), trace.at(125).read("D5")) == (0, 2)
+
+
+def test_a_trapped_scan_is_the_last_one() -> None:
+    plc = Plc(image("PROGRAM Main VAR n : INT := 3; m : INT; END_VAR n := n - 1; m := 6 / n; END_PROGRAM"))
+    file = io.BytesIO()
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    plc.run(scans=9)
+    writer.close()
+    trace = Trace(io.BytesIO(file.getvalue()))
+    assert trace.scans == range(3)
+    assert (trace.at(2).read("Main.n"), trace.at(2).read("Main.m")) == (0, 6)
+
+
+# --- what happened inside ---------------------------------------------------------------------------------------------
+
+
+class Log:
+    """Events without their frames' identity."""
+
+    def __init__(self, names: Names) -> None:
+        self.rows: list[Any] = []
+        self.names = names
+
+    def phase(self, plc: Any, phase: Phase) -> None:
+        self.rows.append((plc.scans, phase, plc.read("Main.Both[2].b"), plc.read("CIO 0.00")))
+
+    def event(self, plc: Any, event: Event) -> None:
+        frame = event.frame
+        fields = [getattr(event, name) for name in ("site", "offset", "bit", "old", "value") if hasattr(event, name)]
+        self.rows.append((type(event).__name__, self._path(frame), *fields, plc.read("Main.Pump")))
+
+    def _path(self, frame: Frame) -> tuple[Any, ...]:
+        caller = frame.caller
+        above = self._path(caller) if caller is not None and caller.body >= 0 else ()
+        return (*above, frame.body, self.names.instance(frame.base), frame.site)
+
+
+def test_a_trace_tells_what_a_listener_was_told() -> None:
+    plc = Plc(image())
+    names = Names(plc.image.symbols, plc.memory.areas)
+    live, told = Log(names), Log(names)
+    file = io.BytesIO()
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    plc.phases.append(live.phase)
+    tell, plc.engine.tell = plc.engine.tell, lambda event: (tell(event), live.event(plc, event))  # type: ignore[attr-defined]
+    for _ in range(12):
+        press(plc)
+        plc.scan()
+    writer.close()
+    Trace(io.BytesIO(file.getvalue())).follow(told)
+    assert told.rows == live.rows
+
+
+@pytest.mark.parametrize(("depth", "kinds"), [
+    (Depth.SCANS, set()), (Depth.WRITES, {Began, Write}), (Depth.STATEMENTS, {Began, Ended, Statement, Read, Write}),
+])  # fmt: skip
+def test_each_depth_holds_its_events(depth: Depth, kinds: set[type]) -> None:
+    found: set[type] = set()
+
+    class Kinds:
+        def phase(self, plc: Any, phase: Phase) -> None:
+            pass
+
+        def event(self, plc: Any, event: Event) -> None:
+            found.add(type(event))
+
+    traced(5, depth).follow(Kinds())
+    assert found == kinds
+
+
+def test_the_scan_table_of_a_trace_is_that_of_the_plc() -> None:
+    plc = Plc(image())
+    names = Names(plc.image.symbols, plc.memory.areas)
+    trace = traced(12, Depth.STATEMENTS)
+    made = recording(trace, ["Main.Start", "Main.Pump", "D200"])
+    signals = [track.signal for track in made.tracks]
+    live, told = ScanTable(plc.image.sites, names, signals), ScanTable(trace.sites, trace.names, signals)
+    with looking(plc, live):
+        for _ in range(12):
+            press(plc)
+            plc.scan()
+    trace.follow(told)
+    assert told.draw() == live.draw()
+    assert "pump.st:19" in told.draw()
+
+
+def test_the_engine_is_given_back() -> None:
+    plc = Plc(image())
+    engine = plc.engine
+    record(plc, 3, Depth.WRITES)
+    assert plc.engine is engine
+    assert not plc.watchers and not plc.phases
+
+
+# --- selection --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("patterns", "found"), [
+    (["Main.Delay.Q"], ["Main.Delay.Q"]),
+    (["main.*.q"], ["Main.Delay.Q", "Main.Starts.Q"]),
+    (["Main.Both[*].b"], ["Main.Both[1].b", "Main.Both[2].b"]),
+    (["Main.Words[*]"], ["Main.Words"]),
+    (["D200..D202", "CIO 5.03"], ["D200", "D201", "D202", "CIO 5.03"]),
+    (["Main.Delay"], ["Main.Delay"]),
+])  # fmt: skip
+def test_patterns_name_places(patterns: list[str], found: list[str]) -> None:
+    plc = Plc(image())
+    assert [place.name for place in select(plc.image.symbols, plc.memory.areas, patterns).places] == found
+
+
+def test_a_pattern_that_fits_nothing() -> None:
+    plc = Plc(image())
+    with pytest.raises(UnknownPlace, match=r"called like Main.\*.Foo"):
+        select(plc.image.symbols, plc.memory.areas, ["Main.*.Foo"])
+    with pytest.raises(UnknownPlace, match="Foo"):
+        TraceWriter(plc, io.BytesIO(), selected=["Main.Foo"])
+
+
+def test_only_what_is_selected_is_kept() -> None:
+    trace = traced(200, Depth.STATEMENTS, ["Main.Delay", "D200"])
+    moment = trace.at(41)
+    assert (moment.read("Main.Delay.ET"), moment.read("D200"), moment.read("Main.Both[2].b")) == (50_000_000, 7, 0.0)
+    assert {track.signal.label for track in recording(trace).tracks} == {
+        "Main.Delay.IN", "Main.Delay.Q", "Main.Delay.ET", "Main.Delay.Running", "Main.Delay.Start", "D200",
+    }  # fmt: skip
+
+
+def test_a_program_stands_for_its_located_variables() -> None:
+    trace = traced(20, Depth.SCANS, ["Main"])
+    assert trace.at(10).read("CIO 0.00") is True
+
+
+# --- charts and lines -------------------------------------------------------------------------------------------------
+
+
+def test_a_chart_of_some_scans() -> None:
+    assert draw(recording(traced(), ["Main.Start", "Main.Pump", "D200"], range(2, 12))) == """
+        Main.Start  .#########
+        Main.Pump   ......####
+        D200        0     |7
+    """
+
+
+def test_without_names_what_changed_is_charted() -> None:
+    labels = [track.signal.label for track in recording(traced(12)).tracks]
+    assert "Main.Delay.ET" in labels and "Main.Mode" in labels
+    assert "Main.Few" not in labels and "Main.Words[0]" not in labels
+
+
+def test_lines_of_the_source_travel_along() -> None:
+    trace = traced(3)
+    site = next(site for site in trace.sites if (site.file, site.line) == ("pump.st", 17))
+    assert trace.line(site) == "Pump := Delay.Q;"
+    assert trace.line(next(site for site in trace.sites if site.file != "pump.st")) == ""
+
+
+# --- growing and damaged files ----------------------------------------------------------------------------------------
+
+
+def test_a_trace_is_read_while_it_grows() -> None:
+    plc, file = Plc(image()), io.BytesIO()
+    writer = TraceWriter(plc, file)
+    reader = io.BytesIO()
+
+    def copy() -> None:
+        reader.seek(0, 2)
+        reader.write(file.getvalue()[reader.tell() :])
+
+    copy()
+    reader.seek(0)
+    trace = Trace(reader)
+    assert trace.scans == range(0)
+    plc.run(scans=130)
+    copy()
+    trace.refresh()
+    assert trace.scans == range(100)
+    writer.flush()
+    copy()
+    trace.refresh()
+    assert trace.at(129).read("Main.Both[2].b") == 65.0
+
+
+@pytest.mark.parametrize("cut", [1, 10, 30])
+def test_a_block_that_is_cut_off_is_not_there(cut: int) -> None:
+    data = record(Plc(image()), 150)
+    assert Trace(io.BytesIO(data[:-cut])).scans == range(100)
+
+
+def test_what_is_no_trace_says_so() -> None:
+    with pytest.raises(TraceError, match="no trace"):
+        Trace(io.BytesIO(b"PROGRAM Main"))
+    with pytest.raises(TraceError, match="no header yet"):
+        Trace(io.BytesIO(MAGIC))
+    with pytest.raises(TraceError, match="header is damaged"):
+        Trace(io.BytesIO(_with_header(b"[]")))
+    with pytest.raises(TraceError, match="format 9"):
+        Trace(io.BytesIO(_with_header(b'{"format":9}')))
+    with pytest.raises(TraceError, match="header is damaged"):
+        Trace(io.BytesIO(_with_header(b'{"format":1}')))
+
+
+def _with_header(payload: bytes) -> bytes:
+    from fbvm.record.trace_format import HEADER, write_chunk
+
+    file = io.BytesIO()
+    file.write(MAGIC)
+    write_chunk(file, HEADER, payload)
+    return file.getvalue()
+
+
+def test_a_damaged_block_is_told() -> None:
+    data = bytearray(record(Plc(image()), 50))
+    data[-5] ^= 0x40
+    trace = Trace(io.BytesIO(bytes(data)))
+    with pytest.raises(TraceError, match="is damaged"):
+        trace.at(49)
+
+
+@given(st.binary(max_size=200), st.integers(0, 400))
+def test_any_bytes_give_a_trace_or_an_error(noise: bytes, at: int) -> None:
+    data = bytearray(GOOD)
+    data[at : at + len(noise)] = noise
+    try:
+        trace = Trace(io.BytesIO(bytes(data)))
+        for moment in trace.moments():
+            assert moment.scans in trace.scans
+    except TraceError as error:
+        assert str(error)
+
+
+GOOD = record(Plc(image()), 20, Depth.STATEMENTS)
+
+
+# --- numbers and symbols ----------------------------------------------------------------------------------------------
+
+
+@given(st.lists(st.integers(0, 1 << 70)))
+def test_numbers_come_back(numbers: list[int]) -> None:
+    out = bytearray()
+    put(out, *numbers)
+    cursor = Cursor(bytes(out))
+    assert [cursor.number() for _ in numbers] == numbers
+    assert not cursor.more
+
+
+@given(st.binary(min_size=1), st.data())
+def test_xor_undoes_itself(a: bytes, data: st.DataObject) -> None:
+    b = data.draw(st.binary(min_size=len(a), max_size=len(a)))
+    assert xor(xor(a, b), b) == a
+
+
+def test_symbols_come_back() -> None:
+    made = compile_text(TEXT + "VAR_GLOBAL G : ARRAY[0..1, 2..3] OF STRING[5]; END_VAR").image
+    assert made is not None
+    back = symbols.from_data(symbols.to_data(made.symbols))
+    assert back == made.symbols
+    main, known = back["MAIN"].type, made.symbols["MAIN"].type
+    assert isinstance(main, StructType) and isinstance(known, StructType)
+    assert main.fields == known.fields
+    kinds = {type(field.type) for field in main.fields.values()}
+    assert {ArrayType, EnumType, StringType, StructType, SubrangeType} <= kinds
+
+
+@pytest.mark.parametrize("data", [{}, {"types": [], "symbols": [5]}, {"types": [], "symbols": [["a", ["?"], 0, "", None, 1]]}])
+def test_what_are_no_symbols(data: dict[str, Any]) -> None:
+    with pytest.raises(symbols.SymbolError, match="no symbols"):
+        symbols.from_data(data)
