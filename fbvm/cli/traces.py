@@ -58,9 +58,15 @@ def scans_option(function: Callable[..., Any]) -> Callable[..., Any]:
 def opened(path: Path) -> Iterator[Trace]:
     """The trace in a file.  What is no trace, and names it does not have, are mistakes of usage."""
     try:
-        with Trace.open(path) as trace:
+        trace = Trace.open(path)
+    except OSError as error:
+        raise click.UsageError(f"{path} cannot be read: {error.strerror}") from None
+    except TraceError as error:
+        raise click.UsageError(f"{path}: {error}") from None
+    try:
+        with trace:
             yield trace
-    except (OSError, TraceError) as error:
+    except TraceError as error:
         raise click.UsageError(f"{path}: {error}") from None
     except (UnknownPlace, TypeError) as error:
         raise click.UsageError(str(error)) from None

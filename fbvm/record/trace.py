@@ -117,7 +117,12 @@ class Trace:
     @classmethod
     def open(cls, path: Path | str) -> Trace:
         """The trace in a file.  Raises OSError, TraceError."""
-        return cls(Path(path).open("rb"))
+        file = Path(path).open("rb")
+        try:
+            return cls(file)
+        except BaseException:
+            file.close()
+            raise
 
     def close(self) -> None:
         """Closes the file."""

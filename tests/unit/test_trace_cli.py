@@ -1,0 +1,136 @@
+"""`fbvm run --trace`, `chart`, `table`, `why` and `convert`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from trace_rig import TEXT
+
+from fbvm.cli.main import main
+
+Fbvm = Callable[..., Result]
+
+
+@pytest.fixture
+def fbvm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fbvm:
+    """Runs the command in a folder with `pump.st`."""
+    monkeypatch.chdir(tmp_path)
+    Path("pump.st").write_text(TEXT, encoding="utf-8")
+    return lambda *arguments: CliRunner().invoke(main, list(arguments))
+
+
+def record(fbvm: Fbvm, *more: str) -> None:
+    result = fbvm("run", "pump.st", "--scans", "60", "--set", "CIO 0.00=TRUE@30ms", "--trace", "run.fbtrace", *more)
+    assert result.exit_code == 0, result.output
+
+
+def test_a_chart_of_a_trace(fbvm: Fbvm) -> None:
+    record(fbvm)
+    result = fbvm("chart", "run.fbtrace", "Main.Start,Main.Pump", "D200", "--scans", "2..12")
+    assert result.output == (
+        "            2       10\n"
+        "Main.Start  .##########\n"
+        "Main.Pump   ......#####\n"
+        "D200        0     |7\n")  # fmt: skip
+
+
+def test_a_long_chart_is_wrapped_and_cut(fbvm: Fbvm) -> None:
+    record(fbvm)
+    assert "~" in fbvm("chart", "run.fbtrace", "Main.Pump").output
+    assert fbvm("chart", "run.fbtrace", "Main.Pump", "--whole", "--width", "40").output.count("Main.Pump") == 3
+
+
+def test_a_table_of_a_trace(fbvm: Fbvm) -> None:
+    record(fbvm, "--depth", "writes")
+    result = fbvm("table", "run.fbtrace", "CIO 0.00,Main.Pump")
+    assert result.output == """\
+scan 3   30ms   CIO0.00   Main.Pump
+  inputs       >TRUE      FALSE
+scan 8   80ms
+  inputs        TRUE      FALSE
+  pump.st:17             >TRUE
+"""
+    assert "pump.st:16" not in result.output
+    assert fbvm("table", "run.fbtrace", "D300").exit_code == 1
+
+
+def test_every_statement(fbvm: Fbvm) -> None:
+    record(fbvm, "--depth", "statements")
+    assert "pump.st:16" in fbvm("table", "run.fbtrace", "D200", "--scans", "8", "--every").output
+
+
+def test_why(fbvm: Fbvm) -> None:
+    record(fbvm, "--depth", "statements")
+    result = fbvm("why", "D200", "--scan", "41")
+    assert result.exit_code == 0
+    lines = result.output.splitlines()
+    assert lines[0] == "D200 = 7 since scan 8 (80ms), by pump.st:19 in Main:  %D200 := 7;"
+    assert lines[1] == "├ if Main.Pump = TRUE since scan 8 (80ms), by pump.st:17 in Main:  Pump := Delay.Q;"
+    assert "by iec/TON.st:28 in Main.Delay:  Q := TRUE;" in lines[2]
+    assert fbvm("why", "D200", "run.fbtrace", "--deep", "0").output == lines[0] + "\n"
+
+
+def test_out_as_csv_and_in_again(fbvm: Fbvm) -> None:
+    record(fbvm)
+    assert fbvm("convert", "run.fbtrace", "run.csv", "Main.Pump,Main.Delay.ET", "--scans", "7..8").exit_code == 0
+    assert Path("run.csv").read_text() == (
+        "scan,time_ms,Main.Pump,Main.Delay.ET [ms]\n7,70,FALSE,40\n8,80,TRUE,50\n")  # fmt: skip
+    assert fbvm("convert", "run.csv", "back.fbtrace").exit_code == 0
+    assert "Main.Pump  .#" in fbvm("chart", "back.fbtrace", "Main.Pump").output
+
+
+def test_out_as_vcd(fbvm: Fbvm) -> None:
+    pytest.importorskip("vcd")
+    record(fbvm)
+    assert fbvm("convert", "run.fbtrace", "run.vcd").exit_code == 0
+    assert "$scope module Delay $end" in Path("run.vcd").read_text()
+
+
+def test_vcd_without_its_package(fbvm: Fbvm, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "vcd", None)
+    record(fbvm)
+    assert "pip install 'fbvm[vcd]'" in fbvm("convert", "run.fbtrace", "run.vcd").output
+
+
+def test_only_what_is_selected(fbvm: Fbvm) -> None:
+    record(fbvm, "--select", "Main.Delay", "--select", "*.CV")
+    assert [line.split()[0] for line in fbvm("chart", "run.fbtrace").output.splitlines()[1:]] == [
+        "Main.Delay.IN", "Main.Delay.Q", "Main.Delay.ET", "Main.Delay.Running", "Main.Delay.Start", "Main.Starts.CV",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    ("chart pump.st", "this is no trace"),
+    ("chart run.fbtrace Foo", "there is no Foo"),
+    ("chart run.fbtrace Main.Both", "name its members"),
+    ("chart run.fbtrace --scans 900..", "the trace has scans 0 to 59"),
+    ("chart run.fbtrace --scans 9..3", "has no scan in it"),
+    ("chart run.fbtrace --scans x", "is not scans such as"),
+    ("table run.fbtrace D200", "--depth statements"),
+    ("why D200", "--depth statements"),
+    ("convert run.fbtrace run.xyz", "what it shall be is not clear"),
+    ("convert run.fbtrace none/run.csv", "cannot be written"),
+    ("convert table.csv run.vcd", "a table becomes a trace"),
+    ("convert table.csv run2.fbtrace", "line 1"),
+    ("run pump.st --scans 1 --select D5", "--trace"),
+    ("run pump.st --scans 1 --trace x.fbtrace --select Foo", "there is no Foo"),
+    ("run pump.st --scans 1 --trace none/x.fbtrace", "cannot be written"),
+])  # fmt: skip
+def test_mistakes_of_usage(fbvm: Fbvm, arguments: str, said: str) -> None:
+    record(fbvm)
+    Path("table.csv").write_text("a,b\n")
+    result = fbvm(*arguments.split())
+    assert result.exit_code == 2, result.output
+    assert said in result.output
+
+
+def test_why_wants_one_trace_and_one_place(fbvm: Fbvm) -> None:
+    assert "there is none here" in fbvm("why", "D200").output
+    record(fbvm, "--depth", "statements")
+    Path("b.fbtrace").write_bytes(Path("run.fbtrace").read_bytes())
+    assert "there are b.fbtrace, run.fbtrace" in fbvm("why", "D200").output
+    assert "name one place" in fbvm("why", "D200..D201", "b.fbtrace").output
+    assert "scan 99 is not in the trace" in fbvm("why", "D200", "b.fbtrace", "--scan", "99").output

@@ -1,0 +1,156 @@
+"""Recordings in other formats: VCD, as pyvcd reads it back, and CSV, out and in."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from trace_rig import image, traced
+
+from fbvm.plc import Plc
+from fbvm.record.recorder import Recorder, Recording
+from fbvm.record.rows import RowsError, read_rows, write_rows
+from fbvm.record.trace import Trace
+from fbvm.record.trace_signals import recording
+from fbvm.record.vcd import write_vcd
+
+
+def rows(made: Recording) -> str:
+    file = io.StringIO(newline="")
+    write_rows(made, file)
+    return file.getvalue()
+
+
+def as_trace(text: str) -> Trace:
+    out = io.BytesIO()
+    read_rows(io.StringIO(text, newline=""), out)
+    return Trace(io.BytesIO(out.getvalue()))
+
+
+NAMES = ["Main.Pump", "Main.Delay.ET", "Main.Starts.CV", "Main.Mode", "Main.Text", "Main.Both[2].b", "D200", "CIO 0.00"]
+
+
+# --- CSV --------------------------------------------------------------------------------------------------------------
+
+
+def test_a_row_is_a_scan() -> None:
+    assert rows(recording(traced(10), NAMES, range(6, 9))) == """\
+scan,time_ms,Main.Pump,Main.Delay.ET [ms],Main.Starts.CV,Main.Mode,Main.Text,Main.Both[2].b,D200,CIO 0.00
+6,60,FALSE,30,0,Low,,3.5,0,TRUE
+7,70,FALSE,40,0,Low,,4.0,0,TRUE
+8,80,TRUE,50,1,High,on,4.5,7,TRUE
+"""
+
+
+def test_times_below_a_millisecond_are_kept() -> None:
+    plc = Plc(image(), cycle_ns=1_500_000)
+    made = Recorder(plc, ["D200"])
+    plc.run(scans=3)
+    assert [line.split(",")[1] for line in rows(made).splitlines()[1:]] == ["0", "1.5", "3"]
+
+
+def test_what_goes_out_comes_in() -> None:
+    names = [name for name in NAMES if "[" not in name]
+    text = rows(recording(traced(30), names))
+    back = as_trace(text)
+    assert rows(recording(back, names)) == text
+    assert back.at(8).read("Main.Delay.ET") == 50_000_000
+    assert back.scans == range(30)
+
+
+def test_a_table_from_elsewhere_becomes_a_trace() -> None:
+    trace = as_trace("scan,time_ms,Tank.Level,Tank.Full,D5,Speed\n3,0.5,-7,FALSE,9,1.5\n4,2,8,TRUE,,2\n")
+    assert trace.at(4).read("Tank") == {"Level": 8, "Full": True}
+    assert (trace.at(4).read("D5"), trace.at(4).read("Speed"), trace.at(3).now_ns) == (9, 2.0, 500_000)
+
+
+@pytest.mark.parametrize(("text", "said"), [
+    ("", "line 1: the first two columns"),
+    ("time,scan\n", "line 1: the first two columns"),
+    ("scan,time_ms,a\n1,2\n", "line 2: 2 cells, 3 expected"),
+    ("scan,time_ms,a b\n", "line 1: 'a b' is neither"),
+    ("scan,time_ms,a,a\n", "line 1: a stands there twice"),
+    ("scan,time_ms,a,a.b\n", "line 1: a is a variable and has members"),
+    ("scan,time_ms,a\nx,2,3\n", "line 2: invalid literal"),
+    ("scan,time_ms,a\n1,x,3\n", "line 2: "),
+    ("scan,time_ms,a\n1,5,3\n2,4,3\n", "line 3: time runs forward only"),
+    ("scan,time_ms,D5\n1,5,99999\n", "line 2: D5: 99999 is out of range"),
+])  # fmt: skip
+def test_what_is_no_such_table(text: str, said: str) -> None:
+    with pytest.raises(RowsError, match=said):
+        read_rows(io.StringIO(text, newline=""), io.BytesIO())
+
+
+@given(st.lists(st.tuples(st.booleans(), st.integers(-(1 << 63), (1 << 63) - 1), st.floats(allow_nan=False),
+                          st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=20)), min_size=1))  # fmt: skip
+def test_any_values_go_out_and_in(values: list[tuple[Any, ...]]) -> None:
+    lines = [f'{n},{n},{b!s},{i},{f!r},"x{t.replace(chr(34), chr(34) * 2)}"' for n, (b, i, f, t) in enumerate(values)]
+    text = "scan,time_ms,b,i,f,t\n" + "\n".join(lines).replace("True", "TRUE").replace("False", "FALSE") + "\n"
+    again = rows(recording(as_trace(text), ["b", "i", "f", "t"]))
+    assert rows(recording(as_trace(again), ["b", "i", "f", "t"])) == again
+    assert len(again.splitlines()) == len(values) + 1
+
+
+# --- VCD --------------------------------------------------------------------------------------------------------------
+
+
+def dump(made: Recording) -> str:
+    pytest.importorskip("vcd")
+    file = io.StringIO()
+    write_vcd(made, file)
+    return file.getvalue()
+
+
+def variables(text: str) -> tuple[dict[str, list[tuple[int, Any]]], list[str]]:
+    """What pyvcd reads: changes by full name, and the scopes."""
+    from vcd.reader import TokenKind, tokenize
+
+    names: dict[str, str] = {}
+    scopes: list[str] = []
+    inner: list[str] = []
+    changes: dict[str, list[tuple[int, Any]]] = {}
+    now = 0
+    for token in tokenize(io.BytesIO(text.encode())):
+        if token.kind is TokenKind.SCOPE:
+            inner.append(token.scope.ident)
+            scopes.append(".".join(inner))
+        elif token.kind is TokenKind.UPSCOPE:
+            inner.pop()
+        elif token.kind is TokenKind.VAR:
+            names[token.var.id_code] = ".".join([*inner, token.var.reference])
+        elif token.kind is TokenKind.CHANGE_TIME:
+            now = token.time_change
+        elif token.kind.name.startswith("CHANGE_"):
+            change = token.data
+            changes.setdefault(names[change.id_code], []).append((now, change.value))
+    return changes, scopes
+
+
+def test_pyvcd_reads_it_back() -> None:
+    changes, scopes = variables(dump(recording(traced(12), NAMES)))
+    assert {"Main", "Main.Delay", "Main.Starts", "fbvm", "memory.D", "memory.CIO"} <= set(scopes)
+    assert changes["Main.Pump"] == [(0, "0"), (80_000_000, "1")]
+    assert changes["Main.Delay.ET"][-1] == (80_000_000, 50_000_000)
+    assert changes["Main.Mode"] == [(0, "Low"), (80_000_000, "High")]
+    assert changes["Main.Both(2).b"][:2] == [(0, 0.5), (10_000_000, 1.0)]
+    assert changes["memory.D.D200"] == [(0, 0), (80_000_000, 7)]
+    assert changes["memory.CIO.CIO0_00"] == [(0, "0"), (30_000_000, "1")]
+
+
+def test_the_scan_is_a_signal() -> None:
+    changes, _ = variables(dump(recording(traced(5), ["D200"])))
+    assert changes["fbvm.scan"] == [(scan * 10_000_000, scan) for scan in range(5)]
+
+
+def test_negative_numbers_and_texts_with_blanks() -> None:
+    text = "PROGRAM Main VAR n : INT; s : STRING[9]; END_VAR n := n - 1; s := 'a b'; END_PROGRAM"
+    plc = Plc(image(text))
+    made = Recorder(plc, ["Main.n", "Main.s"])
+    plc.run(scans=2)
+    changes, _ = variables(dump(made))
+    assert changes["Main.n"][-1][0] == 10_000_000
+    assert changes["Main.n"][-1][1] & 0xFFFF == 0xFFFE
+    assert changes["Main.s"] == [(0, "a_b")]
