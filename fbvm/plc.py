@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
@@ -147,6 +148,7 @@ class Plc:
         self._mode = Mode.RUN
         self._first = True
         self._forces: dict[Place, Value] = {}
+        self._past: deque[State] = deque(maxlen=0)
         self._schedule = Schedule(image.tasks, lambda path: self.read(path) is True)
         self._write_initial()
         self._journal = journal
@@ -179,6 +181,8 @@ class Plc:
         self.memory.write(SCANS, "i64", self.scans)
         if self._journal:
             self._journal.after()
+        if self._past.maxlen:
+            self._past.append(self.snapshot())
         for watcher in self.watchers:
             watcher(self)
         return self.trap
@@ -399,3 +403,19 @@ class Plc:
         twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self._choice)
         twin.restore(self.snapshot())
         return twin
+
+    def remember(self, scans: int) -> None:
+        """Keeps the states at the end of the last so many scans from now on, for `at`."""
+        self._past = deque(self._past, maxlen=scans)
+
+    def at(self, scan: int) -> Plc:
+        """A second PLC as this one was at the end of a scan, without units: to be read, or run again with other inputs.
+
+        Raises ValueError if `remember` did not keep that scan."""
+        for state in self._past:
+            if state.scans == scan + 1:
+                twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self._choice)
+                twin.restore(state)
+                return twin
+        held = f"scans {self._past[0].scans - 1} to {self._past[-1].scans - 1} are" if self._past else "none is"
+        raise ValueError(f"scan {scan} is not remembered; {held}: see Plc.remember")

@@ -117,7 +117,7 @@ class Trace:
     @classmethod
     def open(cls, path: Path | str) -> Trace:
         """The trace in a file.  Raises OSError, TraceError."""
-        file = Path(path).open("rb")
+        file = Path(path).open("rb")  # noqa: SIM115 - the trace closes it
         try:
             return cls(file)
         except BaseException:
