@@ -412,7 +412,7 @@ class Plc:
         """A second PLC as this one was at the end of a scan, without units: to be read, or run again with other inputs.
 
         Raises ValueError if `remember` did not keep that scan."""
-        for state in self._past:
+        for state in reversed(self._past):
             if state.scans == scan + 1:
                 twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self._choice)
                 twin.restore(state)
