@@ -130,7 +130,8 @@ class AddressError(ValueError):
 def parse_address(text: str) -> Address:
     """The address that `text` names: `D100`, `%D100`, `CIO 1519.03`, `1519.03`, `E0_100`, `%MW10`, `%IX0.3`.
 
-    Raises AddressError for text that is no address or lies outside its area."""
+    A bit of a larger unit is one of its bytes: `%MW4.15` is `%MX9.7`.  Raises AddressError for text that is no address or
+    lies outside its area."""
     text = text.strip()
     if match := _PORTABLE.fullmatch(text):
         return _portable(match)
@@ -150,9 +151,13 @@ def _portable(match: re.Match[str]) -> Address:
         if match[4] is None and match[2] == "":
             raise AddressError(f"%{area}{match[3]} has no size: write %{area}X{match[3]}.0 or %{area}W{match[3]}")
         return check_address(Address(area, int(match[3]), int(match[4] or 0), 1))
-    if match[4] is not None:
-        raise AddressError(f"a bit is written %{area}X{match[3]}.{match[4]}")
-    return check_address(Address(area, int(match[3]), None, size))
+    whole = check_address(Address(area, int(match[3]), None, size))
+    if match[4] is None:
+        return whole
+    bit = int(match[4])
+    if bit >= size:
+        raise AddressError(f"bit {bit} does not exist; bits of {whole} are 0 to {size - 1}")
+    return Address(area, whole.byte_offset() + bit // 8, bit % 8, 1)
 
 
 def check_address(address: Address) -> Address:

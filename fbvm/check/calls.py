@@ -121,9 +121,10 @@ class Calls:
     def _positional(self, call: tree.Call, arguments: Sequence[tree.Argument], pou: Pou, bound: PouCall,
                     given: dict[str, tree.Node]) -> None:
         parameters = [v for v in pou.order if v.kind in PARAMETER_KINDS and fold(v.name) not in ("EN", "ENO")]
-        if len(arguments) > len(parameters):
+        if len(arguments) > len(parameters) and not pou.damaged:
+            plural = "" if len(parameters) == 1 else "s"
             self.error("S0402", arguments[len(parameters)],
-                       f"{pou.name} has {len(parameters)} parameters, {len(arguments)} arguments are given")
+                       f"{pou.name} has {len(parameters) or 'no'} parameter{plural}, {len(arguments)} given")
         for argument, variable in zip(arguments, parameters, strict=False):
             assert argument.value is not None
             given[fold(variable.name)] = argument

@@ -13,6 +13,7 @@ from fbvm.base.areas import AREAS, FLAG_AREAS, Address, AddressError, parse_addr
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold
 from fbvm.check.facts import Edge, Pou, Variable, is_block
+from fbvm.check.names import refuse_reserved
 from fbvm.check.specs import MAX_SIZE
 from fbvm.check.statements import assigns_to
 from fbvm.syntax import tree
@@ -123,6 +124,7 @@ class Interfaces:
     def variable(self, declared: tree.VarDecl, name: tree.Name, section: tree.VarSection, source: Source,
                  resolved: tuple[Type, bytes]) -> Variable:
         """A variable as declared, with its location but without a place."""
+        refuse_reserved(self.report, source, name)
         kind, initial = resolved
         words = {fold(q.text) for q in section.qualifiers}
         made = Variable(name.text, kind, section.kind, source, name, initial=initial, constant="CONSTANT" in words,
@@ -223,7 +225,9 @@ class Interfaces:
     def _register(self, variable: Variable, pou: Pou) -> None:
         other = pou.variables.get(fold(variable.name))
         if other is None and fold(variable.name) == fold(pou.name) and pou.is_function:
-            self.report.add("S0202", pou.source, variable.node, f"{variable.name} is the name of the function itself")
+            self.report.add("S0202", pou.source, variable.node, f"{variable.name} is the name of the function itself",
+                            "that name stands for the result; rename the variable")
+            pou.damaged.add(fold(variable.name))
             return
         if other is not None:
             self.report.add("S0202", pou.source, variable.node, f"{variable.name} is declared twice in {pou.name}", "",

@@ -14,17 +14,20 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.types import EnumType, RefType, Type, fold
 from fbvm.check.facts import Facts, Pou, Report, Variable
 from fbvm.check.library import Libraries
+from fbvm.check.names import refuse_reserved
 from fbvm.syntax import tree
 
 
 @dataclass(eq=False)
 class TypeEntry:
-    """A declared type; `resolved` is filled at its first use."""
+    """A declared type; `resolved` is filled at its first use, and stays None if it is wrong."""
 
     tree: tree.TypeDecl
     source: Source
     resolved: tuple[Type, bytes] | None = None
     busy: bool = False
+    known: bool = False
+    """True once it was worked out."""
     awaited: list[RefType] = field(default_factory=list)
     """References to the type that were met while it was being resolved."""
 
@@ -82,6 +85,7 @@ class Project:
             self.new_pous.append(pou)
 
     def _twice(self, key: tuple[str, str], name: tree.Name, source: Source, what: str) -> bool:
+        refuse_reserved(self.report, source, name)
         other = self.pous.get(key) or self.types.get(key)
         if other is None:
             return False

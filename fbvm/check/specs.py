@@ -27,6 +27,7 @@ from fbvm.base.types import (
 )
 from fbvm.check.constants import default
 from fbvm.check.facts import Pou
+from fbvm.check.names import refuse_reserved
 from fbvm.check.project import Project, TypeEntry
 from fbvm.check.values import Values
 from fbvm.syntax import tree
@@ -155,11 +156,12 @@ class Specs:
             self.report.add("S0207", entry.source, entry.tree.name,
                             f"{entry.tree.name.text} contains itself", "a type cannot hold a value of its own type")
             return None
-        if entry.resolved is None:
+        if not entry.known:
             entry.busy = True
             with self.scope(None):
                 entry.resolved = self._type(entry)
             entry.busy = False
+            entry.known = True
             settle(entry.awaited, entry.resolved[0] if entry.resolved else None)
         return entry.resolved
 
@@ -265,6 +267,7 @@ class Specs:
         shown: dict[int, str] = {}
         following = 0
         for member, written in spec.members:
+            refuse_reserved(self.report, source, member)
             value = self.values.integer(written, source) if written is not None else following
             if value is None:
                 return None
