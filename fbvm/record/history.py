@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Protocol
 
 from fbvm.engine.tiers import python_of, substitutes_of
@@ -30,7 +31,7 @@ class Listener(Protocol):
 def looking(plc: Plc, listener: Listener) -> Iterator[None]:
     """Tells a listener all that happens inside the scans of `plc` meanwhile."""
     program = plc.engine
-    plc.engine = Inside(plc.image, plc.memory, lambda event: listener.event(plc, event), program)
+    plc.engine = Inside(plc.image, plc.memory, partial(listener.event, plc), program)
     plc.phases.append(listener.phase)
     try:
         yield

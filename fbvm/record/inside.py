@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from mmap import mmap
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
 from fbvm.code.image import Image
@@ -31,30 +31,30 @@ class Frame:
     caller: Frame | None
 
 
-@dataclass(frozen=True, slots=True)
-class Began:
+OUTSIDE = Frame(NO_SITE, 0, NO_SITE, None)
+"""Who calls programs."""
+
+
+class Began(NamedTuple):
     """A body began."""
 
     frame: Frame
 
 
-@dataclass(frozen=True, slots=True)
-class Ended:
+class Ended(NamedTuple):
     """A body ended."""
 
     frame: Frame
 
 
-@dataclass(frozen=True, slots=True)
-class Statement:
+class Statement(NamedTuple):
     """A statement, or a rung, is about to be executed."""
 
     site: int
     frame: Frame
 
 
-@dataclass(frozen=True, slots=True)
-class Read:
+class Read(NamedTuple):
     """A variable was read.  `bit` is WHOLE_BYTES, or that of a located BOOL, whose `value` is then one byte 0 or 1."""
 
     site: int
@@ -64,8 +64,7 @@ class Read:
     value: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Write:
+class Write(NamedTuple):
     """A variable was written; `old` and `value` may be the same."""
 
     site: int
@@ -76,8 +75,7 @@ class Write:
     value: bytes
 
 
-@dataclass(frozen=True, slots=True)
-class Contact:
+class Contact(NamedTuple):
     """A contact of a rung let power through or not; `element` is what the image calls it."""
 
     site: int
@@ -100,58 +98,65 @@ class Inside:
         for body, function in substitutes_of(program).items():
             self._engine.substitute(body, function)
         self._shadow = bytearray(memory.size)
+        self._frame = OUTSIDE
 
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of one task once, telling what they do."""
-        steps = self.steps(task_index)
-        tell = self.tell
+        observations, tell, event = self._observe(task_index), self.tell, self._event
         while True:
             try:
-                tell(next(steps))
+                tell(event(next(observations)))
             except StopIteration as end:
                 trap: Trap | None = end.value
                 return trap
 
     def steps(self, task_index: int) -> Generator[Event, None, Trap | None]:
         """The events of one execution of a task; execution stands still between two of them."""
-        self._shadow[:] = self.memory.map[:]
-        observations = self._engine.observe(task_index)
-        frame = Frame(NO_SITE, 0, NO_SITE, None)
+        observations = self._observe(task_index)
         while True:
             try:
                 seen = next(observations)
             except StopIteration as end:
                 trap: Trap | None = end.value
                 return trap
-            if seen.kind == "call":
-                body, base = seen.detail
-                frame = Frame(body, base, seen.site, frame)
-                yield Began(frame)
-            elif seen.kind == "return":
-                yield Ended(frame)
-                assert frame.caller is not None
-                frame = frame.caller
-            else:
-                yield self._event(seen, frame)
+            yield self._event(seen)
 
-    def _event(self, seen: Observation, frame: Frame) -> Event:
+    def _observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
+        self._shadow[:] = self.memory.u8
+        self._frame = OUTSIDE
+        return self._engine.observe(task_index)
+
+    def _event(self, seen: Observation) -> Event:
+        """What an observation means; follows calls."""
         kind, site, detail = seen
-        if kind in ("statement", "rung"):
+        frame = self._frame
+        if kind == "statement" or kind == "rung":
             return Statement(site, frame)
-        if kind == "contact":
-            return Contact(site, frame, *detail)
-        form, offset, bit = detail
-        size = form[1] + (form[0] == "s8") if isinstance(form, tuple) else STRUCTS[form].size
-        if kind == "read":
-            return Read(site, frame, offset, bit, value_at(self.memory.map, offset, size, bit))
-        old, value = value_at(self._shadow, offset, size, bit), value_at(self.memory.map, offset, size, bit)
-        self._shadow[offset : offset + size] = self.memory.map[offset : offset + size]
-        return Write(site, frame, offset, bit, old, value)
+        if kind == "read" or kind == "write":
+            form, offset, bit = detail
+            size = form[1] + (form[0] == "s8") if isinstance(form, tuple) else STRUCTS[form].size
+            value = value_at(self.memory.map, offset, size, bit)
+            if kind == "read":
+                return Read(site, frame, offset, bit, value)
+            old = value_at(self._shadow, offset, size, bit)
+            if old != value:
+                self._shadow[offset : offset + size] = self.memory.map[offset : offset + size]
+            return Write(site, frame, offset, bit, old, value)
+        if kind == "call":
+            body, base = detail
+            self._frame = Frame(body, base, site, frame)
+            return Began(self._frame)
+        if kind == "return":
+            assert frame.caller is not None
+            self._frame = frame.caller
+            return Ended(frame)
+        return Contact(site, frame, *detail)
 
 
 def value_at(buffer: bytes | bytearray | mmap, offset: int, size: int, bit: int = WHOLE_BYTES) -> bytes:
     """The bytes of a value; of a bit, one byte 0 or 1."""
     if bit != WHOLE_BYTES:
         return bytes((buffer[offset] >> bit & 1,))
-    return bytes(buffer[offset : offset + size])
+    value = buffer[offset : offset + size]
+    return bytes(value) if isinstance(value, bytearray) else value
 

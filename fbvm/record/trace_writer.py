@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from enum import Enum
 from typing import Any, BinaryIO
@@ -40,8 +40,8 @@ FORMAT = 1
 BLOCK_SCANS = 100
 BLOCK_BYTES = 1 << 18
 """A block is written when it has so many scans or bytes."""
-PIECE = 512
-"""Bytes that are compared at once."""
+PIECE, PART = 4096, 512
+"""Bytes that are compared at once, and those of a piece that differs."""
 START = AREAS["CF"].offset // LINE * LINE
 """Memory before this is the system page, which follows from the rest."""
 
@@ -76,6 +76,11 @@ class TraceWriter:
         self._first = self._scans = self._last = self._last_ns = 0
         self._open = False
         self._frames: dict[Frame, int] = {}
+        self._heads: dict[tuple[int, int, tuple[int, ...]], bytes] = {}
+        self._notes: dict[type, Callable[[Any], None]] = {Write: self._note_write}
+        if depth is Depth.STATEMENTS:
+            self._notes |= {Statement: self._note_statement, Read: self._note_read, Began: self._note_began,
+                            Ended: self._note_ended, Contact: self._note_contact}  # fmt: skip
         self.size_bytes = len(MAGIC)
         file.write(MAGIC)
         head = json.dumps(_header(plc, depth, selected, lines or {}), separators=(",", ":"))
@@ -159,26 +164,46 @@ class TraceWriter:
 
     def event(self, plc: Plc, event: Event) -> None:
         """Something happened in the program."""
-        if isinstance(event, Write):
-            if self._selection.covers(event.offset, len(event.value), event.bit):
-                put(self._out, WRITE, self._frame(event.frame), event.site + 1, event.offset, event.bit, len(event.value))
-                self._out += event.old + event.value
-        elif self.depth is not Depth.STATEMENTS:
-            return
-        elif isinstance(event, Statement):
-            put(self._out, STATEMENT, self._frame(event.frame), event.site)
-        elif isinstance(event, Read):
-            if self._selection.covers(event.offset, len(event.value), event.bit):
-                put(self._out, READ, self._frame(event.frame), event.site + 1, event.offset, event.bit, len(event.value))
-                self._out += event.value
-        elif isinstance(event, Began):
-            self._frame(event.frame)
-        elif isinstance(event, Ended):
-            put(self._out, END, self._frame(event.frame))
-        elif isinstance(event, Contact):
-            text = json.dumps(event.element).encode()
-            put(self._out, CONTACT, self._frame(event.frame), event.site, event.value, len(text))
-            self._out += text
+        note = self._notes.get(type(event))
+        if note is not None:
+            note(event)
+
+    def _note_statement(self, event: Statement) -> None:
+        self._head(STATEMENT, event.frame, event.site)
+
+    def _note_began(self, event: Began) -> None:
+        self._frame(event.frame)
+
+    def _note_ended(self, event: Ended) -> None:
+        self._head(END, event.frame)
+
+    def _note_read(self, event: Read) -> None:
+        _, frame, offset, bit, value = event
+        if self._selection.everything or self._selection.covers(offset, len(value), bit):
+            self._head(READ, frame, event.site + 1, offset, bit, len(value))
+            self._out += value
+
+    def _note_write(self, event: Write) -> None:
+        _, frame, offset, bit, old, value = event
+        if self._selection.everything or self._selection.covers(offset, len(value), bit):
+            self._head(WRITE, frame, event.site + 1, offset, bit, len(value))
+            self._out += old
+            self._out += value
+
+    def _note_contact(self, event: Contact) -> None:
+        text = json.dumps(event.element).encode()
+        self._head(CONTACT, event.frame, event.site, int(event.value), len(text))
+        self._out += text
+
+    def _head(self, tag: int, frame: Frame, *numbers: int) -> None:
+        """Tag, frame and numbers; most of them come again in the next scan."""
+        key = (tag, self._frames[frame] if frame in self._frames else self._frame(frame), numbers)
+        head = self._heads.get(key)
+        if head is None:
+            made = bytearray()
+            put(made, tag, key[1], *numbers)
+            head = self._heads[key] = bytes(made)
+        self._out += head
 
     def _frame(self, frame: Frame) -> int:
         """The number of a frame, written when it is met first."""
@@ -193,9 +218,12 @@ class TraceWriter:
 
 def _different(start: int, now: bytes, old: bytes) -> Iterator[tuple[int, bytes]]:
     """The lines of a piece that differ."""
-    for inner in range(0, len(now), LINE):
-        if now[inner : inner + LINE] != old[inner : inner + LINE]:
-            yield (start + inner) // LINE, xor(now[inner : inner + LINE], old[inner : inner + LINE])
+    for part in range(0, len(now), PART):
+        if now[part : part + PART] == old[part : part + PART]:
+            continue
+        for at in range(part, min(part + PART, len(now)), LINE):
+            if now[at : at + LINE] != old[at : at + LINE]:
+                yield (start + at) // LINE, xor(now[at : at + LINE], old[at : at + LINE])
 
 
 def _header(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[str, Mapping[int, str]]) -> dict[str, Any]:
