@@ -24,6 +24,8 @@ VERBS = {
     "fmt": "Rewrite a program in canonical Structured Text.",
     "list": "Print the compiled program, readable.",
     "explain": "Print the page of a diagnostic.",
+    "serve": "Serve the memory of a PLC by Modbus TCP, through its server program.",
+    "map": "Print under which addresses Modbus clients find words and bits.",
     "peer": "Start a Modbus TCP server to talk to.",
 }
 

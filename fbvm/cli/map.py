@@ -1,0 +1,88 @@
+"""`fbvm map`: the words and bits that the ETN21 server program serves, under all the numbers that people give them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import click
+
+from fbvm.base.areas import Address, AddressError, parse_address
+
+
+class Table(NamedTuple):
+    """One of Modbus's four tables and what stands for it; its addresses are 0 to `last`."""
+
+    name: str
+    area: str
+    bits: bool
+    codes: str
+    last: int
+    digit: str
+    """First digit of its addresses in documents that count from 1."""
+
+
+TABLES = (  # the sheet's sections 1.3 and 2, read as fblib/omron/etn_modbus/README.md says
+    Table("coil", "CIO", True, "01 05", 65535, "0"),
+    Table("discrete input", "CIO", True, "02", 5119, "1"),
+    Table("input register", "CIO", False, "04", 5800, "3"),
+    Table("holding register", "D", False, "03 06 10", 32767, "4"),
+)
+TITLES = ("PLC", "Modbus", "functions", "PDU", "hex", "from 1", "5 digits", "6 digits")
+FORMAT = "{:<14}{:<18}{:<11}{:>6}{:>7}{:>8}{:>10}{:>10}"
+
+
+@click.command("map")
+@click.argument("ranges", nargs=-1, metavar="[ADDRESS|FIRST..LAST]...")
+def command(ranges: tuple[str, ...]) -> None:
+    """Print where Modbus clients find words and bits of a PLC that runs the server program.
+
+    `fbvm map D1000..D1002 'CIO 1.04'`; without an address the first and the last of each table."""
+    addresses = [address for text in ranges for address in _range(text)] or list(_ends())
+    click.echo(FORMAT.format(*TITLES))
+    for address in addresses:
+        rows = [row(table, address) for table in TABLES if _number(table, address) is not None]
+        for line in rows or [(str(address), "not served", *[""] * 6)]:
+            click.echo(FORMAT.format(*line).rstrip())
+
+
+def row(table: Table, address: Address) -> tuple[str, ...]:
+    """The address as this table has it."""
+    number = _number(table, address)
+    assert number is not None, "asked only for what the table has"
+    counted = number + 1
+    return (
+        str(address), table.name, table.codes, str(number), f"{number:04X}", str(counted),
+        f"{table.digit}{counted:04}" if counted <= 9999 else "-", f"{table.digit}{counted:05}",
+    )  # fmt: skip
+
+
+def _number(table: Table, address: Address) -> int | None:
+    """Address in the PDU, or None if the table does not have it."""
+    if address.area != table.area or (address.bit is not None) != table.bits:
+        return None
+    number = address.number if address.bit is None else 16 * address.number + address.bit
+    return number if number <= table.last else None
+
+
+def _ends() -> Iterator[Address]:
+    for first, last in (("CIO 0.00", "CIO 4095.15"), ("CIO 319.15", "CIO 0"), ("CIO 5800", "D0"), ("D32767", "")):
+        yield from (parse_address(text) for text in (first, last) if text)
+
+
+def _range(text: str) -> list[Address]:
+    """The addresses of `D100` or `D100..D109`."""
+    first_text, dots, last_text = text.partition("..")
+    try:
+        first = parse_address(first_text)
+        last = parse_address(last_text) if dots else first
+    except AddressError as error:
+        raise click.UsageError(str(error)) from None
+    if last.area != first.area or (last.bit is None) != (first.bit is None):
+        raise click.UsageError(f"{text} has no two ends of one kind")
+    if (last.number, last.bit or 0) < (first.number, first.bit or 0):
+        raise click.UsageError(f"{text} runs backwards")
+    if first.bit is None or last.bit is None:
+        return [Address(first.area, number, None, first.size_bits) for number in range(first.number, last.number + 1)]
+    bits = range(16 * first.number + first.bit, 16 * last.number + last.bit + 1)
+    return [Address(first.area, bit // 16, bit % 16, first.size_bits) for bit in bits]

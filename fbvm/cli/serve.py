@@ -1,0 +1,171 @@
+"""`fbvm serve`: a PLC with the server program of `examples/server.st` as a service on real TCP."""
+
+from __future__ import annotations
+
+import ipaddress
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import IO, NoReturn
+
+import click
+
+from fbvm.base.data import data_folder
+from fbvm.cli import status
+from fbvm.cli.options import time_ns
+from fbvm.cli.peer import LISTENING
+from fbvm.cli.run import UNIT_ADDRESS
+from fbvm.code.compiler import compile_files
+from fbvm.net.tcp import TcpNetwork
+from fbvm.plc import Plc
+from fbvm.record import images
+from fbvm.record.requests import RequestLog
+from fbvm.run import loop
+from fbvm.units.etn21 import Etn21
+from fbvm.wire.link import Peer
+
+CYCLE_NS = 10_000_000
+START_LIMIT_NS = 5_000_000_000
+SCANS_OF_AN_OPEN = 4
+"""Within which a unit says that a port cannot be listened on."""
+ENDPOINT = Peer(UNIT_ADDRESS, 502)
+SERVED = {"CIO": 5801, "D": 32768}
+"""Words of each area that clients can reach, fblib/omron/etn_modbus/README.md."""
+
+
+@click.command("serve")
+@click.option("--bind", default="127.0.0.1", show_default=True, metavar="ADDRESS",
+              help="Address of this computer to listen on; 0.0.0.0 is all.")
+@click.option("--port", type=click.IntRange(0, 65535), default=1502, show_default=True, help="0: any free port.")
+@click.option("--sockets", type=click.IntRange(1, 8), default=1, show_default=True, help="Clients at once.")
+@click.option("--read-only", is_flag=True, help="Refuse everything that writes.")
+@click.option("--fn0f", is_flag=True, help="Serve 0F, write multiple coils, too.")
+@click.option("--full-dm", is_flag=True, help="Let 10, write multiple registers, begin anywhere in D.")
+@click.option("--idle", "idle_ns", type=time_ns, metavar="TIME", help="Leave a client that is silent for so long (60s).")
+@click.option("--image", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+              help="Memory: loaded at the start if the file is there, saved at the end and on SIGUSR1.")
+@click.option("--log", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path), metavar="FILE",
+              help="Write who asked what, a JSON object a line; - is the terminal.")
+def command(
+    bind: str, port: int, sockets: int, read_only: bool, fn0f: bool, full_dm: bool, idle_ns: int | None,
+    image: Path | None, log: Path | None,
+) -> None:  # fmt: skip
+    """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM.
+
+    Status 5 if the port cannot be used, 4 if a trap stopped the program, else 0."""
+    settings = {"Sockets": sockets, "Read_Only": read_only, "Fn0F": fn0f, "Full_DM": full_dm}
+    if idle_ns is not None:
+        settings["Idle_Time"] = idle_ns
+    signals = Signals()
+    with ExitStack() as stack:
+        stack.enter_context(signals.heard())
+        plc = _plc(settings, image)
+        network = _network(bind, port)
+        stack.callback(network.close)
+        if log:
+            network.tap = RequestLog(_opened(stack, log), loop.epoch_ns(), lambda: plc.scans).tap
+        plc.attach(Etn21(0, UNIT_ADDRESS), network)
+        reason = _start(plc, network)
+        while reason != "trap" and not signals.end:
+            reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=loop.EVENT)
+            signals.save = False
+            _save(plc, image)
+    if plc.trap:
+        click.echo(str(plc.trap), err=True)
+    sys.exit(status.STOPPED if reason == "trap" else status.GOOD)
+
+
+def _plc(settings: dict[str, int], image: Path | None) -> Plc:
+    """The PLC, its program set and its memory loaded."""
+    program = compile_files([data_folder("examples") / "server.st"], runnable=True).image
+    assert program is not None, "the server's own program compiles"
+    plc = Plc(program, CYCLE_NS)
+    for name, value in settings.items():
+        plc.write(f"Main.Server.{name}", value)
+    if image and image.exists():
+        try:
+            images.load(plc.memory, image)
+        except (OSError, images.ImageError) as error:
+            raise click.UsageError(str(error)) from None
+    return plc
+
+
+def _opened(stack: ExitStack, log: Path) -> IO[str]:
+    try:
+        return stack.enter_context(click.open_file(str(log), "a", encoding="utf-8"))
+    except OSError as error:
+        raise click.UsageError(f"{log} cannot be written: {error.strerror}") from None
+
+
+def _network(bind: str, port: int) -> TcpNetwork:
+    try:
+        if not ipaddress.ip_address(bind).is_loopback:
+            click.echo(f"Other computers can reach {bind} and write this PLC's memory.", err=True)
+        network = TcpNetwork({ENDPOINT: (bind, port)})
+        network.host_endpoint(ENDPOINT)
+    except ValueError:
+        raise click.UsageError(f"--bind {bind} is not an IP address") from None
+    except OSError as error:
+        _unusable(Peer(bind, port), str(error))
+    return network
+
+
+def _start(plc: Plc, network: TcpNetwork) -> str:
+    """Runs until the unit listens and says so; what else ended it if it does not get there."""
+    opening, failed = plc.find("CIO 1509.00"), plc.find("Main.Server.Error_Code")
+    reason = loop.run(plc, until=lambda _: bool(plc.read(opening)), max_ns=START_LIMIT_NS, pace=loop.EVENT)
+    if reason == "until":
+        reason = loop.run(plc, scans=SCANS_OF_AN_OPEN, pace=loop.EVENT)
+    real = network.host_endpoint(ENDPOINT)
+    if reason == "max" or plc.read(failed):
+        _unusable(real, f"response code {plc.read(failed):04X}")
+    if reason == "scans":
+        click.echo(f"{LISTENING}{real}")
+        sys.stdout.flush()
+    return reason
+
+
+def _unusable(real: Peer, why: str) -> NoReturn:
+    click.echo(f"{real} cannot be used: {why}", err=True)
+    sys.exit(status.NETWORK)
+
+
+# --- signals and images -----------------------------------------------------------------------------------------------
+
+
+class Signals:
+    """What the process is asked for from outside: to end (SIGTERM, Ctrl-C), to save the image (SIGUSR1, where it is).
+
+    Asked for only, so that a scan, with its replies and their lines in the log, is never left in the middle."""
+
+    def __init__(self) -> None:
+        self.end = False
+        self.save = False
+
+    def _asked(self, number: int, frame: FrameType | None) -> None:
+        if number in (signal.SIGTERM, signal.SIGINT):
+            self.end = True
+        else:
+            self.save = True
+
+    @contextmanager
+    def heard(self) -> Iterator[None]:
+        """While this lasts."""
+        numbers = [signal.SIGTERM, signal.SIGINT, *([signal.SIGUSR1] if hasattr(signal, "SIGUSR1") else [])]
+        before = {number: signal.signal(number, self._asked) for number in numbers}
+        try:
+            yield
+        finally:
+            for number, call in before.items():
+                signal.signal(number, call)
+
+
+def _save(plc: Plc, image: Path | None) -> None:
+    if image:
+        try:
+            images.save(plc.memory, image, SERVED)
+        except OSError as error:
+            click.echo(f"{image} cannot be written: {error.strerror}", err=True)

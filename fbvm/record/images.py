@@ -1,0 +1,67 @@
+"""Memory images: what the areas of a PLC hold, as JSON, `{"spaces": {"CIO": [words from address 0 on], "D": [...]}}`.
+
+The words of CPU bus units are left out in both directions: they say how a unit is now, not what a user has stored.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from fbvm.base.memory import Memory
+
+OF_UNITS = {"CIO": range(1500, 1900), "D": range(30000, 31600)}  # 25 and 100 words a unit, W421 6-6-2 p111
+
+
+class ImageError(ValueError):
+    """A file is no memory image; the message says why."""
+
+
+def save(memory: Memory, path: Path, counts: Mapping[str, int]) -> None:
+    """Writes the first so many words of these areas; words of 0 at the end are left out.
+
+    The file is replaced at once or not at all.  Raises OSError."""
+    spaces = {}
+    for name, count in counts.items():
+        words = memory.words(name)[:count].tolist()
+        of_units = OF_UNITS.get(name, range(0))
+        words = [0 if number in of_units else word for number, word in enumerate(words)]
+        while words and not words[-1]:
+            words.pop()
+        spaces[name] = words
+    lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(words)}" for name, words in spaces.items())
+    beside = path.with_name(path.name + ".new")
+    beside.write_text(f'{{"spaces": {{\n{lines}\n}}}}\n', encoding="utf-8")
+    os.replace(beside, path)
+
+
+def load(memory: Memory, path: Path) -> None:
+    """Writes an image into a memory, wholly or not at all; words that it does not have stay.
+
+    Raises OSError, and ImageError for a file that is no image or has words that this memory lacks."""
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ImageError(f"{path} is not JSON: {error}") from None
+    spaces = found.get("spaces") if isinstance(found, dict) else None
+    if not isinstance(spaces, dict):
+        raise ImageError(f'{path} has no "spaces"')
+    for there, number, word in list(_words(memory, path, spaces)):
+        there[number] = word
+
+
+def _words(memory: Memory, path: Path, spaces: dict[str, object]) -> Iterator[tuple[memoryview, int, int]]:
+    for name, words in spaces.items():
+        try:
+            there = memory.words(name)
+        except KeyError:
+            raise ImageError(f"{path}: this PLC has no area {name}") from None
+        if not isinstance(words, list) or len(words) > len(there):
+            raise ImageError(f"{path}: {name} is not a list of at most {len(there)} words")
+        for number, word in enumerate(words):
+            if not isinstance(word, int) or isinstance(word, bool) or not 0 <= word <= 0xFFFF:
+                raise ImageError(f"{path}: {name} {number} is {word!r}, no word from 0 to 65535")
+            if number not in OF_UNITS.get(name, ()):
+                yield there, number, word
