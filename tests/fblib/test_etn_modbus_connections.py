@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
-from etn_modbus_rig import SECOND_NS, SERVER, Client, Rig
+from etn_modbus_rig import SECOND_NS, SERVER, Client, Rig, image_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fbvm.base.data import data_folder
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
-from fbvm.plc import Mode
+from fbvm.plc import Mode, Plc
 from fbvm.record.chart import chart
 from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21 import Fault as UnitFault
@@ -28,6 +32,24 @@ NAMES = descriptions(Layout.of(0))
 
 def drawn(rig: Rig, scans: int, *signals: str) -> str:
     return chart(rig.plc, scans, [(signal, NAMES.get(signal, "")) for signal in signals])
+
+
+def test_the_program_in_the_readme() -> None:
+    readme = (data_folder("fblib") / "omron" / "etn_modbus" / "README.md").read_text(encoding="utf-8")
+    text = re.search(r"```\n(PROGRAM.*?)```", readme, re.S)
+    assert text is not None
+    assert image_of(text[1]).tasks
+    charts = re.findall(r"```\n(CIO15.*?)```", readme, re.S)
+    tests = Path(__file__).read_text(encoding="utf-8").replace("\n        ", "\n")
+    assert charts and all(one in tests for one in charts), "its charts are those of the tests"
+
+
+def test_the_port_may_be_set_by_a_declaration() -> None:
+    text = "PROGRAM Main VAR Server : ETN_Modbus_Server := (Local_Port := 1502); END_VAR Server(); END_PROGRAM"
+    plc = Plc(image_of(text))
+    plc.attach(Etn21(0, "192.168.250.1"), LoopNetwork())
+    plc.run(scans=5)
+    assert plc.read("D30019") == 1502
 
 
 # --- scan by scan -----------------------------------------------------------------------------------------------------
