@@ -10,7 +10,7 @@ import struct
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -92,6 +92,13 @@ def settled(port: int) -> None:
     connected(port).close()
 
 
+def reached(connect: Callable[[], bool]) -> None:
+    """Connect as soon as the server's one socket is open again; until then a connection is refused."""
+    time_limit = time.monotonic() + BOUND_S
+    while not connect():
+        assert time.monotonic() < time_limit, "the server does not listen any more"
+
+
 # --- other people's clients -------------------------------------------------------------------------------------------
 
 
@@ -99,6 +106,7 @@ def by_pymodbus(port: int) -> None:
     from pymodbus.client import ModbusTcpClient
 
     with ModbusTcpClient("127.0.0.1", port=port, timeout=BOUND_S) as client:
+        reached(client.connect)
         assert not client.write_registers(1000, list(range(100, 223))).isError()
         assert client.read_holding_registers(1000, count=123).registers == list(range(100, 223))
         assert not client.write_register(2000, 0x3AC5).isError()
@@ -118,6 +126,7 @@ def by_pymodbus(port: int) -> None:
 def by_pymodbustcp(port: int) -> None:
     module = pytest.importorskip("pyModbusTCP.client")
     client = module.ModbusClient("127.0.0.1", port, timeout=BOUND_S, auto_open=True)
+    reached(client.open)
     assert client.write_multiple_registers(1000, list(range(123)))
     assert client.read_holding_registers(1000, 123) == list(range(123))
     assert client.write_single_register(2000, 7)
