@@ -40,6 +40,7 @@ class Configurations:
             task = TaskFact("", LOWEST, 0)
             self._instance(programs[0].name, programs[0], task, programs[0].source, programs[0].tree.name)
             self.checker.tasks.append(task)
+            self._unconnected(programs[0], programs[0].source, programs[0].tree.name, "")
 
     def _instance(self, name: str, pou: Pou, task: TaskFact, source: Source, node: tree.Node) -> None:
         assert pou.type is not None
@@ -53,6 +54,15 @@ class Configurations:
         self.checker.global_order.append(instance)
         self.project.globals[key] = instance
         task.programs.append((instance, pou))
+
+    def _unconnected(self, pou: Pou, source: Source, node: tree.Node, connection: str) -> None:
+        """Complain about an in-out of a program that nothing is connected to."""
+        in_outs = pou.parameters("VAR_IN_OUT")
+        if in_outs:
+            name = in_outs[0].name
+            self.report.add("S0404", source, node, f"the in-out {name} of {pou.name} is missing: a task runs the program",
+                            f"connect a variable: {connection.format(name)}" if connection else
+                            "use a VAR_GLOBAL, or connect a variable in a CONFIGURATION")
 
     def _configuration(self, configuration: tree.Configuration, source: Source) -> None:
         for refused in configuration.refused:
@@ -95,6 +105,8 @@ class Configurations:
             self._instance(program.name.text, pou, task, source, program.name)
             if program.connections:
                 self._connect(program, task, source)
+            else:
+                self._unconnected(pou, source, program.name, f"{program.type_name.text}({{}} := ...)")
 
     def _connect(self, program: tree.ProgramInstance, task: TaskFact, source: Source) -> None:
         """Connections are copied before and after each run: the task runs a body that calls the instance with them."""
