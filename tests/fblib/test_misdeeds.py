@@ -154,7 +154,7 @@ EXPECTED: dict[str, set[str]] = {
 """With which codes a first command ends; those that are not named here with 0080, no answer."""
 
 
-TIMINGS = pytest.mark.parametrize("timing", ["exact", "real"])
+TIMINGS = pytest.mark.parametrize("timing", ["exact", pytest.param("real", marks=pytest.mark.slow)])
 
 
 @TIMINGS
@@ -219,6 +219,7 @@ def test_there_are_enough_of_them() -> None:
     assert set(EXPECTED) <= set(MISDEEDS)
 
 
+@pytest.mark.slow
 @TIMINGS
 @pytest.mark.parametrize("seed", range(12))
 def test_all_of_them_by_chance(seed: int, timing: str) -> None:

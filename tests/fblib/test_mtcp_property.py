@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mtcp_rig import SERVER, Rig
@@ -67,7 +68,7 @@ def works_by_itself(rig: Rig) -> None:
 
 
 @given(TIMINGS, SEEDS, st.integers(1, 40), st.integers(0, 30_000_000))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_any_cut_of_the_stream(timing: str, seed: int, segment_bytes: int, gap_ns: int) -> None:
     rig = prepared(timing, seed)
     rig.network.faults.append(Fault(segment_bytes=segment_bytes, random_cut=True, gap_ns=gap_ns))
@@ -80,6 +81,7 @@ def test_any_cut_of_the_stream(timing: str, seed: int, segment_bytes: int, gap_n
 ENDS = st.sampled_from([[], [], [Fin()], [Leave()], [Reset()]])
 
 
+@pytest.mark.slow
 @given(TIMINGS, SEEDS, st.lists(st.tuples(st.binary(max_size=20), st.integers(0, 20), ENDS), min_size=1, max_size=6))
 @settings(max_examples=60, deadline=None)
 def test_a_server_that_says_anything(timing: str, seed: int, says: list[tuple[bytes, int, list[Action]]]) -> None:
@@ -111,6 +113,7 @@ PINS = [*(f"{name}_EN" for name in READS), *(f"{name}_Cmd" for name in READS), "
 CHANGES = st.lists(st.tuples(st.integers(0, 12), st.sampled_from(PINS)), min_size=3, max_size=40)
 
 
+@pytest.mark.slow
 @given(TIMINGS, SEEDS, st.booleans(), CHANGES)
 @settings(max_examples=100, deadline=None)
 def test_any_play_on_the_pins(timing: str, seed: int, wired: bool, changes: list[tuple[int, str]]) -> None:
@@ -128,6 +131,7 @@ def test_any_play_on_the_pins(timing: str, seed: int, wired: bool, changes: list
 EVENTS = st.lists(st.tuples(st.integers(1, 60), st.sampled_from(["gone", "back", "cut", "reset"])), max_size=10)
 
 
+@pytest.mark.slow
 @given(TIMINGS, SEEDS, EVENTS)
 @settings(max_examples=60, deadline=None)
 def test_a_network_that_fails_at_any_scan(timing: str, seed: int, events: list[tuple[int, str]]) -> None:
@@ -152,6 +156,7 @@ def test_a_network_that_fails_at_any_scan(timing: str, seed: int, events: list[t
     works_by_itself(rig)
 
 
+@pytest.mark.slow
 @given(TIMINGS, SEEDS, st.integers(0, 60), st.sampled_from(["mode", "unit", "power", "force-close"]))
 @settings(max_examples=60, deadline=None)
 def test_a_restart_of_anything_at_any_scan(timing: str, seed: int, after: int, what: str) -> None:
