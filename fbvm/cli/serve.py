@@ -44,7 +44,7 @@ SERVED = {"CIO": 5801, "D": 32768}
 @click.option("--read-only", is_flag=True, help="Refuse everything that writes.")
 @click.option("--fn0f", is_flag=True, help="Serve 0F, write multiple coils, too.")
 @click.option("--full-dm", is_flag=True, help="Let 10, write multiple registers, begin anywhere in D.")
-@click.option("--idle", "idle_ns", type=time_ns, metavar="TIME", help="Leave a client that is silent for so long (60s).")
+@click.option("--idle", "idle_ns", type=time_ns, metavar="TIME", help="Leave a client that is silent so long (60s).")
 @click.option("--image", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Memory: loaded at the start if the file is there, saved at the end and on SIGUSR1.")
 @click.option("--log", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path), metavar="FILE",

@@ -42,8 +42,10 @@ def test_a_request_and_its_reply() -> None:
     told.data(False, adu(modbus.read(3, 1000, 2)))
     assert told.rows() == [], "until it is answered"
     told.data(True, adu(b"\3\4\0\1\0\2"))
-    assert told.rows() == [{"time": 1_700_000_000.5, "peer": "127.0.0.1:50001", "function": 3, "address": 1000, "count": 2,
-                            "result": 0, "scan": 7}]  # fmt: skip
+    assert told.rows() == [
+        {"time": 1_700_000_000.5, "peer": "127.0.0.1:50001", "function": 3, "address": 1000, "count": 2, "result": 0,
+         "scan": 7},
+    ]  # fmt: skip
 
 
 def test_writes_exceptions_and_functions_without_address() -> None:
