@@ -135,7 +135,7 @@ class ExpressionLayout:
         return Phrase(of.start, of.doc, self.leaf(token, "." + token.text[1:].lstrip().upper()))
 
     def index(self, of: Phrase, opener: Token, subscripts: list[Phrase], closer: Token) -> Phrase:
-        return Phrase(of.start, of.doc, self.leaf(opener), self.listed(subscripts), self.closer(closer))
+        return Phrase(of.start, of.doc, self.closer(opener), self.listed(subscripts), self.closer(closer))
 
     def deref(self, of: Phrase, caret: Token) -> Phrase:
         return Phrase(of.start, of.doc, self.leaf(caret))

@@ -290,10 +290,10 @@ class Printer:
 def shifted(text: str, by: int) -> list[str]:
     """The lines of a text; from the second on `by` columns further right, or as far left as there is room."""
     first, *more = text.split("\n")
-    lines = [first]
+    lines = [first.rstrip()]
     for line in more:
-        bare = line.lstrip(" \t")
-        indent = len(line[:len(line) - len(bare)].expandtabs(STEP))
+        bare = line.strip()
+        indent = len(line[:len(line) - len(line.lstrip())].expandtabs(STEP))
         lines.append(" " * max(0, indent + by) + bare if bare else "")
     return lines
 

@@ -11,7 +11,7 @@ from dataclasses import fields
 from typing import Any, NamedTuple
 
 from fbvm.base.types import ELEMENTARY, GENERIC, SHORT_NAMES, fold
-from fbvm.syntax.format_scopes import Entry, Scope, declared_in, element, global_scope, members
+from fbvm.syntax.format_scopes import Scope, declared_in, element, global_scope, members
 from fbvm.syntax.tree import (
     Argument,
     ArrayInit,
@@ -84,7 +84,7 @@ class Spelling:
 
     def _visit(self, node: Node, scope: Scope) -> None:
         if isinstance(node, NameRef):
-            self.at[node.start] = self._name(node.text, scope)
+            self._name(node.start, node.text, scope)
         elif isinstance(node, NamedType):
             self._type_name(node)
         elif isinstance(node, Member):
@@ -97,32 +97,32 @@ class Spelling:
             self._program(node)
         elif isinstance(node, VarSection) and node.kind == "VAR_EXTERNAL":
             for name in (name for variable in node.variables for name in variable.names):
-                self.at[name.start] = self.globals.get(fold(name.text), Entry(name.text, None)).text
+                if entry := self.globals.get(fold(name.text)):
+                    self.at[name.start] = entry.text
         elif isinstance(node, (VarDecl, TypeDecl)) and isinstance(node.initial, (StructInit, ArrayInit)):
             self._initial(node.initial, node.spec)
 
     def _program(self, node: ProgramInstance) -> None:
         for name in (node.task, node.type_name):
-            if name and fold(name.text) in self.globals:
-                self.at[name.start] = self.globals[fold(name.text)].text
+            if name:
+                self._name(name.start, name.text, {})
         self._arguments(node.connections, self._named(node.type_name.text))
 
     # --- names ---
 
-    def _name(self, text: str, scope: Scope) -> str:
-        """The spelling of a plain name."""
+    def _name(self, start: int, text: str, scope: Scope) -> None:
+        """Note the spelling of a plain name."""
         key = fold(text)
-        entry = scope.get(key) or self.globals.get(key)
-        if entry:
-            return entry.text
-        if key in TYPE_WORDS or self.outside.standard(key):
-            return key
-        outside = self.outside.declaration(text)
-        return outside.name.text if isinstance(outside, (Pou, TypeDecl)) else text
+        if entry := scope.get(key) or self.globals.get(key):
+            self.at[start] = entry.text
+        elif key in TYPE_WORDS or self.outside.standard(key):
+            self.at[start] = key
+        elif isinstance(outside := self.outside.declaration(text), (Pou, TypeDecl)):
+            self.at[start] = outside.name.text
 
     def _type_name(self, node: NamedType) -> None:
         if "." not in node.text:
-            self.at[node.start] = self._name(node.text, {})
+            self._name(node.start, node.text, {})
 
     def _field(self, name: Name, shape: Shape) -> None:
         entry = self._members(shape).get(fold(name.text))
@@ -130,7 +130,7 @@ class Spelling:
             self.at[name.start] = entry.text
 
     def _enum_literal(self, node: EnumLiteral) -> None:
-        self.at[node.type_name.start] = self._name(node.type_name.text, {})
+        self._name(node.type_name.start, node.type_name.text, {})
         spec = self._resolved(self._named(node.type_name.text))
         names = [name.text for name, _ in spec.members] if isinstance(spec, EnumSpec) else []
         for text in names:
@@ -150,9 +150,9 @@ class Spelling:
             if isinstance(value, StructInit):
                 known = self._members(shape)
                 for name, inner in value.fields:
-                    entry = known.get(fold(name.text), Entry(name.text, None))
-                    self.at[name.start] = entry.text
-                    todo.append((inner, entry.shape))
+                    if entry := known.get(fold(name.text)):
+                        self.at[name.start] = entry.text
+                    todo.append((inner, entry.shape if entry else None))
             elif isinstance(value, ArrayInit):
                 todo += [(inner, element(self._resolved(shape))) for _, inner in value.items]
 

@@ -1,0 +1,158 @@
+"""Formatting keeps the meaning and every comment, formats its own text to the same, and does not ask how a text was spaced."""
+
+from __future__ import annotations
+
+import random
+import re
+from dataclasses import fields
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from fbvm.base.diagnostics import Source, errors
+from fbvm.syntax.format import REFUSED, formatted
+from fbvm.syntax.format_comments import Comments
+from fbvm.syntax.format_names import Spelling
+from fbvm.syntax.lexer import Lexer, Token, lexis
+from fbvm.syntax.parser import parse
+from fbvm.syntax.tree import Literal, Node
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+FOLDERS = ("tests/lang", "tests/golden", "tests/bench", "tests/conformance", "fblib", "examples")
+PROGRAMS = re.compile(r"(?m)^(?=// ----)")
+"""Where a file of several programs is to be cut, so that an error in one does not hide the others."""
+PLACES = {"start", "end", "op_start"}
+
+
+def programs(path: Path) -> list[str]:
+    """The texts of a file that can be formatted."""
+    pieces = PROGRAMS.split(path.read_text(encoding="utf-8"))
+    return [piece for piece in pieces if piece.strip() and not syntax_errors(piece)]
+
+
+def syntax_errors(text: str) -> list[str]:
+    return [d.render() for d in errors(parse(Source("x.st", text))[1]) if d.code not in REFUSED]
+
+
+FILES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.st"))
+
+
+@cache
+def corpus() -> list[str]:
+    """Programs that are short enough to be changed and formatted many times."""
+    return [text for path in FILES for text in programs(path) if len(text) < 6000]
+
+
+def write(text: str) -> str:
+    written, wrong = formatted(Source("x.st", text))
+    assert not wrong
+    return written
+
+
+def tokens(text: str) -> list[Token]:
+    return list(Lexer(text, lambda *message: None).tokens())
+
+
+def comments(text: str) -> list[str]:
+    """All comments and pragmas in order; how far their lines are indented does not count."""
+    found = Comments(text, tokens(text))
+    places = [*((start, c) for start, cs in found.ahead.items() for c in cs),
+              *((end, c) for end, cs in found.behind.items() for c in cs)]
+    ordered = sorted(places, key=lambda item: item[0])
+    return ["\n".join(line.strip() for line in comment.text.split("\n")) for _, comment in ordered]
+
+
+def meaning(value: Any) -> Any:
+    """A tree as plain data without places, names without case, values to the letter."""
+    if isinstance(value, Literal):
+        return value.kind, repr(value.value), value.type_name
+    if isinstance(value, Node):
+        return type(value).__name__, [meaning(getattr(value, f.name)) for f in fields(value) if f.name not in PLACES]
+    if isinstance(value, tuple):
+        return [meaning(item) for item in value]
+    return " ".join(value.upper().split()) if isinstance(value, str) else value
+
+
+def check(text: str) -> str:
+    """Everything that is always true, for one text; its canonical form."""
+    written = write(text)
+    assert syntax_errors(written) == []
+    assert meaning(parse(Source("x", text))[0]) == meaning(parse(Source("x", written))[0])
+    assert comments(text) == comments(written)
+    assert write(written) == written
+    assert not re.search(r"[ \t]$", written, re.MULTILINE) and written.strip() + "\n" == written
+    return written
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_every_program_keeps_its_meaning(path: Path) -> None:
+    assert all(check(text) for text in programs(path))
+
+
+# --- changes that must not matter ---
+
+def respaced(text: str, chance: random.Random) -> str:
+    """Other spaces and line ends between tokens where no comment is, and words of the language in another case."""
+    parts: list[str] = []
+    end = 0
+    for token in tokens(text):
+        gap = text[end:token.start]
+        if not gap.strip() and gap.count("\n") < 2 and end and token.type != "$END":
+            gap = chance.choice(SPACES[not gap])
+        parts += (gap, chance.choice(CASES)(token.text) if token.type in lexis().reserved else token.text)
+        end = token.end
+    return "".join(parts)
+
+
+SPACES = ([" ", "   ", "\t", "\n", " \n    ", "\r\n\t "], ["", "", "", " ", "\n"])
+"""What may stand in place of a gap, and of none."""
+CASES = (str.upper, str.lower, str.title, str)
+WHOLE = {"REFUSED_BLOCK", "REFUSED_SECTION", "TRY"}
+"""Words that begin a text which is kept as it is."""
+
+
+def renamed(text: str, chance: random.Random) -> str:
+    """Names in another case, where something is known about them."""
+    for start, name in Spelling(parse(Source("x", text))[0]).at.items():
+        text = text[:start] + chance.choice(CASES)(name) + text[start + len(name):]
+    return text
+
+
+def commented(text: str, chance: random.Random) -> str:
+    """Comments and pragmas in any places."""
+    places = sorted({chance.choice(tokens(text)).start for _ in range(chance.randint(1, 8))}, reverse=True)
+    for number, place in enumerate(places):
+        comment = chance.choice(REMARKS).format(number)
+        text = text[:place] + comment + text[place:]
+    return text
+
+
+REMARKS = (" (* c{} *) ", " // c{}\n", "\n// c{}\n", "\n\n  // c{}\n\n", " /* c{} */ ", "\n(* c{}\n   more *)\n",
+           " {{region {}}} ", " (* c{} *) // d\n", "\n// c{}\n    // d\n")
+
+
+@settings(deadline=None)
+@given(st.sampled_from(range(len(corpus()))), st.randoms(use_true_random=False))
+def test_spaces_line_ends_and_case_of_words_do_not_matter(number: int, chance: random.Random) -> None:
+    text = corpus()[number]
+    assume(not any("\n" in comment for comment in comments(text)) and not any(t.type in WHOLE for t in tokens(text)))
+    assert write(respaced(text, chance)).replace("\r\n", "\n") == write(text)
+
+
+@settings(deadline=None)
+@given(st.sampled_from(range(len(corpus()))), st.randoms(use_true_random=False))
+def test_names_are_written_as_they_are_declared(number: int, chance: random.Random) -> None:
+    text = corpus()[number]
+    assert write(renamed(text, chance)) == write(text)
+
+
+@settings(deadline=None, max_examples=300)
+@given(st.sampled_from(range(len(corpus()))), st.randoms(use_true_random=False))
+def test_comments_may_stand_anywhere(number: int, chance: random.Random) -> None:
+    text = commented(corpus()[number], chance)
+    assume(not syntax_errors(text))
+    check(text)
