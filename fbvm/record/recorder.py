@@ -6,7 +6,7 @@ Sees what the memory holds at the end of a scan and nothing of what happened ins
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fbvm.base.types import BOOL, Elementary, EnumType, StringType, base
 from fbvm.plc import Plc
@@ -72,6 +72,12 @@ class Recording:
     def scans(self) -> range:
         """Numbers of the scans that are recorded, counted from 0 at power-on."""
         return range(self.first, self.first + len(self.times_ns))
+
+    def relabelled(self, prefix: str) -> Recording:
+        """The same with labels that do not begin with a prefix."""
+        tracks = [Track(replace(track.signal, label=track.signal.label.removeprefix(prefix)), track.changes)
+                  for track in self.tracks]  # fmt: skip
+        return Recording(tracks, self.first, self.times_ns)
 
 
 class Recorder(Recording):

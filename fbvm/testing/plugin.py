@@ -19,6 +19,7 @@ import pytest
 
 if TYPE_CHECKING:
     from fbvm.net.loop import LoopNetwork
+    from fbvm.testing.recorded import Recorded
     from fbvm.testing.rig import Rig
     from fbvm.testing.st_items import StFile
     from fbvm.testing.subject import Stub
@@ -35,6 +36,12 @@ class RigMaker(Protocol):
     def __call__(self, what: str, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
                  sources: Sequence[str] = (), text: str = "", libraries: Sequence[str] = (),
                  **given: Any) -> Rig: ...  # fmt: skip
+
+
+class Tracer(Protocol):
+    """What the fixture `trace` is."""
+
+    def __call__(self, rig: Rig, *patterns: str, depth: str = "statements") -> Recorded: ...
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -69,6 +76,24 @@ def network() -> Iterator[LoopNetwork]:
     made.close()
 
 
+@pytest.fixture
+def trace(tmp_path: Path) -> Iterator[Tracer]:
+    """Records a rig: `run = trace(pump)`, then `run.chart("Start", "Running")`, `run.table(...)`, `run.why("Running")`.
+
+    `trace(pump, "Delay.*", depth="scans")` keeps less; `run.path` is the file, for `fbvm chart` and `fbvm why`."""
+    from fbvm.testing.recorded import Recorded
+
+    made: list[Recorded] = []
+
+    def record(rig: Rig, *patterns: str, depth: str = "statements") -> Recorded:
+        made.append(Recorded(rig, tmp_path / f"run{len(made)}.fbtrace", patterns, depth))
+        return made[-1]
+
+    yield record
+    for recorded in made:
+        recorded.close()
+
+
 def _rigs(node: pytest.Item) -> list[Rig]:
     return node.stash.setdefault(RIGS, [])
 
@@ -77,37 +102,23 @@ def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
     rigs = _rigs(request.node)
     folders = [request.path.parent, request.config.rootpath]
 
-    def make(what: str, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
-             sources: Sequence[str] = (), text: str = "", libraries: Sequence[str] = (), **given: Any) -> Rig:  # fmt: skip
+    def make(what: str, cycle: str | int = "10ms", *, libraries: Sequence[str] = (), **given: Any) -> Rig:
         from fbvm.testing.rig import Rig
-        from fbvm.testing.subject import subject
 
         __tracebackhide__ = True
-        file, mark, name = what.partition("::")
-        if not mark and block and not file.lower().endswith(".st"):
-            file, name = "", what
-        files = [_file(path, folders) for path in (*([file] if file else []), *sources)]
-        shelves = [_file(path, folders) for path in libraries] + library_folders(request.config, files)
-        rig = Rig(subject(files, name if name or block else None, shelves, stubs, text), cycle, stubs=stubs, **given)
+        own = [folder / path for path in libraries for folder in folders if (folder / path).is_dir()]
+        shelves = [*own, *library_folders(request.config)]
+        rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, **given)
         rigs.append(rig)
         return rig
 
     return make
 
 
-def _file(path: str, folders: Sequence[Path]) -> Path:
-    for folder in folders:
-        if (folder / path).exists():
-            return folder / path
-    raise FileNotFoundError(f"{path} is neither in {' nor in '.join(str(folder) for folder in folders)}")
-
-
-def library_folders(config: pytest.Config, files: Sequence[Path]) -> list[Path]:
-    """Folders in which blocks are found by the names of their files: those of pytest's ini, `src`, those of the files."""
-    root = config.rootpath
-    near = [file.parent for file in files if file.parent != root]
-    chosen = [*config.getini("fbvm_libraries"), *([root / SOURCE_FOLDER] if (root / SOURCE_FOLDER).is_dir() else []), *near]
-    return list(dict.fromkeys(chosen))
+def library_folders(config: pytest.Config) -> list[Path]:
+    """Folders in which blocks are found by the names of their files: those of pytest's ini, and `src`."""
+    source = config.rootpath / SOURCE_FOLDER
+    return list(dict.fromkeys([*config.getini("fbvm_libraries"), *([source] if source.is_dir() else [])]))
 
 
 # --- failures ---------------------------------------------------------------------------------------------------------

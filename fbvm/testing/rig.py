@@ -9,6 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -21,7 +22,7 @@ from fbvm.record.history import History
 from fbvm.record.recorder import Recorder
 from fbvm.testing.reads import Reads
 from fbvm.testing.report import Report
-from fbvm.testing.subject import Stub, Subject
+from fbvm.testing.subject import Stub, Subject, subject
 from fbvm.testing.values import Values, value_of, write
 from fbvm.units.etn21 import Etn21
 from fbvm.units.unit import Unit
@@ -86,25 +87,41 @@ class Rig:
     _timed: list[tuple[int, str, object]]
     _report: Report
 
-    def __init__(self, subject: Subject, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
+    def __init__(self, what: Subject, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
                  units: Sequence[Unit] = (), etn21: str = "", network: LoopNetwork | None = None) -> None:  # fmt: skip
         set_ = object.__setattr__
-        plc = Plc(subject.image, to_ns(cycle))
+        plc = Plc(what.image, to_ns(cycle))
         set_(self, "plc", plc)
-        set_(self, "subject", subject)
+        set_(self, "subject", what)
         set_(self, "_history", History(plc))
         set_(self, "_reads", Reads())
         set_(self, "_timed", [])
         set_(self, "network", network or LoopNetwork())
-        set_(self, "_report", Report(plc, subject, self._history, self._reads))
+        set_(self, "_report", Report(plc, what, self._history, self._reads))
         for name, stub in (stubs or {}).items():
             if callable(stub):
                 self._stub(name, stub)
         for unit in (*units, *([Etn21(0, etn21)] if etn21 else ())):
             plc.attach(unit, self.network)
-        for name in self._report.names_in(subject.prefix):
+        for name in self._report.names_in(what.prefix):
             if callable(method := getattr(type(self), name, None)):
                 set_(self, name, Ambiguous(method.__get__(self), name))
+
+    @classmethod
+    def of(cls, what: str, cycle: str | int = "10ms", *, block: bool = True, folders: Sequence[Path] = (),
+           libraries: Sequence[Path] = (), sources: Sequence[str] = (), text: str = "",
+           stubs: Mapping[str, Stub] | None = None, **given: Any) -> Rig:  # fmt: skip
+        """A rig by text: `"src/pump.st::Pump"`, `"src/pump.st"`, or `"TON"` from a library.
+
+        Files are looked for in `folders`, or where Python runs; without `block` it is the whole program of the file."""
+        __tracebackhide__ = True
+        file, mark, name = what.partition("::")
+        if not mark and block and not file.lower().endswith(".st"):
+            file, name = "", what
+        files = [_file(path, folders or [Path.cwd()]) for path in (*([file] if file else []), *sources)]
+        near = [path.parent for path in files if path.parent not in (*libraries, Path.cwd(), *folders[1:])]
+        made = subject(files, name if name or block else None, [*libraries, *dict.fromkeys(near)], stubs, text)
+        return cls(made, cycle, stubs=stubs, **given)
 
     def _stub(self, name: str, stub: Callable[[Any], None]) -> None:
         numbers = [number for number, body in enumerate(self.plc.image.bodies) if fold(body.name) == fold(name)]
@@ -288,8 +305,7 @@ class Rig:
             self.run(scans=scans)
         finally:
             recorder.stop()
-        prefix = self.subject.prefix
-        return Chart(draw(recorder).replace(prefix, "") if prefix else draw(recorder))
+        return draw(recorder.relabelled(self.subject.prefix))
 
     def table(self, *signals: str, scans: int = 10) -> str:
         """The scan table of the last scans: what changed these variables, statement by statement."""
@@ -306,6 +322,13 @@ class Rig:
 
         `lines` are a file and the lines in it that asked; without, all that was asked for since the last scan."""
         return self._report.text(lines)
+
+
+def _file(path: str, folders: Sequence[Path]) -> Path:
+    for folder in folders:
+        if (folder / path).exists():
+            return folder / path
+    raise FileNotFoundError(f"{path} is neither in {' nor in '.join(str(folder) for folder in folders)}")
 
 
 def to_ns(time: str | int) -> int:

@@ -67,7 +67,8 @@ class StItem(pytest.Item):
         self.subject: Subject | None = None
 
     def runtest(self) -> None:
-        shelves = [LIBRARY, *library_folders(self.config, [self.path])]
+        near = [self.path.parent] if self.path.parent != self.config.rootpath else []
+        shelves = [LIBRARY, *library_folders(self.config), *near]
         made = self.subject = subject([self.path], self.name, shelves)
         plc = Plc(made.image, CYCLE_NS)
         watch = Assertions(plc, made.prefix)

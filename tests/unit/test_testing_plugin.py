@@ -179,6 +179,32 @@ def test_libraries_of_the_project(project: pytest.Pytester) -> None:
     run(project).assert_outcomes(passed=2)
 
 
+def test_a_trace_of_a_rig(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        def test_it(fb, trace):
+            pump = fb("src/pump.st")
+            run = trace(pump)
+            pump.at("30ms", Start=True).run("120ms")
+            assert run.chart("Start", "Running", "D5") == '''
+                Start    ...#########
+                Running  ........####
+                D5       0
+            '''
+            assert run.why("Running").startswith("Running = TRUE since scan 8 (80ms), by src/pump.st:14")
+            assert "if Delay.IN = TRUE since scan 3" in run.why("Running")
+            assert "FALSE since power-on" in run.why("Running", scan=7)
+            assert "pump.st:14           >TRUE" in run.table("Start", "Running")
+            assert run.path.stat().st_size > 100
+
+        def test_less(fb, trace):
+            pump = fb("src/pump.st")
+            run = trace(pump, "Running", depth="scans")
+            pump.run("100ms", Start=True)
+            assert run.chart() == "Running  .....#####"
+    """)
+    run(project).assert_outcomes(passed=2)
+
+
 def test_with_xdist(project: pytest.Pytester) -> None:
     pytest.importorskip("xdist")
     project.makepyfile("""

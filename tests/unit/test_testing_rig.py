@@ -138,6 +138,14 @@ def test_at_writes_later() -> None:
     """
 
 
+def test_a_chart_of_the_block_and_of_addresses() -> None:
+    assert rig().write(Start=True).chart("Start", "D200", "Running", scans=7) == """
+        Start    #######
+        D200     0
+        Running  .....##
+    """
+
+
 def test_run_takes_a_time_or_scans() -> None:
     pump = rig(cycle="4ms").run("1s")
     assert (pump.elapsed_ns, pump.scans) == (ns("1s"), 250)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
@@ -134,3 +136,13 @@ def test_why_wants_one_trace_and_one_place(fbvm: Fbvm) -> None:
     assert "there are b.fbtrace, run.fbtrace" in fbvm("why", "D200").output
     assert "name one place" in fbvm("why", "D200..D201", "b.fbtrace").output
     assert "scan 99 is not in the trace" in fbvm("why", "D200", "b.fbtrace", "--scan", "99").output
+
+
+def test_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```(\w+)\n(.*?)^```", readme, re.M | re.S)
+    monkeypatch.chdir(tmp_path)
+    Path("pump.st").write_text(next(text for kind, text in blocks if kind == "iecst"), encoding="utf-8")
+    shown = next(text for kind, text in blocks if kind == "console" and "fbvm why" in text)
+    for command, said in re.findall(r"^\$ fbvm (.*)\n((?:(?!\$ ).*\n)*)", shown, re.M):
+        assert CliRunner().invoke(main, shlex.split(command)).output == said, command

@@ -1,0 +1,66 @@
+"""A rig's run as a trace in a file: charts, scan tables and causes by the names of the test."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from fbvm.record.chart import Chart, draw
+from fbvm.record.recorder import Recording
+from fbvm.record.table import ScanTable
+from fbvm.record.trace import Trace
+from fbvm.record.trace_signals import recording
+from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
+from fbvm.record.why import told, why
+from fbvm.testing.rig import Rig
+from fbvm.watch.paths import Place
+
+
+class Recorded:
+    """Records a rig into `path` from its next scan.  Names are those of the rig; patterns choose what is kept."""
+
+    def __init__(self, rig: Rig, path: Path, patterns: tuple[str, ...] = (), depth: str = "statements") -> None:
+        self.path = path
+        self._rig = rig
+        self._file = path.open("wb")
+        texts = {name: source.text for name, source in rig.subject.sources.items()}
+        chosen = [pattern if "*" in pattern else rig.find(pattern).name for pattern in patterns]
+        self._writer = TraceWriter(rig.plc, self._file, Depth(depth), chosen, source_lines(rig.plc.image, texts))
+
+    def close(self) -> None:
+        """Ends the recording."""
+        if not self._file.closed:
+            self._writer.close()
+            self._file.close()
+
+    def open(self) -> Trace:
+        """The trace so far, to be read; the reader closes it."""
+        if not self._file.closed:
+            self._writer.flush()
+        return Trace.open(self.path)
+
+    def chart(self, *names: str) -> Chart:
+        """The time chart; without names, of what changed."""
+        with self.open() as trace:
+            return draw(self._recording(trace, names))
+
+    def table(self, *names: str, scans: range | None = None) -> str:
+        """The scan table of some variables."""
+        with self.open() as trace:
+            signals = [track.signal for track in self._recording(trace, names).tracks]
+            table = ScanTable(trace.sites, trace.names, signals)
+            trace.follow(table, scans)
+        return table.draw(band for band in table.bands if band.moved)
+
+    def why(self, name: str, scan: int | None = None) -> str:
+        """Why a variable has its value at the end of a scan, or of the last one."""
+        place = self._rig.find(name)
+        if not isinstance(place, Place):
+            raise ValueError(f"{name} is a range; name one place")
+        with self.open() as trace:
+            text = told(trace, why(trace, place, trace.scans[-1] if scan is None else scan))
+        return text.replace(self._rig.subject.prefix, "") if self._rig.subject.prefix else text
+
+    def _recording(self, trace: Trace, names: Sequence[str]) -> Recording:
+        made = recording(trace, [self._rig.find(name).name for name in names])
+        return made.relabelled(self._rig.subject.prefix)
