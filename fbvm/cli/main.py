@@ -7,10 +7,12 @@ used, 130 ended by Ctrl-C.
 from __future__ import annotations
 
 import importlib
+import sys
 
 import click
 
 import fbvm
+from fbvm.cli import status
 
 VERBS = {
     "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
@@ -32,6 +34,14 @@ VERBS = {
 
 class _Verbs(click.Group):
     """Loads the module of a verb when it is called, so that `fbvm check` starts quickly."""
+
+    def invoke(self, ctx: click.Context) -> object:
+        """Runs the verb.  Ctrl-C ends it with its own status, whatever the verb is doing."""
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            click.echo("interrupted", err=True)
+            sys.exit(status.INTERRUPTED)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(VERBS)

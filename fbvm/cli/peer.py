@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import signal
 import sys
+from contextlib import suppress
 from typing import Any
 
 import click
@@ -20,7 +22,7 @@ LISTENING = "listening on "
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to listen on; 0.0.0.0 is all.")
 @click.option("--trace", is_flag=True, help="Print the frames that come and go.")
 def command(port: int, host: str, trace: bool) -> None:
-    """Serve Modbus TCP until Ctrl-C, for every unit id.
+    """Serve Modbus TCP until Ctrl-C or SIGTERM, for every unit id.
 
     Holding register i holds 1000 + i, input register i 2000 + i, every second coil and every third discrete input is
     ON.  Status 5 if the port cannot be used."""
@@ -30,7 +32,7 @@ def command(port: int, host: str, trace: bool) -> None:
         raise click.UsageError("pymodbus is missing: pip install 'fbvm[peer]'") from None
     try:
         asyncio.run(_serve(host, port, trace))
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, asyncio.CancelledError):
         sys.exit(status.GOOD)
     except OSError as error:
         click.echo(f"{host}:{port} cannot be used: {error}", err=True)
@@ -40,15 +42,21 @@ def command(port: int, host: str, trace: bool) -> None:
 async def _serve(host: str, port: int, trace: bool) -> None:
     from pymodbus.server import ModbusTcpServer
 
+    serving = asyncio.current_task()
+    assert serving is not None, "a coroutine runs in a task"
+    with suppress(NotImplementedError):  # where there are no signals there is no SIGTERM
+        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, serving.cancel)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
-    server = ModbusTcpServer(device(), address=(host, port), trace_packet=_trace if trace else None)
+    server: Any = ModbusTcpServer(device(), address=(host, port), trace_packet=_trace if trace else None)
     if not await server.listen():
         raise OSError("somebody else listens there, or it is not an address of this host")
-    transport: Any = server.transport
-    _, bound_port = transport.sockets[0].getsockname()[:2]
+    _, bound_port = server.transport.sockets[0].getsockname()[:2]
     click.echo(f"{LISTENING}{host}:{bound_port}")
     sys.stdout.flush()
-    await server.serving
+    try:
+        await server.serving
+    finally:
+        await server.shutdown()
 
 
 def device() -> Any:
