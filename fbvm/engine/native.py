@@ -6,15 +6,13 @@ meaning is in the table of operations."""
 from __future__ import annotations
 
 import ctypes
-import struct
-from typing import Any
 from weakref import finalize
 
-from fbvm.base.memory import STRUCTS, Memory
+from fbvm.base.memory import Memory
 from fbvm.code.image import Image
 from fbvm.engine import native_compiler
 from fbvm.engine.native_code import Code, code_of
-from fbvm.engine.native_context import FIELDS, new_context
+from fbvm.engine.native_context import Context
 from fbvm.engine.native_entries import Entry, entry, scans
 from fbvm.engine.native_writer import Unsupported
 from fbvm.engine.trap import Trap, trap
@@ -37,15 +35,15 @@ class NativeEngine:
         self.image, self.memory, self.level = image, memory, level
         self._code: Code = code_of(image)
         self._code.prepare(level)
-        self._context = new_context(self._code.context_size, memory.size)
-        self._places = [(ctypes.c_char * len(view)).from_buffer(view) for view in (memory.map, self._context)]
-        self._memory_at, self._context_at = map(ctypes.addressof, self._places)
+        self._context = Context(self._code.kept_bytes, self._code.context_bytes, memory.size)
+        self._place = (ctypes.c_char * memory.size).from_buffer(memory.map)  # which stays while this does
+        self._memory_at = ctypes.addressof(self._place)
         self._entries = [self._entry(number) for number in range(len(image.tasks))]
         self._calls = [entry.call for entry in self._entries]
 
     def _entry(self, task: int) -> Entry:
         bound = entry()
-        bound.bind(self._memory_at, self._context_at)
+        bound.bind(self._memory_at, self._context.at)
         self._code.follow(bound, task, self.level)
         finalize(self, bound.give_back)
         return bound
@@ -71,30 +69,11 @@ class NativeEngine:
         Before each time the scan's time advances by `step_ns`, nothing is due, and the budget is what it is now; after
         each time the number of scans is one more."""
         done = ctypes.c_int64()
-        point = scans()(self._code.address(task_index, self.level), self._memory_at, self._context_at, n, step_ns,
+        point = scans()(self._code.address(task_index, self.level), self._memory_at, self._context.at, n, step_ns,
                         ctypes.addressof(done))
         return done.value, self._trap(point) if point else None
 
     def _trap(self, number: int) -> Trap:
         """What the point says, with the values that the context holds."""
         code, site, shown = self._code.points[number - 1]
-        values: list[Any] = []
-        at = FIELDS["values"]
-        for kind, constant in shown:
-            if kind == "const":
-                values.append(constant)
-                continue
-            if kind == "text":
-                start, length = struct.unpack_from("<qq", self._context, at)
-                values.append(ctypes.string_at(start, length))
-                at += 16
-                continue
-            values.append(_read(self._context, at, kind))
-            at += 8
-        return trap(self.image, code, site, tuple(values))
-
-
-def _read(context: bytearray, at: int, kind: str) -> Any:
-    """One value of a trap: a float as LREAL, an integer in 64 bits with its sign or without."""
-    form = "f64" if kind[0] == "f" else "i64" if kind[0] == "i" else "u64"
-    return STRUCTS[form].unpack_from(context, at)[0]
+        return trap(self.image, code, site, tuple(self._context.values(shown)))

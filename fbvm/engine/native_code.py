@@ -23,12 +23,12 @@ QUICK, FAST = 0, 2
 class Code:
     """The code of one image at each level that somebody wanted.
 
-    `points` and `context_size` are known once there is code."""
+    `points` and the sizes of the context are known once there is code."""
 
     def __init__(self, image: Image) -> None:
         self.image = image
         self.points: tuple[Point, ...] = ()
-        self.context_size = 0
+        self.kept_bytes, self.context_bytes = 0, 0
         self._tasks = [f"task{number}" for number in range(len(image.tasks))]
         self._linked: dict[int, Linked] = {}
         self._waiting = False
@@ -100,7 +100,8 @@ class Code:
 
     def _facts(self) -> dict[str, object]:
         made = self.translation
-        return {"points": made.points, "context": made.context_size, "parts": parts_of(made.routines)}
+        return {"points": made.points, "context": [made.kept_bytes, made.context_bytes],
+                "parts": parts_of(made.routines)}
 
     def _load(self, level: int, stored: Stored) -> None:
         facts = stored.facts
@@ -108,7 +109,7 @@ class Code:
         if not self.points:
             self.points = tuple((code, site, tuple((kind, value) for kind, value in shown))
                                 for code, site, shown in facts["points"])
-            self.context_size = facts["context"]
+            self.kept_bytes, self.context_bytes = facts["context"]
         self._linked[level] = linked
 
     def level_of(self, level: int | None) -> int:

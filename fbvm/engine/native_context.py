@@ -1,13 +1,17 @@
 """The context: the bytes beside a PLC's memory in which native code keeps what is no part of its state.
 
-It holds the size of the memory, the values of a trap and scratch bytes for texts; nothing in it is kept between scans."""
+From where code looks at it, its fields come first and then scratch bytes for the texts of one statement; in front of them
+lie the texts of temporaries.  Nothing in it is kept between scans."""
 
 from __future__ import annotations
 
+import ctypes
 import struct
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from fbvm.base.arithmetic import NAN
+from fbvm.base.memory import STRUCTS
 
 FIELDS = {"size": 0, "values": 8, "result": 32, "f32": 40, "f64": 48}
 """Where its 64-bit fields lie: size of the memory, up to three values of a trap, a second result of a routine, the
@@ -15,7 +19,7 @@ canonical NaN of each float type (out of LLVM's sight, which holds one NaN for a
 DIGITS = 64
 """Where a number's text is cleaned before it is read."""
 SCRATCH = 512
-"""Where the scratch bytes of texts begin."""
+"""Where the scratch bytes of texts begin; statements use them in turn."""
 
 Shown = tuple[str, Any]
 """How a trap tells one value: (machine type, None) or ("text", None) as found in the context, ("const", value)."""
@@ -23,10 +27,31 @@ Point = tuple[str, int, tuple[Shown, ...]]
 """A point at which a run can end: code, site, values."""
 
 
-def new_context(size_bytes: int, memory_bytes: int) -> bytearray:
-    """The context of a memory of that size."""
-    context = bytearray(size_bytes)
-    struct.pack_into("<q", context, FIELDS["size"], memory_bytes)
-    struct.pack_into("<f", context, FIELDS["f32"], NAN)
-    struct.pack_into("<d", context, FIELDS["f64"], NAN)
-    return context
+class Context:
+    """The context of one PLC: `at` is the address of its fields in the host, `read` looks at what a trap left there."""
+
+    def __init__(self, kept_bytes: int, context_bytes: int, memory_bytes: int) -> None:
+        self._content = bytearray(kept_bytes + context_bytes)
+        self._start = kept_bytes
+        self._place = (ctypes.c_char * len(self._content)).from_buffer(self._content)
+        self.at = ctypes.addressof(self._place) + kept_bytes
+        self._put("<q", "size", memory_bytes)
+        self._put("<f", "f32", NAN)
+        self._put("<d", "f64", NAN)
+
+    def _put(self, form: str, field: str, value: float) -> None:
+        struct.pack_into(form, self._content, self._start + FIELDS[field], value)
+
+    def values(self, shown: Iterable[Shown]) -> Iterator[Any]:
+        """The values of a trap: a float as LREAL, an integer of 64 bits with its sign or without, bytes of a text."""
+        at = self._start + FIELDS["values"]
+        for kind, constant in shown:
+            if kind == "const":
+                yield constant
+            elif kind == "text":
+                yield ctypes.string_at(*struct.unpack_from("<qq", self._content, at))
+                at += 16
+            else:
+                form = "f64" if kind[0] == "f" else "i64" if kind[0] == "i" else "u64"
+                yield STRUCTS[form].unpack_from(self._content, at)[0]
+                at += 8

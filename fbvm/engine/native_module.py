@@ -56,11 +56,14 @@ attributes #4 = { nounwind noinline }
 
 @dataclass(frozen=True)
 class Translation:
-    """An image as LLVM: its text, the points at which a run can end, the size of the context, what it calls."""
+    """An image as LLVM: its text, the points at which a run can end, the sizes of the context, what it calls."""
 
     text: str
     points: tuple[Point, ...]
-    context_size: int
+    kept_bytes: int
+    """Bytes of the context in front of its fields."""
+    context_bytes: int
+    """Bytes of the context from its fields on."""
     routines: tuple[str, ...]
     """Names of what it calls of the library."""
 
@@ -84,7 +87,8 @@ def translate(image: Image) -> Translation:
     routines = [declaration(name) for name in sorted(module.routines)]
     text = "\n".join([*definitions(module.constants), *bodies, *tasks, *routines, *_declarations(), ATTRIBUTES, METADATA,
                       *metadata])
-    return Translation(text, tuple(module.points), module.scratch, tuple(sorted(module.routines)))
+    return Translation(text, tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
+                       tuple(sorted(module.routines)))
 
 
 @cache

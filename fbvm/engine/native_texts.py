@@ -1,7 +1,7 @@
 """Text operations as instructions of LLVM: a text is the place of its bytes and their number.
 
-What only looks at a part of a text copies nothing; what makes a new one writes it to scratch bytes of its own in the
-context, whose size is known before because every text has a greatest length."""
+What only looks at a part of a text copies nothing; what makes a new one writes it to scratch bytes of the context, whose
+size is known before because every text has a greatest length."""
 
 from __future__ import annotations
 

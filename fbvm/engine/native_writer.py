@@ -69,7 +69,7 @@ class Unsupported(ValueError):
 
 @dataclass
 class Module:
-    """What the bodies of an image share: points, constants, routines that are called, scratch bytes handed out."""
+    """What the bodies of an image share: points, constants, routines that are called, bytes of the context."""
 
     image: Image
     bases: Mapping[int, int]
@@ -78,7 +78,8 @@ class Module:
     points: list[Point]
     constants: dict[bytes, str]
     routines: set[str]
-    scratch: int = SCRATCH
+    kept_bytes: int = 0
+    scratch_end: int = SCRATCH
 
     def point(self, code: str, site: int, shown: tuple[Shown, ...]) -> int:
         """The number of a point at which a run can end; 0 is none."""
@@ -90,10 +91,9 @@ class Module:
         return self.constants.setdefault(value, f"@k{len(self.constants)}")
 
     def room(self, size: int) -> int:
-        """Scratch bytes that nothing else uses: where in the context they lie."""
-        at = self.scratch
-        self.scratch += max(size, 1)
-        return at
+        """Bytes of the context that nothing else uses: where they begin, seen from its fields."""
+        self.kept_bytes += size
+        return -self.kept_bytes
 
 
 class Writer:
@@ -117,6 +117,7 @@ class Writer:
         """Labels of tail and end of the loops around, the innermost last."""
         self.temporaries: dict[str, str] = {}
         self.capacities: dict[int, tuple[int, int]] | None = None
+        self.next_scratch = SCRATCH
         self.uses_instance = False
         self._names = 0
 
@@ -155,6 +156,7 @@ class Writer:
         for node in block:
             if self.dead:
                 return
+            self.next_scratch = SCRATCH
             self.statements[node[0]](self, *node[1:])
 
     @contextmanager
@@ -201,8 +203,11 @@ class Writer:
         return self.new(f"getelementptr inbounds i8, ptr %c, i64 {FIELDS[name]}")
 
     def scratch(self, size: int) -> str:
-        """Address of scratch bytes of this place in the code."""
-        return self.new(f"getelementptr inbounds i8, ptr %c, i64 {self.module.room(size)}")
+        """Address of bytes of the context that are used until the statement ends."""
+        at = self.next_scratch
+        self.next_scratch += size
+        self.module.scratch_end = max(self.module.scratch_end, self.next_scratch)
+        return self.new(f"getelementptr inbounds i8, ptr %c, i64 {at}")
 
     def integer(self, pointer: str) -> str:
         return self.new(f"ptrtoint ptr {pointer} to i64")
