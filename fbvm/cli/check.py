@@ -9,6 +9,7 @@ import click
 
 from fbvm.base.diagnostics import errors
 from fbvm.cli import status
+from fbvm.cli.patience import patience
 from fbvm.cli.sources import report, source_arguments
 from fbvm.code.compiler import compile_files
 
@@ -20,7 +21,8 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     """Say what is wrong with the files; silent, and status 0, when nothing is.
 
     Status 3 if there is an error; warnings are shown and leave the status 0."""
-    compilation = compile_files(files, program=program, libraries=libraries)
+    with patience(f"checking {', '.join(path.name for path in files)}"):
+        compilation = compile_files(files, program=program, libraries=libraries)
     if compilation.diagnostics or as_json:
         report(compilation, as_json)
     if errors(compilation.diagnostics):

@@ -55,7 +55,10 @@ def opened(path: Path) -> Iterator[tuple[Header, Iterator[Entry]]]:
 
 def _text(lines: Iterable[str]) -> Iterator[str]:
     try:
-        yield from lines
+        for number, line in enumerate(lines):
+            if number == 0 and not line.startswith("{"):
+                raise JournalError("this is no journal of fbvm; `fbvm run --journal FILE` writes one")
+            yield line
     except UnicodeDecodeError:
         raise JournalError("this is no text, so no journal") from None
 

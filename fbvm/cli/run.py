@@ -161,7 +161,7 @@ def build_network(net: str, mappings: tuple[Mapping, ...], seed: int = 0) -> Loo
     try:
         return TcpNetwork({row.said: (row.host or "", row.port) for row in mappings})
     except OSError as error:
-        click.echo(f"the network cannot be used: {error}", err=True)
+        click.echo(f"the network cannot be used: {error.strerror or error}", err=True)
         sys.exit(status.NETWORK)
 
 

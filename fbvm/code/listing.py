@@ -39,7 +39,8 @@ def _layout(image: Image) -> Iterator[str]:
 
 def _tasks(image: Image) -> Iterator[str]:
     for task in image.tasks:
-        yield f"task      {task.name or '(no name)'}: priority {task.priority}, {_when(task)}"
+        priority = f"priority {task.priority}, " if task.name else ""
+        yield f"task      {task.name or 'no task'}: {priority}{_when(task)}"
         for run in task.programs:
             yield f"{'':10}{run.name} at {run.offset}: body {run.body} {image.bodies[run.body].name}"
 
@@ -58,8 +59,7 @@ def _symbols(image: Image) -> Iterator[str]:
 def _symbol(field: Field, start: int, path: str, areas: dict[str, Area]) -> Iterator[str]:
     offset = field.offset + (0 if field.absolute else start)
     kind = ("REFERENCE TO " if field.reference else "") + str(field.type)
-    bit = f".{field.bit}" if field.bit is not None else ""
-    yield f"symbol    {_absolute(offset, areas) + bit:12} {path} : {kind}"
+    yield f"symbol    {_absolute(offset, areas, field.bit):12} {path} : {kind}"
     if isinstance(field.type, StructType) and not field.reference:
         for member in field.type.fields.values():
             yield from _symbol(member, offset, f"{path}.{member.name}", areas)
@@ -75,14 +75,16 @@ def _retained(image: Image) -> Iterator[str]:
         yield f"retained  {_absolute(row.offset, image.layout.areas):12} {row.name}, {row.size} bytes"
 
 
-def _absolute(offset: int, areas: dict[str, Area]) -> str:
-    """A place in the buffer, by its word where it lies in an area of words."""
+def _absolute(offset: int, areas: dict[str, Area], bit: int | None = None) -> str:
+    """A place in the buffer, by its word where it lies in an area of words, with its bit as the word counts them."""
     for area in areas.values():
         if area.offset <= offset < area.offset + area.size_bytes and area.unit_bits > 1:
             number, odd = divmod(offset - area.offset, area.unit_bits // 8)
+            if bit is not None:
+                return str(AreaAddress(area.name, number, 8 * odd + bit))
             word = str(AreaAddress(area.name, number, None, 8 if area.unit_bits == 8 else 0))
             return word + ("+1" if odd else "")
-    return str(offset)
+    return str(offset) + (f".{bit}" if bit is not None else "")
 
 
 def _bytes(data: bytes) -> str:

@@ -93,6 +93,8 @@ def find_place(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: st
 
 def _unknown(symbols: Mapping[str, Field], text: str, first: str, reason: str) -> str:
     """What to say about a name that is neither a symbol nor an address."""
+    if meant := _meant(text):
+        return f"there is no {text.strip()}; did you mean {meant}?"
     if not first or re.fullmatch(r"\s*(%.*|[A-Za-z]{1,3}\s*\d+(\.\d+)?|\d+(\.\d+)?|E\w\s*[_:]\s*\d+.*)", text):
         return reason
     for field in symbols.values():
@@ -100,6 +102,26 @@ def _unknown(symbols: Mapping[str, Field], text: str, first: str, reason: str) -
             return f"there is no {first}; did you mean {field.name}.{text.strip()}?"
     known = ", ".join(sorted(field.name for field in symbols.values())[:8])
     return f"there is no {first}" + (f"; known here: {known}" if known else " (the program declares nothing)")
+
+
+_OTHER_NAMES = {"EM": "E", "HR": "H", "WR": "W", "AR": "A", "TIM": "T", "CNT": "C", "DR": "D", "IR": "CIO "}
+"""How areas are called in other software and in older manuals."""
+_OTHER = re.compile(rf"\s*%?({'|'.join(_OTHER_NAMES)})\s*([0-9A-F]\s*[_:]\s*)?(\d+(?:\.\d+)?)\s*", re.I)
+_FLAG = re.compile(r"\s*%?(T|C)(?:IM|NT)?\s*(\d+)\s*\.\s*(Q|CF|DN)\s*", re.I)
+
+
+def _meant(text: str) -> str:
+    """How an address of another spelling is written here; "" for what looks like none."""
+    if match := _FLAG.fullmatch(text):
+        return ("TF" if match[1].upper() == "T" else "CNF") + match[2]
+    match = _OTHER.fullmatch(text)
+    if not match or bool(match[2]) != (match[1].upper() == "EM"):
+        return ""
+    meant = _OTHER_NAMES[match[1].upper()] + re.sub(r"\s*[_:]\s*", "_", match[2] or "").upper() + match[3]
+    try:
+        return str(parse_address(meant))
+    except AddressError:
+        return ""
 
 
 def _span(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> Span:

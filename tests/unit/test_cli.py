@@ -391,3 +391,39 @@ END_PROGRAM
 """, encoding="utf-8")
     result = fbvm("run", "block.st", "--scans", "1", "--show", "Main.h")
     assert result.stdout == "Main.h = (X := 0.2, Y := 0.1, seen := 2)\n"
+
+
+# --- what was meant -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("text", "meant"), [
+    ("T5.Q", "TF5"), ("C5.Q", "CNF5"), ("EM1_5", "E1_5"), ("EM 1:5", "E1_5"), ("HR0", "H0"), ("WR3.05", "W3.05"),
+    ("TIM5", "T5"), ("IR100.01", "CIO 100.01"),
+])
+def test_an_address_of_another_spelling_is_offered_in_the_right_one(counter: str, text: str, meant: str) -> None:
+    result = run("--scans", "1", "--show", text)
+    assert result.exit_code == 2
+    assert f"there is no {text}; did you mean {meant}" in result.stderr
+
+
+def test_list_writes_bits_and_tasks_as_everybody_does(counter: str) -> None:
+    Path("bits.st").write_text("""PROGRAM Main
+VAR Start AT CIO 0.00 : BOOL; Pump AT CIO 100.10 : BOOL; Lamp AT %QX1.3 : BOOL; END_VAR
+    Pump := Start AND Lamp;
+END_PROGRAM
+""", encoding="utf-8")
+    lines = fbvm("list", "bits.st").stdout.splitlines()
+    assert "task      no task: every cycle" in lines
+    assert "symbol    CIO 0.00     Main.Start : BOOL" in lines
+    assert "symbol    CIO 100.10   Main.Pump : BOOL" in lines
+    assert "symbol    %QX1.3       Main.Lamp : BOOL" in lines
+
+
+def test_a_host_that_is_not_known_is_named(counter: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def unknown(host: str) -> str:
+        raise OSError(2, "Name or service not known")
+
+    monkeypatch.setattr("fbvm.net.tcp.socket.gethostbyname", unknown)
+    result = run("--scans", "1", "--net", "tcp", "--map", "1.2.3.4:502=nohost:502")
+    assert (result.exit_code, result.stderr) == (
+        5, "the network cannot be used: nohost: Name or service not known\n")

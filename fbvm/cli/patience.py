@@ -1,0 +1,38 @@
+"""A word on the terminal while something takes long that tells nothing by itself; nothing where it is quick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from rich.console import Console, ConsoleOptions, RenderResult
+from rich.live import Live
+from rich.spinner import Spinner
+
+QUICK_S = 2.0
+"""What ends sooner needs no word."""
+PER_SECOND = 8
+
+
+class _Late:
+    """Renders as nothing first, later as a spinner and a text."""
+
+    def __init__(self, console: Console, text: str) -> None:
+        self._console = console
+        self._spinner = Spinner("line", text)
+        self._began_s = console.get_time()
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        if self._console.get_time() - self._began_s >= QUICK_S:
+            yield self._spinner
+
+
+@contextmanager
+def patience(text: str, console: Console | None = None) -> Iterator[None]:
+    """Shows `text` on stderr from two seconds on until the block is over.  Nothing in a pipe."""
+    console = console or Console(stderr=True)
+    if not console.is_terminal:
+        yield
+        return
+    with Live(_Late(console, text), console=console, transient=True, refresh_per_second=PER_SECOND):
+        yield
