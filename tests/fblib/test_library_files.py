@@ -12,8 +12,9 @@ from mtcp_rig import SERVER
 from fbvm.base.data import data_folder
 from fbvm.code.compiler import compile_text
 from fbvm.net.loop import LoopNetwork
-from fbvm.net.peers import ModbusPeer
+from fbvm.net.peers import Leave, ModbusPeer, Say
 from fbvm.plc import Plc
+from fbvm.record.chart import chart
 from fbvm.units.etn21 import Etn21
 
 FBLIB = data_folder("fblib")
@@ -48,18 +49,29 @@ def test_no_block_gives_a_message(path: Path) -> None:
     assert made.diagnostics == []
 
 
-def test_the_program_in_the_readme() -> None:
+def test_the_program_and_the_charts_in_the_readme() -> None:
     readme = (MTCP / "README.md").read_text(encoding="utf-8")
     text = re.search(r"```\n(PROGRAM.*?)```", readme, re.S)
+    first, lost = re.findall(r"```\n(CIO15.*?)```", readme, re.S)
     assert text is not None
     made = compile_text(text[1])
     assert made.image is not None
-    plc, network, peer = Plc(made.image), LoopNetwork(), ModbusPeer()
+    plc, network = Plc(made.image), LoopNetwork()
+    peer = ModbusPeer(reply=lambda frame: [Say(frame), Leave(200_000_000)])
     peer.server.holding_registers[1000] = 4711
     network.place(SERVER, peer)
-    plc.attach(Etn21(0, "192.168.250.1"), network)
-    plc.run(scans=10)
-    assert plc.read("D200") == 4711
+    unit = Etn21(0, "192.168.250.1")
+    plc.attach(unit, network)
+    assert chart(plc, 10, signals(first, unit)) == first
+    plc.run(until="D30009 = 5", max_ns=10**9)
+    assert chart(plc, 8, signals(lost, unit)) == lost
+
+
+def signals(drawn: str, unit: Etn21) -> list[tuple[str, str]]:
+    """The signals of a chart, as the unit describes them."""
+    names = [line.split()[0] for line in drawn.splitlines()]
+    shown = [re.sub(r"^CIO", "CIO ", name) for name in names]
+    return [(name, unit.descriptions.get(name, "")) for name in shown]
 
 
 def test_the_time_limits_may_be_set_by_a_declaration() -> None:
