@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 
-WORDS = {"region", "endregion", "warning", "info", "text"}
-"""First words of pragmas for the reader or for messages of a compiler that we are not."""
+WORDS = {"region", "endregion", "warning", "info", "text", "elsif", "else", "end_if"}
+"""First words of pragmas for the reader or for messages of a compiler that we are not, and of those that go on with an
+IF, which was warned of."""
 
 ATTRIBUTES = {
     "qualified_only", "strict", "hide", "hide_all_locals", "conditionalshow", "conditionalshow_all_locals", "displaymode",

@@ -8,11 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from fbvm.syntax.automaton import Automaton
-from fbvm.syntax.frames import STATEMENT_WORDS, anchor, frames
+from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, frames
 from fbvm.syntax.lexer import Token, lexis, meant
 from fbvm.syntax.phrases import found
 from fbvm.syntax.prospect import advance, symbols
 from fbvm.syntax.tree import Empty
+
+ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
+POU_ENDS = {ENDS[word] for word in POUS}
 
 
 @dataclass(frozen=True)
@@ -136,6 +139,65 @@ def _parameters_in_head(automaton: Automaton, token: Token, following: list[Toke
                 f"`(` behind the name `{head.text}` of a POU", "parameters are declared in VAR_INPUT .. END_VAR", cut=True)
 
 
+def _nameless(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`PROGRAM VAR ..`, `FUNCTION : INT`"""
+    word = automaton.before
+    if word.type not in POUS or automaton.values[-1:] == [] or advance(automaton.states, "NAME") is None:
+        return None
+    if token.type not in ("COLON", "VAR", "VAR_GLOBAL", *STATEMENT_WORDS):
+        return None
+    kind = word.text.upper()
+    return Mend([Token("NAME", "?", word.end, word.end), token], word.start, word.end, f"the {kind} has no name",
+                f"write it behind {kind}")
+
+
+def _access_in_front(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`PUBLIC METHOD Stop ..`"""
+    access, word = automaton.before, token.text.upper()
+    if word not in ("METHOD", "PROPERTY", "ACTION") or access.text.upper() not in ACCESS or len(following) < 2:
+        return None
+    return Mend([Token("REFUSED_BLOCK", token.text, token.start, token.end)], access.start, access.end,
+                f"{found(access)} stands in front of {word}", f"write {word} {access.text.upper()} {following[1].text}", cut=True)
+
+
+def _no_instance(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`(IN := a, PT := b);`"""
+    opener = open_bracket(automaton, "LPAR")
+    if token.type not in ("ASSIGN", "OUTPUT") or opener is None or automaton.before.type != "NAME":
+        return None
+    at = automaton.values.index(opener)
+    if anchor(automaton.states, at + 2) != Anchor(at + 1, "ended_list") or len(automaton.values) != at + 2:
+        return None
+    depth = 1
+    while depth and token.type not in ("SEMICOLON", "$END"):
+        token = automaton.next()
+        depth += {"LPAR": 1, "RPAR": -1}.get(token.type, 0)
+    return Mend([] if not depth else [token], opener.start, opener.end, "the name of an instance is missing in front of `(`",
+                "write the name of the instance that is called", cut=True)
+
+
+def _other_end(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`PROGRAM Main .. END_FUNCTION`"""
+    open_ = frames(automaton.states, automaton.values)
+    if token.type not in POU_ENDS or not open_ or open_[0].word.type not in POUS or len(following) < 2:
+        return None
+    word = open_[0].word
+    if following[1].type not in UNITS or any(frame.word.type in OPENERS[token.type] for frame in open_):
+        return None
+    end = ENDS[word.type]
+    return Mend([Token(end, end, token.start, token.end)], token.start, token.end,
+                f"{end} expected, but {found(token)} found", f"a {word.text.upper()} ends with {end}", word)
+
+
+def _location_behind_type(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`x : INT AT D5;`"""
+    if token.type != "AT" or anchor(automaton.states).symbol != "var_decls" or len(following) < 2:
+        return None
+    location = automaton.next()
+    return Mend([], token.start, location.end, "AT stands behind the type",
+                f"write it in front of the colon: x AT {location.text} : ...")
+
+
 SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
-    _misspelt, _statement_word, _reserved_name, _end_of_section, _semicolon_behind_section, _colon_behind_else,
-    _semicolon_in_call, _parameters_in_head)
+    _misspelt, _statement_word, _nameless, _reserved_name, _end_of_section, _semicolon_behind_section, _colon_behind_else,
+    _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end, _location_behind_type)
