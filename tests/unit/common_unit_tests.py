@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from array import array
 from collections.abc import Iterator, Sequence
 
@@ -123,6 +124,15 @@ class CommonUnitTests:
         unit = self.new_unit()
         assert unit.name
         assert len(unit.address.split(".")) == 4
+
+    def test_says_how_it_was_made_and_set(self) -> None:
+        """As plain data, by which a journal builds the same unit again."""
+        unit = self.new_unit()
+        made, was_set = json.loads(json.dumps([unit.configuration, unit.settings]))
+        twin = type(unit)(**made)
+        twin.settings = was_set
+        assert (twin.name, twin.address) == (unit.name, unit.address)
+        assert (twin.configuration, twin.settings) == (unit.configuration, unit.settings)
 
     def test_silent_after_reset(self) -> None:
         unit, memory = self.fresh()
