@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Protocol
 
-from fbvm.engine.tiers import python_of, substitutes_of
+from fbvm.engine.tiers import python_of
 from fbvm.plc import Phase, Plc, State
 from fbvm.record.inside import Event, Inside
 
@@ -31,13 +31,21 @@ class Listener(Protocol):
 def looking(plc: Plc, listener: Listener) -> Iterator[None]:
     """Tells a listener all that happens inside the scans of `plc` meanwhile."""
     program = plc.engine
-    plc.engine = Inside(plc.image, plc.memory, partial(listener.event, plc), program)
+    tell = partial(listener.event, plc)
+    if isinstance(program, Inside):
+        tell = partial(_both, program.tell, tell)
+    plc.engine = Inside(plc.image, plc.memory, tell, program)
     plc.phases.append(listener.phase)
     try:
         yield
     finally:
         plc.phases.remove(listener.phase)
         plc.engine = program
+
+
+def _both(first: Callable[[Event], None], second: Callable[[Event], None], event: Event) -> None:
+    first(event)
+    second(event)
 
 
 class History:
@@ -48,6 +56,7 @@ class History:
         self._every = every
         self._states: deque[State] = deque(maxlen=keep)
         self._touched = True
+        self._substituted: list[int] = []
         self._played: deque[tuple[int, int, bytes]] = deque(maxlen=keep * every)
 
     def touch(self) -> None:
@@ -63,6 +72,7 @@ class History:
 
     def substitute(self, body: int, function: Callable[[int], None]) -> None:
         """Python in place of a body, which is not called again when scans are: what it did is played back."""
+        self._substituted.append(body)
         engine, memory, size = self._plc.engine, self._plc.memory, self._plc.image.bodies[body].instance_size
 
         def noted(base: int) -> None:
@@ -99,7 +109,7 @@ class History:
     def _twin(self) -> Plc:
         plc = self._plc
         twin = Plc(plc.image, plc.cycle_ns, budget=plc.budget)
-        for body in substitutes_of(plc.engine):
+        for body in self._substituted:
             python_of(twin.engine).substitute(body, self._player(twin))
         return twin
 

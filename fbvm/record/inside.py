@@ -95,7 +95,8 @@ class Inside:
         self.tell = tell
         self.program = program
         self._engine = PythonEngine(image, memory, observed=True)
-        for body, function in substitutes_of(program).items():
+        known = program._engine if isinstance(program, Inside) else program
+        for body, function in substitutes_of(known).items():
             self._engine.substitute(body, function)
         self._shadow = bytearray(memory.size)
         self._frame = OUTSIDE

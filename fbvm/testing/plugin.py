@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -19,10 +20,12 @@ import pytest
 
 if TYPE_CHECKING:
     from fbvm.net.loop import LoopNetwork
+    from fbvm.plc import Plc
+    from fbvm.testing.coverage_plugin import CoveragePlugin
     from fbvm.testing.recorded import Recorded
     from fbvm.testing.rig import Rig
     from fbvm.testing.st_items import StFile
-    from fbvm.testing.subject import Stub
+    from fbvm.testing.subject import Stub, Subject
 
 RIGS: pytest.StashKey[list[Rig]] = pytest.StashKey()
 """The rigs that a test has made."""
@@ -46,6 +49,31 @@ class Tracer(Protocol):
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addini("fbvm_libraries", "folders of libraries of function blocks", type="paths", default=[])
+    group = parser.getgroup("fbvm", "PLC programs")
+    group.addoption("--fbvm-cov", action="store_true", help="report which statements and branches of PLC code tests executed")
+    group.addoption("--fbvm-cov-html", metavar="DIR", help="write the coverage of PLC code as pages")
+    group.addoption("--fbvm-cov-xml", metavar="FILE", help="write the coverage of PLC code as Cobertura XML")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Coverage is counted if an option asks for it."""
+    if any(config.getoption(name) for name in ("fbvm_cov", "fbvm_cov_html", "fbvm_cov_xml")):
+        from fbvm.testing.coverage_plugin import NAME, CoveragePlugin
+
+        config.pluginmanager.register(CoveragePlugin(config), NAME)
+
+
+@contextmanager
+def counted(config: pytest.Config, plc: Plc, subject: Subject) -> Iterator[None]:
+    """Counts what a PLC executes meanwhile, if coverage is wanted."""
+    counting: CoveragePlugin | None = config.pluginmanager.get_plugin("fbvm_coverage")
+    if counting is None:
+        yield
+        return
+    from fbvm.record.history import looking
+
+    with looking(plc, counting.coverage.listener(subject)):
+        yield
 
 
 @pytest.fixture
@@ -110,6 +138,9 @@ def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
         shelves = [*own, *library_folders(request.config)]
         rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, **given)
         rigs.append(rig)
+        counting = ExitStack()
+        counting.enter_context(counted(request.config, rig.plc, rig.subject))
+        request.addfinalizer(counting.close)
         return rig
 
     return make

@@ -22,7 +22,7 @@ from fbvm.record.names import Names, is_single
 from fbvm.record.recorder import Signal
 from fbvm.record.table import ScanTable
 from fbvm.syntax.text import read
-from fbvm.testing.plugin import library_folders
+from fbvm.testing.plugin import counted, library_folders
 from fbvm.testing.rig import Trapped
 from fbvm.testing.subject import Subject, SubjectError, pous, subject
 from fbvm.watch.paths import Place
@@ -74,7 +74,7 @@ class StItem(pytest.Item):
         watch = Assertions(plc, made.prefix)
         history = History(plc)
         try:
-            with looking(plc, watch):
+            with counted(self.config, plc, made), looking(plc, watch):
                 _run(plc, history, f"{made.prefix}Done")
         except AssertFailed as failed:
             table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])

@@ -43,6 +43,7 @@ class Subject:
     image: Image
     prefix: str
     sources: Mapping[str, Source]
+    libraries: tuple[Path, ...] = ()
     in_outs: frozenset[str] = frozenset()
     """In-outs of a block by folded name: the test sees the variables of the program that are passed."""
 
@@ -110,7 +111,8 @@ def _compiled(sources: list[Source], program: str | None, libraries: Sequence[Pa
         raise SubjectError("\n".join(message.render() for message in made.errors))
     if not prefix and len(made.image.tasks) == 1 and len(made.image.tasks[0].programs) == 1:
         prefix = f"{made.image.tasks[0].programs[0].name}."
-    return Subject(name or prefix.rstrip(".") or "PLC", made.image, prefix, {source.name: source for source in sources})
+    return Subject(name or prefix.rstrip(".") or "PLC", made.image, prefix,
+                   {source.name: source for source in sources}, tuple(libraries))
 
 
 def _read(path: Path) -> Source:

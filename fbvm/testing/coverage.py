@@ -1,0 +1,169 @@
+"""What tests executed of a program's text: statements, and ways of IF and CASE, by file and place.
+
+Counts; how it is shown is `coverage_report`.  What fbvm brings with it is not counted unless a test names its file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from fbvm.base.data import data_folder
+from fbvm.code.image import Site
+from fbvm.plc import Phase, Plc
+from fbvm.record.branches import Fork, forks, statements
+from fbvm.record.inside import Ended, Event, Frame, Statement
+from fbvm.testing.subject import Subject
+
+Spot = tuple[int, int]
+"""Line and column."""
+PAST: Spot = (0, 0)
+"""The way past all branches."""
+
+
+@dataclass
+class FileCoverage:
+    """One file: how often each statement was executed, and for each that chooses how often each way was taken."""
+
+    statements: dict[Spot, int] = field(default_factory=dict)
+    ways: dict[Spot, dict[Spot, int]] = field(default_factory=dict)
+
+    @property
+    def lines(self) -> dict[int, int]:
+        """How often each line with statements was executed: its statement that was executed least."""
+        made: dict[int, int] = {}
+        for (line, _), count in self.statements.items():
+            made[line] = min(count, made.get(line, count))
+        return made
+
+    @property
+    def missing(self) -> list[int]:
+        """Lines of which something was not executed."""
+        return sorted(line for line, count in self.lines.items() if not count)
+
+    @property
+    def partial(self) -> dict[int, list[int]]:
+        """By line of an IF or CASE the lines to which it never went; 0 is past it."""
+        made: dict[int, list[int]] = {}
+        for (line, column), ways in self.ways.items():
+            if self.statements.get((line, column)):
+                made.setdefault(line, []).extend(way[0] for way, count in ways.items() if not count)
+        return {line: sorted(set(to)) for line, to in made.items() if to}
+
+    def rate(self) -> float:
+        """The share of statements and ways that were executed, 0 to 1; 1 of nothing."""
+        counts = [*self.statements.values(), *(count for ways in self.ways.values() for count in ways.values())]
+        return sum(count > 0 for count in counts) / len(counts) if counts else 1.0
+
+    def add(self, other: FileCoverage) -> None:
+        """Adds what somebody else counted."""
+        for spot, count in other.statements.items():
+            self.statements[spot] = self.statements.get(spot, 0) + count
+        for spot, ways in other.ways.items():
+            mine = self.ways.setdefault(spot, {})
+            for way, count in ways.items():
+                mine[way] = mine.get(way, 0) + count
+
+
+class Coverage:
+    """Coverage of all files, by absolute path."""
+
+    def __init__(self) -> None:
+        self.files: dict[str, FileCoverage] = {}
+
+    def listener(self, subject: Subject) -> Counter:
+        """Who counts one run of a subject."""
+        return Counter(self, subject)
+
+    def add(self, other: Coverage) -> None:
+        """Adds what somebody else counted."""
+        for name, coverage in other.files.items():
+            self.files.setdefault(name, FileCoverage()).add(coverage)
+
+    def to_data(self) -> dict[str, Any]:
+        """As plain lists, for another process."""
+        return {name: [[[*spot, count] for spot, count in each.statements.items()],
+                       [[*spot, *way, count] for spot, ways in each.ways.items() for way, count in ways.items()]]
+                for name, each in self.files.items()}  # fmt: skip
+
+    @classmethod
+    def from_data(cls, data: Mapping[str, Any]) -> Coverage:
+        """What `to_data` gave."""
+        made = cls()
+        for name, (rows, ways) in data.items():
+            each = made.files[name] = FileCoverage({(line, column): count for line, column, count in rows})
+            for line, column, to_line, to_column, count in ways:
+                each.ways.setdefault((line, column), {})[to_line, to_column] = count
+        return made
+
+
+class Counter:
+    """Listens to one PLC and counts."""
+
+    def __init__(self, coverage: Coverage, subject: Subject) -> None:
+        image = subject.image
+        self._statements: dict[int, tuple[FileCoverage, Spot]] = {}
+        self._forks: dict[int, tuple[FileCoverage, Spot, Fork]] = {}
+        self._sites = image.sites
+        self._open: dict[Frame, int] = {}
+        paths = {name: _path(name, subject) for name in {site.file for site in image.sites}}
+        for number in statements(image):
+            site = image.sites[number]
+            if path := paths[site.file]:
+                each = coverage.files.setdefault(path, FileCoverage())
+                self._statements[number] = each, _spot(site)
+                each.statements.setdefault(_spot(site), 0)
+        for fork in forks(image):
+            if fork.site in self._statements:
+                each, spot = self._statements[fork.site]
+                self._forks[fork.site] = each, spot, fork
+                ways = each.ways.setdefault(spot, {})
+                for way in (*(_spot(self._sites[way]) for way in fork.ways), *([PAST] if fork.past else [])):
+                    ways.setdefault(way, 0)
+
+    def phase(self, plc: Plc, phase: Phase) -> None:
+        self._open.clear()
+
+    def event(self, plc: Plc, event: Event) -> None:
+        if isinstance(event, Statement):
+            self._decide(event.frame, event.site)
+            if event.site in self._statements:
+                each, spot = self._statements[event.site]
+                each.statements[spot] += 1
+            if event.site in self._forks:
+                self._open[event.frame] = event.site
+        elif isinstance(event, Ended):
+            self._decide(event.frame, -1)
+
+    def _decide(self, frame: Frame, site: int) -> None:
+        """A statement that chose is followed by another of the same body, or by its end."""
+        chose = self._open.pop(frame, None)
+        if chose is None:
+            return
+        each, spot, fork = self._forks[chose]
+        way = _spot(self._sites[site]) if site in fork.ways else PAST
+        if way in each.ways[spot]:
+            each.ways[spot][way] += 1
+
+
+def _spot(site: Site) -> Spot:
+    return site.line, site.column
+
+
+def _path(name: str, subject: Subject) -> str:
+    """The file of a source, "" for one that is no file or came with fbvm."""
+    if name in subject.sources:
+        return str(Path(name).resolve()) if Path(name).is_file() else ""
+    if (data_folder("fblib") / name).is_file():
+        return ""
+    for shelf in subject.libraries:
+        for path in (shelf / name, shelf.parent / name):
+            if path.is_file() and shelf != LIBRARY:
+                return str(path.resolve())
+    return ""
+
+
+LIBRARY = Path(__file__).parent / "library"
+"""What tests in ST call."""
