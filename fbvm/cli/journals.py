@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -24,9 +24,10 @@ from fbvm.syntax.text import read
 
 def start_journal(
     stack: ExitStack, path: Path, files: Sequence[Path], program: str | None, libraries: Sequence[Path],
-    banks: Sequence[str],
+    banks: Sequence[str], options: Mapping[str, object],
 ) -> Journal:  # fmt: skip
-    """A journal to be written to a file; it holds the texts of the program, and ends with the stack."""
+    """A journal to be written to a file; it holds the texts of the program and the `options` of the run, and ends with
+    the stack."""
     try:
         file = stack.enter_context(path.open("w", encoding="utf-8", newline="\n"))
     except OSError as error:
@@ -35,6 +36,7 @@ def start_journal(
     journal = Journal(file, {
         "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program,
         "libraries": [str(folder) for folder in libraries], "banks": list(banks),
+        "options": dict(options),
         "sources": [[text.name, text.text] for text in texts if isinstance(text, Source)],
     })  # fmt: skip
     stack.callback(journal.close)

@@ -92,7 +92,8 @@ def command(
         network = build_network(options["net"], options["mappings"], options["seed"])
         stack.callback(network.close)
         path = options["journal"]
-        journal = start_journal(stack, path, files, program, libraries, banks) if path else None
+        said = {name: options[name] for name in ("net", "pace", "timing", "seed", "engine")}
+        journal = start_journal(stack, path, files, program, libraries, banks, said) if path else None
         plc = _plc(image, cycle_ns, options["engine"], journal)
         if options["pcap"]:
             network.tap = _capture(stack, options["pcap"], network).tap

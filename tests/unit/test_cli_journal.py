@@ -44,6 +44,9 @@ def test_a_run_is_done_again(here: Path, timing: str) -> None:
 def test_the_same_seed_is_the_same_run(here: Path) -> None:
     for name, seed in (("a", "1"), ("b", "1"), ("c", "2")):
         fbvm("run", DEMO, *PEER, "--scans", "60", "--timing", "real", "--seed", seed, "--journal", name)
+    header = json.loads(Path("c").read_text(encoding="utf-8").splitlines()[0])
+    assert header["about"]["options"]["seed"] == 2
+    assert header["about"]["options"]["timing"] == "real"
     a, b, c = (Path(name).read_text(encoding="utf-8").splitlines()[2:] for name in "abc")
     assert a == b != c
 
