@@ -1,4 +1,4 @@
-"""Codes that only a program which drives the unit itself can provoke (1103, 2606), and scripted faults of the unit."""
+"""Codes that only a program which drives the unit itself can provoke (1103, 2606, 2607), and scripted faults of it."""
 
 from __future__ import annotations
 
@@ -81,6 +81,36 @@ def test_connect_finds_its_socket_open_as_udp() -> None:
     assert rig.get("conn.Waiting_Server") is True
     assert rig.run_until("Main.conn.ENO", 3) > 0.9
     assert rig.code("conn") == ""
+    rig.command("rd")
+    assert rig.result("rd") == (1, "")
+
+
+def test_connect_finds_its_parameter_area_in_use_by_another_socket() -> None:
+    """2607 until the program closes its socket 2, then MTCP_ETN_Connect connects by itself."""
+    rig = Rig(
+        wired=False,
+        rd=READ,
+        more="""
+            CASE Step OF
+                0: Number := 2; IP[0] := 16#C0A8; IP[1] := 16#FA02; Remote := 502; Opening := TRUE; Step := 1;
+                1: IF NOT Opening THEN Step := 2; END_IF;
+                3: Number := 2; Closing := TRUE; Step := 4;
+            END_CASE;""",
+        more_variables="""
+            Number AT D30018 : WORD; IP AT D30020 : ARRAY[0..1] OF WORD; Remote AT D30022 : UINT;
+            Opening AT CIO 1519.02 : BOOL; Closing AT CIO 1519.05 : BOOL; Step : INT;""",
+    )
+    rig.set("conn_EN", False)
+    rig.set("Connect", False)
+    rig.run_until("Main.Step = 2", 1)
+    rig.set("conn_EN", True)
+    rig.set("Connect", True)
+    rig.run_until("Main.conn.Error", 1)
+    assert rig.code("conn") == "2607"
+    rig.scan(50)
+    assert rig.code("conn") == "2607"
+    rig.set("Step", 3)
+    rig.run_until("Main.conn.ENO", 3)
     rig.command("rd")
     assert rig.result("rd") == (1, "")
 
