@@ -65,14 +65,16 @@ def connected(port: int) -> socket.socket:
     """A connection that the server has accepted and answered on; until it listens, others are refused."""
     end_s = time.monotonic() + BOUND_S
     while True:
+        sock = socket.socket()
+        sock.settimeout(BOUND_S)
         try:
-            sock = socket.create_connection(("127.0.0.1", port), BOUND_S)
+            sock.connect(("127.0.0.1", port))
             sock.sendall(ECHO)
             if heard(sock, len(ECHO)) == ECHO:
                 return sock
-            sock.close()
         except OSError:
             pass
+        sock.close()
         assert time.monotonic() < end_s, "it does not serve any more"
 
 
