@@ -6,6 +6,7 @@ to do with fbvm.
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -215,14 +216,25 @@ def _table(comparisons: list[Comparison]) -> Table:
     return table
 
 
+def called() -> str:
+    """How to call this command again from here: `fbvm` where that is found, else the path by which it was called."""
+    if shutil.which("fbvm"):
+        return "fbvm"
+    path = Path(sys.argv[0])
+    if path.stem != "fbvm":
+        return f"{sys.executable} -m fbvm"
+    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+
+
 def _next(program: Path, port: int) -> str:
     here = program.relative_to(Path.cwd()) if program.is_relative_to(Path.cwd()) else program
+    fbvm = called()
     return f"""
 What to try next:
-  fbvm run {here} --until Main.Done --max 5s --map {SERVER}=peer --show D200..D209
+  {fbvm} run {here} --until Main.Done --max 5s --map {SERVER}=peer --show D200..D209
                                         the same in memory, in virtual time
-  fbvm peer --port 15020 --trace        a server to watch, and in another window:
-  fbvm run {here} --net tcp --map {SERVER}=127.0.0.1:15020 --until Main.Done --max 5s \\
+  {fbvm} peer --port 15020 --trace        a server to watch, and in another window:
+  {fbvm} run {here} --net tcp --map {SERVER}=127.0.0.1:15020 --until Main.Done --max 5s \\
            --set Main.Quantity=125 --pcap demo.pcapng
-  fbvm list {here}                      what the program compiles to
+  {fbvm} list {here}                      what the program compiles to
 """

@@ -6,7 +6,6 @@ import asyncio
 import logging
 import signal
 import sys
-from contextlib import suppress
 from typing import Any
 
 import click
@@ -44,7 +43,7 @@ async def _serve(host: str, port: int, trace: bool) -> None:
 
     serving = asyncio.current_task()
     assert serving is not None, "a coroutine runs in a task"
-    with suppress(NotImplementedError):  # where there are no signals there is no SIGTERM
+    if sys.platform != "win32":  # where there is no SIGTERM
         asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, serving.cancel)
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
     server: Any = ModbusTcpServer(device(), address=(host, port), trace_packet=_trace if trace else None)

@@ -159,11 +159,14 @@ def build_network(net: str, mappings: tuple[Mapping, ...], seed: int = 0) -> Loo
         for row in mappings:
             network.place(row.said, ModbusPeer(registers.server()))
         return network
-    try:
-        return TcpNetwork({row.said: (row.host or "", row.port) for row in mappings})
-    except OSError as error:
-        click.echo(f"the network cannot be used: {error.strerror or error}", err=True)
-        sys.exit(status.NETWORK)
+    for row in mappings:
+        try:
+            TcpNetwork({row.said: (row.host or "", row.port)}).close()
+        except (OSError, UnicodeError) as error:  # a host without an address, or a name that cannot be one
+            reason = getattr(error, "strerror", "no name of a host")
+            click.echo(f"the network cannot be used: {row.host}: {reason}", err=True)
+            sys.exit(status.NETWORK)
+    return TcpNetwork({row.said: (row.host or "", row.port) for row in mappings})
 
 
 def _tell_doors(network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...]) -> None:

@@ -41,15 +41,6 @@ def _dotted(real: Peer) -> tuple[str, int]:
     return real.host, real.port
 
 
-def _resolved(host: str) -> str:
-    """The IPv4 address of a host.  Raises OSError with the name in it."""
-    try:
-        return socket.gethostbyname(host)
-    except (OSError, UnicodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "no name of a host"
-        raise OSError(errno.EADDRNOTAVAIL, f"{host}: {reason}") from None
-
-
 class TcpNetwork(Switchboard):
     """Real connections.  `address_map` says where on the host the program's endpoints are, see `AddressMap`.
 
@@ -59,7 +50,7 @@ class TcpNetwork(Switchboard):
     virtual_time = False
 
     def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1") -> None:
-        rows = {said: Peer(_resolved(host), port) for said, (host, port) in (address_map or {}).items()}
+        rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
         super().__init__(AddressMap(rows, bind))
         self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
 

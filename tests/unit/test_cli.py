@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
 
 from fbvm.base.codes import CODES
+from fbvm.cli.demo import called
 from fbvm.cli.main import VERBS, main
 from fbvm.cli.options import split_names
 from fbvm.record.chart import Chart
@@ -427,3 +429,17 @@ def test_a_host_that_is_not_known_is_named(counter: str, monkeypatch: pytest.Mon
     result = run("--scans", "1", "--net", "tcp", "--map", "1.2.3.4:502=nohost:502")
     assert (result.exit_code, result.stderr) == (
         5, "the network cannot be used: nohost: Name or service not known\n")
+
+
+@pytest.mark.parametrize(("found", "argument", "called_so"), [
+    ("/usr/bin/fbvm", "/usr/bin/fbvm", "fbvm"),
+    (None, ".venv/bin/fbvm", ".venv/bin/fbvm"),
+    (None, "{here}/.venv/bin/fbvm", ".venv/bin/fbvm"),
+    (None, "fbvm/__main__.py", f"{sys.executable} -m fbvm"),
+])
+def test_the_demo_names_the_command_as_it_can_be_called(
+    found: str | None, argument: str, called_so: str, counter: str, monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr("fbvm.cli.demo.shutil.which", lambda name: found)
+    monkeypatch.setattr(sys, "argv", [argument.format(here=Path.cwd())])
+    assert called() == called_so

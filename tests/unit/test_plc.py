@@ -415,3 +415,21 @@ def test_watchers_see_the_memory_after_the_refresh(plc: Plc) -> None:
     plc.watchers.append(lambda plc: seen.append(plc.read("D300")))
     plc.run(scans=3)
     assert seen == [1, 2, 3]
+
+
+def test_a_snapshot_of_a_plc_with_units_is_compared_and_forked_but_no_way_back() -> None:
+    plc = Plc(counter_image())
+    plc.attach(_Echo(), _Wire())
+    plc.run(scans=2)
+    state, twin = plc.snapshot(), plc.fork()
+    assert bytes(state.memory) == bytes(twin.snapshot().memory)
+    assert (twin.units, twin.scans) == ([], 2)
+    with pytest.raises(ValueError, match="with units attached cannot go back"):
+        plc.restore(state)
+
+
+def test_tasks_that_want_to_be_quicker_than_the_cycle_are_told() -> None:
+    tasks = (task("Fast", interval_ns=5 * MS), task("Slow", interval_ns=15 * MS), task("Each"))
+    assert [warning.partition(":")[0] for warning in Plc(counter_image(*tasks), 10 * MS).warnings] == [
+        "task Fast wants 5ms, the PLC scans every 10ms"]
+    assert Plc(counter_image(*tasks), 5 * MS).warnings == ()
