@@ -81,7 +81,7 @@ def test_an_entry_is_used_again() -> None:
     where = ctypes.addressof(slot_of)
     e = None
     gc.collect()
-    others = [NativeEngine(program, power_on(program), 0) for _ in range(native_entries.BLOCK)]
+    others = [NativeEngine(program, power_on(program), 0) for _ in range(8 * native_entries.BLOCK)]
     assert where in [ctypes.addressof(other._entries[0]._slot) for other in others]
 
 
