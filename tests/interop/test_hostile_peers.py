@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import select
 import socket
 import time
@@ -17,12 +18,15 @@ from real_station import black_hole, closed_port, real
 import fbvm.net.switchboard
 import fbvm.net.tcp
 from fbvm.code.compiler import compile_text
+from fbvm.code.image import Image
 from fbvm.net.addresses import AddressMap
+from fbvm.net.journal import Journal, open_journal
 from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS, by_script, right
 from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
 from fbvm.plc import Plc
 from fbvm.run import run
+from fbvm.run.replay import Replay
 from fbvm.units.etn21 import Etn21
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus_server import ModbusServer
@@ -52,12 +56,16 @@ def held() -> ModbusServer:
     return server
 
 
+def image() -> Image:
+    made = compile_text(PROGRAM).image
+    assert made is not None
+    return made
+
+
 @contextmanager
-def plc_at(port: int) -> Iterator[Plc]:
+def plc_at(port: int, journal: Journal | None = None) -> Iterator[Plc]:
     """A PLC whose server is at a port of 127.0.0.1."""
-    image = compile_text(PROGRAM).image
-    assert image is not None
-    plc, network = Plc(image, 5_000_000), TcpNetwork({SERVER: ("127.0.0.1", port)})
+    plc, network = Plc(image(), 5_000_000, journal=journal), TcpNetwork({SERVER: ("127.0.0.1", port)})
     plc.attach(Etn21(0, "192.168.250.1"), network)
     try:
         yield plc
@@ -140,6 +148,22 @@ def test_a_server_that_cannot_be_reached_and_then_can(name: str, codes: set[int]
         with real(ModbusPeer(held())) as good:
             plc.units[0].network.map = AddressMap({SERVER: Peer("127.0.0.1", good)}, "127.0.0.1")  # type: ignore[attr-defined]
             assert read(plc) == "ok"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["black hole", "closes between requests", "floods from the start", "slow"])
+def test_a_journal_of_real_connections_is_done_again(name: str) -> None:
+    """To the bit, without the connections and without waiting."""
+    file = io.StringIO()
+    journal = Journal(file)
+    with PLACES[name]() as port, plc_at(port, journal) as plc:
+        plc.write("Main.Poll", True)
+        run(plc, for_ns=SECOND_NS, pace="event")
+        journal.close()
+        memory = bytes(plc.memory.u8)
+    replay = Replay(*open_journal(file.getvalue().splitlines(keepends=True)), image())
+    assert (replay.run(), replay.differs, replay.plc.scans) == ("end", None, plc.scans)
+    assert bytes(replay.plc.memory.u8) == memory
 
 
 # --- no scan waits ----------------------------------------------------------------------------------------------------
