@@ -16,6 +16,8 @@ from fbvm.cli import status
 
 VERBS = {
     "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
+    "new": "Make a project with a block and its test.",
+    "test": "Run the tests of a project.",
     "run": "Run a program, in virtual time or over real TCP.",
     "replay": "Do a run again from its journal.",
     "chart": "Draw variables of a trace, a column a scan.",

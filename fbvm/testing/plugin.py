@@ -5,7 +5,7 @@
         pump.run("50ms", Start=True)
         assert pump.Running
 
-Files are looked for beside the test, then from the folder where pytest.ini or pyproject.toml lies.
+Files are looked for beside the test, then in the folders above it, up to that where pytest.ini or pyproject.toml lies.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ class Tracer(Protocol):
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addini("fbvm_libraries", "folders of libraries of function blocks", type="paths", default=[])
     group = parser.getgroup("fbvm", "PLC programs")
+    group.addoption("--fbvm-golden", action="store_true", help="write the golden traces of the tests anew")
     group.addoption("--fbvm-cov", action="store_true", help="report which statements and branches of PLC code tests executed")
     group.addoption("--fbvm-cov-html", metavar="DIR", help="write the coverage of PLC code as pages")
     group.addoption("--fbvm-cov-xml", metavar="FILE", help="write the coverage of PLC code as Cobertura XML")
@@ -105,8 +106,10 @@ def network() -> Iterator[LoopNetwork]:
 
 
 @pytest.fixture
-def trace(tmp_path: Path) -> Iterator[Tracer]:
+def trace(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Tracer]:
     """Records a rig: `run = trace(pump)`, then `run.chart("Start", "Running")`, `run.table(...)`, `run.why("Running")`.
+
+    `run.golden("golden/start.txt", "Running")` holds it to a file beside the test, which `--fbvm-golden` writes.
 
     `trace(pump, "Delay.*", depth="scans")` keeps less; `run.path` is the file, for `fbvm chart` and `fbvm why`."""
     from fbvm.testing.recorded import Recorded
@@ -114,7 +117,8 @@ def trace(tmp_path: Path) -> Iterator[Tracer]:
     made: list[Recorded] = []
 
     def record(rig: Rig, *patterns: str, depth: str = "statements") -> Recorded:
-        made.append(Recorded(rig, tmp_path / f"run{len(made)}.fbtrace", patterns, depth))
+        path, anew = tmp_path / f"run{len(made)}.fbtrace", request.config.getoption("fbvm_golden")
+        made.append(Recorded(rig, path, patterns, depth, request.path.parent, anew))
         return made[-1]
 
     yield record
@@ -128,14 +132,14 @@ def _rigs(node: pytest.Item) -> list[Rig]:
 
 def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
     rigs = _rigs(request.node)
-    folders = [request.path.parent, request.config.rootpath]
+    folders = folders_of(request.path, request.config.rootpath)
 
     def make(what: str, cycle: str | int = "10ms", *, libraries: Sequence[str] = (), **given: Any) -> Rig:
         from fbvm.testing.rig import Rig
 
         __tracebackhide__ = True
         own = [folder / path for path in libraries for folder in folders if (folder / path).is_dir()]
-        shelves = [*own, *library_folders(request.config)]
+        shelves = [*own, *library_folders(request.config, request.path)]
         rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, **given)
         rigs.append(rig)
         counting = ExitStack()
@@ -146,10 +150,15 @@ def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
     return make
 
 
-def library_folders(config: pytest.Config) -> list[Path]:
-    """Folders in which blocks are found by the names of their files: those of pytest's ini, and `src`."""
-    source = config.rootpath / SOURCE_FOLDER
-    return list(dict.fromkeys([*config.getini("fbvm_libraries"), *([source] if source.is_dir() else [])]))
+def folders_of(path: Path, root: Path) -> list[Path]:
+    """Where the files that a test names are looked for: beside it, then above it, up to pytest's root."""
+    return [folder for folder in path.parents if folder.is_relative_to(root)] or [path.parent]
+
+
+def library_folders(config: pytest.Config, path: Path) -> list[Path]:
+    """Folders in which a test finds blocks by the names of their files: those of pytest's ini, and `src` near it."""
+    sources = [folder / SOURCE_FOLDER for folder in folders_of(path, config.rootpath)]
+    return list(dict.fromkeys([*config.getini("fbvm_libraries"), *(folder for folder in sources if folder.is_dir())]))
 
 
 # --- failures ---------------------------------------------------------------------------------------------------------

@@ -12,6 +12,7 @@ from fbvm.record.trace import Trace
 from fbvm.record.trace_signals import recording
 from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
 from fbvm.record.why import told, why
+from fbvm.testing.golden import check
 from fbvm.testing.rig import Rig
 from fbvm.watch.paths import Place
 
@@ -19,8 +20,10 @@ from fbvm.watch.paths import Place
 class Recorded:
     """Records a rig into `path` from its next scan.  Names are those of the rig; patterns choose what is kept."""
 
-    def __init__(self, rig: Rig, path: Path, patterns: tuple[str, ...] = (), depth: str = "statements") -> None:
+    def __init__(self, rig: Rig, path: Path, patterns: tuple[str, ...] = (), depth: str = "statements",
+                 folder: Path = Path(), write_golden: bool = False) -> None:  # fmt: skip
         self.path = path
+        self._folder, self._write_golden = folder, write_golden
         self._rig = rig
         self._file = path.open("wb")
         texts = {name: source.text for name, source in rig.subject.sources.items()}
@@ -51,6 +54,15 @@ class Recorded:
             table = ScanTable(trace.sites, trace.names, signals)
             trace.follow(table, scans)
         return table.draw(band for band in table.bands if band.moved)
+
+    def golden(self, file: str, *names: str) -> None:
+        """Holds the run to a file beside the test; `--fbvm-golden` writes it.  Without names, what changed.
+
+        Raises AssertionError with what differs."""
+        __tracebackhide__ = True
+        with self.open() as trace:
+            made = self._recording(trace, names)
+        check(self._folder / file, made, self._write_golden)
 
     def why(self, name: str, scan: int | None = None) -> str:
         """Why a variable has its value at the end of a scan, or of the last one."""

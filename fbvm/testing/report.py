@@ -40,7 +40,7 @@ class Report:
         if not signals or not self._plc.scans:
             return ""
         table = self._again(signals, LOOKED_BACK)
-        told = "\n".join(self._told(table, signal) for signal in signals)
+        told = "\n".join([*(self._told(table, signal) for signal in signals), *self._blocks(table, signals)])
         moved = [band for band in table.bands if band.moved][-BANDS:]
         last = table.bands[-1:] if table.bands and table.bands[-1] not in moved else []
         return f"{told}\n\n{table.draw([*moved, *last])}" if table.bands else told
@@ -78,6 +78,25 @@ class Report:
             return f"{now}; no statement wrote it"
         last = f", written last in scan {writer.scan}" if change is None or change.scan != writer.scan else ""
         return f"{now}{last}, by {self._by(writer)}"
+
+    def _blocks(self, table: ScanTable, signals: list[Signal]) -> list[str]:
+        """`Delay: TON with IN = TRUE, PT = 50ms, Q = FALSE, ET = 20ms`, for blocks whose variables were read."""
+        asked = {signal.place.name for signal in signals}
+        writers = [table.writers[signal] for signal in signals if signal in table.writers]
+        named = dict.fromkeys(name.rpartition(".")[0] for writer in writers if writer.scan == self._plc.scans - 1
+                              for name, _ in writer.reads if name not in asked)  # fmt: skip
+        lines = []
+        for name in named:
+            block = self._plc.find(name) if name else None
+            if not isinstance(block, Place) or not isinstance(block.type, StructType) or f"{name}." == self._subject.prefix:
+                continue
+            pins = [field.name for field in block.type.fields.values() if field.kind in ("VAR_INPUT", "VAR_OUTPUT")]
+            places = [place for pin in pins if isinstance(place := self._plc.find(f"{name}.{pin}"), Place) and is_single(place)]
+            said = ", ".join(f"{place.name.rpartition('.')[2]} = {Signal(place, place.name).text(self._plc.read(place))}"
+                             for place in places[:MOST_COLUMNS])  # fmt: skip
+            if said:
+                lines.append(f"{name.removeprefix(self._subject.prefix)}: {block.type.name} with {said}")
+        return lines
 
     def _by(self, writer: Writer) -> str:
         if writer.site is None:

@@ -118,7 +118,9 @@ class Rig:
         file, mark, name = what.partition("::")
         if not mark and block and not file.lower().endswith(".st"):
             file, name = "", what
-        files = [_file(path, folders or [Path.cwd()]) for path in (*([file] if file else []), *sources)]
+        files = []
+        for path in (*([file] if file else []), *sources):
+            files.append(_file(path, folders or [Path.cwd()]))
         near = [path.parent for path in files if path.parent not in (*libraries, Path.cwd(), *folders[1:])]
         made = subject(files, name if name or block else None, [*libraries, *dict.fromkeys(near)], stubs, text)
         return cls(made, cycle, stubs=stubs, **given)
@@ -325,6 +327,7 @@ class Rig:
 
 
 def _file(path: str, folders: Sequence[Path]) -> Path:
+    __tracebackhide__ = True
     for folder in folders:
         if (folder / path).exists():
             return folder / path

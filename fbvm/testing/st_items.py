@@ -68,7 +68,7 @@ class StItem(pytest.Item):
 
     def runtest(self) -> None:
         near = [self.path.parent] if self.path.parent != self.config.rootpath else []
-        shelves = [LIBRARY, *library_folders(self.config), *near]
+        shelves = [LIBRARY, *library_folders(self.config, self.path), *near]
         made = self.subject = subject([self.path], self.name, shelves)
         plc = Plc(made.image, CYCLE_NS)
         watch = Assertions(plc, made.prefix)

@@ -313,3 +313,47 @@ def test_the_failure_of_the_readme_looks_like_that(project: pytest.Pytester) -> 
     lines = run(project).outlines
     shown = in_readme("text", "assert pump.Starts == 2").splitlines()
     assert [line for line in shown if line not in lines] == []
+
+
+GOLDEN = """
+    def test_golden(fb, trace):
+        pump = fb("src/pump.st")
+        run = trace(pump)
+        pump.at("20ms", Start=True).run("100ms")
+        run.golden("golden/start.txt", "Start", "Running")
+"""
+
+
+def test_a_golden_trace_is_written_kept_and_told_apart(project: pytest.Pytester) -> None:
+    project.makepyfile(GOLDEN)
+    run(project).stdout.fnmatch_lines(["*start.txt is not there; look at this run, then write it with --fbvm-golden:*"])
+    run(project, "--fbvm-golden").assert_outcomes(passed=1)
+    kept = (project.path / "golden" / "start.txt").read_text(encoding="utf-8")
+    assert kept == (
+        "scans 0 to 9\n\nStart\n  scan 0      0s        FALSE\n  scan 2      20ms      TRUE\n"
+        "\nRunning\n  scan 0      0s        FALSE\n  scan 7      70ms      TRUE\n"
+    )
+    run(project).assert_outcomes(passed=1)
+    (project.path / "src" / "pump.st").write_text(PUMP.replace("50ms", "60ms"), encoding="utf-8")
+    result = run(project)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["E*Running", "E*- scan 7      70ms      TRUE", "E*+ scan 8      80ms      TRUE"])
+
+
+def test_the_block_that_was_read_shows_its_pins(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        def test_wrong(fb):
+            pump = fb("src/pump.st").run("30ms", Start=True)
+            assert pump.Running
+    """)
+    run(project).stdout.fnmatch_lines(["Delay: TON with IN = TRUE, PT = 50ms, Q = FALSE, ET = 20ms"])
+
+
+def test_a_project_within_another_folder_finds_its_files(project: pytest.Pytester) -> None:
+    inner = project.mkdir("inner")
+    (project.path / "src").rename(inner / "src")
+    (inner / "tests").mkdir()
+    (inner / "tests" / "test_pump.py").write_text(
+        "def test_there(fb):\n    assert not fb('src/pump.st').scan().Running\n"
+        "def test_by_name(fb):\n    assert not fb('x.st::X', text='').Running\n".replace("x.st::X", "Pump"), encoding="utf-8")
+    run(project).assert_outcomes(passed=2)

@@ -1,0 +1,49 @@
+"""`fbvm new`: a project with a block, its test, and what continuous integration needs."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import click
+
+from fbvm.base.data import data_folder
+
+EXAMPLE = "project"
+"""The folder in `examples/` that is copied."""
+TITLE = "PROJECT"
+"""What stands there in place of the name."""
+WORDS = {
+    "src/pump.st": "a function block",
+    "src/main.st": "the program that uses it",
+    "tests/test_pump.py": "its test",
+    "requirements.txt": "what to install",
+    ".github/workflows/test.yml": "tests on each push",
+}
+"""What is said of the files, in the order in which they are best read."""
+
+
+@click.command("new")
+@click.argument("name", metavar="NAME")
+def command(name: str) -> None:
+    """Make a folder NAME with a project: a block, a program, a test, and a file for continuous integration.
+
+    `fbvm test` in it passes at once."""
+    target = Path(name)
+    title = target.resolve().name
+    if not re.fullmatch(r"[\w][\w .-]*", title):
+        raise click.UsageError(f"{name!r} cannot be the name of a project; use letters, digits, - and _")
+    if target.exists() and (not target.is_dir() or any(target.iterdir())):
+        raise click.UsageError(f"{name} is there already")
+    source = data_folder("examples") / EXAMPLE
+    try:
+        for path in sorted(each for each in source.rglob("*") if each.is_file() and "__pycache__" not in each.parts):
+            copy = target / path.relative_to(source)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            copy.write_text(path.read_text(encoding="utf-8").replace(TITLE, title), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise click.UsageError(f"{name} cannot be made: {error.strerror}") from None
+    click.echo(f"{name}/")
+    for file, said in WORDS.items():
+        click.echo(f"  {file:<28}{said}")
+    click.echo(f"\ncd {name}\nfbvm test")
