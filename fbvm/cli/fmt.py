@@ -6,7 +6,7 @@ import codecs
 import os
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from difflib import unified_diff
 from functools import cache
 from pathlib import Path
@@ -33,43 +33,60 @@ ENCODINGS = (("utf-8", codecs.BOM_UTF8), ("utf-16-le", codecs.BOM_UTF16_LE), ("u
 
 @click.command("fmt")
 @click.argument("files", nargs=-1, required=True, metavar="FILE...",
-                type=click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path))
+                type=click.Path(exists=True, allow_dash=True, path_type=Path))
 @click.option("--check", is_flag=True, help="Write nothing; status 1 if a file would change.")
 @click.option("--diff", is_flag=True, help="Write nothing; show what would change.")
 def command(files: tuple[Path, ...], check: bool, diff: bool) -> None:
     """Rewrite the files in canonical Structured Text, and print the names of those that change.
 
-    The program means the same.  FILE - reads the standard input and writes the standard output.  A file with syntax errors
-    is left alone, and the status is 3."""
-    results = [_one(path, check, diff) for path in files]
+    The program means the same.  A folder stands for all files in it that end in .st; FILE - reads the standard input and
+    writes the standard output.  A file with syntax errors is left alone, and the status is 3."""
+    results = [_one(path, check, diff) for path in _found(files)]
     if None in results:
         sys.exit(status.PROGRAM_ERRORS)
     if check and any(results):
         sys.exit(status.FAILED)
 
 
+def _found(paths: Iterable[Path]) -> list[Path]:
+    """The files themselves and those in folders, each once."""
+    found: dict[Path, None] = {}
+    for path in paths:
+        inside = sorted(file for file in path.rglob("*") if file.suffix.lower() == ".st" and file.is_file())
+        found.update(dict.fromkeys(inside if path.is_dir() else [path]))
+        if path.is_dir() and not inside:
+            click.echo(f"{path}: no file in this folder ends in .st", err=True)
+    return list(found)
+
+
 def _one(path: Path, check: bool, diff: bool) -> bool | None:
     """Format one file; whether it changes, None if it has errors."""
     source, data = _read(path)
     if source is None:
+        _left_alone(str(path), "it cannot be read")
         return None
     text, wrong = formatted(source, OUTSIDE)
     for diagnostic in wrong:
         show(diagnostic)
     if wrong:
+        _left_alone(source.name, "one syntax error" if len(wrong) == 1 else f"{len(wrong)} syntax errors")
         return None
     changes = text != source.text
     if diff:
         click.echo("".join(_difference(source, text)), nl=False)
     elif check:
         if changes:
-            click.echo(str(path))
+            click.echo(source.name)
     elif path == STREAM:
         sys.stdout.buffer.write(_encoded(source.text, text, data))
     elif changes:
         _replace(path, _encoded(source.text, text, data))
         click.echo(str(path))
     return changes
+
+
+def _left_alone(name: str, why: str) -> None:
+    click.secho(f"{name} is left as it is: {why}", bold=True, err=True)
 
 
 def _read(path: Path) -> tuple[Source | None, bytes]:

@@ -74,9 +74,7 @@ class DeclarationLayout(TypeLayout):
     def task(self, word: Token, token: Token, opener: Token, arguments: list[Phrase] | None, closer: Token,
              end: Token) -> Phrase:
         for argument in arguments or ():
-            key = argument.parts[0]
-            if isinstance(key, Leaf):
-                argument.parts[0] = replace(key, text=key.text.upper())
+            argument.parts[0] = _in_capitals(argument.parts[0])
         return Phrase(word.start, self.leaf(word), " ", self.leaf(token), self.leaf(opener), self.listed(arguments),
                       self.closer(closer), self.closer(end))
 
@@ -98,3 +96,10 @@ class DeclarationLayout(TypeLayout):
 
     def fb_task(self, instance: Phrase, with_: Token, task: Token) -> Phrase:
         return Phrase(instance.start, instance.doc, " ", self.leaf(with_), " ", self.leaf(task))
+
+
+def _in_capitals(doc: Doc) -> Doc:
+    """A piece whose first word is written in capitals."""
+    if isinstance(doc, tuple) and doc:
+        return (_in_capitals(doc[0]), *doc[1:])
+    return replace(doc, text=doc.text.upper()) if isinstance(doc, Leaf) else doc

@@ -14,8 +14,8 @@ WIDTH = 100
 """Columns of a line, where it can be helped."""
 STEP = 4
 """Columns of one level of indentation."""
-HANG_LIMIT = 60
-"""Column beyond which broken text does not hang below its beginning."""
+HANG_LIMIT = 40
+"""Column up to which broken text hangs below its beginning in any case."""
 HANG_STEP = 2 * STEP
 REMARK_SPREAD = 30
 """Largest difference of line lengths behind which comments are aligned."""
@@ -126,13 +126,25 @@ def _leaf_width(leaf: Leaf, comments: Comments) -> int | None:
     return width
 
 
+def _widest(doc: Doc, comments: Comments) -> int:
+    """Columns of the widest part between the breaks of a piece."""
+    while isinstance(doc, Group):
+        doc = doc.doc
+    parts: list[list[Doc]] = [[]]
+    for part in doc.parts if isinstance(doc, Fill) else doc if isinstance(doc, tuple) else (doc,):
+        if isinstance(part, Break) or isinstance(doc, Fill):
+            parts.append([])
+        parts[-1].append(part)
+    return max(flat_width(tuple(part), comments) or 0 for part in parts)
+
+
 class _Line:
-    """A line that is written: its text, and the comments behind it."""
+    """A line that is written: its text, and the comments behind it; `more` if it goes on with what began above it."""
 
-    __slots__ = ("remarks", "text")
+    __slots__ = ("more", "remarks", "text")
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self, text: str, more: bool) -> None:
+        self.text, self.more = text, more
         self.remarks: list[Comment] = []
 
 
@@ -142,7 +154,7 @@ class Printer:
     def __init__(self, comments: Comments) -> None:
         self.comments = comments
         self.lines: list[_Line] = []
-        self.line = _Line("")
+        self.line = _Line("", False)
         self.fresh = True
         """Whether nothing but indentation stands on the line."""
         self.full = False
@@ -169,17 +181,15 @@ class Printer:
             elif isinstance(part, Group):
                 todo.append((indent, flat or self.fits(part.doc, todo), part.doc))
             elif isinstance(part, Hang):
-                column = len(self.line.text)
-                below = column if column <= HANG_LIMIT and not self.full else indent + HANG_STEP
-                todo.append((below, flat, part.doc))
+                todo.append((self.hang(part.doc, indent, flat, todo), flat, part.doc))
             elif isinstance(part, Indent):
                 todo.append((indent + STEP, flat, part.doc))
             elif isinstance(part, Fill):
                 self.fill(part, indent, flat, todo)
             elif isinstance(part, End):
-                self.end_line(indent)
+                self.end_line(indent, more=False)
                 if part.blank:
-                    self.end_line(indent)
+                    self.end_line(indent, more=False)
             else:
                 self.begin(part.text, indent)
                 self.verbatim(part.text, part.column)
@@ -205,10 +215,10 @@ class Printer:
         if not self.full:
             self.line.text += text
 
-    def end_line(self, indent: int) -> None:
+    def end_line(self, indent: int, more: bool = True) -> None:
         self.line.text = self.line.text.rstrip(" ")
         self.lines.append(self.line)
-        self.line = _Line(" " * indent)
+        self.line = _Line(" " * indent, more)
         self.fresh, self.full, self.apart = True, False, False
 
     def verbatim(self, text: str, column: int) -> None:
@@ -217,7 +227,7 @@ class Printer:
         self.line.text += first
         for line in more:
             self.lines.append(self.line)
-            self.line = _Line(line)
+            self.line = _Line(line, True)
         self.fresh = False
 
     def leaf(self, leaf: Leaf, indent: int) -> None:
@@ -245,6 +255,17 @@ class Printer:
         if not last:
             todo.append((indent, flat, Fill(part.parts, part.at + 1)))
         todo.append((indent, flat, Group(here)))
+
+    def hang(self, doc: Doc, indent: int, flat: bool, behind: list[Work]) -> int:
+        """Where the lines of a hanging piece begin: below its first character, or on a line of its own if there is not
+        room enough for each of its parts."""
+        column, aside = len(self.line.text), indent + HANG_STEP
+        if flat or self.full or column <= max(HANG_LIMIT, aside) or self.fits(doc, behind):
+            return indent if self.full else column
+        if column + _widest(doc, self.comments) <= WIDTH:
+            return column
+        self.end_line(aside)
+        return aside
 
     def fits(self, doc: Doc, behind: list[Work]) -> bool:
         """Whether a piece fits on this line with all that must follow on the same line."""
@@ -311,26 +332,20 @@ def _text(lines: list[_Line]) -> str:
                 last = text.rsplit("\n", 1)[-1]
                 text += "\n".join(shifted(comment.text, len(last) - comment.column))
         written.append(text)
-    return "\n".join(written) + "\n"
+    return "\n".join(written).strip("\n") + "\n" if any(written) else ""
 
 
 def _columns(lines: list[_Line]) -> list[int]:
     """For each line where its comments begin: in one column as long as neither the indentation changes nor a line is
     empty, and the lines are not too different."""
-    columns = [0] * len(lines)
-    run: list[int] = []
-    indent, shortest, longest = -1, 0, 0
+    columns: list[int] = []
+    indent = shortest = longest = first = 0
     for at, line in enumerate(lines):
-        width = len(line.text)
-        own = width - len(line.text.lstrip(" ")) if line.text else -1
-        if own != indent or own < 0:
-            indent, run = own, []
-        if not line.remarks:
-            continue
-        if run and max(longest, width) - min(shortest, width) > REMARK_SPREAD:
-            run = []
-        shortest, longest = (min(shortest, width), max(longest, width)) if run else (width, width)
-        run.append(at)
-        for each in run:
-            columns[each] = longest + 2
-    return columns
+        width, own = len(line.text), len(line.text) - len(line.text.lstrip(" "))
+        differ = shortest and line.remarks and max(longest, width) - min(shortest, width) > REMARK_SPREAD
+        if differ or (not line.more and (own != indent or not width)):
+            columns += [longest + 2] * (at - first)
+            indent, first, shortest, longest = own, at, 0, 0
+        if line.remarks:
+            shortest, longest = min(shortest or width, width), max(longest, width)
+    return columns + [longest + 2] * (len(lines) - first)

@@ -84,7 +84,7 @@ class Spelling:
 
     def _visit(self, node: Node, scope: Scope) -> None:
         if isinstance(node, NameRef):
-            self._name(node.start, node.text, scope)
+            self._name(node, scope)
         elif isinstance(node, NamedType):
             self._type_name(node)
         elif isinstance(node, Member):
@@ -93,6 +93,7 @@ class Spelling:
             self._enum_literal(node)
         elif isinstance(node, Call):
             self._arguments(node.arguments, self._called(node.callee, scope))
+            self._function_name(node.callee, scope)
         elif isinstance(node, ProgramInstance):
             self._program(node)
         elif isinstance(node, VarSection) and node.kind == "VAR_EXTERNAL":
@@ -103,26 +104,37 @@ class Spelling:
             self._initial(node.initial, node.spec)
 
     def _program(self, node: ProgramInstance) -> None:
-        for name in (node.task, node.type_name):
-            if name:
-                self._name(name.start, name.text, {})
+        if node.task:
+            self._name(node.task, {})
+        self._type_name(node.type_name)
         self._arguments(node.connections, self._named(node.type_name.text))
 
     # --- names ---
 
-    def _name(self, start: int, text: str, scope: Scope) -> None:
-        """Note the spelling of a plain name."""
-        key = fold(text)
-        if entry := scope.get(key) or self.globals.get(key):
-            self.at[start] = entry.text
-        elif key in TYPE_WORDS or self.outside.standard(key):
-            self.at[start] = key
-        elif isinstance(outside := self.outside.declaration(text), (Pou, TypeDecl)):
-            self.at[start] = outside.name.text
+    def _name(self, name: Name | NamedType | NameRef, scope: Scope) -> bool:
+        """Note the spelling of a name that the text declares; whether it does."""
+        entry = scope.get(fold(name.text)) or self.globals.get(fold(name.text))
+        if entry:
+            self.at[name.start] = entry.text
+        return entry is not None
 
-    def _type_name(self, node: NamedType) -> None:
-        if "." not in node.text:
-            self._name(node.start, node.text, {})
+    def _type_name(self, name: Name | NamedType) -> None:
+        """The name of a type or block, also of one outside."""
+        if not self._name(name, {}):
+            key = fold(name.text)
+            outside = None if key in TYPE_WORDS else self.outside.declaration(key)
+            if key in TYPE_WORDS:
+                self.at[name.start] = key
+            elif isinstance(outside, (Pou, TypeDecl)):
+                self.at[name.start] = outside.name.text
+
+    def _function_name(self, callee: Expr, scope: Scope) -> None:
+        """The name of a function, also of one outside."""
+        if isinstance(callee, NameRef) and not self._name(callee, scope):
+            if self.outside.standard(fold(callee.text)):
+                self.at[callee.start] = fold(callee.text)
+            elif isinstance(outside := self.outside.declaration(callee.text), Pou):
+                self.at[callee.start] = outside.name.text
 
     def _field(self, name: Name, shape: Shape) -> None:
         entry = self._members(shape).get(fold(name.text))
@@ -130,7 +142,7 @@ class Spelling:
             self.at[name.start] = entry.text
 
     def _enum_literal(self, node: EnumLiteral) -> None:
-        self._name(node.type_name.start, node.type_name.text, {})
+        self._type_name(node.type_name)
         spec = self._resolved(self._named(node.type_name.text))
         names = [name.text for name, _ in spec.members] if isinstance(spec, EnumSpec) else []
         for text in names:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import NamedTuple
 
 from fbvm.syntax.format_comments import Comment
@@ -42,7 +43,10 @@ class StatementLayout(ExpressionLayout):
 
     def before_divider(self, start: int) -> tuple[list[Row], list[Row]]:
         """The comments in front of ELSE or a label: those of the block above, which stand further in, and its own."""
-        comments, column = self.comments.claim(start), self.comments.column(start)
+        comments = self.comments.claim(start)
+        if not comments:
+            return [], []
+        column = self.comments.column(start)
         count = next((at for at, c in enumerate(comments) if c.column <= column), len(comments))
         return self.remarks(comments[:count]), self.remarks(comments[count:])
 
@@ -126,7 +130,8 @@ class StatementLayout(ExpressionLayout):
     def branch(self, items: list[Phrase], divider: Token) -> Doc:
         """A block that ends at ELSIF or ELSE, and the comments of that."""
         inside, outside = self.before_divider(divider.start)
-        return (Indent(lines(self.rows(items) + inside)), lines(outside), HARD)
+        above = self.rows(items) + inside
+        return (Indent(lines(above)), lines(outside, bool(above)), HARD)
 
     def if_statement(self, word: Token, condition: Phrase, then: Token, items: list[Phrase], more: list[Branch],
                      other: Token | None, otherwise: list[Phrase] | None, end: Token) -> Phrase:
@@ -161,28 +166,30 @@ class StatementLayout(ExpressionLayout):
     def case_statement(self, word: Token, selector: Phrase, of: Token, items: list[Phrase], other: Token | None,
                        otherwise: list[Phrase] | None, end: Token) -> Phrase:
         phrase = Phrase(word.start, self.head(word, selector, of))
-        starts = [at for at, item in enumerate(items) if item.level == "label"] or [0]
-        rows: list[Row] = self.rows(items[:starts[0]])
-        for at, until in zip(starts, [*starts[1:], len(items)], strict=True):
-            if not items:
-                break
-            inside, outside = self.before_divider(items[at].start)
-            if at == starts[0]:
-                inside, outside = [], inside + outside
-            elif inside:
-                rows[-1] = Row(rows[-1].blank, (rows[-1].doc, Indent(lines(inside))))
-            rows += outside
-            blank = items[at].start in self.comments.blanks
-            body = self.rows(items[at + 1:until])
-            rows.append(Row(blank, (items[at].doc, Indent(lines(body)))))
+        rows = self.branches(items)
         if other and otherwise is not None:
             inside, outside = self.before_divider(other.start)
-            phrase.parts += (Indent((lines(rows), Indent(lines(inside)))), lines(outside), HARD)
+            phrase.parts += (Indent((lines(rows), Indent(lines(inside, True)))), lines(outside, True), HARD)
             phrase.parts += (self.leaf(other), self.block(otherwise, end))
         else:
-            phrase.parts.append(Indent((lines(rows), Indent(lines(self.before_end(end))))))
+            phrase.parts.append(Indent((lines(rows), Indent(lines(self.before_end(end), True)))))
         phrase.parts += (HARD, self.ended(end))
         return phrase
+
+    def branches(self, items: list[Phrase]) -> list[Row]:
+        """Each label of a CASE, and further in what stands behind it."""
+        rows: list[Row] = []
+        starts = [at for at, item in enumerate(items) if item.level == "label"]
+        for at, until in pairwise([*starts, len(items)]):
+            inside, outside = self.before_divider(items[at].start)
+            if not rows:
+                inside, outside = [], inside + outside
+            elif inside:
+                rows[-1] = rows[-1]._replace(doc=(rows[-1].doc, Indent(lines(inside, True))))
+            body = self.rows(items[at + 1:until])
+            blank = items[at].start in self.comments.blanks
+            rows += [*outside, Row(blank, (items[at].doc, Indent(lines(body))))]
+        return rows
 
     def for_statement(self, word: Token, variable: Phrase, sign: Token, first: Phrase, to: Token, last: Phrase,
                       by: Token | None, step: Phrase | None, do: Token, items: list[Phrase], end: Token) -> Phrase:

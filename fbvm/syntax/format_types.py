@@ -9,7 +9,7 @@ from fbvm.syntax.format_layout import HARD, Doc, Fill, Hang, Indent, Leaf, flat_
 from fbvm.syntax.format_statements import Row, StatementLayout, lines
 from fbvm.syntax.lexer import Token
 
-SPREAD = 24
+SPREAD = 16
 """Largest difference of the lengths of what is aligned."""
 
 
@@ -33,17 +33,15 @@ class Declared(Phrase):
 
 def paddings(widths: Sequence[int | None]) -> list[int]:
     """Spaces behind each cell of a column.  None parts a column in two, and so do widths that differ too much."""
-    pads, run = [0] * len(widths), list[int]()
-    for at, width in enumerate(widths):
-        known = [widths[each] or 0 for each in run]
-        if width is None or (run and max(*known, width) - min(*known, width) > SPREAD):
-            run = []
-        if width is None:
-            continue
-        run.append(at)
-        longest = max(widths[each] or 0 for each in run)
-        for each in run:
-            pads[each] = longest - (widths[each] or 0)
+    pads = [0] * len(widths)
+    first, shortest, longest = 0, 0, 0
+    for at, width in enumerate([*widths, None]):
+        if width is None or (first < at and max(longest, width) - min(shortest, width) > SPREAD):
+            for each in range(first, at):
+                pads[each] = longest - (widths[each] or 0)
+            first = at + (width is None)
+        if width is not None:
+            shortest, longest = (width, width) if first == at else (min(shortest, width), max(longest, width))
     return pads
 
 
@@ -100,7 +98,7 @@ class TypeLayout(StatementLayout):
         names = [flat_width(each.names, self.comments) if fits else None for each, fits in zip(group, whole, strict=True)]
         plain = paddings([width if not each.at else None for each, width in zip(group, names, strict=True)])
         located = paddings([width if each.at else None for each, width in zip(group, names, strict=True)])
-        address = paddings([flat_width(each.at, self.comments) if each.at and fits else None
+        address = paddings([flat_width(each.at, self.comments) if each.at and each.names and fits else None
                             for each, fits in zip(group, whole, strict=True)])
         kind = paddings([flat_width(each.spec, self.comments) if each.initial else None for each in group])
         for each, *pads in zip(group, map(sum, zip(plain, located, strict=True)), address, kind, strict=True):
@@ -112,7 +110,8 @@ class TypeLayout(StatementLayout):
         return [Phrase(word.start, self.leaf(word), self.block(declarations, end), HARD, self.leaf(end))]
 
     def join(self, items: list[Phrase], more: list[Phrase]) -> list[Phrase]:
-        return items + more
+        items += more
+        return items
 
     def type_decl(self, token: Token, colon: Token, spec: Phrase, sign: Token | None, initial: Phrase | None,
                   end: Token) -> Phrase:

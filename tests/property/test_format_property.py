@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from fbvm.base.diagnostics import Source, errors
+from fbvm.code.compiler import compile_text
 from fbvm.syntax.format import REFUSED, formatted
 from fbvm.syntax.format_comments import Comments
 from fbvm.syntax.format_names import Spelling
@@ -22,9 +23,11 @@ from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Literal, Node
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-FOLDERS = ("tests/lang", "tests/golden", "tests/bench", "tests/conformance", "fblib", "examples")
+CORPUS = ("tests/lang/**/", "tests/golden/**/", "tests/bench/", "tests/conformance/", "fblib/**/", "examples/**/")
 PROGRAMS = re.compile(r"(?m)^(?=// ----)")
 """Where a file of several programs is to be cut, so that an error in one does not hide the others."""
+LONG = 100_000
+"""Bytes of a file that takes seconds."""
 PLACES = {"start", "end", "op_start"}
 
 
@@ -38,7 +41,7 @@ def syntax_errors(text: str) -> list[str]:
     return [d.render() for d in errors(parse(Source("x.st", text))[1]) if d.code not in REFUSED]
 
 
-FILES = sorted(path for folder in FOLDERS for path in (ROOT / folder).rglob("*.st"))
+FILES = sorted(path for folder in CORPUS for path in ROOT.glob(f"{folder}*.st"))
 
 
 @cache
@@ -88,9 +91,25 @@ def check(text: str) -> str:
     return written
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(ROOT).as_posix())
+every_file = pytest.mark.parametrize("path", [
+    pytest.param(path, id=path.relative_to(ROOT).as_posix(), marks=[pytest.mark.slow] * (path.stat().st_size > LONG))
+    for path in FILES])
+
+
+@every_file
 def test_every_program_keeps_its_meaning(path: Path) -> None:
     assert all(check(text) for text in programs(path))
+
+
+def image(text: str) -> object:
+    """What would be executed, without lines and columns."""
+    made = compile_text(text).image
+    return made and replace(made, sites=tuple(replace(site, line=0, column=0) for site in made.sites))
+
+
+@every_file
+def test_every_program_is_compiled_to_the_same_image(path: Path) -> None:
+    assert all(image(text) == image(write(text)) for text in programs(path))
 
 
 # --- changes that must not matter ---
