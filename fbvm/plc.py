@@ -128,8 +128,7 @@ class Plc:
         self.memory = Memory(image.layout.size, image.layout.areas)
         self._choice = engine
         self.engine: Engine = engine_for(image, self.memory, engine, observed)
-        cio = self.memory.areas["CIO"]
-        self._cio = self.memory.u8[cio.offset : cio.offset + cio.size_bytes]
+        self._shared = [self.memory.words(name) for name in ("CIO", *(box.name for box in image.layout.mailboxes))]
         self.units: list[Attached] = []
         self.watchers: list[Callable[[Plc], None]] = []
         """Called at the end of each scan, after its I/O refresh: recorders, watches."""
@@ -144,7 +143,8 @@ class Plc:
         """How long scans took, where somebody with a clock measured it (`fbvm.run`)."""
         self.trap: Trap | None = None
         self.stirred = False
-        """True if in the last scan a network told something or a unit changed a CIO word: the program has news to see."""
+        """True if in the last scan a network told something, or a unit changed words of CIO or of its mailbox: the program
+        has news to see."""
         self._mode = Mode.RUN
         self._first = True
         self._forces: dict[Place, Value] = {}
@@ -223,7 +223,7 @@ class Plc:
         """I/O refresh: each unit exchanges its words once, the networks take what the units ask for."""
         if not self.units:
             return
-        before = self._cio.tobytes()
+        before = [words.tobytes() for words in self._shared]
         told = False
         for number, attached in enumerate(self.units):
             events = attached.link.events(self.now_ns)
@@ -233,7 +233,7 @@ class Plc:
             if requests:
                 attached.link.submit(requests, self.now_ns)
             told = told or bool(events)
-        self.stirred = told or self._cio.tobytes() != before
+        self.stirred = told or [words.tobytes() for words in self._shared] != before
 
     @property
     def elapsed_ns(self) -> int:

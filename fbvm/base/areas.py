@@ -2,13 +2,14 @@
 
 Omron areas count 16-bit words, the portable areas %I %Q %M count bytes.  The buffer begins with the system page (what
 machine and engines tell each other); behind the areas come the slots of globals and instances, E banks come last and
-only if a program or a unit names them.
+only if a program or a unit names them.  Before them lie areas that units bring (mailboxes), if the program names any.
 Sizes: W394 and etn21 facts, CS1/CJ1/CJ2 (CIO 6144, W 512, H 512 + 1024 for blocks, A 960, D 32768, 13 E banks, T/C 4096).
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 PAGE_BYTES = 4096
@@ -51,6 +52,8 @@ _ROWS = (
 AREAS: dict[str, Area] = {row[0]: Area(*row) for row in _ROWS}
 FLAG_AREAS = frozenset(("CF", "TF", "CNF"))
 """Areas that count bits."""
+PORTABLE_AREAS = frozenset("IQM")
+"""Areas that count bytes and are written with a size, as in `%MW10`."""
 
 SLOTS_OFFSET = 180224
 """Where the slots of globals and instances begin."""
@@ -65,6 +68,43 @@ def e_bank(name: str, offset: int) -> Area:
 
 
 E_NAMES = tuple(f"E{bank:X}" for bank in range(E_BANKS))
+
+
+# --- areas that units bring -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Mailbox:
+    """An area of its own that a unit brings, through which the blocks of its library reach it: words for the unit as
+    a whole, then slots of equal size, of which an instance claims a free one."""
+
+    name: str
+    head_words: int
+    slots: int
+    slot_words: int
+
+    @property
+    def words(self) -> int:
+        """How many words it has in all."""
+        return self.head_words + self.slots * self.slot_words
+
+    def at(self, offset: int) -> Area:
+        """The area when it lies at `offset`."""
+        return Area(self.name, offset, self.words, 16)
+
+
+MAILBOX_NAME = re.compile(r"[A-Z]{2,8}")
+MAILBOX_MOST_WORDS = 1 << 20
+
+
+def refusal(mailbox: Mailbox) -> str:
+    """Why there cannot be such a mailbox, "" if there can."""
+    name = mailbox.name
+    if not MAILBOX_NAME.fullmatch(name) or name in AREAS or name == "DM":
+        return f"{name!r} cannot name an area: write 2 to 8 capitals that no other area has"
+    if min(mailbox.head_words, mailbox.slots, mailbox.slot_words) < 0 or not 0 < mailbox.words <= MAILBOX_MOST_WORDS:
+        return f"{name} would have {mailbox.words} words; 1 to {MAILBOX_MOST_WORDS} are possible"
+    return ""
 
 
 # --- the system page ------------------------------------------------------------------------------------------------
@@ -98,28 +138,29 @@ class Address:
         """Offset in bytes from the start of the area (of the byte that holds the bit, if one is named)."""
         if self.area in FLAG_AREAS:
             return self.number // 8
-        unit = (self.size_bits or 8) // 8 if self.area in "IQM" else 2
+        unit = (self.size_bits or 8) // 8 if self.area in PORTABLE_AREAS else 2
         if self.bit is None:
             return self.number * unit
-        return self.number * (1 if self.area in "IQM" else 2) + self.bit // 8
+        return self.number * (1 if self.area in PORTABLE_AREAS else 2) + self.bit // 8
 
     def bit_in_byte(self) -> int:
         return self.number % 8 if self.area in FLAG_AREAS else (self.bit or 0) % 8
 
     def __str__(self) -> str:
-        if self.area in "IQM":
+        if self.area in PORTABLE_AREAS:
             size = "X" if self.bit is not None else {8: "B", 16: "W", 32: "D", 64: "L"}[self.size_bits or 8]
             return f"%{self.area}{size}{self.number}" + (f".{self.bit}" if self.bit is not None else "")
         bit = f".{self.bit:02}" if self.bit is not None else ""
         if self.area in FLAG_AREAS:
             return f"CF{self.number:03}" if self.area == "CF" else f"{self.area[0]}{self.number:04}"
-        if self.area[0] == "E":
+        if self.area in E_NAMES:
             return f"{self.area}_{self.number}{bit}"
         return f"{self.area}{' ' if self.area == 'CIO' else ''}{self.number}{bit}"
 
 
 _OMRON = re.compile(r"%?\s*(CIO|DM|D|W|H|A|TF|CNF|CF|T|C|E([0-9A-F])_|E([0-9A-F])\s*:)?\s*(\d+)(?:\.(\d+))?", re.I)
 _PORTABLE = re.compile(r"%\s*([IQM])([XBWDL]?)(\d+)(?:\.(\d+))?", re.I)
+_BROUGHT = re.compile(rf"%?\s*({MAILBOX_NAME.pattern})\s*(\d+)(?:\.(\d+))?", re.I)
 _SIZES = {"X": 1, "": 1, "B": 8, "W": 16, "D": 32, "L": 64}
 
 
@@ -127,9 +168,10 @@ class AddressError(ValueError):
     """The text is no address, or the address does not exist; the message says why."""
 
 
-def parse_address(text: str) -> Address:
+def parse_address(text: str, areas: Mapping[str, Area] = AREAS) -> Address:
     """The address that `text` names: `D100`, `%D100`, `CIO 1519.03`, `1519.03`, `E0_100`, `%MW10`, `%IX0.3`.
 
+    `areas` are those that there are, with what units bring; E banks are known without being among them.
     A bit of a larger unit is one of its bytes: `%MW4.15` is `%MX9.7`.  Raises AddressError for text that is no address or
     lies outside its area."""
     text = text.strip()
@@ -137,6 +179,10 @@ def parse_address(text: str) -> Address:
         return _portable(match)
     match = _OMRON.fullmatch(text)
     if not match:
+        brought = _BROUGHT.fullmatch(text)
+        if brought and brought[1].upper() in areas:
+            bit = int(brought[3]) if brought[3] is not None else None
+            return check_address(Address(brought[1].upper(), int(brought[2]), bit), areas)
         raise AddressError(f"{text!r} is not an address")
     name = (match[1] or "CIO").upper().replace(" ", "")
     if name.startswith("E") or name == "DM":
@@ -160,14 +206,14 @@ def _portable(match: re.Match[str]) -> Address:
     return Address(area, whole.byte_offset() + bit // 8, bit % 8, 1)
 
 
-def check_address(address: Address) -> Address:
+def check_address(address: Address, areas: Mapping[str, Area] = AREAS) -> Address:
     """The same address.  Raises AddressError if it lies outside its area."""
-    if address.area[0] == "E":
-        if address.area not in E_NAMES:
-            raise AddressError(f"there is no E bank {address.area[1:]}; banks are 0 to {E_BANKS - 1:X}")
+    if address.area in areas:
+        area = areas[address.area]
+    elif address.area in E_NAMES:
         area = e_bank(address.area, 0)
     else:
-        area = AREAS[address.area]
+        raise AddressError(f"there is no E bank {address.area[1:]}; banks are 0 to {E_BANKS - 1:X}")
     if area.unit_bits == 1 and address.bit is not None:
         raise AddressError(f"{address} is a flag and has no bits")
     top = 7 if area.unit_bits == 8 else 15

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from fbvm.base.areas import AREAS, E_NAMES
+from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import StructType, Type, fold
 from fbvm.check.calls import Calls
@@ -32,7 +32,13 @@ class Checker:
         self.specs.values = self.values
         self.specs.scope = self.scope
         self.interfaces = Interfaces(self)
+        brought = project.libraries.mailboxes
+        self.areas: dict[str, Area] = {**AREAS, **{name: e_bank(name, 0) for name in E_NAMES},
+                                       **{name: box.at(0) for name, box in brought.items()}}
+        """Areas that a program may name; where the optional ones lie is known after layout."""
         self.e_banks: set[str] = set()
+        self.mailboxes: dict[str, Mailbox] = {}
+        """Those that the program uses."""
         self.tasks: list[TaskFact] = []
         self.globals = Globals(self)
         self.bodies: list[Pou] = []
@@ -67,9 +73,10 @@ class Checker:
         return Calls(expressions)
 
     def use_area(self, name: str) -> None:
-        """Note that a program names an area, which matters for E banks."""
-        if name not in AREAS:
-            assert name in E_NAMES
+        """Note that a program names an area, which matters for those that a PLC has only then."""
+        if name in self.project.libraries.mailboxes:
+            self.mailboxes[name] = self.project.libraries.mailboxes[name]
+        elif name in E_NAMES:
             self.e_banks.add(name)
 
     def is_damaged(self, pou: Pou, name: str) -> bool:

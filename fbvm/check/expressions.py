@@ -247,7 +247,7 @@ class Expressions:
                 self.checker.globals.is_told(expr, self.source):
             return
         try:
-            address = parse_address(name)
+            address = parse_address(name, self.checker.areas)
             hint = f"for the address write %{name}, or declare a variable AT {address}"
         except AddressError:
             known = [v.name for v in self.pou.order] if self.pou else []
@@ -260,7 +260,7 @@ class Expressions:
 
     def _direct(self, expr: tree.Direct, want: Type | None) -> Type | None:
         try:
-            address = parse_address(expr.text)
+            address = parse_address(expr.text, self.checker.areas)
         except AddressError as error:
             self.error("S0601", expr, str(error))
             return None

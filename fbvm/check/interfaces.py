@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.areas import AREAS, FLAG_AREAS, Address, AddressError, parse_address
+from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold
 from fbvm.check.facts import Edge, Pou, Variable, is_block
@@ -150,7 +150,7 @@ class Interfaces:
                             "write the whole address")
             return None
         try:
-            address = parse_address(node.text)
+            address = parse_address(node.text, self.checker.areas)
         except AddressError as error:
             self.report.add("S0601", source, node, str(error))
             return None
@@ -173,7 +173,7 @@ class Interfaces:
             self.report.add("S0604", source, node, "instances of blocks have no location")
             return False
         self.checker.use_area(address.area)
-        size = AREAS[address.area].size_bytes if address.area in AREAS else 65536
+        size = self.checker.areas[address.area].size_bytes
         if address.size_bits and not isinstance(kind, ArrayType | StructType | StringType) \
                 and kind.size * 8 != max(8, address.size_bits):
             self.report.add("S0602", source, node, f"{address} has {address.size_bits} bits, {kind} {kind.size * 8}")

@@ -1,4 +1,13 @@
-"""Libraries of blocks: folders with a `library.toml` and one POU a file, found by the file's name."""
+"""Libraries of blocks: folders with a `library.toml` and one POU a file, found by the file's name.
+
+A library for a unit that has no words of its own in the PLC's areas declares them, the unit's mailbox:
+
+    [mailbox]
+    area = "NOC"        # as the library's variables name it behind AT
+    head = 512          # words for the unit as a whole
+    slots = 32
+    slot = 400          # words of a slot
+"""
 
 from __future__ import annotations
 
@@ -7,6 +16,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from fbvm.base.areas import Mailbox, refusal
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
@@ -24,6 +34,7 @@ class Library:
     folder: Path
     files: dict[str, Path]
     globals: tuple[str, ...] = ()
+    mailbox: Mailbox | None = None
     loaded: set[str] = field(default_factory=set)
 
 
@@ -45,7 +56,23 @@ def _libraries_below(root: Path) -> Iterator[Library]:
         if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
             raise LibraryError(f"{described}: globals must be a list of file names")
         name = folder.relative_to(root).as_posix() if folder != root else root.name
-        yield Library(name, folder, {fold(p.stem): p for p in sorted(folder.glob("*.st"))}, tuple(listed))
+        files = {fold(p.stem): p for p in sorted(folder.glob("*.st"))}
+        yield Library(name, folder, files, tuple(listed), _mailbox(table, described))
+
+
+def _mailbox(table: dict[str, object], described: Path) -> Mailbox | None:
+    """The mailbox of the library's unit."""
+    written = table.get("mailbox")
+    if written is None:
+        return None
+    row = written if isinstance(written, dict) else {}
+    sizes = [size for key in ("head", "slots", "slot") if type(size := row.get(key)) is int]
+    if set(row) != {"area", "head", "slots", "slot"} or len(sizes) != 3:
+        raise LibraryError(f"{described}: a mailbox has an area and whole numbers for head, slots and slot")
+    mailbox = Mailbox(str(row["area"]), *sizes)
+    if why := refusal(mailbox):
+        raise LibraryError(f"{described}: {why}")
+    return mailbox
 
 
 class Libraries:
@@ -57,6 +84,11 @@ class Libraries:
         for root in roots:
             for library in _libraries_below(Path(root)):
                 self._libraries.setdefault(library.name, library)
+        self.mailboxes: dict[str, Mailbox] = {}
+        """What the libraries' units bring, by area."""
+        for library in self._libraries.values():
+            if library.mailbox and self.mailboxes.setdefault(library.mailbox.name, library.mailbox) != library.mailbox:
+                raise LibraryError(f"{library.folder}: {library.mailbox.name} is another library's mailbox, too")
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -5,9 +5,9 @@ All code is plain data (see `operations`).  Names of sources stand in `sites`' t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, Area
+from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, Area, Mailbox, e_bank
 from fbvm.base.types import Field, Type
 from fbvm.code.operations import Block
 
@@ -67,21 +67,22 @@ class Layout:
 
     slots_size: int
     e_banks: tuple[str, ...] = ()
+    mailboxes: tuple[Mailbox, ...] = ()
 
     @property
     def areas(self) -> dict[str, Area]:
-        """All areas that a PLC with this image has, E banks behind the slots."""
+        """All areas that a PLC with this image has: behind the slots what units bring, then E banks."""
         areas = dict(AREAS)
         at = _page_up(SLOTS_OFFSET + self.slots_size)
-        for name in self.e_banks:
-            areas[name] = Area(name, at, 32768, 16, 0, True)
-            at += areas[name].size_bytes
+        for area in (*(box.at(0) for box in self.mailboxes), *(e_bank(name, 0) for name in self.e_banks)):
+            areas[area.name] = replace(area, offset=at)
+            at = _page_up(at + area.size_bytes)
         return areas
 
     @property
     def size(self) -> int:
         """Bytes of the whole buffer, in whole pages."""
-        return _page_up(SLOTS_OFFSET + self.slots_size) + 65536 * len(self.e_banks)
+        return _page_up(max(SLOTS_OFFSET + self.slots_size, *(a.offset + a.size_bytes for a in self.areas.values())))
 
 
 def _page_up(size: int) -> int:

@@ -38,7 +38,7 @@ def place(checker: Checker) -> Placed:
         frames += -frames % 8
         pou.frame_offset = SLOTS_OFFSET + frames
         frames += pou.frame_size
-    placed = Placed(Layout(frames, tuple(sorted(checker.e_banks))))
+    placed = Placed(Layout(frames, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values())))
     placed.initial += _runs(slots)
     located = [v for v in checker.global_order if v.place == "area"]
     for pou in checker.bodies:

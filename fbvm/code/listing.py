@@ -35,6 +35,8 @@ def _layout(image: Image) -> Iterator[str]:
     layout = image.layout
     yield f"layout    {layout.size} bytes: {layout.slots_size} of slots from {SLOTS_OFFSET}" + (
         f", E banks {' '.join(layout.e_banks)}" if layout.e_banks else "")
+    for box in layout.mailboxes:
+        yield f"mailbox   {box.name}: {box.head_words} words, then {box.slots} slots of {box.slot_words}"
 
 
 def _tasks(image: Image) -> Iterator[str]:

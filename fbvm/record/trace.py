@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
+from fbvm.base.areas import Mailbox
 from fbvm.base.memory import Memory
 from fbvm.code.image import Layout, Site
 from fbvm.plc import Phase
@@ -99,8 +100,9 @@ class Trace:
     def _take(self, head: dict[str, Any]) -> None:
         try:
             self.symbols = symbols.from_data(head)
-            self.areas = Layout(int(head["slots"]), tuple(head["e_banks"])).areas
-            self.size = Layout(int(head["slots"]), tuple(head["e_banks"])).size
+            boxes = tuple(Mailbox(str(name), *map(int, sizes)) for name, *sizes in head["mailboxes"])
+            layout = Layout(int(head["slots"]), tuple(head["e_banks"]), boxes)
+            self.areas, self.size = layout.areas, layout.size
             self.cycle_ns = int(head["cycle_ns"])
             self.depth = Depth(head["depth"])
             self.selected: tuple[str, ...] = tuple(head["selected"])

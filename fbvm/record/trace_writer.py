@@ -6,6 +6,7 @@ import json
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from dataclasses import astuple
 from enum import Enum
 from typing import Any, BinaryIO
 
@@ -234,6 +235,7 @@ def _header(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[str,
     return {
         "format": FORMAT, "image": fingerprint(image), "cycle_ns": plc.cycle_ns, "depth": depth.value,
         "selected": list(selected), "slots": image.layout.slots_size, "e_banks": image.layout.e_banks,
+        "mailboxes": [astuple(box) for box in image.layout.mailboxes],
         **symbols.to_data(image.symbols),
         "files": files, "sites": [[files.index(s.file), s.pou, s.line, s.column] for s in image.sites],
         "outer": outer_statements(image), "bodies": [[body.name, body.kind] for body in image.bodies],

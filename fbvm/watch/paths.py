@@ -9,7 +9,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from fbvm.base.areas import FLAG_AREAS, Address, AddressError, Area, parse_address
+from fbvm.base.areas import FLAG_AREAS, PORTABLE_AREAS, Address, AddressError, Area, parse_address
 from fbvm.base.types import (
     BOOL,
     BYTE,
@@ -77,7 +77,7 @@ def find(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> 
     if first and first[1].upper() in symbols and not _SPACED.fullmatch(text):
         return _walk(symbols, text)
     try:
-        address = parse_address(text)
+        address = parse_address(text, areas)
     except AddressError as error:
         raise UnknownPlace(_unknown(symbols, text, first[1] if first else "", str(error))) from None
     return _at(areas, address)
@@ -133,7 +133,7 @@ def _span(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) ->
     if low.bit is None:
         addresses = [replace(low, number=number) for number in range(low.number, high.number + 1)]
     else:
-        width = 8 if low.area in "IQM" else 16
+        width = 8 if low.area in PORTABLE_AREAS else 16
         bits = range(low.number * width + low.bit, high.number * width + (high.bit or 0) + 1)
         addresses = [replace(low, number=bit // width, bit=bit % width) for bit in bits]
     return Span(f"{low}..{high}", tuple(_at(areas, address) for address in addresses))
@@ -141,7 +141,7 @@ def _span(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) ->
 
 def _span_end(areas: Mapping[str, Area], part: str, text: str) -> Address:
     try:
-        return parse_address(part)
+        return parse_address(part, areas)
     except AddressError as error:
         raise UnknownPlace(f"{text} is no range of addresses: {error}") from None
 
