@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import pytest
 from etn_modbus_rig import Client, Model, Rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fbvm.net.faults import Fault
 from fbvm.wire.modbus import FUNCTIONS, Adu, Splitter
+
+pytestmark = pytest.mark.slow
 
 TIMINGS = st.sampled_from(["exact", "exact", "real"])
 SEEDS = st.integers(0, 10**6)

@@ -124,6 +124,7 @@ def conversions() -> Iterator[tuple[str, str]]:
     yield from ((kind, "STRING") for kind in (*INTEGERS, *BITS, *REALS, "BOOL", "TIME"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("source", "target"), list(conversions()))
 def test_conversions(source: str, target: str) -> None:
     rows = [{"a": a} for a in literals(source)]

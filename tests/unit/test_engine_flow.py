@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 
+import pytest
 from hand_image import at, const, execute, load
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -164,6 +165,7 @@ def deep_bodies(node: Node, levels: int) -> Node:
     return ("loop", node[1], deepened(node[2], levels), node[3]) if node[0] == "loop" else node
 
 
+@pytest.mark.slow
 @given(code=blocks(3, False), levels=st.sampled_from((0, 0, 59, 75)))
 @settings(max_examples=40, deadline=None)
 def test_random_programs(code: Block, levels: int) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
 from fbvm.net.faults import KINDS, Fault, random_faults
@@ -152,7 +154,7 @@ def test_random_faults_are_seeded() -> None:
     rows = random_faults(7, 5000, longest=50)
     assert rows == random_faults(7, 5000, longest=50) != random_faults(8, 5000, longest=50)
     assert len(rows) > 50
-    for before, after in zip(rows, rows[1:], strict=False):
+    for before, after in itertools.pairwise(rows):
         assert before.from_scan < before.until_scan <= before.from_scan + 50
         assert before.until_scan < after.from_scan <= before.until_scan + 50
     assert {row.silent for row in rows} == {True, False}

@@ -41,5 +41,5 @@ def test_only_so_many_are_kept(plc: Plc) -> None:
     assert plc.at(50).scans == 51
     with pytest.raises(ValueError, match="scan 49 is not remembered; scans 50 to 99 are"):
         plc.at(49)
-    with pytest.raises(ValueError, match="none is: see Plc.remember"):
+    with pytest.raises(ValueError, match=r"none is: see Plc\.remember"):
         Plc(image()).at(0)

@@ -10,6 +10,8 @@ from fbvm.syntax.builder import CHAIN_LIMIT
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Pou
 
+pytestmark = pytest.mark.slow
+
 MANY = 100_000
 
 

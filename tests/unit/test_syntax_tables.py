@@ -34,6 +34,7 @@ def test_a_missing_file_is_written_and_used(cache: Path, monkeypatch: pytest.Mon
     assert file.suffix == ".json"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("content", [
     b"", b"{", b"[]", b"null", b'{"key": 1}', b"\xff\xfe", b"[" * 100_000, b'{"key": 1, "tables": {}}'], ids=range(8))
 def test_a_damaged_file_is_replaced(cache: Path, content: bytes) -> None:
@@ -45,6 +46,7 @@ def test_a_damaged_file_is_replaced(cache: Path, content: bytes) -> None:
     assert file.read_bytes() == good
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spoil", [
     lambda t: t["tables"]["actions"][0].update(NAME=99_999), lambda t: t["tables"].pop("rules"),
     lambda t: t["tables"]["rules"][0].pop(), lambda t: t["key"].append("other")], ids=["state", "rules", "rule", "key"])

@@ -216,6 +216,7 @@ def test_a_report_at_the_end(pytester: pytest.Pytester) -> None:
     assert 'filename="src/Choose.st"' in (pytester.path / "cov.xml").read_text()
 
 
+@pytest.mark.slow
 def test_with_xdist(pytester: pytest.Pytester) -> None:
     pytest.importorskip("xdist")
     project_of(pytester)

@@ -205,6 +205,7 @@ def test_a_trace_of_a_rig(project: pytest.Pytester) -> None:
     run(project).assert_outcomes(passed=2)
 
 
+@pytest.mark.slow
 def test_with_xdist(project: pytest.Pytester) -> None:
     pytest.importorskip("xdist")
     project.makepyfile("""
