@@ -76,6 +76,19 @@ class OpenArrayType(Type):
 
 
 @dataclass(frozen=True)
+class AnyType(Type):
+    """ANY or a narrower generic type as a parameter: whatever is passed brings its place, size and type.
+
+    `name` is that of the generic type.  `size` is that of the parameter's slot: a reference, and from ANY_SIZE on what is
+    known of its target."""
+
+
+ANY_SIZE, ANY_BITS, ANY_STRIDE, ANY_CLASS = 8, 12, 16, 20
+"""Where in the slot of an ANY its numbers lie, 32 bits each: whole bytes, BOOLs or bits, bits from one of these to the
+next (8 for BOOLs that fill bytes), type class."""
+
+
+@dataclass(frozen=True)
 class Field:
     """A member of a structure or a variable of a POU, at `offset` bytes from the start of the whole.
 
@@ -133,7 +146,7 @@ _PARENTS = {
     "ANY_SIGNED": "ANY_INT", "ANY_UNSIGNED": "ANY_INT", "ANY_INT": "ANY_NUM", "ANY_REAL": "ANY_NUM",
     "ANY_NUM": "ANY_MAGNITUDE", "ANY_DURATION": "ANY_MAGNITUDE", "ANY_MAGNITUDE": "ANY_ELEMENTARY",
     "ANY_BIT": "ANY_ELEMENTARY", "ANY_DATE": "ANY_ELEMENTARY", "ANY_CHARS": "ANY_ELEMENTARY",
-    "ANY_CHAR": "ANY_CHARS", "ANY_STRING": "ANY_CHARS", "ANY_ELEMENTARY": "ANY",
+    "ANY_CHAR": "ANY_CHARS", "ANY_STRING": "ANY_CHARS", "ANY_ELEMENTARY": "ANY", "ANY_DERIVED": "ANY",
 }
 
 
@@ -167,7 +180,9 @@ SHORT_NAMES = {
     "TOD": "TIME_OF_DAY", "LTOD": "LTIME_OF_DAY", "DT": "DATE_AND_TIME", "LDT": "LDATE_AND_TIME",
     "T": "TIME", "LT": "LTIME", "D": "DATE", "LD": "LDATE",
 }
-GENERIC = frozenset(_PARENTS) | {"ANY", "ANY_DERIVED"}
+GENERIC = frozenset(_PARENTS) | {"ANY"}
+ANYTHING = {name: AnyType(name, 24, 8) for name in GENERIC}
+"""Parameters of generic type by name."""
 DEFAULT_STRING = 80
 """Characters of a STRING declared without a length (as CODESYS; the standard leaves it to the maker)."""
 DAY_NS = 86_400_000_000_000
@@ -220,6 +235,8 @@ def families(kind: Type) -> frozenset[str]:
         return kind.families
     if isinstance(kind, StringType):
         return families_of("ANY_STRING")
+    if isinstance(kind, AnyType):
+        return frozenset()
     return frozenset(("ANY_DERIVED", "ANY"))
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import BOOL, DEFAULT_STRING, StringType, StructType, Type, base, fold
+from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, StringType, StructType, Type, base, fold
+from fbvm.check.anything import contents_hidden
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.facts import Pou, PouCall, Variable, is_block
 from fbvm.check.fitting import assignable, holds, same
@@ -190,6 +191,10 @@ class Calls:
             return False
         if not self.expressions.is_variable(value):
             self.error("S0407", value, f"the in-out {variable.name} needs a variable, not a value")
+            return False
+        if isinstance(variable.type, AnyType) and contents_hidden(kind):
+            self.error("S0405", value, f"{variable.name} is {variable.type}, and {kind} is or holds an instance",
+                       "pass a variable of it")
             return False
         if not same(kind, variable.type) and not _long_enough(kind, variable):
             hint = "an in-out takes a variable of exactly its own type"

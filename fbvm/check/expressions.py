@@ -20,6 +20,7 @@ from fbvm.base.types import (
     NULL,
     ULINT,
     WORD,
+    AnyType,
     Elementary,
     EnumType,
     RefType,
@@ -30,6 +31,7 @@ from fbvm.base.types import (
     fold,
     string,
 )
+from fbvm.check import anything
 from fbvm.check.constants import convert, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
 from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, is_untyped, literal_hint
@@ -280,6 +282,8 @@ class Expressions:
         whole = self.infer(expr.of)
         if whole is None:
             return None
+        if isinstance(whole, AnyType):
+            return anything.member(self, expr, whole)
         if not isinstance(whole, StructType):
             self.error("S0304", expr.of, f"this is {whole} and has no members")
             return None
@@ -324,6 +328,8 @@ class Expressions:
 
     def is_variable(self, expr: tree.Expr) -> bool:
         """True for an expression that names a place in memory."""
+        if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
+            return anything.is_array(expr)
         return expr not in self.facts.rewritten and self._is_variable(expr) and \
             isinstance(expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part | tree.Deref)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fbvm.base.types import (
     BOOL,
+    AnyType,
     ArrayType,
     Elementary,
     EnumType,
@@ -15,6 +16,7 @@ from fbvm.base.types import (
     base,
     converts,
     families,
+    families_of,
 )
 from fbvm.check.constants import limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
@@ -28,7 +30,7 @@ def is_untyped(kind: Type | None) -> bool:
 
 def assignable(kind: Type, target: Type) -> bool:
     """True if a value of `kind` may be stored where `target` is declared, arrays and structures as a whole included."""
-    if isinstance(target, OpenArrayType) or isinstance(kind, OpenArrayType):
+    if isinstance(target, OpenArrayType | AnyType) or isinstance(kind, OpenArrayType | AnyType):
         return False
     if isinstance(target, ArrayType) and isinstance(kind, ArrayType):
         return kind.bounds == target.bounds and same(kind.element, target.element)
@@ -47,6 +49,8 @@ def holds(target: Type, kind: Type) -> bool:
 
 def same(kind: Type, other: Type) -> bool:
     """True if a variable of `kind` may be passed to an in-out of type `other`: both are the same, but for open bounds."""
+    if isinstance(other, AnyType):
+        return kind == other or other.name in (families_of(kind.name) if isinstance(kind, AnyType) else families(kind))
     if isinstance(other, OpenArrayType):
         dimensions = len(kind.bounds) if isinstance(kind, ArrayType) else getattr(kind, "dimensions", 0)
         return isinstance(kind, ArrayType | OpenArrayType) and dimensions == other.dimensions and \

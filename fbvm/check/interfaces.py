@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
-from fbvm.base.types import BOOL, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold
+from fbvm.base.types import BOOL, AnyType, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold
 from fbvm.check.facts import Edge, Pou, Variable, is_block
 from fbvm.check.names import refuse_reserved
 from fbvm.check.specs import MAX_SIZE
@@ -33,6 +33,8 @@ _QUALIFIERS = {
     "VAR_OUTPUT": ("RETAIN", "NON_RETAIN"), "VAR_IN_OUT": (), "VAR_TEMP": (), "VAR_EXTERNAL": ("CONSTANT",),
     "VAR_GLOBAL": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"),
 }
+BORROWED = (OpenArrayType, AnyType)
+"""Types whose slot holds a reference and more."""
 _LATER = ("VAR_STAT", "VAR_INST", "VAR_ACCESS", "VAR_CONFIG")
 
 
@@ -113,7 +115,8 @@ class Interfaces:
             spec = declared.spec
             if isinstance(spec, tree.RefSpec) and spec.kind == "REFERENCE TO" and pou is not None:
                 spec = spec.target  # the variable stands for what it is bound to
-            resolved = self.checker.specs.resolve(spec, source)
+            specs = self.checker.specs
+            resolved = specs.resolve(spec, source) if pou is None else specs.parameter(spec, source)
             if resolved is None:
                 return None
             kind, initial = resolved
@@ -202,9 +205,11 @@ class Interfaces:
             variable.initial = b"\x01"  # EN is TRUE where nobody connects it
 
     def _open(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
-        """ARRAY [*] is a parameter that borrows its bounds from what is passed."""
-        if isinstance(variable.type, OpenArrayType) and variable.kind != "VAR_IN_OUT":
-            self.report.add("S0205", pou.source, declared.spec, f"ARRAY [*] cannot be {variable.kind}",
+        """ARRAY [*] and ANY are parameters that borrow bounds, size and type from what is passed."""
+        kind = variable.type
+        if isinstance(kind, BORROWED) and variable.kind != "VAR_IN_OUT":
+            what = kind.name if isinstance(kind, AnyType) else "ARRAY [*]"
+            self.report.add("S0205", pou.source, declared.spec, f"{what} cannot be {variable.kind}",
                             "declare it in VAR_IN_OUT")
 
     def _bound(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
@@ -314,7 +319,7 @@ class Interfaces:
 
 
 def _slot(variable: Variable) -> int:
-    return variable.type.size if isinstance(variable.type, OpenArrayType) else 8
+    return variable.type.size if isinstance(variable.type, BORROWED) else 8
 
 
 def _append(content: bytearray, variable: Variable) -> None:

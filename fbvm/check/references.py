@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import DINT, UDINT, ArrayType, OpenArrayType, Type, reference
+from fbvm.base.types import DINT, UDINT, AnyType, ArrayType, OpenArrayType, Type, reference
 from fbvm.check.facts import StandardCall, Variable
 from fbvm.check.writes import writable
 from fbvm.syntax import tree
@@ -83,7 +83,7 @@ def bound(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr
 
 
 def size(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:
-    """SIZEOF(x) of a variable or a type: bytes, known before the program runs."""
+    """SIZEOF(x) of a variable or a type: bytes, known before the program runs but for ANY."""
     kind: Type | None = None
     if isinstance(value, tree.NameRef) and expressions.variable(value.text) is None:
         kind = expressions.checker.specs.named_type(value.text, expressions.source)
@@ -91,6 +91,9 @@ def size(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | 
         kind = expressions.settle(value)
     if kind is None:
         return None
+    if isinstance(kind, AnyType):
+        expressions.facts.calls[call] = StandardCall("SIZEOF", [(value, kind)])
+        return UDINT
     expressions.facts.constants[call] = kind.size
     return UDINT
 

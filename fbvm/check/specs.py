@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import (
+    ANYTHING,
     ELEMENTARY,
     GENERIC,
     INT,
@@ -69,6 +70,11 @@ class Specs:
         self.scope: Callable[[Pou | None], AbstractContextManager[None]]
         self._anonymous = 0
 
+    def parameter(self, spec: tree.TypeSpec, source: Source) -> Resolved | None:
+        """As `resolve`, for a variable of a POU, where generic types may stand."""
+        generic = ANYTHING.get(fold(spec.text)) if isinstance(spec, tree.NamedType) else None
+        return (generic, bytes(generic.size)) if generic is not None else self.resolve(spec, source)
+
     def resolve(self, spec: tree.TypeSpec, source: Source, name: str = "") -> Resolved | None:
         """Type and initial bytes, or None after a diagnostic.  `name` names a type declared with this spec."""
         if isinstance(spec, tree.NamedType):
@@ -105,6 +111,12 @@ class Specs:
 
     # --- names ------------------------------------------------------------------------------------------------------
 
+    def type_classes(self) -> EnumType:
+        """The enumeration of the classes of types that ANY parameters tell, which a library declares."""
+        kind = self.named_type("TYPE_CLASS", Source("", "", "codesys"))
+        assert isinstance(kind, EnumType)
+        return kind
+
     def elementary(self, name: str) -> Type | None:
         """The elementary type that a name stands for."""
         folded = fold(name)
@@ -126,7 +138,10 @@ class Specs:
                 self.report.add("S0901", source, spec, "WSTRING is understood but not executed by this version")
                 return None
             return kind, default(kind)
-        if folded in ("CHAR", "WCHAR") or folded in GENERIC:
+        if folded in GENERIC:
+            self.report.add("S0205", source, spec, f"{folded} is no type of a variable", "it is one of a parameter only")
+            return None
+        if folded in ("CHAR", "WCHAR"):
             self.report.add("S0901", source, spec, f"{folded} is understood but not executed by this version")
             return None
         self.report.add("S0204", source, spec, f"there is no type or block {spec.text}", self._meant(spec.text))

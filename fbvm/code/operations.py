@@ -114,6 +114,7 @@ to_text    | data_type a            | s8     |             | the value as a lite
 from_text  | data_type a site       | any    | R0111 R0105 | reads a literal with or without type prefix, spaces trimmed
 enum_text  | names a                | s8     |             | the member's name by value from `names`, else the number
 reference  | address bit            | ref    |             | the place in object 1, or the base's; bit 0..7 or 255 (WHOLE_BYTES)
+bit_behind | a n                    | ref    |             | bit n (i64) on from where a points: bit 0 of a byte, or a bit
 """
 
 _STATEMENTS = """

@@ -6,7 +6,24 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import FLAG_AREAS
-from fbvm.base.types import LINT, ArrayType, OpenArrayType, StringType, SubrangeType, Type, base, machine
+from fbvm.base.types import (
+    ANY_BITS,
+    ANY_SIZE,
+    ANY_STRIDE,
+    BOOL,
+    DINT,
+    LINT,
+    AnyType,
+    ArrayType,
+    OpenArrayType,
+    StringType,
+    SubrangeType,
+    Type,
+    base,
+    fold,
+    machine,
+)
+from fbvm.check.anything import NUMBERS, VIEWS
 from fbvm.check.facts import StandardCall, Value, Variable
 from fbvm.code.layout import variable_bit
 from fbvm.code.operations import SIZES, WHOLE_BYTES, Address, Node
@@ -57,6 +74,8 @@ class Places:
             offset = self.body.program.areas[address.area].offset + address.byte_offset()
             is_bit = address.bit is not None or address.area in FLAG_AREAS
             return Place(("abs", offset, ()), kind, address.bit_in_byte() if is_bit else None)
+        if isinstance(expr, tree.Member) and isinstance(self.facts.types[expr.of], AnyType):
+            return self._of_any(expr, kind)
         if isinstance(expr, tree.Member):
             member = self.facts.fields[expr]
             if member.absolute:
@@ -71,6 +90,8 @@ class Places:
             return Place((("ref", self.body.value(expr.of), self.body.site(expr)), 0, ()), kind)
         assert isinstance(expr, tree.Index)
         whole = self.facts.types[expr.of]
+        if whole is VIEWS["BITS"]:
+            return self._bit_of_any(expr)
         return self._open_index(expr, whole) if isinstance(whole, OpenArrayType) else self._index(expr, kind)
 
     def variable(self, variable: Variable, expr: tree.Expr | None = None) -> Place:
@@ -136,6 +157,8 @@ class Places:
         return Place((start, offset, (*terms, (kind.element.size, distance))), kind.element)
 
     def _bound_at(self, expr: tree.Expr, kind: OpenArrayType, dimension: int, upper: bool) -> Node:
+        if isinstance(expr, tree.Member):
+            return self._last_of_any(expr, kind) if upper else ("const", "i64", 0)
         slot = self.slot(self.facts.variables[expr])
         return ("load", "i64", slot.moved(kind.bound_offset(dimension, upper), LINT).address)
 
@@ -152,6 +175,38 @@ class Places:
             return [self._bound_at(expr, kind, d, upper) for d in range(kind.dimensions) for upper in (False, True)]
         assert isinstance(kind, ArrayType)
         return [("const", "i64", bound) for pair in kind.bounds for bound in pair]
+
+    # --- ANY --------------------------------------------------------------------------------------------------------
+
+    def any_number(self, expr: tree.Expr, offset: int) -> Node:
+        """A number of the slot of an ANY, as i64."""
+        slot = self.slot(self.facts.variables[expr])
+        return ("convert", "i64", "i32", ("load", "i32", slot.moved(offset, DINT).address))
+
+    def _of_any(self, expr: tree.Member, kind: Type) -> Place:
+        """A member of an ANY: a number of its slot, or the bytes that it stands for."""
+        offset = NUMBERS.get(fold(expr.name.text))
+        variable = self.facts.variables[expr.of]
+        return self.variable(variable, expr) if offset is None else self.slot(variable).moved(offset, kind)
+
+    def _last_of_any(self, expr: tree.Member, kind: OpenArrayType) -> Node:
+        """The last subscript of BITS, BYTES, WORDS ... of an ANY, as i64."""
+        if kind is VIEWS["BITS"]:
+            count = self.any_number(expr.of, ANY_BITS)
+        else:
+            count = ("floor_div", "i64", self.any_number(expr.of, ANY_SIZE), ("const", "i64", kind.element.size))
+        return ("sub", "i64", count, ("const", "i64", 1))
+
+    def _bit_of_any(self, expr: tree.Index) -> Place:
+        """An element of BITS, behind a reference that names a bit."""
+        assert isinstance(expr.of, tree.Member)
+        subscript, = expr.subscripts
+        last = self._last_of_any(expr.of, VIEWS["BITS"])
+        site = self.body.site(subscript)
+        number = ("within", "i64", self.body.as_i64(subscript), ("const", "i64", 0), last, "R0102", site)
+        distance = ("mul", "i64", number, self.any_number(expr.of.of, ANY_STRIDE))
+        start = ("load", "ref", self.slot(self.facts.variables[expr.of.of]).address)
+        return Place((("ref", ("bit_behind", "ref", start, distance), self.body.site(expr)), 0, ()), BOOL)
 
     # --- access -----------------------------------------------------------------------------------------------------
 

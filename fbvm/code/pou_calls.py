@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import BOOL, LINT, OpenArrayType, machine
+from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, machine
 from fbvm.check.constants import default
 from fbvm.check.facts import PouCall, Variable
+from fbvm.code.anything import described
 from fbvm.code.operations import Address, Block, Node
 from fbvm.code.places import Place
 from fbvm.code.values import is_aggregate
@@ -119,6 +120,8 @@ class CallLowering:
                 body.out.append(("store", "ref", place.address, node))
                 if isinstance(variable.type, OpenArrayType):
                     self._bounds(place, expr)
+                elif isinstance(variable.type, AnyType):
+                    self._described(place, expr)
             else:
                 body.write(place, node, site)
         if called.pou.is_function:
@@ -132,6 +135,11 @@ class CallLowering:
         """Store the bounds of what is passed to ARRAY [*] beside its reference."""
         for number, node in enumerate(self.body.places.bounds(expr)):
             self.body.out.append(("store", "i64", slot.moved(8 + 8 * number, LINT).address, node))
+
+    def _described(self, slot: Place, expr: tree.Expr) -> None:
+        """Store the size and type of what is passed to an ANY beside its reference."""
+        for offset, node in described(self.body, expr):
+            self.body.out.append(("store", "i32", slot.moved(offset, DINT).address, node))
 
     def _argument(self, variable: Variable, expr: tree.Expr) -> Node:
         if variable.kind == "VAR_IN_OUT":

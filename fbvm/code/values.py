@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import (
+    ANY_SIZE,
     BOOL,
     DAY_NS,
     LREAL,
@@ -138,6 +139,8 @@ class ValueLowering:
         """A call of a standard function."""
         if called.key == "REF":
             return self.body.places.reference(self.body.places.of(called.arguments[0][0]))
+        if called.key == "SIZEOF":
+            return ("convert", "u32", "i64", self.body.places.any_number(called.arguments[0][0], ANY_SIZE))
         if called.key in ("LOWER_BOUND", "UPPER_BOUND"):
             return ("convert", "i32", "i64", self.body.places.bound(called, self.facts.constants))
         arguments = self.operands(*called.arguments)

@@ -289,7 +289,7 @@ VALUES: dict[str, Callable[..., str]] = {
     "concat": lambda e, machine, a, b: f"({e.value(a)} + {e.value(b)})",
     "find": lambda e, machine, a, b: e.bring(f"find({bare(e.value(a))}, {bare(e.value(b))})", machine),
     "to_text": _call("to_text"), "from_text": _call("from_text"), "enum_text": _enum_text,
-    "reference": _reference,
+    "reference": _reference, "bit_behind": _call("bit_behind"),
 }
 """How each operation is written: called with the operands of its row."""
 

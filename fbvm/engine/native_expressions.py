@@ -65,6 +65,17 @@ def _reference(w: Writer, machine: str, address: Address, bit: int) -> str:
     return w.new(f"add i64 {moved}, {(1 << 40) + bit}")
 
 
+def _bit_behind(w: Writer, machine: str, a: Node, n: Node) -> str:
+    reference, number = w.value(a), w.value(n)
+    bit = w.new(f"and i64 {reference}, {WHOLE_BYTES}")
+    start = w.new(f"select i1 {w.new(f'icmp eq i64 {bit}, {WHOLE_BYTES}')}, i64 0, i64 {bit}")
+    number = w.new(f"add i64 {number}, {start}")
+    offset = w.new(f"add i64 {w.new(f'lshr i64 {reference}, 8')}, {w.new(f'ashr i64 {number}, 3')}")
+    moved = w.new(f"shl i64 {w.new(f'and i64 {offset}, {(1 << 32) - 1}')}, 8")
+    whose = w.new(f"and i64 {reference}, {-1 << 40}")
+    return w.new(f"or i64 {w.new(f'or i64 {whose}, {moved}')}, {w.new(f'and i64 {number}, 7')}")
+
+
 # --- arithmetic -----------------------------------------------------------------------------------------------------
 
 
@@ -413,5 +424,6 @@ VALUES: dict[str, Row] = {
     "check": _check, "within": _within, "math": _math, "atan2": _arctangent, "floor_div": _floor_divide,
     "now": lambda w, machine: w.system(NOW),
     "from_bcd": _bcd_number, "to_bcd": _bcd_digits, "length": _length, "find": _find, "reference": _reference,
+    "bit_behind": _bit_behind,
 }
 """How each operation is written but those that yield or read a text: called with the operands of its row."""

@@ -82,6 +82,14 @@ def sited(function: Callable[..., T]) -> Callable[..., T]:
     return answer
 
 
+def bit_behind(reference: int, n: int) -> int:
+    """A reference to bit n counted from where `reference` points."""
+    start = reference & BIT_MASK
+    n += 0 if start == WHOLE_BYTES else start
+    offset = (reference >> OFFSET_SHIFT) + (n >> 3) & OFFSET_MASK
+    return reference >> OBJECT_SHIFT << OBJECT_SHIFT | offset << OFFSET_SHIFT | n & 7
+
+
 def enum_text(names: Mapping[int, str], value: int) -> bytes:
     name = names.get(value)
     return str(int(value)).encode() if name is None else name.encode("latin-1", "replace")
@@ -93,6 +101,7 @@ _PURE: dict[str, Any] = {
     "lesser": arithmetic.lesser, "greater": arithmetic.greater, "choose": choose, "mux": mux, "within": within,
     "single": arithmetic.single, "single_of_integer": arithmetic.single_of_integer, "bits": arithmetic.bits,
     "arctangent": arithmetic.arctangent, "find": strings.find, "to_text": texts.to_text, "enum_text": enum_text,
+    "bit_behind": bit_behind,
     **{function.__name__: sited(function) for function in (
         arithmetic.nearest, arithmetic.truncate, arithmetic.from_bcd, arithmetic.to_bcd, arithmetic.shift_left,
         arithmetic.shift_right, arithmetic.rotate_left, arithmetic.rotate_right, strings.left, strings.right,

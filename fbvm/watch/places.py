@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
-from fbvm.base.types import ArrayType, OpenArrayType, StringType, StructType, Type, base, machine
+from fbvm.base.types import AnyType, ArrayType, OpenArrayType, StringType, StructType, Type, base, machine
 from fbvm.watch.paths import Place, member
 from fbvm.watch.values import Value, conform
 
@@ -49,7 +49,7 @@ def _follow(memory: Memory, place: Place) -> tuple[int, int | None] | None:
 
 def _read(memory: Memory, kind: Type, offset: int, bit: int | None) -> Value:
     plain = base(kind)
-    if isinstance(plain, OpenArrayType):
+    if isinstance(plain, OpenArrayType | AnyType):
         return None  # what was passed may be gone, and only its owner knows its bounds
     if isinstance(plain, ArrayType):
         return [_read(memory, plain.element, *_element(plain, offset, bit, number)) for number in range(plain.count)]

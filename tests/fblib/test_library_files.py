@@ -28,7 +28,7 @@ MTCP = FBLIB / "omron" / "mtcp_etn"
 def test_a_file_holds_the_pou_that_it_is_named_after(path: Path) -> None:
     described = tomllib.loads((path.parent / "library.toml").read_text(encoding="utf-8"))
     text = path.read_text(encoding="utf-8")
-    pous = re.findall(r"^(?:FUNCTION_BLOCK|FUNCTION|PROGRAM) (\w+)", text, re.M)
+    pous = re.findall(r"^(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|TYPE) (\w+)", text, re.M)
     assert pous == ([] if path.name in described["globals"] else [path.stem])
     assert text.startswith("//"), "it says what it is for"
     assert max(map(len, text.splitlines())) <= 120

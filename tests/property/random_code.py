@@ -86,6 +86,13 @@ class Maker:
             return "reference", "ref", at(ROWS["f64"] + 256 * self.random.randrange(PLACES)), 255
         return "load", "ref", at(ROWS["ref"] + 256 * self.random.randrange(PLACES))
 
+    def flag(self) -> Address:
+        """Where a BOOL behind a reference lies: a byte, or a bit."""
+        whole = self.reference()
+        if self.random.randrange(2):
+            whole = "bit_behind", "ref", whole, self.small_number(63, 1)
+        return (("ref", whole, self.site()), 0, ())
+
     def rarely(self) -> bool:
         """True where a trap may come of it: programs shall get far as a rule."""
         return not self.random.randrange(40)
@@ -230,7 +237,7 @@ class Maker:
             return self.pick((("not", "b", v("b", d)), ("is_set", "b", form := self.pick(FORMS), v(form, d))))
         if what == 6:
             return self.pick((("load_bit", "b", self.address("u8"), self.random.randrange(8)),
-                              ("load_flag", "b", (("ref", self.reference(), self.site()), 0, ()))))
+                              ("load_flag", "b", self.flag())))
         return self.either("b", d)
 
     def text(self, d: int) -> Node:
@@ -286,7 +293,7 @@ class Maker:
         if form == "b" and self.random.randrange(2):
             if self.random.randrange(2):
                 return "store_bit", self.address("u8"), self.random.randrange(8), self.value("b", 3)
-            return "store_flag", (("ref", self.reference(), self.site()), 0, ()), self.value("b", 2)
+            return "store_flag", self.flag(), self.value("b", 2)
         return self.pick(("store", "store", "store_raw")), form, self.address(form), self.value(form, 4)
 
     def let(self) -> Node:

@@ -1,0 +1,85 @@
+"""ANY parameters: what a block may ask of what was passed to it, whatever its type.
+
+    x.diSize        how many bytes it fills (DINT)              x.BITS[i]    BOOL number i: an element of an array of BOOL,
+    x.TypeClass     its type, TYPE_CLASS.TYPE_INT ...                        else bit i, the lowest of the first byte first
+    x.BYTES[i]      byte i, likewise WORDS, DWORDS, LWORDS      SIZEOF(x)    as diSize (UDINT)
+
+All begin at 0; UPPER_BOUND(x.BITS, 1) is the last.  A BOOL on a bit of a word fills no byte: it has BITS only.  diSize and
+TypeClass are named as CODESYS names them; the rest is ours.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import (
+    ANY_CLASS,
+    ANY_SIZE,
+    BOOL,
+    BYTE,
+    DINT,
+    DWORD,
+    LWORD,
+    WORD,
+    AnyType,
+    ArrayType,
+    Elementary,
+    EnumType,
+    OpenArrayType,
+    RefType,
+    StringType,
+    StructType,
+    SubrangeType,
+    Type,
+    fold,
+    open_array,
+)
+from fbvm.check.facts import is_block
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.expressions import Expressions
+
+VIEWS = {name: open_array(1, kind) for name, kind in (
+    ("BITS", BOOL), ("BYTES", BYTE), ("WORDS", WORD), ("DWORDS", DWORD), ("LWORDS", LWORD))}
+"""The members that are arrays over what was passed."""
+NUMBERS = {"DISIZE": ANY_SIZE, "TYPECLASS": ANY_CLASS}
+"""The members that are numbers, by their place in the slot."""
+_CLASSES = {"DATE_AND_TIME": "DATEANDTIME", "TIME_OF_DAY": "TIMEOFDAY", "LDATE_AND_TIME": "LDATEANDTIME",
+            "LTIME_OF_DAY": "LTIMEOFDAY"}
+_DERIVED: dict[type[Type], str] = {ArrayType: "ARRAY", OpenArrayType: "ARRAY", EnumType: "ENUM", SubrangeType: "SUBRANGE",
+                                   RefType: "POINTER", StructType: "USERDEF"}
+
+
+def member(expressions: Expressions, expr: tree.Member, whole: AnyType) -> Type | None:
+    """The type of a member of an ANY, or None after a diagnostic."""
+    name = fold(expr.name.text)
+    if name == "TYPECLASS":
+        return expressions.checker.specs.type_classes()
+    if name in NUMBERS:
+        return DINT
+    if name not in VIEWS:
+        expressions.error("S0210", expr.name, f"{whole} has no {expr.name.text}",
+                          expressions.project.choices(expr.name.text, ("diSize", "TypeClass", *VIEWS)))
+    return VIEWS.get(name)
+
+
+def type_class(kind: Type) -> str:
+    """The member of TYPE_CLASS for a type."""
+    if isinstance(kind, StringType):
+        return "TYPE_WSTRING" if kind.wide else "TYPE_STRING"
+    if isinstance(kind, Elementary):
+        return f"TYPE_{_CLASSES.get(kind.name, kind.name)}"
+    return f"TYPE_{_DERIVED[type(kind)]}"
+
+
+def contents_hidden(kind: Type) -> bool:
+    """True for what has no bytes that a program may look at: instances, and what holds them."""
+    if isinstance(kind, ArrayType):
+        return contents_hidden(kind.element)
+    return is_block(kind) or isinstance(kind, StructType) and any(contents_hidden(f.type) for f in kind.fields.values())
+
+
+def is_array(expr: tree.Member) -> bool:
+    """True for a member of an ANY that can be passed on as an array: of bytes or words, not of bits."""
+    return fold(expr.name.text) in VIEWS.keys() - {"BITS"}
