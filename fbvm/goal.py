@@ -34,6 +34,7 @@ class Goal:
         self.max_ns = None if max_ns is None else plc.elapsed_ns + max_ns
         self._until = self._condition(until)
         self._started = plc.scans
+        self._halted = plc.halted
 
     def _condition(self, until: str | Callable[[Plc], bool] | None) -> Callable[[], bool] | None:
         if until is None:
@@ -45,8 +46,10 @@ class Goal:
         return lambda: condition.holds(self._plc.read)
 
     def reached(self) -> str:
-        """"trap", "until", "scans", "time" or "max" if that ended the run, else ""."""
+        """"trap", "until", "scans", "time", "max" or "break" if that ended the run, else ""."""
         plc = self._plc
+        if plc.halted and plc.halted is not self._halted:
+            return "break"
         if plc.trap:
             return "trap"
         if self._until and plc.scans > self._started and self._until():

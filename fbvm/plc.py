@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import Enum
@@ -15,17 +15,18 @@ from enum import Enum
 from fbvm import flags
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
 from fbvm.base.memory import Memory, Snapshot
+from fbvm.breakpoints import Breakpoints, Halt
 from fbvm.code.image import Image
 from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
 from fbvm.scan_times import ScanTimes
-from fbvm.schedule import Schedule
+from fbvm.schedule import Schedule, hurried
 from fbvm.units.unit import Unit
 from fbvm.watch import places
 from fbvm.watch.paths import Place, Span, find, find_place
-from fbvm.watch.values import Value, show_time
+from fbvm.watch.values import Value
 from fbvm.wire.link import Link, Network
 
 STEP_BUDGET = 2_000_000
@@ -68,15 +69,6 @@ def fingerprint(image: Image) -> str:
         else:
             said.update(repr(item).encode())
     return said.hexdigest()[:32]
-
-
-def hurried(image: Image, cycle_ns: int) -> Iterator[str]:
-    """What to say of tasks with an INTERVAL that is shorter than the cycle."""
-    for task in image.tasks:
-        if 0 < task.interval_ns < cycle_ns:
-            wanted, cycle = show_time(task.interval_ns)[2:], show_time(cycle_ns)[2:]
-            yield (f"task {task.name} wants {wanted}, the PLC scans every {cycle}: it runs once a scan, what is between "
-                   f"is lost; a cycle of {wanted} gives all")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -137,7 +129,7 @@ class Plc:
         self.now_ns = 0
         """Time of the last scan; `elapsed_ns` is where the next one begins in virtual time."""
         self.scans = 0
-        self.warnings = tuple(hurried(image, cycle_ns))
+        self.warnings = tuple(hurried(image.tasks, cycle_ns))
         """What the program asks and this PLC does not do, for people: tasks that want to be quicker than the cycle."""
         self.scan_times = ScanTimes()
         """How long scans took, where somebody with a clock measured it (`fbvm.run`)."""
@@ -149,6 +141,8 @@ class Plc:
         self._first = True
         self._forces: dict[Place, Value] = {}
         self._past: deque[State] = deque(maxlen=0)
+        self._due: deque[int] = deque()
+        self.breakpoints = Breakpoints(self)
         self._schedule = Schedule(image.tasks, lambda path: self.read(path) is True)
         self._write_initial()
         self._journal = journal
@@ -160,10 +154,24 @@ class Plc:
     def scan(self, now_ns: int | None = None) -> Trap | None:
         """One cycle at time `now_ns`, or in virtual time one cycle after the last.  Returns the trap that stopped it.
 
-        A scan that traps ends there: its outputs do not reach the units.  Raises Stopped if a trap was before, and
-        ValueError if time runs backwards or real connections are to live in virtual time."""
+        A scan that traps ends there: its outputs do not reach the units.  One that meets a breakpoint stands (`halted`);
+        the next call ends it.  Raises Stopped if a trap was before, and ValueError if time runs backwards or real
+        connections are to live in virtual time."""
         if self.trap:
             raise Stopped(self.trap)
+        if not self.halted:
+            self._begin(now_ns)
+        if self._mode is Mode.RUN:
+            self.trap = self._execute()
+            if self.halted:
+                return None
+            self._apply_forces()
+            self._over(Phase.PROGRAM)
+        self._end()
+        return self.trap
+
+    def _begin(self, now_ns: int | None) -> None:
+        """A scan up to its program."""
         now_ns = self._time(now_ns)
         if self._journal:
             self._journal.before(self.scans, now_ns, self.budget, self.forces)
@@ -171,9 +179,10 @@ class Plc:
         if self._mode is Mode.RUN:
             self._apply_forces()
             self._over(Phase.INPUTS)
-            self.trap = self._execute()
-            self._apply_forces()
-            self._over(Phase.PROGRAM)
+            self._due.extend(self._schedule.due(now_ns))
+
+    def _end(self) -> None:
+        """A scan from the end of its program on."""
         if not self.trap:
             self._refresh()
             self._over(Phase.REFRESH)
@@ -185,7 +194,11 @@ class Plc:
             self._past.append(self.snapshot())
         for watcher in self.watchers:
             watcher(self)
-        return self.trap
+
+    @property
+    def halted(self) -> Halt | None:
+        """Where the scan stands at a breakpoint; None if it does not."""
+        return self.breakpoints.halted
 
     def _time(self, now_ns: int | None) -> int:
         """When the scan is, told or virtual."""
@@ -211,10 +224,15 @@ class Plc:
             told(self, phase)
 
     def _execute(self) -> Trap | None:
-        """Program execution: the tasks that are due, by priority."""
-        for number in self._schedule.due(self.now_ns):
-            trap = self.engine.run(number)
+        """Program execution: the tasks that are due, by priority.  One that stands at a breakpoint stays due."""
+        due, breakpoints = self._due, self.breakpoints
+        while due:
+            trap = breakpoints.run(due[0], self.engine) if breakpoints.armed else self.engine.run(due[0])
+            if breakpoints.halted:
+                return None
+            due.popleft()
             if trap:
+                due.clear()
                 return trap
         self._first = False
         return None
@@ -256,7 +274,8 @@ class Plc:
         """Scans in virtual time until the first of these: so many more `scans`, so much more time, a condition.
 
         `until` is a function of the PLC or an expression such as `Main.done AND D200 > 5`, looked at after each scan;
-        `max_ns` bounds the time.  Returns what ended it: "scans", "time", "until", "max" or "trap"."""
+        `max_ns` bounds the time.  Returns what ended it: "scans", "time", "until", "max", "trap", or "break" for a scan
+        that stands at a breakpoint; the next run goes on there."""
         goal = Goal(self, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
         while not (reason := goal.reached()):
             self.scan()
@@ -362,6 +381,7 @@ class Plc:
         for offset, data in kept:
             self.memory.u8[offset : offset + len(data)] = data
         self._schedule.reset()
+        self._leave()
         self._first = True
         self.trap = None
 
@@ -380,7 +400,9 @@ class Plc:
         """The state of the PLC itself at this moment; pages that did not change are shared, not copied.
 
         With units attached it can be taken, its memory compared, and `fork` goes on from the same state without units;
-        only `restore` cannot."""
+        only `restore` cannot.  Raises ValueError while a scan stands at a breakpoint."""
+        if self.halted:
+            raise ValueError("this scan stands at a breakpoint: end it by another scan() first")
         return State(
             self.memory.snapshot(), self.now_ns, self.scans, self._schedule.state(), dict(self._forces),
             self._mode, self._first, self.trap,
@@ -397,6 +419,12 @@ class Plc:
         self.now_ns, self.scans, self.trap = state.now_ns, state.scans, state.trap
         self._mode, self._first, self._forces = state.mode, state.first, dict(state.forces)
         self._schedule.restore(state.schedule)
+        self._leave()
+
+    def _leave(self) -> None:
+        """A scan that stands at a breakpoint does not go on."""
+        self.breakpoints.leave()
+        self._due.clear()
 
     def fork(self) -> Plc:
         """A second PLC in the same state, without units, watchers and connections, whether or not this one has them."""

@@ -7,11 +7,12 @@ was missed is not made up for: the next one counts from the grid of the first.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from fbvm.base.areas import NEVER
 from fbvm.code.image import TaskRow
+from fbvm.watch.values import show_time
 
 
 @dataclass
@@ -60,3 +61,12 @@ class Schedule:
     def restore(self, state: tuple[dict[int, int], dict[int, bool]]) -> None:
         """Back to a state that `state` gave."""
         self._next_ns, self._levels = dict(state[0]), dict(state[1])
+
+
+def hurried(tasks: tuple[TaskRow, ...], cycle_ns: int) -> Iterator[str]:
+    """What to say of tasks with an INTERVAL that is shorter than the cycle."""
+    for task in tasks:
+        if 0 < task.interval_ns < cycle_ns:
+            wanted, cycle = show_time(task.interval_ns)[2:], show_time(cycle_ns)[2:]
+            yield (f"task {task.name} wants {wanted}, the PLC scans every {cycle}: it runs once a scan, what is between "
+                   f"is lost; a cycle of {wanted} gives all")  # fmt: skip

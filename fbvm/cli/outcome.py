@@ -13,6 +13,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
+from fbvm.breakpoints import Halt
 from fbvm.cli import status
 from fbvm.plc import Plc
 from fbvm.record.chart import draw
@@ -69,12 +70,22 @@ class Outcome:
             "time_ms": plc.elapsed_ns // 1_000_000 if plc.elapsed_ns % 1_000_000 == 0 else plc.elapsed_ns / 1e6,
             "stopped": self.reason,
             "values": {text: for_scripts(place, plc.read(place)) for text, place in self.places.items()},
+            **({"break": _halt(plc.halted)} if plc.halted else {}),
             "trap": trap and site and {
                 "code": trap.code, "file": site.file, "pou": site.pou, "line": site.line, "column": site.column,
                 "message": trap.message,
             },
             **({"scan_time": plc.scan_times.as_dict()} if self.scan_time else {}),
         }  # fmt: skip
+
+
+def _halt(halt: Halt) -> dict[str, object]:
+    """A scan that stands at a breakpoint, as JSON has it."""
+    site = halt.site
+    return {
+        "scan": halt.scan, "file": site and site.file, "pou": halt.frames[0].pou, "line": site and site.line,
+        "column": site and site.column, "reasons": list(halt.reasons),
+    }  # fmt: skip
 
 
 def shown(place: Place | Span, value: Value) -> str:

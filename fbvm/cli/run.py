@@ -11,6 +11,7 @@ import click
 
 from fbvm.cli import registers, status
 from fbvm.cli.banks import banks_in, with_banks
+from fbvm.cli.breakpoints import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.journals import start_journal
 from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, time_ns
 from fbvm.cli.outcome import Outcome, Progress
@@ -47,6 +48,7 @@ UNIT_ADDRESS = "192.168.250.21"
 @click.option("--until", metavar="EXPRESSION", help="End when this holds after a scan: 'Main.done AND D200 > 5'.")
 @click.option("--max", "max_ns", type=time_ns, metavar="TIME",
               help="With --until: give up after this time, with status 1.")
+@breakpoint_options
 @click.option("--set", "settings", type=setting, multiple=True, metavar="NAME=VALUE[@TIME]",
               help="Write once, before the scan at that time.")
 @click.option("--show", "shown", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST", help="Print this at the end.")
@@ -81,12 +83,13 @@ def command(
 ) -> None:  # fmt: skip
     """Compile the files and run them, with an ETN21 (unit number 0) on the backplane.
 
-    End by one of --scans, --for and --until.  Status 1 if --max ended --until, 3 if the program has errors, 4 if a
-    trap stopped it, 5 if the network could not be used."""
+    End by one of --scans, --for and --until; before that, --break, --watch and --break-if end it inside a scan.  Status 1
+    if --max ended --until, 3 if the program has errors, 4 if a trap stopped it, 5 if the network could not be used."""
     _check_usage(**options)
     image = compiled(files, program, libraries, runnable=True, as_json=as_json)
     named = [given.name for given in options["settings"]]
-    banks = banks_in([*named, *options["shown"], *options["charted"], options["until"] or ""])
+    banks = banks_in([*named, *options["shown"], *options["charted"], options["until"] or "", *options["watched"],
+                      *options["conditions"]])
     image = with_banks(image, banks)
     with ExitStack() as stack:
         network = build_network(options["net"], options["mappings"], options["seed"])
@@ -102,6 +105,9 @@ def command(
         with tracing(plc, options["trace"], options["depth"], options["selected"], files, libraries):
             outcome = _run(plc, as_json, **options)
         outcome.print()
+        if plc.halted and not as_json:
+            for line in halt_lines(plc, plc.halted, files):
+                click.secho(line, fg="yellow", err=True)
     sys.exit(outcome.status)
 
 
@@ -115,7 +121,7 @@ def _plc(image: Image, cycle_ns: int, engine: str, journal: Journal | None) -> P
 def _run(
     plc: Plc, as_json: bool, *, settings: tuple[Setting, ...], shown: tuple[str, ...], charted: tuple[str, ...],
     pace: str, scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, net: str,
-    scan_time: bool, **_: Any,
+    scan_time: bool, lines: tuple[str, ...], watched: tuple[str, ...], conditions: tuple[str, ...], **_: Any,
 ) -> Outcome:  # fmt: skip
     """Runs to the end.  Names, values and conditions that do not fit the program are mistakes of usage."""
     for warning in plc.warnings:
@@ -125,6 +131,7 @@ def _run(
         places = {text: plc.find(text) for text in shown}
         names = charted_names(charted)
         recorder = Recorder(plc, names) if names else None
+        set_breakpoints(plc, lines, watched, conditions)
         with Progress(None if as_json else plc, scans, for_ns or max_ns) as progress:
             reason = loop.run(
                 plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes, pace=pace,

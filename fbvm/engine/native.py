@@ -15,6 +15,7 @@ from fbvm.engine.native_code import Code, code_of
 from fbvm.engine.native_context import Context
 from fbvm.engine.native_entries import Entry, entry, scans
 from fbvm.engine.native_writer import Unsupported
+from fbvm.engine.stops import PAUSE, STOPPED, Stops
 from fbvm.engine.trap import Trap, trap
 
 __all__ = ["NativeEngine", "Unsupported", "available"]
@@ -26,16 +27,18 @@ class NativeEngine:
 
     The caller sets time and budget in the system page before a run.  `level` 0 is code that is soon there, 2 is code
     that is fast, None begins with the one and goes on with the other.  A program's mistakes come back as a Trap; memory
-    is then what was stored before it.  Raises ImportError where llvmlite is missing (see `available`), Unsupported for
-    code that the compiler never makes."""
+    is then what was stored before it.  With `stops` a run also ends where these say, with the Trap PAUSE.  Raises
+    ImportError where llvmlite is missing (see `available`), Unsupported for code that the compiler never makes."""
 
-    def __init__(self, image: Image, memory: Memory, level: int | None = None) -> None:
+    def __init__(self, image: Image, memory: Memory, level: int | None = None, stops: Stops | None = None) -> None:
         if memory.size < image.layout.size:
             raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")
         self.image, self.memory, self.level = image, memory, level
-        self._code: Code = code_of(image)
+        self._code: Code = code_of(image, stops is not None)
         self._code.prepare(level)
-        self._context = Context(self._code.kept_bytes, self._code.context_bytes, memory.size)
+        self._context = Context(self._code.kept_bytes, self._code.context_bytes, memory.size,
+                                0 if stops is None else stops.at)
+        self._stops = stops  # which stays while machine code looks into it
         self._place = (ctypes.c_char * memory.size).from_buffer(memory.map)  # which stays while this does
         self._memory_at = ctypes.addressof(self._place)
         self._entries = [self._entry(number) for number in range(len(image.tasks))]
@@ -76,4 +79,6 @@ class NativeEngine:
     def _trap(self, number: int) -> Trap:
         """What the point says, with the values that the context holds."""
         code, site, shown = self._code.points[number - 1]
+        if code == STOPPED:
+            return PAUSE
         return trap(self.image, code, site, tuple(self._context.values(shown)))

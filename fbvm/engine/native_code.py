@@ -25,8 +25,8 @@ class Code:
 
     `points` and the sizes of the context are known once there is code."""
 
-    def __init__(self, image: Image) -> None:
-        self.image = image
+    def __init__(self, image: Image, stops: bool = False) -> None:
+        self.image, self.stops = image, stops
         self.points: tuple[Point, ...] = ()
         self.kept_bytes, self.context_bytes = 0, 0
         self._tasks = [f"task{number}" for number in range(len(image.tasks))]
@@ -38,7 +38,7 @@ class Code:
     @cached_property
     def translation(self) -> Translation:
         """The image in LLVM's language."""
-        return translate(self.image)
+        return translate(self.image, self.stops)
 
     @cached_property
     def _fingerprint(self) -> str:
@@ -88,7 +88,7 @@ class Code:
                 entry.point_to(self.address(task, None))
 
     def _name(self, level: int) -> str:
-        return name_of(f"image {level}", self._fingerprint)
+        return name_of(f"image {level}{' with stops' * self.stops}", self._fingerprint)
 
     def _known(self, level: int) -> Stored | None:
         return native_cache.read(self._name(level))
@@ -128,14 +128,14 @@ class Code:
             entry.point_to(self.address(task, level))
 
 
-_codes: WeakValueDictionary[int, Code] = WeakValueDictionary()
+_codes: WeakValueDictionary[tuple[int, bool], Code] = WeakValueDictionary()
 
 
-def code_of(image: Image) -> Code:
-    """The code of an image; the same object as long as somebody has it."""
-    code = _codes.get(id(image))
+def code_of(image: Image, stops: bool = False) -> Code:
+    """The code of an image, with `stops` or without; the same object as long as somebody has it."""
+    code = _codes.get((id(image), stops))
     if code is None:
-        code = _codes[id(image)] = Code(image)
+        code = _codes[id(image), stops] = Code(image, stops)
     return code
 
 

@@ -13,9 +13,9 @@ from typing import Any
 from fbvm.base.arithmetic import NAN
 from fbvm.base.memory import STRUCTS
 
-FIELDS = {"size": 0, "values": 8, "result": 32, "f32": 40, "f64": 48}
+FIELDS = {"size": 0, "values": 8, "result": 32, "f32": 40, "f64": 48, "stops": 56}
 """Where its 64-bit fields lie: size of the memory, up to three values of a trap, a second result of a routine, the
-canonical NaN of each float type (out of LLVM's sight, which holds one NaN for as good as another)."""
+canonical NaN of each float type (out of LLVM's sight, which holds one NaN for as good as another), the table of `stops`."""
 DIGITS = 64
 """Where a number's text is cleaned before it is read."""
 SCRATCH = 512
@@ -30,12 +30,13 @@ Point = tuple[str, int, tuple[Shown, ...]]
 class Context:
     """The context of one PLC: `at` is the address of its fields in the host, `read` looks at what a trap left there."""
 
-    def __init__(self, kept_bytes: int, context_bytes: int, memory_bytes: int) -> None:
+    def __init__(self, kept_bytes: int, context_bytes: int, memory_bytes: int, stops_at: int = 0) -> None:
         self._content = bytearray(kept_bytes + context_bytes)
         self._start = kept_bytes
         self._place = (ctypes.c_char * len(self._content)).from_buffer(self._content)
         self.at = ctypes.addressof(self._place) + kept_bytes
         self._put("<q", "size", memory_bytes)
+        self._put("<q", "stops", stops_at)
         self._put("<f", "f32", NAN)
         self._put("<d", "f64", NAN)
 

@@ -16,12 +16,14 @@ from fbvm.engine.native_calls import call_graph, heights, instance_places
 from fbvm.engine.native_compiler import MATH
 from fbvm.engine.native_context import Point
 from fbvm.engine.native_expressions import VALUES
+from fbvm.engine.native_guard import GUARD, at_end
 from fbvm.engine.native_library import declaration, definitions
 from fbvm.engine.native_regions import FIRST_NUMBER, METADATA
 from fbvm.engine.native_statements import EMITTERS
 from fbvm.engine.native_texts import TEXTS, from_text
 from fbvm.engine.native_writer import RARE, TRAPPED, Module, Writer
 from fbvm.engine.python import height
+from fbvm.engine.stops import STOPPED
 
 SMALL, LARGE = 40, 600
 """Lines of LLVM up to which a body that calls no other is always copied to where it is called, and from which on a body
@@ -76,17 +78,20 @@ class BodyWriter(Writer):
     statements = EMITTERS
 
 
-def translate(image: Image) -> Translation:
-    """The module of an image.  Raises Unsupported for code that the compiler never makes."""
+def translate(image: Image, stops: bool = False) -> Translation:
+    """The module of an image, whose runs can be stopped at observations or not.
+
+    Raises Unsupported for code that the compiler never makes."""
     graph = call_graph(image)
-    module = Module(image, fixed_bases(image), instance_places(image, graph), heights(graph), [], {}, set())
+    module = Module(image, fixed_bases(image), instance_places(image, graph), heights(graph), [], {}, set(),
+                    stops)
     metadata: list[str] = []
     with deep(image):
         bodies = [_body(module, number, metadata) for number in module.heights]
-    tasks = [_task(image, number) for number in range(len(image.tasks))]
+    tasks = [_task(module, number) for number in range(len(image.tasks))]
     routines = [declaration(name) for name in sorted(module.routines)]
     text = "\n".join([*definitions(module.constants), *bodies, *tasks, *routines, *_declarations(), ATTRIBUTES, METADATA,
-                      *metadata])
+                      *metadata, *[GUARD] * stops])
     return Translation(text, tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
                        tuple(sorted(module.routines)))
 
@@ -141,11 +146,14 @@ def _body(module: Module, number: int, metadata: list[str]) -> str:
         f"{inline} {{", "entry:", text, "}"])
 
 
-def _task(image: Image, number: int) -> str:
+def _task(module: Module, number: int) -> str:
+    image = module.image
+    point = module.point(STOPPED, 0, ()) if module.stops else 0
     lines = [f"define i32 @task{number}(ptr noalias %m, ptr noalias %c) #0 {{",
              f"%w = getelementptr inbounds i8, ptr %m, i64 {BUDGET}", "%b0 = load i64, ptr %w"]
     for n, run in enumerate(image.tasks[number].programs):
         lines += [f"%b{n + 1} = call fastcc i64 @b{run.body}(ptr %m, ptr %c, i64 {run.offset}, i64 %b{n})",
                   f"%t{n} = icmp slt i64 %b{n + 1}, {TRAPPED}", f"br i1 %t{n}, label %x{n}, label %g{n}, {RARE}",
                   f"x{n}:", f"%p{n} = trunc i64 %b{n + 1} to i32", f"ret i32 %p{n}", f"g{n}:"]
+        lines += at_end(n, len(image.sites), point) if module.stops else []
     return "\n".join([*lines, "ret i32 0", "}"])

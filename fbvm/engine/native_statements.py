@@ -8,8 +8,9 @@ from typing import Any
 from fbvm.base.areas import BUDGET, DUE
 from fbvm.code.operations import SIZES, Address, Block, Node
 from fbvm.engine.native_expressions import flag_mask, signed
+from fbvm.engine.native_guard import observe
 from fbvm.engine.native_texts import keep
-from fbvm.engine.native_writer import RARE, TRAPPED, Writer, ir, stored
+from fbvm.engine.native_writer import TRAPPED, Writer, ir, stored
 from fbvm.engine.ranges import is_float
 from fbvm.engine.statements import case_table
 
@@ -41,7 +42,7 @@ def to_memory(w: Writer, machine: str, pointer: str, a: Node, align: int, scope:
         value = w.new(f"zext i1 {value} to i8")
     elif is_float(machine) and not (a[0] == "const" or (a[0] == "convert" and not is_float(a[2]))):
         bad, good, after = w.label("x"), w.label(), w.label()
-        w.emit(f"br i1 {w.new(f'fcmp uno {kind} {value}, {value}')}, label %{bad}, label %{good}, {RARE}")
+        w.unlikely(w.new(f"fcmp uno {kind} {value}, {value}"), bad, good)
         with w.aside(bad):
             w.emit(f"store {kind} {w.new(f'load {kind}, ptr {w.field(machine)}')}, ptr {pointer}, {how}")
             w.emit(f"br label %{after}")
@@ -192,7 +193,7 @@ def _call(w: Writer, pou: int, address: Address | None) -> None:
     left = w.new("load i64, ptr %budget")
     result = w.new(f"call fastcc i64 @b{pou}(ptr %m, ptr %c, i64 {place}, i64 {left})")
     bad, good = w.label("x"), w.label()
-    w.emit(f"br i1 {w.new(f'icmp slt i64 {result}, {TRAPPED}')}, label %{bad}, label %{good}, {RARE}")
+    w.unlikely(w.new(f"icmp slt i64 {result}, {TRAPPED}"), bad, good)
     with w.aside(bad):
         w.emit(f"ret i64 {result}")
     w.begin(good)
@@ -221,7 +222,9 @@ def _stop(w: Writer, code: str, site: int) -> None:
 
 
 def _observe(w: Writer, kind: str, site: int, detail: Any) -> None:
-    """Native code is a plain build."""
+    """A plain build has none, but those that a run can stop at."""
+    if w.module.stops:
+        observe(w, kind, site)
 
 
 EMITTERS: dict[str, Callable[..., None]] = {

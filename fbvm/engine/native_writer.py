@@ -78,6 +78,8 @@ class Module:
     points: list[Point]
     constants: dict[bytes, str]
     routines: set[str]
+    stops: bool = False
+    """Whether its runs can be stopped at observations."""
     kept_bytes: int = 0
     scratch_end: int = SCRATCH
 
@@ -150,6 +152,10 @@ class Writer:
     def branch(self, condition: str, yes: str, no: str) -> None:
         self.emit(f"br i1 {condition}, label %{yes}, label %{no}")
         self.dead = True
+
+    def unlikely(self, condition: str, yes: str, no: str) -> None:
+        """A branch that hardly ever goes the first way."""
+        self.emit(f"br i1 {condition}, label %{yes}, label %{no}, {RARE}")
 
     def write(self, block: Block) -> None:
         """The statements of a block, up to one that leaves it."""
@@ -250,14 +256,14 @@ class Writer:
 
         `shown` are the values of the trap: (machine type, operand), ("text", at, length) or ("const", value)."""
         bad, good = self.label("x"), self.label()
-        self.emit(f"br i1 {condition}, label %{bad}, label %{good}, {RARE}")
+        self.unlikely(condition, bad, good)
         with self.aside(bad):
-            self._end(code, site, shown)
+            self.end(code, site, shown)
         self.begin(good)
 
     def trap(self, code: str, site: int) -> None:
         """End the run."""
-        self._end(code, site, ())
+        self.end(code, site)
         self.dead = True
 
     def give_back(self) -> None:
@@ -266,7 +272,8 @@ class Writer:
         self.emit(f"ret i64 {left}")
         self.dead = True
 
-    def _end(self, code: str, site: int, shown: tuple[Any, ...]) -> None:
+    def end(self, code: str, site: int, shown: tuple[Any, ...] = ()) -> None:
+        """Leave the body for a point, here."""
         kinds: list[Shown] = []
         place = 0
         for kind, *operands in shown:

@@ -47,6 +47,14 @@ def engine_for(image: Image, memory: Memory, choice: str = "auto", observed: boo
     return Tiers(image, memory)
 
 
+def choice_of(engine: object) -> str:
+    """The choice by which `engine_for` makes such an engine.  Raises ValueError for what it does not make."""
+    for choice, kind in (("auto", Tiers), ("python", PythonEngine), ("native", native.NativeEngine)):
+        if isinstance(engine, kind):
+            return choice
+    raise ValueError("somebody looks into every scan already: a run with breakpoints is another one")
+
+
 def substitutes_of(engine: object) -> Mapping[int, Callable[[int], None]]:
     """What stands in place of bodies, by their numbers."""
     return python_of(engine).substitutes if isinstance(engine, PythonEngine | Tiers) else {}

@@ -58,6 +58,8 @@ def run(
                 plc.write(write.where, write.value)
             began_ns = time.monotonic_ns()
             plc.scan(now_ns)
+            if plc.halted:
+                continue
             plc.scan_times.note(plc.scans - 1, time.monotonic_ns() - began_ns, plc.cycle_ns)
             if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
                 told_ns = time.monotonic_ns()

@@ -29,6 +29,7 @@ class Condition:
 
     text: str
     term: Term
+    places: tuple[Place, ...] = ()
 
     def holds(self, read: Read) -> bool:
         """True if the condition is TRUE now.  What cannot be computed (1 / 0, a null reference) is FALSE."""
@@ -46,7 +47,7 @@ def parse_condition(text: str, find: Find) -> Condition:
         raise ConditionError(f"{parser.word!r} is not expected in {text!r}")
     if term.sort != "BOOL":
         raise ConditionError(f"{text!r} is no condition: it is not BOOL; compare it with something")
-    return Condition(text, term)
+    return Condition(text, term, tuple(parser.places))
 
 
 class _Parser:
@@ -54,6 +55,7 @@ class _Parser:
         self.text = text
         self.find = find
         self.rest = list(tokens(text))
+        self.places: list[Place] = []
         self.depth = 0
 
     @property
@@ -115,4 +117,5 @@ class _Parser:
             return Term(word, lambda read: None, "", unknown=reason)
         if not isinstance(place, Place) or not isinstance(base(place.type), Elementary | StringType | EnumType):
             raise ConditionError(f"{word} is no single value and cannot be compared")
+        self.places.append(place)
         return Term(word, lambda read: read(place), sort_of(place.type), place.type, place=True)

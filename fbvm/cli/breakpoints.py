@@ -1,0 +1,74 @@
+"""Breakpoints on the command line: the options, and what is said of a scan that stands at one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import click
+
+from fbvm.breakpoints import Frame, Halt
+from fbvm.plc import Plc
+from fbvm.record.names import Names
+
+
+def breakpoint_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """--break, --watch and --break-if."""
+    for decorate in (
+        click.option("--break-if", "conditions", multiple=True, metavar="EXPRESSION",
+                     help="End inside the scan, as soon as this becomes TRUE.  May be repeated."),
+        click.option("--watch", "watched", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST",
+                     help="End inside the scan, behind the statement that changed this.  May be repeated."),
+        click.option("--break", "lines", multiple=True, metavar="FILE:LINE|POU[ IF EXPRESSION]",
+                     help="End inside the scan, before the statement of this line.  May be repeated."),
+    ):  # fmt: skip
+        function = decorate(function)
+    return function
+
+
+def set_breakpoints(plc: Plc, lines: Sequence[str], watched: Sequence[str], conditions: Sequence[str]) -> None:
+    """As the options say.  Raises ValueError or LookupError for what is not in the program."""
+    for text in lines:
+        where, when = _parted(text)
+        plc.breakpoints.line(where, when)
+    for text in watched:
+        where, when = _parted(text)
+        plc.breakpoints.change(where, when)
+    for text in conditions:
+        plc.breakpoints.condition(text)
+
+
+def _parted(text: str) -> tuple[str, str]:
+    """What stands in front of IF, and the condition behind it."""
+    words = text.split()
+    at = next((number for number, word in enumerate(words) if word.upper() == "IF"), len(words))
+    return " ".join(words[:at]), " ".join(words[at + 1:])
+
+
+def halt_lines(plc: Plc, halt: Halt, files: Sequence[Path]) -> Iterator[str]:
+    """Where a scan stands and why, the line of the source, and who called whom."""
+    yield str(halt)
+    yield from _line(halt, files)
+    names = Names(plc.image.symbols, plc.memory.areas)
+    rows = [_row(number, frame, names) for number, frame in enumerate(halt.frames)]
+    widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
+    for first, second, third in rows:
+        yield f"  {first:<{widths[0]}}  {second:<{widths[1]}}  {third}".rstrip()
+
+
+def _row(number: int, frame: Frame, names: Names) -> tuple[str, str, str]:
+    place = f"{frame.site.file}:{frame.site.line}" if frame.site else "at its end"
+    return f"#{number} {frame.pou}", names.instance(frame.base), place
+
+
+def _line(halt: Halt, files: Sequence[Path]) -> Iterator[str]:
+    """The line that is next, where its file is one of these."""
+    if halt.site is None:
+        return
+    for path in files:
+        if path.as_posix().endswith(halt.site.file):
+            lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+            if halt.site.line <= len(lines):
+                yield f"  {halt.site.line} | {lines[halt.site.line - 1].strip()}"
+            return

@@ -1,0 +1,114 @@
+"""Runs that can stop inside a scan: at a line, at a change of watched bytes, where a condition holds.
+
+As machine code runs it looks into the table of `stops`.  What it finds there ends the scan early: memory goes back to
+where the scan began, and the observed Python build does the scan again up to that very observation.  There it stands
+until somebody lets it go on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
+from typing import NamedTuple
+
+from fbvm.base.areas import BUDGET
+from fbvm.base.memory import Memory
+from fbvm.code.image import Image
+from fbvm.engine import native
+from fbvm.engine.native_code import code_of
+from fbvm.engine.python import PythonEngine
+from fbvm.engine.runtime import NO_SITE, Observation
+from fbvm.engine.stops import STOPPED, Stops
+from fbvm.engine.tiers import PAYS
+from fbvm.engine.trap import Trap
+
+STATEMENTS = ("statement", "rung")
+
+
+class Call(NamedTuple):
+    """A body in execution: its number, where its instance begins, the site of the statement that called it."""
+
+    body: int
+    base: int
+    site: int
+
+
+class Guarded:
+    """An engine whose runs stop where `stops` say.  `seen` is the observation at which one stands, None if none does.
+
+    `choice` is "auto", "python" or "native" as for `tiers.engine_for`."""
+
+    def __init__(self, image: Image, memory: Memory, stops: Stops, choice: str,
+                 substitutes: Mapping[int, Callable[[int], None]]) -> None:  # fmt: skip
+        self._image, self._memory, self._stops = image, memory, stops
+        self._python = PythonEngine(image, memory, observed=True)
+        for body, function in substitutes.items():
+            self._python.substitute(body, function)
+        compiles = choice != "python" and not substitutes and native.available()
+        self._code = code_of(image, stops=True) if compiles else None
+        self._native = native.NativeEngine(image, memory, stops=stops) if compiles and choice == "native" else None
+        self._executed = 0
+        self._steps: Generator[Observation, None, Trap | None] | None = None
+        self.seen: Observation | None = None
+        self.calls: list[Call] = []
+        """The bodies in execution where a run stands, the innermost last."""
+
+    @property
+    def native(self) -> bool:
+        """True if machine code runs."""
+        return self._native is not None
+
+    def run(self, task_index: int) -> Trap | None:
+        """Execute the programs of a task up to their end, a trap or a stop."""
+        if self._native is None and self._code and self._code.ready:
+            self._native = native.NativeEngine(self._image, self._memory, 2, self._stops)
+        if self._native is None:
+            return self._observe(task_index)
+        began, seen = self._memory.snapshot(), self._stops.state
+        trap = self._native.run(task_index)
+        if trap is None or trap.code != STOPPED:
+            return trap
+        failure, self._stops.failure = self._stops.failure, None
+        if failure:
+            raise failure
+        self._memory.restore(began)
+        self._stops.back(seen)
+        return self._observe(task_index)
+
+    def _observe(self, task_index: int) -> Trap | None:
+        before = int(self._memory.read(BUDGET, "i64"))
+        self._steps, self.calls = self._python.observe(task_index), []
+        trap = self.go_on()
+        self._executed += before - int(self._memory.read(BUDGET, "i64"))
+        if self._code and self._executed >= PAYS:
+            self._code.request()
+        return trap
+
+    def go_on(self) -> Trap | None:
+        """From where the run stands to its end, a trap or the next stop."""
+        assert self._steps is not None
+        self.seen = None
+        while True:
+            try:
+                seen = next(self._steps)
+            except StopIteration as end:
+                self._steps = None
+                trap: Trap | None = end.value
+                return trap
+            if self._hit(seen):
+                self.seen = seen
+                return None
+
+    def _hit(self, seen: Observation) -> bool:
+        """Follow calls; True if the run stops here."""
+        kind, site, detail = seen
+        if kind == "call":
+            body, base = detail
+            self.calls.append(Call(body, base, site))
+        elif kind == "return":
+            if site == NO_SITE and self._stops.hit(NO_SITE, False):
+                return True  # before the program is taken off: the run stands at its end
+            self.calls.pop()
+        elif kind == "write":
+            return self._stops.hit(site, False)
+        elif kind in STATEMENTS:
+            return self._stops.hit(site, True)
+        return False

@@ -1,0 +1,84 @@
+"""Breakpoints on the command line: where a run ends within a scan, and what is said of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from fbvm.cli.main import main
+
+PLANT = """\
+FUNCTION_BLOCK Adder
+VAR_INPUT a : INT; END_VAR
+VAR_OUTPUT n : INT; END_VAR
+  n := n + a;
+END_FUNCTION_BLOCK
+
+PROGRAM Main
+VAR i : INT; f : Adder; d AT %D100 : INT; END_VAR
+  FOR i := 1 TO 3 DO
+    f(a := i);
+  END_FOR;
+  d := f.n;
+END_PROGRAM
+"""
+
+
+@pytest.fixture(autouse=True)
+def _plant(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("plant.st").write_text(PLANT, encoding="utf-8")
+
+
+def run(*arguments: str) -> Result:
+    result = CliRunner().invoke(main, ["run", "plant.st", "--scans", "10", *arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+def test_a_line_in_an_instance_is_told_with_its_callers() -> None:
+    result = run("--break", "plant.st:4 IF Main.f.n > 10", "--show", "Main.f.n")
+    assert result.exit_code == 0 and result.stdout == "Main.f.n = 12\n"
+    assert result.stderr == """\
+plant.st:4:3 in Adder, scan 2: breakpoint plant.st:4 when Main.f.n > 10
+  4 | n := n + a;
+  #0 Adder  Main.f  plant.st:4
+  #1 Main   Main    plant.st:10
+"""
+
+
+@pytest.mark.parametrize(("arguments", "first"), [
+    (["--watch", "D100"], "plant.st:12:3 in Main, scan 0: D100 was 0, is 6"),
+    (["--watch", "D100 if D100 > 20"], "plant.st:12:3 in Main, scan 3: D100 was 18, is 24"),
+    (["--break-if", "D100 > 20"], "plant.st:12:3 in Main, scan 3: D100 > 20 holds"),
+    (["--break", "main"], "plant.st:9:3 in Main, scan 0: breakpoint plant.st:9"),
+    (["--watch", "D9", "--set", "D9=1@20ms"], "plant.st:9:3 in Main, scan 2: D9 was 0, is 1"),
+])
+def test_where_a_run_stops(arguments: list[str], first: str) -> None:
+    assert run(*arguments).stderr.splitlines()[0] == first
+
+
+def test_a_run_that_meets_none_ends_as_ever() -> None:
+    result = run("--watch", "D101", "--show", "D100")
+    assert (result.exit_code, result.stdout, result.stderr) == (0, "D100 = 60 (16#003C)\n", "")
+
+
+def test_json_tells_where() -> None:
+    told = json.loads(run("--watch", "D100", "--json").stdout)
+    assert told["stopped"] == "break" and told["scans"] == 0
+    assert told["break"] == {"scan": 0, "file": "plant.st", "pou": "Main", "line": 12, "column": 3,
+                             "reasons": ["D100 was 0, is 6"]}
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["--break", "plant.st:99"], "the last statement of plant.st is on line 12"),
+    (["--watch", "Main.nothing"], "nothing"),
+    (["--break-if", "D100"], "is no condition"),
+    (["--break", "main", "--trace", "t.fbvm", "--depth", "statements"], "looks into every scan already"),
+])
+def test_what_cannot_be_is_refused(arguments: list[str], words: str) -> None:
+    result = run(*arguments)
+    assert result.exit_code == 2 and words in result.stderr
