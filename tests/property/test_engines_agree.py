@@ -23,6 +23,8 @@ from fbvm.plc import Plc
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
+pytestmark = pytest.mark.slow
+
 LEVELS = (0, 2)
 _python = hand_image.execute
 

@@ -15,6 +15,8 @@ if not native.available():
 from hand_image import operations_in
 from random_code import Maker, differing
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("seed", range(16))
 def test_every_engine_agrees(seed: int) -> None:
