@@ -20,33 +20,66 @@ FREE_COUNTERS = ((0, 10_000_000), (1, 100_000_000))
 """A0 counts 10 ms, A1 100 ms, both modulo 65536 (newer CPU units; assumed for all)."""
 
 ALWAYS_ON = 113
-CLOCK_PULSES = ((100, 100_000_000), (101, 200_000_000), (102, 1_000_000_000), (103, 20_000_000), (104, 60_000_000_000))
+PERIODS_NS = {100: 100_000_000, 101: 200_000_000, 102: 1_000_000_000, 103: 20_000_000, 104: 60_000_000_000, ALWAYS_ON: 1}
 """CF number and period: half of it OFF, then half of it ON (which half comes first is assumed)."""
 
 IOM_HOLD = (500, 12)
 """A500.12: CIO, W and timers keep their contents over a change of mode."""
 
-
-def update(memory: Memory, now_ns: int, cycle_time_ns: int, first: bool) -> None:
-    """Writes all of them for the scan at `now_ns`; `cycle_time_ns` is the length of the cycle before, 0 at first."""
-    a = memory.words("A")
-    word, bit = FIRST_CYCLE
-    a[word] = a[word] & ~(1 << bit) | first << bit
-    tenths = min(cycle_time_ns // TENTH_MS_NS, 0xFFFFFFFF)
-    longest = 0 if first else a[MAX_CYCLE_TIME] | a[MAX_CYCLE_TIME + 1] << 16
-    for at, value in ((CYCLE_TIME, tenths), (MAX_CYCLE_TIME, max(tenths, longest))):
-        a[at], a[at + 1] = value & 0xFFFF, value >> 16
-    for at, step_ns in FREE_COUNTERS:
-        a[at] = now_ns // step_ns & 0xFFFF
-    _set(memory, ALWAYS_ON, True)
-    for number, period_ns in CLOCK_PULSES:
-        _set(memory, number, now_ns % period_ns >= period_ns // 2)
+Periods = list[tuple[int, int, int]]
+"""Bit of its byte, period and half of it."""
+SLOT_NS = 10_000_000
+"""Within such a slot of time no clock pulse and no free counter changes."""
 
 
-def io_memory_held(memory: Memory) -> bool:
-    """True if A500.12 is ON."""
-    return bool(memory.words("A")[IOM_HOLD[0]] >> IOM_HOLD[1] & 1)
+class Flags:
+    """These words and bits of one memory."""
+
+    def __init__(self, memory: Memory) -> None:
+        self._a = memory.words("A")
+        self._bytes = memory.u8
+        self._slot = -1
+        self._counters: list[tuple[int, int]] = []
+        self._pulses: list[tuple[int, int, int]] = []
+        self._rows = [(AREAS["CF"].offset + byte, *_masks(byte)) for byte in sorted({number // 8 for number in PERIODS_NS})]
+
+    def update(self, now_ns: int, cycle_time_ns: int, first: bool) -> None:
+        """Write all of them for the scan at `now_ns`; `cycle_time_ns` is the length of the cycle before, 0 at first."""
+        a, on = self._a, self._bytes
+        word, bit = FIRST_CYCLE
+        a[word] = a[word] & ~(1 << bit) | first << bit
+        tenths = min(cycle_time_ns // TENTH_MS_NS, 0xFFFFFFFF)
+        longest = 0 if first else a[MAX_CYCLE_TIME] | a[MAX_CYCLE_TIME + 1] << 16
+        a[CYCLE_TIME], a[CYCLE_TIME + 1] = tenths & 0xFFFF, tenths >> 16
+        longest = max(tenths, longest)
+        a[MAX_CYCLE_TIME], a[MAX_CYCLE_TIME + 1] = longest & 0xFFFF, longest >> 16
+        if now_ns // SLOT_NS != self._slot:
+            self._enter(now_ns)
+        for at, count in self._counters:
+            a[at] = count
+        for at, keep, pulses in self._pulses:
+            on[at] = on[at] & keep | pulses
+
+    def _enter(self, now_ns: int) -> None:
+        """Work out what holds all through the slot of this moment."""
+        self._slot = now_ns // SLOT_NS
+        self._counters = [(at, now_ns // step_ns & 0xFFFF) for at, step_ns in FREE_COUNTERS]
+        self._pulses = []
+        for at, keep, periods in self._rows:
+            pulses = 0
+            for bit, period_ns, half_ns in periods:
+                if now_ns % period_ns >= half_ns:
+                    pulses |= bit
+            self._pulses.append((at, keep, pulses))
+
+    @property
+    def io_memory_held(self) -> bool:
+        """True if A500.12 is ON."""
+        word, bit = IOM_HOLD
+        return bool(self._a[word] >> bit & 1)
 
 
-def _set(memory: Memory, number: int, on: bool) -> None:
-    memory.write(AREAS["CF"].offset + number // 8, "b", on, number % 8)
+def _masks(byte: int) -> tuple[int, Periods]:
+    """Which bits of a byte of CF are not clock pulses, and when the others are ON."""
+    here = {1 << number % 8: period_ns for number, period_ns in PERIODS_NS.items() if number // 8 == byte}
+    return 0xFF & ~sum(here), [(bit, period_ns, period_ns // 2) for bit, period_ns in here.items()]

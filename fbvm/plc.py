@@ -12,13 +12,13 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import Enum
 
-from fbvm import flags
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
 from fbvm.base.memory import Memory, Snapshot
 from fbvm.breakpoints import Breakpoints, Halt
 from fbvm.code.image import Image
 from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
+from fbvm.flags import Flags
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
 from fbvm.scan_times import ScanTimes
@@ -120,7 +120,8 @@ class Plc:
         self.memory = Memory(image.layout.size, image.layout.areas)
         self._choice = engine
         self.engine: Engine = engine_for(image, self.memory, engine, observed)
-        self._shared = [self.memory.words(name) for name in ("CIO", *(box.name for box in image.layout.mailboxes))]
+        self._system = self.memory.views["i64"]
+        self._flags = Flags(self.memory)
         self.units: list[Attached] = []
         self.watchers: list[Callable[[Plc], None]] = []
         """Called at the end of each scan, after its I/O refresh: recorders, watches."""
@@ -134,9 +135,6 @@ class Plc:
         self.scan_times = ScanTimes()
         """How long scans took, where somebody with a clock measured it (`fbvm.run`)."""
         self.trap: Trap | None = None
-        self.stirred = False
-        """True if in the last scan a network told something, or a unit changed words of CIO or of its mailbox: the program
-        has news to see."""
         self._mode = Mode.RUN
         self._first = True
         self._forces: dict[Place, Value] = {}
@@ -187,7 +185,7 @@ class Plc:
             self._refresh()
             self._over(Phase.REFRESH)
         self.scans += 1
-        self.memory.write(SCANS, "i64", self.scans)
+        self._system[SCANS // 8] = self.scans
         if self._journal:
             self._journal.after()
         if self._past.maxlen:
@@ -214,10 +212,9 @@ class Plc:
         """Time, first-cycle flag, clock pulses, cycle time of the cycle before, step budget."""
         cycle_time_ns = 0 if self._first else now_ns - self.now_ns
         self.now_ns = now_ns
-        self.memory.write(NOW, "i64", now_ns)
-        self.memory.write(DUE, "i64", NEVER)
-        self.memory.write(BUDGET, "i64", self.budget)
-        flags.update(self.memory, now_ns, cycle_time_ns, self._first and self._mode is Mode.RUN)
+        system = self._system
+        system[NOW // 8], system[DUE // 8], system[BUDGET // 8] = now_ns, NEVER, self.budget
+        self._flags.update(now_ns, cycle_time_ns, self._first and self._mode is Mode.RUN)
 
     def _over(self, phase: Phase) -> None:
         for told in self.phases:
@@ -239,10 +236,6 @@ class Plc:
 
     def _refresh(self) -> None:
         """I/O refresh: each unit exchanges its words once, the networks take what the units ask for."""
-        if not self.units:
-            return
-        before = [words.tobytes() for words in self._shared]
-        told = False
         for number, attached in enumerate(self.units):
             events = attached.link.events(self.now_ns)
             if self._journal:
@@ -250,8 +243,6 @@ class Plc:
             requests = attached.unit.refresh(self.memory, events, self.now_ns)
             if requests:
                 attached.link.submit(requests, self.now_ns)
-            told = told or bool(events)
-        self.stirred = told or [words.tobytes() for words in self._shared] != before
 
     @property
     def elapsed_ns(self) -> int:
@@ -260,8 +251,12 @@ class Plc:
 
     @property
     def due_ns(self) -> int:
-        """The earliest time at which a timer of the program or a task's interval changes something by itself."""
-        return min(int(self.memory.read(DUE, "i64")), self._schedule.next_ns(self.now_ns))
+        """When the next scan is worth while, if no network tells anything before: at once if a unit has news for the
+        program, else when a timer of the program, a task's interval or a unit changes something by itself."""
+        due_ns: int = self._system[DUE // 8]
+        for attached in self.units:
+            due_ns = min(due_ns, attached.unit.wake_ns)
+        return min(due_ns, self._schedule.next_ns(self.now_ns))
 
     def run(
         self,
@@ -351,7 +346,7 @@ class Plc:
     def mode(self, mode: Mode) -> None:
         with self._acting("mode", mode.value):
             if mode is Mode.RUN and self._mode is Mode.PROGRAM:
-                held = ("CIO", "W", "TF", "T") if flags.io_memory_held(self.memory) else ()
+                held = ("CIO", "W", "TF", "T") if self._flags.io_memory_held else ()
                 self._restart(self._kept(held))
             self._mode = mode
 

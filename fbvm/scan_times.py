@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
-
 DIGIT_BITS = 5
 """Bits that a time keeps when it is sorted in: a share is true to 3 %."""
 
@@ -19,7 +17,8 @@ class ScanTimes:
         self.longest_scan = 0
         """Number of the longest one."""
         self._total_ns = 0
-        self._sorted: Counter[tuple[int, int]] = Counter()
+        self._sorted: dict[int, int] = {}
+        """How many there were, by a number that grows with the duration: how many bits were dropped, and those left."""
 
     def note(self, scan: int, duration_ns: int, cycle_ns: int) -> None:
         """Take one scan in."""
@@ -29,7 +28,8 @@ class ScanTimes:
         if duration_ns > self.longest_ns:
             self.longest_ns, self.longest_scan = duration_ns, scan
         dropped = max(duration_ns.bit_length() - DIGIT_BITS, 0)
-        self._sorted[dropped, duration_ns >> dropped] += 1
+        kind = dropped << DIGIT_BITS | duration_ns >> dropped
+        self._sorted[kind] = self._sorted.get(kind, 0) + 1
 
     @property
     def mean_ns(self) -> int:
@@ -39,9 +39,10 @@ class ScanTimes:
     def within_ns(self, share: float) -> int:
         """The time that this share of all scans (0.99: 99 of 100) did not exceed, to 3 %."""
         missing = share * self.count
-        for (dropped, digits), times in sorted(self._sorted.items()):
+        for kind, times in sorted(self._sorted.items()):
             missing -= times
             if missing <= 0:
+                dropped, digits = kind >> DIGIT_BITS, kind & (1 << DIGIT_BITS) - 1
                 return min((digits + 1 << dropped) - 1, self.longest_ns)
         return self.longest_ns
 

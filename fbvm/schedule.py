@@ -37,11 +37,13 @@ class Schedule:
 
     def _is_due(self, number: int, now_ns: int) -> bool:
         task = self.tasks[number]
+        if not task.single and not task.interval_ns:
+            return True
         level = bool(task.single) and self.single(task.single)
         edge = level and not self._levels.get(number, False)
         self._levels[number] = level
         if not task.interval_ns:
-            return edge or not task.single
+            return edge
         planned_ns = self._next_ns.setdefault(number, now_ns)
         if now_ns < planned_ns:
             return edge

@@ -103,10 +103,9 @@ class _Real:
         return now_ns
 
     def _wait_for_events(self, wait: Callable[[float], bool]) -> None:
-        if self._plc.stirred:
-            return
-        until_ns = min(self._planned_ns, max(self._plc.due_ns, self._plc.now_ns + 1))
-        wait((until_ns - self._now_ns()) / 1e9)
+        due_ns = self._plc.due_ns
+        if due_ns > self._plc.now_ns:
+            wait((min(due_ns, self._planned_ns) - self._now_ns()) / 1e9)
 
     def _now_ns(self) -> int:
         return time.monotonic_ns() - self._zero_ns

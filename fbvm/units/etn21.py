@@ -58,7 +58,7 @@ class Etn21:
         self._dispatch = Dispatch(self.layout, address, timing_of(timing, seed), choices, self.faults)
         self._switches_at = slice(self.layout.n + at.SWITCHES, self.layout.n + at.FINS_TCP_STATUS)
         self._seen = [0, 0, 0, 0]
-        self._wake_ns = NEVER_NS
+        self.wake_ns = self._next_ns = NEVER_NS
 
     @cached_property
     def descriptions(self) -> dict[str, str]:
@@ -86,7 +86,7 @@ class Etn21:
         """Power on or restart: the unit's own words and all switches 0, connections broken by RST."""
         self._dispatch.forget()
         self._seen = [0, 0, 0, 0]
-        self._wake_ns = NEVER_NS
+        self.wake_ns, self._next_ns = 0, NEVER_NS
         cio, d = memory.words("CIO"), memory.words("D")
         n, m = self.layout.n, self.layout.m
         for word in range(n + 1, n + at.FINS_TCP_STATUS + 1):
@@ -105,11 +105,14 @@ class Etn21:
         self._show_unit_status(cio)
         switches = cio[self._switches_at].tolist()
         force = cio[self.layout.n] & at.FORCE_CLOSE
-        if not events and not force and switches == self._seen and now_ns < self._wake_ns:
+        if not events and not force and switches == self._seen and now_ns < self._next_ns:
+            self.wake_ns = self._next_ns
             return []
         start_force = force and not dispatch.is_force_closing
-        found = dispatch.find(switches)
-        requests = [request for event in events for request in dispatch.take(event)]
+        found = dispatch.find(switches) if switches != self._seen else ()
+        requests: list[Request] = []
+        for event in events:
+            requests += dispatch.take(event)
         requests += dispatch.expire(now_ns)
         dispatch.conclude(memory, now_ns)
         for new in found:
@@ -117,9 +120,10 @@ class Etn21:
         requests += dispatch.accept(memory, now_ns)
         if start_force:
             requests += dispatch.force_close(now_ns)
-        dispatch.show(memory)
-        self._seen = cio[self._switches_at].tolist()
-        self._wake_ns = dispatch.wake_ns()
+        changed = dispatch.show(memory)
+        self._seen = cio[self._switches_at].tolist() if changed else switches
+        self._next_ns = dispatch.wake_ns(now_ns)
+        self.wake_ns = 0 if changed else self._next_ns
         return requests
 
     def _show_unit_status(self, cio: memoryview) -> None:

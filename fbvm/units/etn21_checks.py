@@ -6,14 +6,13 @@ is from W421 6-7-6 p120-125 and W343 6-2-2 p118.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from fbvm.units import etn21_codes as codes
 from fbvm.units.etn21_data import check_address
 from fbvm.units.etn21_map import FLAG_OF, OPENS, Parameters, Switch
 from fbvm.units.etn21_service import Area
 from fbvm.units.etn21_socket import SERVICE_LIMIT, Phase, Socket
 from fbvm.units.unit import AreaMemory
+from fbvm.wire.link import Peer
 
 ANY_HOST = "0.0.0.0"
 PROTOCOL_OF = {Switch.UDP_OPEN: "UDP", Switch.PASSIVE_OPEN: "TCP", Switch.ACTIVE_OPEN: "TCP"}
@@ -23,20 +22,33 @@ def check_request(
     switch: Switch,
     parameters: Parameters,
     area: Area,
-    sockets: Mapping[int, Socket],
+    socket: Socket | None,
     memory: AreaMemory,
     cycle: int,
 ) -> int:
-    """0000 if the request can be processed, else the code that refuses it."""
-    socket = sockets.get(parameters.socket)
+    """0000 if the request can be processed, else the code that refuses it.  `socket` is None if there is no such one."""
     if socket is None:
         return _without_socket(switch, area)
+    if switch is Switch.SEND or switch is Switch.RECEIVE:
+        return _check_transfer(switch, parameters, area, socket, cycle) or check_address(memory, parameters)
     return (
         _check_binding(switch, area, socket)
         or _check_open(switch, socket, cycle)
-        or _check_ranges(switch, parameters, socket)
-        or (check_address(memory, parameters) if switch in (Switch.SEND, Switch.RECEIVE) else codes.NORMAL_END)
+        or _check_ranges(switch, parameters)
     )
+
+
+def _check_transfer(switch: Switch, parameters: Parameters, area: Area, socket: Socket, cycle: int) -> int:
+    if area.bound is not None and area.bound is not socket:
+        return codes.OTHER_SOCKET
+    if not (socket.is_open and cycle > socket.settled_cycle):
+        return codes.NOT_OPEN
+    if FLAG_OF[switch] in socket.services:
+        return codes.ALREADY_OPEN
+    wrong = parameters.size_bytes > SERVICE_LIMIT
+    if switch is Switch.SEND and socket.protocol == "UDP":
+        wrong = wrong or _is_nobody(parameters.remote)
+    return codes.PARAMETER_RANGE if wrong else codes.NORMAL_END
 
 
 def _without_socket(switch: Switch, area: Area) -> int:
@@ -57,27 +69,19 @@ def _check_binding(switch: Switch, area: Area, socket: Socket) -> int:
 
 def _check_open(switch: Switch, socket: Socket, cycle: int) -> int:
     """Open or not is what bit 15 has shown for a cycle at least: nobody can know it earlier."""
-    settled = cycle > socket.settled_cycle
-    if switch in OPENS:
-        free = socket.phase is Phase.CLOSED and not socket.services and settled
-        return codes.NORMAL_END if free else codes.ALREADY_OPEN
     if switch is Switch.CLOSE:
         return codes.NORMAL_END if socket.phase in (Phase.OPENING, Phase.OPEN) else codes.NOT_OPEN
-    if not (socket.is_open and settled):
-        return codes.NOT_OPEN
-    return codes.ALREADY_OPEN if FLAG_OF[switch] in socket.services else codes.NORMAL_END
+    free = socket.phase is Phase.CLOSED and not socket.services and cycle > socket.settled_cycle
+    return codes.NORMAL_END if free else codes.ALREADY_OPEN
 
 
-def _check_ranges(switch: Switch, parameters: Parameters, socket: Socket) -> int:
-    remote = parameters.remote
-    if switch in (Switch.UDP_OPEN, Switch.PASSIVE_OPEN):
-        wrong = not parameters.local_port
-    elif switch is Switch.ACTIVE_OPEN:
-        wrong = remote.host == ANY_HOST or not remote.port
-    elif switch is Switch.SEND and socket.protocol == "UDP":
-        wrong = parameters.count > SERVICE_LIMIT or remote.host == ANY_HOST or not remote.port
-    elif switch is Switch.CLOSE:
-        wrong = False
+def _check_ranges(switch: Switch, parameters: Parameters) -> int:
+    if switch is Switch.ACTIVE_OPEN:
+        wrong = _is_nobody(parameters.remote)
     else:
-        wrong = parameters.count > SERVICE_LIMIT
+        wrong = switch in OPENS and not parameters.local_port
     return codes.PARAMETER_RANGE if wrong else codes.NORMAL_END
+
+
+def _is_nobody(remote: Peer) -> bool:
+    return remote.host == ANY_HOST or not remote.port

@@ -36,7 +36,7 @@ def check_address(memory: AreaMemory, parameters: Parameters) -> int:
         length = len(memory.words(area))
     except KeyError:
         return codes.AREA_CODE
-    end = parameters.word + max(1, (parameters.count + 1) // 2)
+    end = parameters.word + max(1, (parameters.size_bytes + 1) // 2)
     if parameters.word < first or end > min(last + 1, length):
         return codes.AREA_CODE
     return codes.BIT_NUMBER if parameters.bit else codes.NORMAL_END
@@ -45,10 +45,10 @@ def check_address(memory: AreaMemory, parameters: Parameters) -> int:
 def fetch(memory: AreaMemory, parameters: Parameters) -> bytes:
     """The `count` bytes to send, from an address that `check_address` has passed."""
     words = memory.words(AREA_OF_CODE[parameters.area_code][0])
-    data = array("H", words[parameters.word : parameters.word + (parameters.count + 1) // 2].tolist())
+    data = array("H", words[parameters.word : parameters.word + (parameters.size_bytes + 1) // 2].tolist())
     if byteorder == "little":
         data.byteswap()
-    return data.tobytes()[: parameters.count]
+    return data.tobytes()[: parameters.size_bytes]
 
 
 def store(memory: AreaMemory, parameters: Parameters, data: bytes, odd_filler: int | None) -> None:

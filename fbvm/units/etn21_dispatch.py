@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import NamedTuple
 
 from fbvm.units import etn21_codes as codes
@@ -25,6 +26,7 @@ from fbvm.wire.link import Event, Request
 
 NEVER_NS = 1 << 63
 TRANSFERS = at.SENDING | at.RECEIVING
+BY_RANK = attrgetter("rank")
 CHECKED_FIRST = frozenset({codes.CPU_UNIT_ERROR, codes.LOCAL_ADDRESS_ERROR})
 
 
@@ -55,7 +57,7 @@ class Found(NamedTuple):
     """Switches of an area that belong to no request yet."""
 
     area: Area
-    switches: list[Switch]
+    switches: tuple[Switch, ...]
     busy: bool
     """True if the program could see something running when it turned them ON."""
 
@@ -75,7 +77,7 @@ class Dispatch:
     def forget(self) -> None:
         """As after power-on, but for what the network still has to close."""
         self.cycle = 0
-        self._areas = [Area(number) for number in at.AREAS]
+        self._areas = [Area(number, self._layout.parameters(number), self._layout.switches(number)) for number in at.AREAS]
         self._services: list[Service] = []
         self._forced: list[Service] | None = None
         self._held_ports: dict[int, int] = {}
@@ -91,12 +93,13 @@ class Dispatch:
     def find(self, words: Sequence[int]) -> list[Found]:
         """New switches in n+19..n+22, judged before this refresh ends anything."""
         found = []
-        for area in self._areas:
-            shift = 0 if area.number % 2 else 8
-            new = words[(area.number - 1) // 2] >> shift & at.ALL_SWITCHES & ~area.owned()
-            if new:
-                busy = any(service.code != codes.OTHER_PROCESSING for service in area.services)
-                found.append(Found(area, [switch for switch in Switch if new >> switch & 1], busy))
+        for pair, word in enumerate(words):
+            for half in (0, 1) if word else ():
+                area = self._areas[2 * pair + half]
+                new = word >> 8 * half & at.ALL_SWITCHES & ~area.owned()
+                if new:
+                    busy = any(service.code != codes.OTHER_PROCESSING for service in area.services)
+                    found.append(Found(area, at.SWITCHES_IN[new], busy))
         return found
 
     # --- 2. what the network and the clock say -----------------------------------------------------------------------
@@ -125,10 +128,13 @@ class Dispatch:
 
     def conclude(self, memory: AreaMemory, now_ns: int) -> None:
         """Write the results of what has ended: refusals first, closes last, one result an area and refresh."""
-        for service in sorted(self._services, key=lambda service: service.rank):
+        ended = [service for service in self._services if service.code is not None]
+        if not ended and self._forced is None:
+            return
+        for service in sorted(ended, key=BY_RANK) if len(ended) > 1 else ended:
             if service.concluded_cycle is None and self._is_ready(service, now_ns):
                 self._conclude(service, memory, now_ns)
-        for service in [service for service in self._services if self._is_over(service, self.cycle)]:
+        for service in [service for service in ended if self._is_over(service, self.cycle)]:
             self._services.remove(service)
             if service.area is not None:
                 service.area.services.remove(service)
@@ -136,8 +142,7 @@ class Dispatch:
 
     def _is_ready(self, service: Service, now_ns: int) -> bool:
         return (
-            service.code is not None
-            and self.cycle >= service.earliest_cycle
+            self.cycle >= service.earliest_cycle
             and now_ns >= service.earliest_ns
             and (service.area is None or service.area.result_cycle < self.cycle)
             and all(self._is_over(other, self.cycle - 1) for other in service.interrupts)
@@ -152,10 +157,12 @@ class Dispatch:
         service.concluded_cycle = self.cycle + skew.switch
         socket = service.socket
         if socket is not None:
-            self._hold_port(service, socket, now_ns)
-            was_connected = socket.connected
-            socket.end(service)
-            if service.switch in at.OPENS or service.switch is Switch.CLOSE:
+            if service.flag & TRANSFERS:
+                socket.end(service)
+            else:
+                self._hold_port(service, socket, now_ns)
+                was_connected = socket.connected
+                socket.end(service)
                 socket.settled_cycle = self.cycle + (skew.open if socket.connected != was_connected else 0)
             self._touched[socket.number] = skew
         if service.area is not None:
@@ -166,12 +173,12 @@ class Dispatch:
         if service.socket is not None and service.parameters is not None and service.flag & TRANSFERS:
             store(memory, service.parameters, service.data, self._choices.odd_filler)
             service.results[at.COUNT] = service.count
-        first = self._layout.parameters(area.number)
+        put, first = self._display.put, area.first
         for offset, value in service.results.items():
-            self._display.put("D", first + offset, value, due)
-        self._display.put("D", first + at.RESPONSE, service.code or codes.NORMAL_END, due)
-        word, first_bit = self._layout.switches(area.number)
-        self._display.clear_bit("CIO", word, first_bit + service.switch, due)
+            put(("D", first + offset), value, due)
+        put(("D", first + at.RESPONSE), service.code or codes.NORMAL_END, due)
+        word, first_bit = area.switches
+        self._display.clear_bit(("CIO", word), first_bit + service.switch, due)
         area.result_cycle = due
 
     def _hold_port(self, service: Service, socket: Socket, now_ns: int) -> None:
@@ -203,18 +210,19 @@ class Dispatch:
         return requests
 
     def _accept(self, service: Service, area: Area, memory: AreaMemory, now_ns: int) -> list[Request]:
-        parameters = Parameters.read(memory.words("D"), self._layout.parameters(area.number))
+        parameters = Parameters.read(memory.words("D"), area.first)
         service.parameters = parameters
         self._delay(service, self._timing.delay(), now_ns)
+        number = parameters.socket
         service.code = (
-            self._fault(service.switch, parameters.socket, first=True)
-            or check_request(service.switch, parameters, area, self._sockets, memory, self.cycle)
-            or self._fault(service.switch, parameters.socket, first=False)
+            self._fault(service.switch, number, first=True)
+            or check_request(service.switch, parameters, area, self._sockets.get(number), memory, self.cycle)
+            or self._fault(service.switch, number, first=False)
             or None
         )
         if service.code is not None:
             return []
-        socket = self._sockets[parameters.socket]
+        socket = self._sockets[number]
         if service.switch is Switch.CLOSE:
             service.interrupts = self._interrupt(socket, now_ns)
         around = Surroundings(memory, self._address, self._held_ports, now_ns)
@@ -268,28 +276,30 @@ class Dispatch:
 
     def _conclude_force_close(self) -> None:
         if self._forced is not None and all(self._is_over(service, self.cycle) for service in self._forced):
-            self._display.clear_bit("CIO", self._layout.n, at.FORCE_CLOSE_BIT, self.cycle)
+            self._display.clear_bit(("CIO", self._layout.n), at.FORCE_CLOSE_BIT, self.cycle)
             self._forced = None
 
     # --- 6. what is seen ---------------------------------------------------------------------------------------------
 
-    def show(self, memory: AreaMemory) -> None:
-        """Write what changed and is due."""
+    def show(self, memory: AreaMemory) -> bool:
+        """Write what changed and is due; True if that is anything."""
         for number, skew in self._touched.items():
             self._display.show(self._sockets[number], skew, self.cycle)
         self._touched.clear()
-        self._display.flush(memory, self.cycle)
+        return self._display.flush(memory, self.cycle)
 
     def _touch(self, socket: Socket, skew: Skew) -> None:
         self._touched.setdefault(socket.number, skew)
 
-    def wake_ns(self) -> int:
+    def wake_ns(self, now_ns: int) -> int:
         """Until when nothing happens by itself: 0 if the next refresh has work, `NEVER_NS` if nothing is timed."""
         if self._display.pending or self._forced is not None:
             return 0
         wake_ns = NEVER_NS
         for service in self._services:
-            if service.code is not None or service.accept_cycle > self.cycle:
+            if service.code is not None and service.earliest_ns > now_ns:
+                wake_ns = min(wake_ns, service.earliest_ns)
+            elif service.code is not None or service.accept_cycle > self.cycle:
                 return 0
             if service.deadline_ns is not None:
                 wake_ns = min(wake_ns, service.deadline_ns)

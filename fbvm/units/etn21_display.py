@@ -6,78 +6,83 @@ Only bits that changed are written, so what the CPU has cleared meanwhile (a cha
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from fbvm.units import etn21_map as at
 from fbvm.units.etn21_socket import Socket
-from fbvm.units.etn21_timing import Skew
+from fbvm.units.etn21_timing import TOGETHER, Skew
 from fbvm.units.unit import AreaMemory
 
-
-class _Change(NamedTuple):
-    due_cycle: int
-    area: str
-    word: int
-    clear: int
-    set: int
+Word = tuple[str, int]
+"""Area and address."""
 
 
 class Display:
     """Writes for one unit's status words, R words and request switches."""
 
     def __init__(self, layout: at.Layout) -> None:
-        self._layout = layout
-        self._shown: dict[tuple[str, int], int] = {}
-        self._queue: list[_Change] = []
-        self._last_due: dict[tuple[str, int], int] = {}
+        self._words_of = {
+            (protocol, socket): (
+                ("CIO", layout.status(protocol, socket)),
+                ("D", layout.m + at.BYTES_RECEIVED + socket),
+                ("D", layout.m + at.TCP_STATE + socket),
+            )
+            for protocol in ("TCP", "UDP") for socket in at.SOCKETS
+        }  # fmt: skip
+        self._shown: dict[Word, int] = {}
+        self._queue: list[tuple[int, Word, int, int]] = []
+        """Due refresh, word, mask of the bits that stay, bits that turn ON."""
+        self._last_due: dict[Word, int] = {}
 
-    def put(self, area: str, word: int, value: int, due_cycle: int) -> None:
+    def put(self, word: Word, value: int, due_cycle: int) -> None:
         """Write a whole word in refresh `due_cycle`."""
-        self._change(area, word, 0xFFFF, value, due_cycle)
+        self._change(word, 0, value, due_cycle)
 
-    def clear_bit(self, area: str, word: int, bit: int, due_cycle: int) -> None:
+    def clear_bit(self, word: Word, bit: int, due_cycle: int) -> None:
         """Turn one bit OFF in refresh `due_cycle`."""
-        self._change(area, word, 1 << bit, 0, due_cycle)
+        self._change(word, ~(1 << bit), 0, due_cycle)
 
     def show(self, socket: Socket, skew: Skew, cycle: int) -> None:
         """Report what changed of a socket since it was last shown."""
-        status = self._layout.status(socket.protocol, socket.number)
-        groups = ((at.FLAGS, skew.flag), (at.OPEN, skew.open), (at.DATA_RECEIVED, skew.data))
-        self._differences(("CIO", status), socket.status(), groups, cycle)
-        if socket.protocol == "TCP":
-            whole = ((0xFFFF, skew.data),)
-            d = self._layout.m + socket.number
-            self._differences(("D", d + at.BYTES_RECEIVED), socket.bytes_shown(), whole, cycle)
-            self._differences(("D", d + at.TCP_STATE), socket.state, whole, cycle)
+        protocol = socket.protocol
+        status, received, state = self._words_of[protocol, socket.number]
+        self._differences(status, socket.status(), skew, cycle)
+        if protocol == "TCP":
+            self._differences(received, socket.bytes_shown(), skew, cycle)
+            self._differences(state, socket.state, skew, cycle)
 
-    def flush(self, memory: AreaMemory, cycle: int) -> None:
-        """Write everything that is due."""
-        later = []
-        for change in self._queue:
-            if change.due_cycle > cycle:
-                later.append(change)
+    def flush(self, memory: AreaMemory, cycle: int) -> bool:
+        """Write everything that is due; True if that is anything."""
+        queue, self._queue = self._queue, []
+        for change in queue:
+            due_cycle, (area, at), stays, turns_on = change
+            if due_cycle > cycle:
+                self._queue.append(change)
             else:
-                words = memory.words(change.area)
-                words[change.word] = words[change.word] & ~change.clear | change.set
-        self._queue = later
-        if not later:
+                words = memory.words(area)
+                words[at] = words[at] & stays | turns_on
+        if not self._queue:
             self._last_due.clear()
+        return len(self._queue) < len(queue)
 
     @property
     def pending(self) -> bool:
         """True while a write is still to come."""
         return bool(self._queue)
 
-    def _differences(self, key: tuple[str, int], value: int, groups: tuple[tuple[int, int], ...], cycle: int) -> None:
-        changed = self._shown.get(key, 0) ^ value
-        if changed:
-            self._shown[key] = value
-            for mask, delay in groups:
-                if changed & mask:
-                    self._change(*key, changed & mask & ~value, changed & mask & value, cycle + delay)
+    def _differences(self, word: Word, value: int, skew: Skew, cycle: int) -> None:
+        changed = self._shown.get(word, 0) ^ value
+        if not changed:
+            return
+        self._shown[word] = value
+        if skew is TOGETHER:
+            self._change(word, ~changed, changed & value, cycle)
+            return
+        flags, opened = (at.FLAGS, at.OPEN) if word[0] == "CIO" else (0, 0)
+        groups = ((flags, skew.flag), (opened, skew.open), (0xFFFF & ~flags & ~opened, skew.data))
+        for mask, delay in groups:
+            if changed & mask:
+                self._change(word, ~(changed & mask), changed & mask & value, cycle + delay)
 
-    def _change(self, area: str, word: int, clear: int, turn_on: int, due_cycle: int) -> None:
-        key = area, word
-        due_cycle = max(due_cycle, self._last_due.get(key, 0))
-        self._last_due[key] = due_cycle
-        self._queue.append(_Change(due_cycle, area, word, clear, turn_on))
+    def _change(self, word: Word, stays: int, turns_on: int, due_cycle: int) -> None:
+        due_cycle = max(due_cycle, self._last_due.get(word, 0))
+        self._last_due[word] = due_cycle
+        self._queue.append((due_cycle, word, stays, turns_on))

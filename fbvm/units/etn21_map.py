@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 from fbvm.wire.link import Peer
 
@@ -59,6 +60,8 @@ class Switch(IntEnum):
 
 OPENS = frozenset({Switch.UDP_OPEN, Switch.PASSIVE_OPEN, Switch.ACTIVE_OPEN})
 ALL_SWITCHES = 0x3F
+SWITCHES_IN = tuple(tuple(switch for switch in Switch if mask >> switch & 1) for mask in range(ALL_SWITCHES + 1))
+"""The switches that are ON in a mask of them."""
 
 FLAG_OF = {
     Switch.UDP_OPEN: OPENING,
@@ -113,35 +116,51 @@ class Layout:
         return self.n + (TCP_STATUS if protocol == "TCP" else UDP_STATUS) + socket
 
 
-@dataclass(frozen=True, slots=True)
-class Parameters:
-    """A parameter area as the unit reads it when it accepts a request."""
+class Parameters(NamedTuple):
+    """The words of a parameter area when the unit accepts a request, and what they say."""
 
-    option: int
-    socket: int
+    option_and_socket: int
     local_port: int
-    remote: Peer
-    count: int
-    area_code: int
-    word: int
-    bit: int
-    timeout_ns: int
+    host_high: int
+    host_low: int
+    remote_port: int
+    size_bytes: int
+    address_high: int
+    address_low: int
+    timeout: int
 
     @classmethod
     def read(cls, d: memoryview, at: int) -> Parameters:
         """The area whose first word is D `at`."""
-        first, port, host_high, host_low, remote_port, count, high, low, timeout = d[at : at + RESPONSE].tolist()
-        return cls(
-            option=first >> 8,
-            socket=first & 0xFF,
-            local_port=port,
-            remote=Peer(host_of(host_high, host_low), remote_port),
-            count=count,
-            area_code=high >> 8,
-            word=(high & 0xFF) << 8 | low >> 8,
-            bit=low & 0xFF,
-            timeout_ns=timeout * 100_000_000,
-        )
+        return cls._make(d[at : at + RESPONSE].tolist())
+
+    @property
+    def option(self) -> int:
+        return self.option_and_socket >> 8
+
+    @property
+    def socket(self) -> int:
+        return self.option_and_socket & 0xFF
+
+    @property
+    def remote(self) -> Peer:
+        return Peer(host_of(self.host_high, self.host_low), self.remote_port)
+
+    @property
+    def area_code(self) -> int:
+        return self.address_high >> 8
+
+    @property
+    def word(self) -> int:
+        return (self.address_high & 0xFF) << 8 | self.address_low >> 8
+
+    @property
+    def bit(self) -> int:
+        return self.address_low & 0xFF
+
+    @property
+    def timeout_ns(self) -> int:
+        return self.timeout * 100_000_000
 
 
 def host_of(high: int, low: int) -> str:

@@ -65,6 +65,10 @@ class Area:
     """Parameter area 1..8: what runs in it and to which socket it is bound."""
 
     number: int
+    first: int
+    """D address of its first word."""
+    switches: tuple[int, int]
+    """CIO address of the word with its switches, and the bit number of the first."""
     services: list[Service] = field(default_factory=list)
     bound: Socket | None = None
     """From a successful open until the close (W421 6-7-1 p113)."""

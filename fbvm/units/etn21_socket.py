@@ -137,15 +137,21 @@ class Socket:
         service.code = code
         return []
 
-    def begin_send(self, service: Service, remote: Peer, data: bytes) -> list[Request]:
-        """Start sending; nothing goes out for no bytes, nor on a connection that is known to be broken."""
+    def begin_send_to(self, service: Service, remote: Peer, data: bytes) -> list[Request]:
+        """Start sending a datagram; nothing goes out for no bytes."""
         self._run(service)
         if not data:
             service.code = codes.NORMAL_END
             return []
-        if self.protocol == "UDP":
-            service.unanswered = 1
-            return [SendTo(self.number, remote, data)]
+        service.unanswered = 1
+        return [SendTo(self.number, remote, data)]
+
+    def begin_send(self, service: Service, data: bytes) -> list[Request]:
+        """Start sending on a connection; nothing goes out for no bytes, nor if it is known to be broken."""
+        self._run(service)
+        if not data:
+            service.code = codes.NORMAL_END
+            return []
         if self._broken or self._send_ended:
             service.code = self._unreported or codes.ERRNO["EPIPE"]
             self._unreported = 0
@@ -315,7 +321,7 @@ class Socket:
         service = self.services.get(at.RECEIVING)
         if service is None or service.code is not None or service.parameters is None:
             return []
-        limit = service.parameters.count
+        limit = service.parameters.size_bytes
         if self._datagrams and limit:
             datagram = self._datagrams.popleft()
             self._hand_over(service, datagram.data[:limit])

@@ -6,7 +6,7 @@ From W421 6-7-4 p117 (parameters), W420 7-3-14 p175 (errno codes of an open), W4
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from fbvm.units import etn21_codes as codes
 from fbvm.units import etn21_map as at
@@ -25,8 +25,7 @@ TCP_PORTS_OF_THE_UNIT = frozenset({20, 21, 25, 53, 80, 110, 9600})  # W421 6-7-4
 UDP_PORTS_OF_THE_UNIT = frozenset({53, 123, 9600})  # W343 6-1 p106
 
 
-@dataclass(frozen=True, slots=True)
-class Surroundings:
+class Surroundings(NamedTuple):
     """What a starting service may look at."""
 
     memory: AreaMemory
@@ -45,9 +44,12 @@ def start(service: Service, parameters: Parameters, socket: Socket, around: Surr
     if switch in at.OPENS:
         return _start_open(service, parameters, socket, around)
     if switch is Switch.SEND:
-        if parameters.remote.host == BROADCAST and parameters.count > DATAGRAM_LIMIT and socket.protocol == "UDP":
+        data = fetch(around.memory, parameters)
+        if socket.protocol == "TCP":
+            return socket.begin_send(service, data)
+        if parameters.remote.host == BROADCAST and parameters.size_bytes > DATAGRAM_LIMIT:
             return socket.fail(service, codes.ERRNO["EMSGSIZE"])
-        return socket.begin_send(service, parameters.remote, fetch(around.memory, parameters))
+        return socket.begin_send_to(service, parameters.remote, data)
     if switch is Switch.RECEIVE:
         _limit(service, parameters.timeout_ns, codes.TIMED_OUT, around.now_ns)
         return socket.begin_receive(service)

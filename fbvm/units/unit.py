@@ -26,6 +26,11 @@ class Unit(Protocol):
     address: str
     """IPv4 address of the unit, by which it is attached to a network."""
 
+    wake_ns: int
+    """When another refresh is worth while, after the last one: 0 if that changed words or left work, so that nobody
+    should wait; else the time at which something happens by itself, far away if nothing does.  What the program asks
+    for, or a network tells, comes besides."""
+
     @property
     def configuration(self) -> dict[str, Any]:
         """The arguments with which the unit's class makes the same unit; plain data, as a journal keeps it."""

@@ -198,6 +198,36 @@ class CommonUnitTests:
             assert set(memory.differences(before)) <= self.may_write() | self.data_words()
             before = memory.snapshot()
 
+    def test_wakes_the_program_when_it_has_news(self) -> None:
+        """Nobody scans without need, and nobody sleeps while the program has something to see."""
+        unit, memory = self.fresh()
+        unit.refresh(memory, [], CYCLE_NS)
+        assert unit.wake_ns > CYCLE_NS << 10
+        self.ask(memory)
+        told = answer(unit.refresh(memory, [], 2 * CYCLE_NS))
+        assert unit.wake_ns == 0  # what it shows of the request
+        unit.refresh(memory, [], 3 * CYCLE_NS)
+        assert unit.wake_ns > 3 * CYCLE_NS
+        unit.refresh(memory, told, 4 * CYCLE_NS)
+        assert unit.wake_ns == 0
+
+    @inherited
+    @given(st.lists(st.lists(events(st.integers(0, 3)), max_size=4), max_size=12))
+    def test_nothing_happens_before_its_time(self, scans: list[list[Event]]) -> None:
+        unit, memory = self.fresh()
+        now_ns = CYCLE_NS
+        for told in scans:
+            self.ask(memory)
+            before = memory.snapshot()
+            unit.refresh(memory, told, now_ns)
+            assert unit.wake_ns == 0 or not any(memory.differences(before))
+            if unit.wake_ns > now_ns:
+                before = memory.snapshot()
+                now_ns = min(unit.wake_ns - 1, now_ns + 10 * CYCLE_NS)
+                assert unit.refresh(memory, [], now_ns) == []
+                assert not any(memory.differences(before))
+            now_ns += CYCLE_NS
+
     @inherited
     @given(st.lists(st.lists(events(st.integers(0, 3)), max_size=4), max_size=12))
     def test_same_inputs_give_the_same_memory_and_requests(self, scans: list[list[Event]]) -> None:

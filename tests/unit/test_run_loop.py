@@ -68,7 +68,7 @@ class RealNetwork:
 class Idle:
     """A unit that does nothing."""
 
-    name, address = "Idle 0", "192.168.250.9"
+    name, address, wake_ns = "Idle 0", "192.168.250.9", 1 << 63
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
         return []
@@ -169,7 +169,7 @@ def test_a_real_run_goes_on_from_where_time_stands(clock: Clock) -> None:
 def test_event_pace_scans_when_something_arrives(clock: Clock) -> None:
     plc, network = real_plc(clock, 3, 4, 22)
     assert scan_times_ms(plc, scans=6, pace="event") == [0, 3, 4, 14, 22, 32]
-    assert network.waits_ms == [0, 10, 10, 10, 10, 10]
+    assert network.waits_ms == [10, 10, 10, 10, 10]
 
 
 def test_event_pace_wakes_for_a_tasks_interval(clock: Clock) -> None:
