@@ -21,7 +21,7 @@ FLOORS = {
     "base": 0, "syntax": 1, "check": 2, "code": 3, "engine": 4,
     "wire": 1, "units": 2, "net": 2,
     "watch": 4, "breakpoints": 5, "flags": 5, "goal": 5, "schedule": 5, "scan_times": 5, "plc": 5,
-    "record": 6, "run": 6, "testing": 7, "cli": 7, "": 7, "__main__": 7,
+    "record": 6, "run": 6, "step": 6, "testing": 7, "cli": 7, "": 7, "__main__": 7,
 }  # fmt: skip
 """A room may import from its own floor and from below."""
 STAIRS = {
@@ -45,6 +45,7 @@ ONLY_IN = {
     "pymodbus": {"cli/peer.py", "cli/demo.py"},
     "click": {"cli"},
     "rich": {"cli"},
+    "prompt_toolkit": {"cli"},
     "lark": {"syntax"},
 }
 """Modules that are used in these places only."""

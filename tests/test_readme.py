@@ -32,6 +32,16 @@ def test_the_first_program_draws_that_chart(tmp_path: Path, monkeypatch: pytest.
     assert result.output == shown
 
 
+def test_stepping_says_that(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("pump.st").write_text(block("iecst"), encoding="utf-8")
+    found = re.search(r"^\$ printf '(.*)' \| fbvm (.*)\n", README, re.M)
+    assert found
+    shown = README[found.end() : README.index("```", found.end())]
+    result = CliRunner().invoke(main, shlex.split(found[2]), input=found[1].replace("\\n", "\n"))
+    assert result.output == shown
+
+
 def test_the_python_example_prints_that(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(HOUSE)
     output = io.StringIO()

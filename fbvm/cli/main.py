@@ -19,6 +19,7 @@ VERBS = {
     "new": "Make a project with a block and its test.",
     "test": "Run the tests of a project.",
     "run": "Run a program, in virtual time or over real TCP.",
+    "step": "Step through the scans of a program, forth and back.",
     "replay": "Do a run again from its journal.",
     "chart": "Draw variables of a trace, a column a scan.",
     "table": "Show which statement changed variables of a trace.",

@@ -9,8 +9,7 @@ from typing import Any
 
 import click
 
-from fbvm.base.data import data_folder
-from fbvm.base.diagnostics import Source
+from fbvm.cli.sources import source_texts
 from fbvm.code.image import Image
 from fbvm.plc import Plc
 from fbvm.record.recorder import Recording
@@ -18,7 +17,6 @@ from fbvm.record.trace import Trace
 from fbvm.record.trace_format import TraceError
 from fbvm.record.trace_signals import recording
 from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
-from fbvm.syntax.text import read
 from fbvm.watch.paths import UnknownPlace
 
 SUFFIX = ".fbtrace"
@@ -110,13 +108,4 @@ def tracing(
 
 
 def _lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:
-    """The source's lines, as far as the files are there."""
-    own = {str(path): path for path in files}
-    texts = {}
-    for name in {site.file for site in image.sites}:
-        for path in (own.get(name), *(folder / name for folder in (*libraries, data_folder("fblib")))):
-            source = read(path, name) if path and path.is_file() else None
-            if isinstance(source, Source):
-                texts[name] = source.text
-                break
-    return source_lines(image, texts)
+    return source_lines(image, source_texts(image, files, libraries))

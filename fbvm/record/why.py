@@ -5,17 +5,18 @@ Needs a trace of statements.  What the conditions around a statement read counts
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
-from fbvm.base.memory import Snapshot, compare
+from fbvm.base.memory import Memory, Snapshot, compare
 from fbvm.code.image import Site
 from fbvm.plc import Phase
 from fbvm.record.inside import Event, Frame, Read, Statement, Write
+from fbvm.record.names import Names
 from fbvm.record.recorder import Signal
-from fbvm.record.trace import Moment, Trace
 from fbvm.watch.paths import Place
-from fbvm.watch.values import show_time
+from fbvm.watch.values import Value, show_time
 
 DEEPEST = 6
 """Causes of causes that are looked for if nobody says how deep."""
@@ -23,6 +24,47 @@ WINDOWS = (100, 2000)
 """Scans that are read at first, and if they do not suffice; then all."""
 LARGEST_BYTES = 4096
 """What copies at once is not followed byte by byte if it is larger."""
+
+
+class Instant(Protocol):
+    """A PLC at some moment of what happened."""
+
+    @property
+    def memory(self) -> Memory: ...
+    @property
+    def scans(self) -> int: ...
+    @property
+    def now_ns(self) -> int: ...
+    def read(self, where: str | Place) -> Value: ...
+
+
+class Follower(Protocol):
+    """Who is told what happened."""
+
+    def phase(self, moment: Instant, phase: Phase) -> None: ...
+    def event(self, moment: Instant, event: Event) -> None: ...
+
+
+class Readable(Protocol):
+    """Whose values can be read."""
+
+    def read(self, where: str | Place) -> Value: ...
+
+
+class Past(Protocol):
+    """What happened, to be gone through again: a trace, or a session of stepping."""
+
+    @property
+    def names(self) -> Names: ...
+    @property
+    def sites(self) -> Sequence[Site]: ...
+    @property
+    def outer(self) -> Sequence[int]: ...
+    @property
+    def scans(self) -> range: ...
+    def at(self, scan: int) -> Readable: ...
+    def follow(self, follower: Follower, scans: range | None = None) -> None: ...
+    def line(self, site: Site) -> str: ...
 
 
 @dataclass(frozen=True)
@@ -61,10 +103,10 @@ class Cause:
     causes: list[Cause] = field(default_factory=list)
 
 
-class _Past:
+class _Changes:
     """Every change in some scans, by byte and bit."""
 
-    def __init__(self, trace: Trace, scans: range) -> None:
+    def __init__(self, trace: Past, scans: range) -> None:
         self._trace = trace
         self._changes: dict[int, list[tuple[int, Change]]] = {}
         self._reads: dict[tuple[Frame, int], list[Fact]] = {}
@@ -72,7 +114,7 @@ class _Past:
         self.order = 0
         trace.follow(self, scans)
 
-    def phase(self, moment: Moment, phase: Phase) -> None:
+    def phase(self, moment: Instant, phase: Phase) -> None:
         self.order += 1
         now = moment.memory.snapshot()
         if phase is not Phase.PROGRAM and self._known is not None:
@@ -85,7 +127,7 @@ class _Past:
         if phase is Phase.REFRESH:
             self._reads.clear()
 
-    def event(self, moment: Moment, event: Event) -> None:
+    def event(self, moment: Instant, event: Event) -> None:
         self.order += 1
         if isinstance(event, Statement):
             self._reads[event.frame, event.site] = []
@@ -123,20 +165,20 @@ class _Past:
         return found
 
 
-def why(trace: Trace, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
+def why(trace: Past, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
     """What gave a place its value at the end of a scan.  Raises ValueError for a scan that is not recorded."""
     value = Signal(place, place.name).text(trace.at(scan).read(place))
     start = trace.scans.start
     for window in (*WINDOWS, scan - start + 1):
         first = max(start, scan - window + 1)
-        past = _Past(trace, range(first, scan + 1))
+        past = _Changes(trace, range(first, scan + 1))
         cause = _explain(past, place, value, past.order + 1, deepest, set())
         if first == start or not _open(cause):
             break
     return cause
 
 
-def _explain(past: _Past, place: Place, value: str, before: int, deepest: int, known: set[object]) -> Cause:
+def _explain(past: _Changes, place: Place, value: str, before: int, deepest: int, known: set[object]) -> Cause:
     change = past.last(place, before)
     cause = Cause(place, value, change)
     key = place, change.order if change else -1
@@ -167,19 +209,19 @@ def _open(cause: Cause) -> bool:
 # --- as text ----------------------------------------------------------------------------------------------------------
 
 
-def told(trace: Trace, cause: Cause) -> str:
+def told(trace: Past, cause: Cause) -> str:
     """The answer as a tree of lines."""
     return "\n".join(_lines(trace, cause, "", ""))
 
 
-def _lines(trace: Trace, cause: Cause, first: str, rest: str) -> Iterator[str]:
+def _lines(trace: Past, cause: Cause, first: str, rest: str) -> Iterator[str]:
     yield f"{first}{'if ' if cause.guard else ''}{cause.place.name} = {cause.value}{_since(trace, cause)}"
     for number, inner in enumerate(cause.causes):
         last = number == len(cause.causes) - 1
         yield from _lines(trace, inner, rest + ("└ " if last else "├ "), rest + ("  " if last else "│ "))
 
 
-def _since(trace: Trace, cause: Cause) -> str:
+def _since(trace: Past, cause: Cause) -> str:
     change = cause.change
     if change is None:
         return " since the trace begins" if trace.scans.start else " since power-on"

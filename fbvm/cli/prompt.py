@@ -1,0 +1,49 @@
+"""The prompt of a terminal: history, editing, completion.  Only what asks; what is understood is `step.commands`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from prompt_toolkit import PromptSession
+from prompt_toolkit.completion import CompleteEvent, Completer, Completion
+from prompt_toolkit.document import Document
+from prompt_toolkit.history import FileHistory, History, InMemoryHistory
+
+from fbvm.base.data import cache_folder
+from fbvm.step.commands import Commands
+
+HISTORY = "step_history"
+
+
+class _Completer(Completer):
+    def __init__(self, commands: Commands) -> None:
+        self._commands = commands
+
+    def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterable[Completion]:
+        """What the word before the cursor may become."""
+        word = document.get_word_before_cursor(WORD=True)
+        for found in self._commands.completions(document.text_before_cursor):
+            yield Completion(found, start_position=-len(word))
+
+
+def prompted(commands: Commands) -> Iterator[str]:
+    """Lines that somebody types, until the end of input.  Ctrl-C takes back the line."""
+    asking: PromptSession[str] = PromptSession(history=_history(), completer=_Completer(commands), complete_while_typing=False)
+    while True:
+        here = commands.session.here
+        try:
+            yield asking.prompt(f"{here.scan}:{here.step}> ")
+        except KeyboardInterrupt:
+            continue
+        except EOFError:
+            return
+
+
+def _history() -> History:
+    """What was typed before, if there is a place to keep it."""
+    try:
+        cache_folder().mkdir(parents=True, exist_ok=True)
+        (cache_folder() / HISTORY).touch()
+    except OSError:
+        return InMemoryHistory()
+    return FileHistory(str(cache_folder() / HISTORY))

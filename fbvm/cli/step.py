@@ -1,0 +1,129 @@
+"""`fbvm step`: a program that stands still at any statement of any scan, for people at a terminal and for scripts."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from fbvm.cli import status
+from fbvm.cli.options import Mapping, Setting, mapping, setting, time_ns
+from fbvm.cli.prompt import prompted
+from fbvm.cli.run import CYCLE_NS, UNIT_ADDRESS, build_network
+from fbvm.cli.sources import compiled, source_arguments, source_texts
+from fbvm.code.image import Image
+from fbvm.plc import Plc
+from fbvm.record.traffic import Passed, Reader
+from fbvm.step.commands import CommandError, Commands, ExpectationError
+from fbvm.step.session import Session
+from fbvm.step.words import Words
+from fbvm.units.etn21 import Etn21
+from fbvm.watch.paths import Place
+from fbvm.watch.values import parse_value
+from fbvm.wire.tap import Happening
+
+
+class Bench:
+    """Makes the PLC with its unit and network, each time the same, and notes what passes the network."""
+
+    def __init__(self, image: Image, cycle_ns: int, mappings: tuple[Mapping, ...], timing: str, seed: int) -> None:
+        self._image, self._cycle_ns, self._mappings = image, cycle_ns, mappings
+        self._timing, self._seed = timing, seed
+        self.passed: list[Passed] = []
+
+    def make(self) -> Plc:
+        """A PLC at power-on."""
+        plc = Plc(self._image, self._cycle_ns)
+        network = build_network("loop", self._mappings, self._seed)
+        self.passed, reader = [], Reader()
+
+        def tap(now_ns: int, unit: str, happening: Happening) -> None:
+            self.passed.extend(reader.read(now_ns, happening))
+
+        network.tap = tap
+        plc.attach(Etn21(0, UNIT_ADDRESS, timing=self._timing, seed=self._seed), network)
+        return plc
+
+
+@click.command("step", epilog="At the prompt, `help` lists the commands.  A script: printf 'run Main.Done\\nprint D200\\n' | "
+               "fbvm step FILE")
+@source_arguments
+@click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
+              help="Cycle of programs without a TASK, and how often the PLC scans.")
+@click.option("--set", "settings", type=setting, multiple=True, metavar="NAME=VALUE", help="Write before the first scan.")
+@click.option("--watch", "watched", multiple=True, metavar="NAME|ADDRESS", help="Print this at each stop.")
+@click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=peer",
+              help="Where a Modbus server is, in memory.")
+@click.option("--timing", type=click.Choice(["exact", "real"]), default="exact", show_default=True,
+              help="exact: the unit answers in fixed scans.  real: late and out of step, as the device may.")
+@click.option("--seed", type=int, default=0, metavar="N", help="What chance begins with: the same again with the same N.")
+def command(
+    files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int, settings: tuple[Setting, ...],
+    watched: tuple[str, ...], mappings: tuple[Mapping, ...], timing: str, seed: int,
+) -> None:  # fmt: skip
+    """Step through a program statement by statement and scan by scan, forth and back, in virtual time.
+
+    Going back is real: memory, unit and network are as they were, and what is written there leads to another future.
+    From a pipe, each line is a command; the first that fails ends it with status 1 (`expect`) or 2."""
+    image = compiled(files, program, libraries, runnable=True)
+    for row in mappings:
+        if row.host is not None:
+            raise click.UsageError(f"stepping stays in memory: --map {row.said}=peer")
+    bench = Bench(image, cycle_ns, mappings, timing, seed)
+    session = Session(bench.make)
+    commands = Commands(session, Words(session, source_texts(image, files, libraries)), lambda: bench.passed)
+    try:
+        for given in settings:
+            _write(session, given)
+        for name in watched:
+            commands.words.value(name)
+            commands.watches.append(name)
+    except (LookupError, TypeError, ValueError) as error:
+        raise click.UsageError(str(error)) from None
+    for line in commands.stop():
+        _say(line)
+    if sys.stdin.isatty():
+        _talk(commands)
+    else:
+        _script(commands)
+
+
+def _write(session: Session, given: Setting) -> None:
+    place = session.find(given.name)
+    if not isinstance(place, Place):
+        raise ValueError(f"{given.name} is a range; name one place")
+    value = parse_value(place.type, given.value, given.name)
+    session.act(lambda plc: plc.write(place, value))
+
+
+def _talk(commands: Commands) -> None:
+    """Asks for lines until `quit` or the end of input.  A mistake is said, and nothing else happens."""
+    for line in prompted(commands):
+        try:
+            for said in commands.run(line):
+                _say(said)
+        except CommandError as error:
+            click.secho(str(error), fg="red")
+        if commands.ended:
+            return
+
+
+def _script(commands: Commands) -> None:
+    for line in sys.stdin:
+        if not line.strip() or line.lstrip().startswith("//"):
+            continue
+        click.echo(f"> {line.strip()}")
+        try:
+            for said in commands.run(line):
+                click.echo(said)
+        except CommandError as error:
+            click.echo(str(error), err=True)
+            sys.exit(status.FAILED if isinstance(error, ExpectationError) else status.USAGE)
+        if commands.ended:
+            return
+
+
+def _say(line: str) -> None:
+    """A line; the statement that comes next is bold on a terminal."""
+    click.secho(line, bold=line.startswith((" >", "scan ")) or None)

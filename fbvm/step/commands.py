@@ -1,0 +1,360 @@
+"""The language of stepping: a word, and what it is about.  `help` lists it; a line without a word repeats the last move.
+
+    run Main.Delay.Q          back scan        force CIO 0.00 = TRUE          print Main.Delay D200..D209
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+from fbvm.base.types import fold
+from fbvm.plc import Mode, Plc
+from fbvm.record.names import is_single
+from fbvm.record.recorder import signals_at
+from fbvm.record.table import ScanTable
+from fbvm.record.traffic import Passed
+from fbvm.record.why import told, why
+from fbvm.step.past import Past
+from fbvm.step.session import Session
+from fbvm.step.targets import Target, target
+from fbvm.step.twin import Act
+from fbvm.step.words import Words
+from fbvm.watch.conditions import ConditionError, parse_condition
+from fbvm.watch.paths import Place, Span, UnknownPlace
+from fbvm.watch.values import parse_time_ns, parse_value, split_list
+
+LOOK_AHEAD_NS = 60_000_000_000
+"""How far `run` looks for a line or a condition."""
+TABLE_SCANS = 5
+
+
+class CommandError(Exception):
+    """A line that means nothing, or cannot be done here; the message says why."""
+
+
+class ExpectationError(CommandError):
+    """What a script expects does not hold."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """One word of the language."""
+
+    name: str
+    short: str
+    usage: str
+    help: str
+    moves: bool = False
+    takes: str = ""
+    """What completes its argument: "place", "line", "command" or nothing."""
+
+
+COMMANDS = (
+    Command("step", "s", "step [N]", "one statement on, into blocks", True),
+    Command("next", "n", "next [N]", "one statement on, blocks at once", True),
+    Command("out", "o", "out", "to the end of this block", True),
+    Command("scan", "c", "scan [N]", "to the beginning of the next scan, or the Nth from here", True),
+    Command("run", "r", "run [LINE | CONDITION | TIME]", "to a line, until something holds, for a time, or to a breakpoint",
+            True, "place"),
+    Command("back", "b", "back [N | scan | FILE:LINE | CONDITION]",
+            "one statement back, to the beginning of the scan, or to where it last was so", True, "place"),
+    Command("goto", "g", "goto SCAN", "to the beginning of any scan", True),
+    Command("break", "k", "break [LINE | CONDITION]", "a breakpoint for `run` and `back`; without, lists them", takes="line"),
+    Command("unbreak", "", "unbreak [NUMBER]", "takes a breakpoint away, or all"),
+    Command("print", "p", "print NAME...", "values of variables, blocks, addresses, ranges", takes="place"),
+    Command("watch", "w", "watch NAME...", "prints these at each stop", takes="place"),
+    Command("unwatch", "", "unwatch [NAME...]", "no longer", takes="place"),
+    Command("write", "", "write NAME = VALUE", "writes once, here; what came later is forgotten", takes="place"),
+    Command("force", "f", "force NAME = VALUE", "holds a value from here on", takes="place"),
+    Command("unforce", "", "unforce [NAME]", "ends a force, or all", takes="place"),
+    Command("mode", "", "mode PROGRAM | RUN", "changes the mode between two scans"),
+    Command("power", "", "power [cold]", "power off and on between two scans; cold forgets what is retained"),
+    Command("table", "t", "table [NAME...]", "the scan table of the last scans, of what is named or watched", takes="place"),
+    Command("why", "y", "why NAME", "why it has its value", takes="place"),
+    Command("list", "l", "list [LINES]", "the text around"),
+    Command("calls", "", "calls", "who called whom"),
+    Command("net", "", "net [SCANS]", "what passed the network in the scan before, or in the last ones"),
+    Command("expect", "", "expect CONDITION", "fails if it does not hold; for scripts", takes="place"),
+    Command("help", "h", "help [COMMAND]", "this list, or one of its lines", takes="command"),
+    Command("quit", "q", "quit", "ends the session"),
+)  # fmt: skip
+WORDS = {word: command for command in COMMANDS for word in (command.name, command.short) if word}
+
+
+class Commands:
+    """Understands lines about a session.  `run` gives what is to be said; raises CommandError."""
+
+    def __init__(self, session: Session, words: Words, passed: Callable[[], list[Passed]] = list) -> None:
+        self.session, self.words = session, words
+        self.watches: list[str] = []
+        self.breakpoints: list[Target] = []
+        self.ended = False
+        self._passed = passed
+        self._last = "step"
+
+    def run(self, line: str) -> Iterator[str]:
+        """Does what a line says."""
+        line = line.strip()
+        if line.startswith("//"):
+            return
+        name, _, rest = (line or self._last).partition(" ")
+        command = WORDS.get(name.lower())
+        rest = rest.strip()
+        if command is None and re.search(r":=|(?<![<>])=", line):
+            command, rest = WORDS["write"], line
+        if command is None:
+            raise CommandError(f"{name!r} is no command; `help` lists them")
+        if command.moves:
+            self._last = line or self._last
+            self.session.mark()
+        function: Callable[[str], Iterator[str] | None] = getattr(self, f"_{command.name}")
+        try:
+            said = function(rest)
+            yield from said or ()
+        except (ConditionError, UnknownPlace, ValueError, TypeError) as error:
+            raise CommandError(str(error)) from None
+        if command.moves:
+            yield from self.stop()
+
+    def stop(self) -> Iterator[str]:
+        """Where the program stands, what changed, what is watched."""
+        yield self.words.place()
+        yield from self.words.around()
+        yield from self.words.changes()
+        for name in self.watches:
+            yield self.words.value(name)
+
+    # --- moves
+
+    def _step(self, rest: str) -> None:
+        for _ in range(_count(rest)):
+            self.session.step()
+
+    def _next(self, rest: str) -> None:
+        for _ in range(_count(rest)):
+            self.session.over()
+
+    def _out(self, rest: str) -> None:
+        self.session.out()
+
+    def _scan(self, rest: str) -> None:
+        self.session.scan(_count(rest))
+
+    def _goto(self, rest: str) -> None:
+        self.session.goto(_count(rest, least=0))
+
+    def _run(self, rest: str) -> Iterator[str]:
+        if re.fullmatch(r"(?:T#)?[\d.]+\s*[a-zA-Z]\w*", rest, re.I):
+            self.session.scan(max(1, -(-parse_time_ns(rest) // self.session.plc.cycle_ns)))
+            return
+        targets = self._targets(rest)
+        scans = max(1, LOOK_AHEAD_NS // self.session.plc.cycle_ns)
+        if not self.session.run(lambda statement: any(each.reached(statement) for each in targets), scans) \
+                and not self.session.trap:  # fmt: skip
+            yield f"{rest or 'no breakpoint'} was not reached in {scans} scans"
+
+    def _back(self, rest: str) -> Iterator[str]:
+        if rest == "scan":
+            self.session.back_scan()
+        elif not rest or rest.isdecimal():
+            for _ in range(_count(rest)):
+                self.session.back()
+        else:
+            targets = self._targets(rest)
+            if not self.session.run_back(lambda statement: any(each.reached(statement) for each in targets)):
+                yield f"{rest} was never reached before"
+
+    def _targets(self, rest: str) -> list[Target]:
+        if rest:
+            return [self._target(rest)]
+        if not self.breakpoints:
+            raise CommandError("say where to: a line, a condition or a time; or set breakpoints")
+        return self.breakpoints
+
+    def _target(self, text: str) -> Target:
+        return target(text, self.session, self.words.site())
+
+    # --- breakpoints
+
+    def _break(self, rest: str) -> Iterator[str]:
+        if rest:
+            self.breakpoints.append(self._target(rest))
+        for number, each in enumerate(self.breakpoints, 1):
+            yield f"  {number}  {each.text}"
+
+    def _unbreak(self, rest: str) -> None:
+        if not rest:
+            self.breakpoints.clear()
+            return
+        number = _count(rest)
+        if number > len(self.breakpoints):
+            raise CommandError(f"there is no breakpoint {number}")
+        del self.breakpoints[number - 1]
+
+    # --- values
+
+    def _print(self, rest: str) -> Iterator[str]:
+        for name in self._names(rest):
+            yield self.words.value(name)
+
+    def _watch(self, rest: str) -> Iterator[str]:
+        names = self._names(rest)
+        for name in names:
+            yield self.words.value(name)
+        self.watches += [name for name in names if name not in self.watches]
+
+    def _unwatch(self, rest: str) -> None:
+        gone = [fold(name) for name in self._names(rest)] if rest else None
+        self.watches = [name for name in self.watches if gone is not None and fold(name) not in gone]
+
+    def _write(self, rest: str) -> Iterator[str]:
+        place, value = self._value(rest)
+        yield from self._act(lambda plc: plc.write(place, value), place.name)
+
+    def _force(self, rest: str) -> Iterator[str]:
+        place, value = self._value(rest)
+        if not isinstance(place, Place):
+            raise CommandError("force one place after the other")
+        yield from self._act(lambda plc: plc.force(place.name, value), place.name)
+
+    def _unforce(self, rest: str) -> None:
+        name = _place(self.session, rest).name if rest else None
+        self.session.act(lambda plc: plc.unforce(name))
+
+    def _value(self, rest: str) -> tuple[Place | Span, object]:
+        match = re.fullmatch(r"(.+?)\s*:?=\s*(.+)", rest)
+        if not match:
+            raise CommandError("write NAME = VALUE")
+        found = self.session.find(match[1])
+        if isinstance(found, Place):
+            return found, parse_value(found.type, match[2], found.name)
+        texts = split_list(match[2])
+        if len(texts) != len(found.places):
+            raise CommandError(f"{found.name} takes {len(found.places)} values parted by commas")
+        return found, [parse_value(place.type, text.strip(), place.name)
+                       for place, text in zip(found.places, texts, strict=True)]  # fmt: skip
+
+    def _act(self, act: Act, name: str) -> Iterator[str]:
+        self.session.act(act)
+        yield self.words.value(name)
+
+    def _mode(self, rest: str) -> None:
+        self._between()
+        mode = Mode(rest.upper()) if rest.upper() in Mode.__members__ else None
+        if mode is None:
+            raise CommandError("mode PROGRAM, or mode RUN")
+        self.session.act(partial(_set_mode, mode))
+
+    def _power(self, rest: str) -> None:
+        self._between()
+        if rest not in ("", "cold"):
+            raise CommandError("power, or power cold")
+        self.session.act(Plc.cold_start if rest else Plc.warm_start)
+
+    def _between(self) -> None:
+        if self.session.here.step:
+            raise CommandError("that can be done between two scans only; `scan` or `back scan` goes there")
+
+    # --- looking
+
+    def _table(self, rest: str) -> Iterator[str]:
+        names = self._names(rest) if rest else self.watches
+        if not names:
+            raise CommandError("name variables, or watch some")
+        signals = [signal for name in names for signal in signals_at(self.session.find(name), {})]
+        table = ScanTable(self.words.sites, self.session.names, signals)
+        here = self.session.here.scan
+        self.session.follow(table, range(here - TABLE_SCANS + 1, here + 1))
+        yield table.draw()
+
+    def _why(self, rest: str) -> Iterator[str]:
+        past = Past(self.session, self.words)
+        yield told(past, why(past, _place(self.session, rest), self.session.here.scan))
+
+    def _list(self, rest: str) -> Iterator[str]:
+        return self.words.around(_count(rest) if rest else 10)
+
+    def _calls(self, rest: str) -> Iterator[str]:
+        return self.words.calls()
+
+    def _net(self, rest: str) -> Iterator[str]:
+        end_ns, cycle_ns = self.session.now_ns, self.session.plc.cycle_ns
+        start_ns = end_ns - _count(rest) * cycle_ns
+        for row in self._passed():
+            if start_ns <= row.now_ns < end_ns:
+                yield f"  {row}"
+
+    def _expect(self, rest: str) -> Iterator[str]:
+        condition = parse_condition(rest, self.session.find)
+        if not condition.holds(self.session.read):
+            raise ExpectationError(f"{rest} does not hold in {self.words.place()}")
+        return iter(())
+
+    def _help(self, rest: str) -> Iterator[str]:
+        if rest and rest not in WORDS:
+            raise CommandError(f"{rest!r} is no command")
+        for command in COMMANDS:
+            if not rest or WORDS[rest] is command:
+                short = f"{command.short:<2}" if command.short else "  "
+                yield f"  {short} {command.usage:<32} {command.help}"
+        if not rest:
+            yield "  LINE is 15, pump.st:15 or the name of a POU.  NAME := VALUE writes, too.  An empty line moves again."
+
+    def _quit(self, rest: str) -> None:
+        self.ended = True
+
+    @staticmethod
+    def _names(rest: str) -> list[str]:
+        """Names parted by blanks or commas; `CIO 0.00` is one."""
+        parts = re.findall(r"(?:CIO\s+)?[^\s,\[]+(?:\[[^\]]*\])*(?:[^\s,]*)", rest, re.I)
+        if not parts:
+            raise CommandError("name something")
+        return parts
+
+    def completions(self, text: str) -> list[str]:
+        """What the last word of a line may become."""
+        name, blank, rest = text.lstrip().partition(" ")
+        if not blank:
+            return [command.name for command in COMMANDS if command.name.startswith(name.lower())]
+        takes = WORDS[name.lower()].takes if name.lower() in WORDS else "place"
+        return completed(self.session, takes, re.split(r"[\s,(]", rest)[-1], list(WORDS))
+
+
+def completed(session: Session, takes: str, word: str, words: Mapping[str, object] | list[str]) -> list[str]:
+    """Paths of the program that begin with a word; words of the language for `help`."""
+    if takes == "command":
+        return [each for each in words if each.startswith(word)]
+    if takes not in ("place", "line"):
+        return []
+    front, dot, last = word.rpartition(".")
+    if dot:
+        try:
+            place = session.find(front)
+        except UnknownPlace:
+            return []
+        names = [field.name for field in getattr(getattr(place, "type", None), "fields", {}).values()]
+    else:
+        names = [field.name for field in session.plc.image.symbols.values()]
+    return [f"{front}{dot}{name}" for name in names if fold(name).startswith(fold(last))]
+
+
+def _count(text: str, least: int = 1) -> int:
+    if not text:
+        return 1
+    if not text.isdecimal() or int(text) < least:
+        raise CommandError(f"{text!r} is no number of steps")
+    return int(text)
+
+
+def _place(session: Session, text: str) -> Place:
+    found = session.find(text) if text else None
+    if not isinstance(found, Place) or not is_single(found):
+        raise CommandError("name one variable, not a block, an array or a range" if found else "name something")
+    return found
+
+
+def _set_mode(mode: Mode, plc: Plc) -> None:
+    plc.mode = mode

@@ -1,0 +1,105 @@
+"""What is said at a stop: where the program stands, the lines around, what changed, and values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from fbvm.base.types import StructType, base
+from fbvm.code.image import Site
+from fbvm.record.inside import Frame
+from fbvm.step.session import Session
+from fbvm.watch.paths import Place, Span
+from fbvm.watch.values import show, show_time
+
+AROUND = 2
+"""Lines before and behind the one that comes next."""
+MOST_CHANGES = 8
+
+
+class Words:
+    """Says it in text; `texts` are the sources by name."""
+
+    def __init__(self, session: Session, texts: Mapping[str, str]) -> None:
+        self._session = session
+        self._lines = {name: text.split("\n") for name, text in texts.items()}
+        self.sites = session.plc.image.sites
+
+    def site(self) -> Site | None:
+        """The statement that comes next, or that a trap has ended."""
+        statement = self._session.statement
+        if self._session.trap:
+            return self._session.trap.site
+        return self.sites[statement.site] if statement else None
+
+    def line(self, file: str, number: int) -> str:
+        """A line of a source, "" if it is not there."""
+        rows = self._lines.get(file, [])
+        return rows[number - 1].rstrip() if 0 < number <= len(rows) else ""
+
+    def place(self) -> str:
+        """`scan 3, 30ms: pump.st:15 in Main.Station`"""
+        session, site = self._session, self.site()
+        text = f"scan {session.here.scan}, {show_time(session.now_ns)[2:]}: "
+        if session.trap:
+            return f"{text}{session.trap}"
+        if site is None or session.statement is None:
+            return f"{text}end of the program; the I/O refresh comes next"
+        return f"{text}{short(site)} in {self.instance(session.statement.frame)}"
+
+    def instance(self, frame: Frame) -> str:
+        """The path of an instance; a function has only its name."""
+        return self._session.names.instance(frame.base) or self._session.plc.image.bodies[frame.body].name
+
+    def around(self, lines: int = AROUND) -> Iterator[str]:
+        """The lines around the statement that comes next, which is marked."""
+        site = self.site()
+        if site is None:
+            return
+        for number in range(max(1, site.line - lines), site.line + lines + 1):
+            text = self.line(site.file, number)
+            if text or number == site.line:
+                yield f" {'>' if number == site.line else ' '}{number:>4}  {text}".rstrip()
+
+    def changes(self) -> Iterator[str]:
+        """What the last move changed."""
+        changes = list(self._session.changes())
+        for change in changes[:MOST_CHANGES]:
+            yield f"  {change.place.name}: {change.old} -> {change.new}"
+        if len(changes) > MOST_CHANGES:
+            yield f"  and {len(changes) - MOST_CHANGES} more"
+
+    def calls(self) -> Iterator[str]:
+        """Who called whom, the innermost first."""
+        statement = self._session.statement
+        if statement is None:
+            return
+        frame, site = statement.frame, statement.site
+        while frame.caller is not None:
+            yield f"  {short(self.sites[site]):<20} {self.instance(frame)} ({self._session.plc.image.bodies[frame.body].name})"
+            frame, site = frame.caller, frame.site
+
+    def value(self, text: str) -> str:
+        """`Main.Delay.ET = T#20ms`; words of addresses also in hexadecimal, what units call them beside it."""
+        found = self._session.find(text)
+        value = self._session.read(found)
+        if isinstance(found, Span):
+            values = value if isinstance(value, list) else []
+            return "\n".join(self._one(place, item) for place, item in zip(found.places, values, strict=True))
+        return self._one(found, value)
+
+    def _one(self, place: Place, value: object) -> str:
+        name = place.name
+        if isinstance(base(place.type), StructType) and isinstance(value, dict):
+            return f"{name} = {place.type.name} {show(place.type, value)}"
+        text = f"{name} = {show(place.type, value)}"  # type: ignore[arg-type]
+        if place.area and isinstance(value, int) and not isinstance(value, bool):
+            text += f" ({show(place.type, value, hexadecimal=True)})"
+        for attached in self._session.units.units:
+            if place.area and (said := getattr(attached.unit, "descriptions", {}).get(name)):
+                text += f"   {said}"
+        return text
+
+
+def short(site: Site) -> str:
+    """`pump.st:15`"""
+    return f"{site.file.rpartition('/')[2]}:{site.line}"

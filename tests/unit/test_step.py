@@ -1,0 +1,284 @@
+"""Stepping: statement by statement, scan by scan, forth and back, with units and network, and its language."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fbvm.cli.main import main
+from fbvm.code.compiler import compile_text
+from fbvm.net.loop import LoopNetwork
+from fbvm.net.peers import ModbusPeer
+from fbvm.plc import Plc
+from fbvm.step.commands import COMMANDS, CommandError, Commands, ExpectationError
+from fbvm.step.session import Position, Session
+from fbvm.step.words import Words
+from fbvm.units.etn21 import Etn21
+from fbvm.wire.link import Peer
+
+HOUSE = Path(__file__).resolve().parents[2]
+TEXT = """\
+FUNCTION_BLOCK Twice
+VAR_INPUT A : INT; END_VAR
+VAR_OUTPUT Q : INT; END_VAR
+    Q := A;
+    Q := Q * 2;
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR
+    Button AT CIO 0.00 : BOOL;
+    N, R : INT;
+    T : Twice;
+END_VAR
+    N := N + 1;
+    T(A := N);
+    IF Button THEN
+        R := 100 / (N - 5);
+    END_IF;
+END_PROGRAM
+"""
+
+
+def made(text: str = TEXT) -> Commands:
+    compilation = compile_text(text)
+    assert compilation.image is not None
+    image = compilation.image
+    session = Session(lambda: Plc(image))
+    return Commands(session, Words(session, {image.sites[0].file: text}))
+
+
+def said(commands: Commands, *lines: str) -> str:
+    return "\n".join(text for line in lines for text in commands.run(line))
+
+
+def line_of(commands: Commands) -> int | None:
+    site = commands.words.site()
+    return site.line if site else None
+
+
+def test_each_statement_is_a_stop() -> None:
+    commands = made()
+    lines = [line_of(commands)]
+    for _ in range(6):
+        commands.session.step()
+        lines.append(line_of(commands))
+    assert lines == [13, 14, 4, 5, 15, None, 13]
+    assert commands.session.here == Position(1, 0)
+
+
+def test_blocks_at_once_and_out_of_them() -> None:
+    commands = made()
+    said(commands, "next", "next")
+    assert line_of(commands) == 15
+    said(commands, "back", "step")
+    assert line_of(commands) == 15
+    said(commands, "goto 0", "step", "step")
+    assert line_of(commands) == 4
+    said(commands, "out")
+    assert line_of(commands) == 15
+
+
+def test_what_changed_is_said() -> None:
+    commands = made()
+    assert "  Main.N: 0 -> 1" in said(commands, "step")
+    assert "  Main.N: 1 -> 0" in said(commands, "back")
+
+
+@given(moves=st.lists(st.sampled_from(["step", "next", "out", "scan", "back", "back scan", "goto 2", "run 14"]), max_size=12),
+       button=st.integers(0, 12))  # fmt: skip
+@settings(max_examples=40, deadline=None)
+def test_a_place_is_the_same_however_one_got_there(moves: list[str], button: int) -> None:
+    commands = made()
+    for number, move in enumerate(moves):
+        if number == button:
+            said(commands, "CIO 0.00 = TRUE")
+        said(commands, move)
+    session = commands.session
+    here, memory = session.here, bytes(session.plc.memory.u8)
+    session.goto(0)
+    session.goto(here.scan)
+    for _ in range(here.step):
+        session.step()
+    assert session.here == here
+    assert bytes(session.plc.memory.u8) == memory
+
+
+def test_what_is_written_in_the_past_leads_elsewhere() -> None:
+    commands = made()
+    said(commands, "scan 10", "goto 3", "step", "Main.N := 40", "scan")
+    assert commands.session.read("Main.N") == 40
+    said(commands, "scan 2")
+    assert commands.session.read("Main.N") == 42
+    said(commands, "goto 2")
+    assert commands.session.read("Main.N") == 2
+
+
+def test_a_write_in_mid_scan_stays_when_the_scan_is_done_again() -> None:
+    commands = made()
+    said(commands, "run 5", "Main.T.Q = 7", "step")
+    assert commands.session.read("Main.T.Q") == 14
+    said(commands, "scan", "goto 0", "run 15")
+    assert commands.session.read("Main.T.Q") == 14
+
+
+def test_a_force_holds_and_ends() -> None:
+    commands = made()
+    said(commands, "force Main.N = 3", "scan 4")
+    assert commands.session.read("Main.N") == 3
+    said(commands, "unforce", "scan")
+    assert commands.session.read("Main.N") == 4
+
+
+def test_a_trap_can_be_gone_back_from() -> None:
+    commands = made()
+    text = said(commands, "CIO 0.00 = TRUE", "run 1s")
+    assert "100 divided by 0" in text
+    assert " >  16          R := 100 / (N - 5);" in text
+    assert commands.session.here.scan == 4
+    said(commands, "scan", "step")
+    assert commands.session.trap
+    said(commands, "goto 4", "CIO 0.00 = FALSE", "scan 3")
+    assert commands.session.trap is None
+    assert commands.session.read("Main.N") == 7
+
+
+def test_run_and_back_to_lines_conditions_and_breakpoints() -> None:
+    commands = made()
+    said(commands, "run Main.N = 3")
+    assert (commands.session.here, line_of(commands)) == (Position(2, 1), 14)
+    said(commands, "run Twice")
+    assert line_of(commands) == 4
+    said(commands, "back Main.N = 2")
+    assert commands.session.here == Position(2, 0)
+    assert "1  " in said(commands, "break 15")
+    said(commands, "run")
+    assert line_of(commands) == 15
+    assert "was not reached in" in said(commands, "run Main.N > 30000")
+    assert said(commands, "unbreak 1", "break") == ""
+
+
+def test_the_scan_table_the_cause_and_the_calls() -> None:
+    commands = made()
+    text = said(commands, "run 5", "scan", "table Main.T.Q")
+    assert ">1" in text and ">2" in text
+    assert "Q := Q * 2" in said(commands, "why Main.T.Q")
+    calls = said(commands, "run 5", "calls").splitlines()[-2:]
+    assert [row.split()[1] for row in calls] == ["Main.T", "Main"]
+
+
+def test_mode_and_power_between_scans_only() -> None:
+    commands = made()
+    said(commands, "scan 2", "mode PROGRAM", "scan 2")
+    assert commands.session.read("Main.N") == 2
+    said(commands, "mode run", "scan")
+    assert commands.session.read("Main.N") == 1
+    said(commands, "step")
+    with pytest.raises(CommandError, match="between two scans"):
+        said(commands, "power")
+    said(commands, "back scan", "power cold", "scan")
+    assert commands.session.read("Main.N") == 1
+
+
+@pytest.mark.parametrize("line", [
+    "nonsense", "print", "print Nobody", "run 3", "run x.st:1", "step -1", "goto x", "write Main.N", "Main.N = 99999",
+    "unbreak 3", "mode x", "power x", "table", "why Main.T", "run", "expect Main.N", "help x", "run Main.N", "D0..D1 = 1",
+    "force D0..D1 = 1,2",
+])  # fmt: skip
+def test_a_mistake_is_said_and_changes_nothing(line: str) -> None:
+    commands = made()
+    before = bytes(commands.session.plc.memory.u8)
+    with pytest.raises(CommandError):
+        said(commands, line)
+    assert commands.session.here == Position()
+    assert bytes(commands.session.plc.memory.u8) == before
+
+
+def test_every_command_is_in_the_help_and_exists() -> None:
+    commands = made()
+    text = said(commands, "help")
+    for command in COMMANDS:
+        assert command.usage in text
+        assert command.usage in said(commands, f"help {command.name}")
+        assert hasattr(commands, f"_{command.name}")
+
+
+def test_completion() -> None:
+    commands = made()
+    assert commands.completions("pr") == ["print"]
+    assert commands.completions("print Main.T") == ["Main.T"]
+    assert commands.completions("print Main.T.") == ["Main.T.A", "Main.T.Q"]
+    assert commands.completions("help br") == ["break"]
+    assert commands.completions("print Nobody.") == []
+
+
+# --- units and network ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def demo() -> Callable[[], Plc]:
+    compilation = compile_text((HOUSE / "examples" / "demo.st").read_text(encoding="utf-8"))
+    assert compilation.image is not None
+    image = compilation.image
+
+    def make() -> Plc:
+        plc, network, peer = Plc(image), LoopNetwork(), ModbusPeer()
+        for register in range(20):
+            peer.server.holding_registers[register] = 100 + register
+        network.place(Peer("192.168.250.1", 502), peer)
+        plc.attach(Etn21(0, "192.168.250.21"), network)
+        return plc
+
+    return make
+
+
+def test_back_goes_back_with_unit_and_network(demo: Callable[[], Plc]) -> None:
+    session = Session(demo)
+    assert session.run(lambda statement: session.read("Main.Done") is True, 100)
+    assert session.read("D200..D202") == [100, 101, 102]
+    session.goto(3)
+    assert session.read("D200..D202") == [0, 0, 0]
+    session.act(lambda plc: plc.write("Main.Source", 5))
+    assert session.run(lambda statement: session.read("Main.Done") is True, 100)
+    assert session.read("D200..D202") == [105, 106, 107]
+    session.goto(session.here.scan)
+    twin = demo()
+    twin.run(scans=3)
+    twin.write("Main.Source", 5)
+    twin.run(scans=session.here.scan - 3)
+    for name in ("Main", "D0..D999", "D30000..D32767", "CIO 1500..CIO 1524"):
+        assert twin.read(name) == session.read(name)
+
+
+# --- the verb ---------------------------------------------------------------------------------------------------------
+
+
+def called(script: str, *arguments: str) -> tuple[int, str]:
+    result = CliRunner().invoke(main, ["step", str(HOUSE / "examples" / "demo.st"), *arguments], input=script)
+    return result.exit_code, result.output
+
+
+def test_a_script_from_a_pipe() -> None:
+    code, output = called("// until it is done\nrun Main.Done\nexpect D200 = 1002\nnet 20\nquit\nnonsense\n",
+                          "--map", "192.168.250.1:502=peer", "--set", "Main.Source=2", "--watch", "D200")  # fmt: skip
+    assert code == 0
+    assert "D200 = 1002 (16#03EA)" in output
+    assert "Modbus 1, unit 1: 03 read holding registers, address 2, quantity 10" in output
+
+
+def test_a_script_ends_with_what_is_wrong() -> None:
+    assert called("expect D200 = 1\nquit\n") == (1, called("expect D200 = 1\n")[1])
+    assert "does not hold in scan 0" in called("expect D200 = 1\n")[1]
+    assert called("nonsense\n")[0] == 2
+    assert called("", "--map", "192.168.250.1:502=127.0.0.1:502")[0] == 2
+    assert called("", "--set", "Nobody=1")[0] == 2
+    assert called("", "--watch", "Nobody")[0] == 2
+
+
+def test_errors_raised_for_scripts_are_told_apart() -> None:
+    with pytest.raises(ExpectationError):
+        said(made(), "expect Main.N = 1")
