@@ -185,7 +185,7 @@ def test_mode_and_power_between_scans_only() -> None:
 
 
 @pytest.mark.parametrize("line", [
-    "nonsense", "print", "print Nobody", "run 3", "run x.st:1", "step -1", "goto x", "write Main.N", "Main.N = 99999",
+    "nonsense", "print", "print Nobody", "run 33", "run x.st:1", "step -1", "goto x", "write Main.N", "Main.N = 99999",
     "unbreak 3", "mode x", "power x", "table", "why Main.T", "run", "expect Main.N", "help x", "run Main.N", "D0..D1 = 1",
     "force D0..D1 = 1,2",
 ])  # fmt: skip
