@@ -168,6 +168,8 @@ def _elementary() -> Iterator[Elementary]:
         yield Elementary(string, size, size, f"u{bits}", families_of("ANY_BIT"), 0, top, bits)
     yield Elementary("REAL", 4, 4, "f32", families_of("ANY_REAL"), bits=32)
     yield Elementary("LREAL", 8, 8, "f64", families_of("ANY_REAL"), bits=64)
+    yield Elementary("CHAR", 1, 1, "u8", families_of("ANY_CHAR"), 0, 0xFF, 8)
+    yield Elementary("WCHAR", 2, 2, "u16", families_of("ANY_CHAR"), 0, 0xFFFF, 16)
     for names, family in ((("TIME", "LTIME"), "ANY_DURATION"),
                           (("DATE", "LDATE", "TIME_OF_DAY", "LTIME_OF_DAY", "DATE_AND_TIME", "LDATE_AND_TIME"),
                            "ANY_DATE")):
@@ -198,6 +200,11 @@ NULL = RefType("NULL", 8, 8, None)
 def reference(target: Type) -> RefType:
     """REF_TO target."""
     return RefType(f"REF_TO {target.name}", 8, 8, target)
+
+
+def character(kind: StringType) -> Elementary:
+    """The type of one character of a string."""
+    return ELEMENTARY["WCHAR" if kind.wide else "CHAR"]
 
 
 @cache
@@ -270,6 +277,8 @@ def converts(source: Type, target: Type) -> bool:
         return True
     if isinstance(source, StringType) and isinstance(target, StringType):
         return source.wide == target.wide
+    if isinstance(target, StringType):
+        return source is character(target)
     if isinstance(source, RefType) and isinstance(target, RefType):
         return source.target is None or source.target == target.target
     return isinstance(source, Elementary) and target.name in IMPLICIT.get(source.name, ()) \

@@ -6,6 +6,7 @@ import math
 import struct
 
 from fbvm.base import arithmetic
+from fbvm.base.strings import packed
 from fbvm.base.types import BOOL, DAY_NS, ArrayType, Elementary, EnumType, StringType, SubrangeType, Type, machine
 from fbvm.base.types import base as base_of
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
@@ -21,9 +22,9 @@ class NotConstant(Exception):
 def encode(kind: Type, value: Value) -> bytes:
     """The bytes of `value` in memory as a `kind` (elementary, enumeration, subrange or STRING)."""
     if isinstance(kind, StringType):
-        assert isinstance(value, bytes)
-        unit = 2 if kind.wide else 1
-        return value[:kind.capacity * unit].ljust(kind.size, b"\0")
+        assert isinstance(value, bytes | str)
+        cut = value[:kind.capacity]
+        return (cut if isinstance(cut, bytes) else packed(cut)).ljust(kind.size, b"\0")
     form = machine(kind)
     if form == "f32" and isinstance(value, float | int):
         return struct.pack("<f", arithmetic.single(float(value)))
@@ -91,12 +92,12 @@ def binary(op: str, kind: Type, a: Value, b: Value) -> Value:
     if op in _COMPARE:
         return bool(_COMPARE[op](a, b))
     if op == "**":
-        assert not isinstance(a, bytes) and not isinstance(b, bytes)
+        assert not isinstance(a, bytes | str) and not isinstance(b, bytes | str)
         return _finish(kind, _power(a, b))
     if base_of(kind) == BOOL:
         x, y = bool(a), bool(b)
         return {"and": x and y, "or": x or y, "xor": x != y}[_LOGIC[op]]
-    assert not isinstance(a, bytes) and not isinstance(b, bytes)
+    assert not isinstance(a, bytes | str) and not isinstance(b, bytes | str)
     if machine(kind) in ("f32", "f64") and kind is not UNTYPED_INT:
         return _finish(kind, _real(op, float(a), float(b)))
     if isinstance(b, float):  # a duration times or by a real: to the nearest ns, ties to even
@@ -134,4 +135,7 @@ def convert(value: Value, kind: Type) -> Value:
         return arithmetic.single(float(value)) if form == "f32" else float(value)
     if form == "b":
         return bool(value)
+    if isinstance(kind, StringType) and isinstance(value, int):  # a character
+        text = chr(value) if value else ""
+        return text if kind.wide else text.encode("latin-1")
     return value

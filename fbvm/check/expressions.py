@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from fbvm.check.checker import Checker
 
 PARTS = {"X": BOOL, "B": BYTE, "W": WORD, "D": DWORD, "L": LWORD}
-NOT_EXECUTED = "is understood but not executed by this version"
 
 
 class Expressions:
@@ -105,9 +104,7 @@ class Expressions:
             return self.adopt(expr, target, code) is not None
         if assignable(kind, target):
             value = self.facts.constants.get(expr)
-            if value is not None:
-                return self._in_range(expr, value, target)
-            return True
+            return value is None or self._in_range(expr, value, target)
         known = code in _KNOWN and not is_block(kind)
         self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
                    literal_hint(self.facts.constants.get(expr), base(target)) if known else fitting_hint(expr, kind, target))
@@ -158,10 +155,9 @@ class Expressions:
     # --- literals and names -----------------------------------------------------------------------------------------
 
     def _literal(self, expr: tree.Literal, want: Type | None) -> Type | None:
-        value: Value = expr.value if not isinstance(expr.value, str) else _text(expr.value)
-        self.facts.constants[expr] = value
-        if expr.kind in ("string", "wstring"):
-            return self._string_literal(expr)
+        if isinstance(expr.value, str):
+            return self._text_literal(expr, expr.value, want)
+        value = self.facts.constants[expr] = expr.value
         if expr.type_name is None and expr.kind in ("int", "real"):
             return UNTYPED_INT if expr.kind == "int" else UNTYPED_REAL
         name = expr.type_name or {"bool": "BOOL", "time": "TIME"}.get(expr.kind, "")
@@ -184,15 +180,25 @@ class Expressions:
             self.facts.constants[expr] = bool(value)
         return kind
 
-    def _string_literal(self, expr: tree.Literal) -> Type | None:
-        if expr.kind == "wstring" or expr.type_name in ("WSTRING", "CHAR", "WCHAR"):
-            what = expr.type_name or "WSTRING"
-            self.error("S0901", expr, f"{what} {NOT_EXECUTED}", "a STRING literal stands in single quotes")
+    def _text_literal(self, expr: tree.Literal, text: str, want: Type | None) -> Type:
+        """A STRING or WSTRING, or of one character a CHAR or WCHAR where that is wanted."""
+        kind = string(max(1, len(text)), expr.kind == "wstring")
+        if expr.type_name in ("CHAR", "WCHAR"):
+            self.facts.constants[expr] = ord(text)
+            return ELEMENTARY[expr.type_name]
+        ended = text.partition("\0")[0]
+        self.facts.constants[expr] = ended if kind.wide else ended.encode("latin-1")
+        return self.as_character(expr, want) or kind
+
+    def as_character(self, expr: tree.Expr, want: Type | None) -> Type | None:
+        """The type of a text literal without type as one character, which becomes its constant; None if it is none."""
+        if not isinstance(expr, tree.Literal) or expr.type_name is not None or not isinstance(expr.value, str) or \
+                len(expr.value) != 1 or want is None or \
+                base(want).name != ("WCHAR" if expr.kind == "wstring" else "CHAR"):
             return None
-        value = self.facts.constants[expr]
-        assert isinstance(value, bytes)
-        self.facts.constants[expr] = value.split(b"\0")[0]
-        return string(max(1, len(value)))
+        self.facts.constants[expr] = ord(expr.value)
+        self.facts.types[expr] = base(want)
+        return base(want)
 
     def _enum_literal(self, expr: tree.EnumLiteral, want: Type | None) -> Type | None:
         kind = self.checker.specs.named_type(expr.type_name.text, self.source)
@@ -372,7 +378,3 @@ _INFER: dict[type, Callable[..., Type | None]] = {
     tree.Part: Expressions._part, tree.Deref: Expressions._deref, tree.NullLiteral: Expressions._null,
     tree.Call: Expressions._call, tree.Unary: Expressions._unary, tree.Binary: Expressions._binary,
 }
-
-
-def _text(value: str) -> bytes:
-    return value.encode("latin-1", "replace")

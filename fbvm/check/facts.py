@@ -10,8 +10,9 @@ from fbvm.base.types import Elementary, EnumType, Field, RefType, StructType, Ty
 from fbvm.syntax import tree
 from fbvm.syntax.tree import Node
 
-Value = int | float | bool | bytes
-"""A constant: bool for BOOL, int for integers, bits, times and enumerations, float for reals, bytes for STRING."""
+Value = int | float | bool | bytes | str
+"""A constant: bool for BOOL, int for integers, bits, times, enumerations and characters, float for reals, bytes for STRING,
+for WSTRING a str of UTF-16 units."""
 
 UNTYPED_INT = Elementary("an integer literal", 0, 1, "i64", frozenset())
 UNTYPED_REAL = Elementary("a real literal", 0, 1, "f64", frozenset())

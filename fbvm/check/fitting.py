@@ -84,6 +84,8 @@ def convertible(form: str, source: Type, target: Type) -> bool:
         return is_any(source, "ANY_INT", "ANY_BIT", "ANY_STRING") or is_any(target, "ANY_INT", "ANY_BIT", "ANY_STRING")
     if isinstance(source, StringType) or isinstance(target, StringType):
         return True
+    if is_any(source, "ANY_CHAR") or is_any(target, "ANY_CHAR"):
+        return all(is_any(kind, "ANY_CHAR", "ANY_INT", "ANY_BIT") and kind != BOOL for kind in (source, target))
     timed = [is_any(kind, *_TIMES) for kind in (source, target)]
     if all(timed):
         short = [kind.name.removeprefix("L") for kind in (source, target)]
@@ -100,6 +102,9 @@ def convertible(form: str, source: Type, target: Type) -> bool:
 
 def fitting_hint(expr: tree.Expr, kind: Type, target: Type) -> str:
     """What to write where `expr` of type `kind` stands and `target` is needed: a literal another way, else a conversion."""
+    wanted = base(target)
+    if isinstance(expr, tree.Literal) and isinstance(expr.value, str) and isinstance(wanted, StringType):
+        return f"a {wanted.name.partition('[')[0]} literal stands in {'double' if wanted.wide else 'single'} quotes"
     if isinstance(expr, tree.Literal):
         return literal_hint(expr.value if isinstance(expr.value, int | float) else None, base(target))
     return conversion_hint(kind, target)
@@ -116,7 +121,7 @@ def conversion_hint(kind: Type, target: Type) -> str:
     if not all(isinstance(t, Elementary | StringType | EnumType) for t in (source, wanted)) or \
             source == wanted or not convertible("TO", source, wanted):
         return ""
-    names = ["STRING" if isinstance(t, StringType) else t.name for t in (source, wanted)]
+    names = [t.name.partition("[")[0] for t in (source, wanted)]
     if isinstance(source, EnumType):
         return f"write TO_{names[1]}(...)"
     return f"write {names[0]}_TO_{names[1]}(...)"
@@ -136,7 +141,9 @@ def literal_hint(value: Value | None, kind: Type) -> str:
     if kind == BOOL:
         return "write TRUE or FALSE, or a comparison"
     if isinstance(kind, StringType):
-        return "a text is written 'text'"
+        return 'a WSTRING is written "text"' if kind.wide else "a text is written 'text'"
+    if is_any(kind, "ANY_CHAR"):
+        return 'a WCHAR is one character, written "A"' if kind.name == "WCHAR" else "a CHAR is one character, written 'A'"
     if isinstance(kind, EnumType):
         return f"name a member, such as {kind}#{next(iter(kind.shown.values()))}"
     for name, written in (("DURATION", "a duration is written T#500ms"), ("DATE", f"a literal is written {_dated(kind)}")):

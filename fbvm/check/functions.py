@@ -10,7 +10,10 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from fbvm.base.types import ELEMENTARY, SHORT_NAMES
+from fbvm.base.types import ELEMENTARY, SHORT_NAMES, Elementary, StringType, string
+
+RESULT_STRING = 255
+"""Characters that the result of a string function can have (as CODESYS)."""
 
 
 @dataclass(frozen=True)
@@ -37,14 +40,14 @@ MUX                                    K:ANY_INT IN0:T ..           -> T      AN
 GT GE LE LT                            IN1:T IN2:T ..               -> BOOL   ANY_ELEMENTARY
 EQ                                     IN1:T IN2:T ..               -> BOOL   ANY_ELEMENTARY ENUMERATION
 NE                                     IN1:T IN2:T                  -> BOOL   ANY_ELEMENTARY ENUMERATION
-LEN                                    IN:STRING                    -> INT
-LEFT RIGHT                             IN:STRING L:ANY_INT          -> STRING
-MID                                    IN:STRING L:ANY_INT P:ANY_INT -> STRING
-CONCAT                                 IN1:STRING IN2:STRING ..     -> STRING
-INSERT                                 IN1:STRING IN2:STRING P:ANY_INT -> STRING
-DELETE                                 IN:STRING L:ANY_INT P:ANY_INT -> STRING
-REPLACE                                IN1:STRING IN2:STRING L:ANY_INT P:ANY_INT -> STRING
-FIND                                   IN1:STRING IN2:STRING        -> INT
+LEN                                    IN:T                         -> INT    ANY_STRING
+LEFT RIGHT                             IN:T L:ANY_INT               -> T      ANY_STRING
+MID                                    IN:T L:ANY_INT P:ANY_INT     -> T      ANY_STRING
+CONCAT                                 IN1:T IN2:T ..               -> T      ANY_STRING
+INSERT                                 IN1:T IN2:T P:ANY_INT        -> T      ANY_STRING
+DELETE                                 IN:T L:ANY_INT P:ANY_INT     -> T      ANY_STRING
+REPLACE                                IN1:T IN2:T L:ANY_INT P:ANY_INT -> T   ANY_STRING
+FIND                                   IN1:T IN2:T                  -> INT    ANY_STRING
 TRUNC                                  IN:T                         -> DINT   ANY_REAL
 TIME                                                                -> TIME
 IS_VALID                               IN:T                         -> BOOL   ANY_REAL
@@ -85,7 +88,14 @@ SIGNATURES = _parse(_ROWS)
 
 _CONVERSION = re.compile(r"(?:(?P<source>[A-Z_]+?)_)?(?P<form>TO_BCD|BCD_TO|TRUNC|TO)_(?P<target>[A-Z_]+)")
 _TYPED = re.compile(r"(?P<name>[A-Z0-9]+)_(?P<type>[A-Z_]+)")
-_CONVERTIBLE = set(ELEMENTARY) | {"STRING"} | {"TOD", "DT", "LTOD", "LDT"}
+_CONVERTIBLE = set(ELEMENTARY) | {"STRING", "WSTRING", "TOD", "DT", "LTOD", "LDT"}
+
+
+def named_type(name: str) -> Elementary | StringType | None:
+    """The elementary type that stands in the name of a function (INT in ADD_INT); a string is as long as results are."""
+    if name in ("STRING", "WSTRING"):
+        return string(RESULT_STRING, name == "WSTRING")
+    return ELEMENTARY.get(long_name(name))
 
 
 def long_name(name: str) -> str:
@@ -117,14 +127,15 @@ def conversion(name: str) -> Conversion | None:
     return Conversion(long_name(source), form, long_name(target))
 
 
-def typed_name(name: str) -> tuple[str, str] | None:
-    """`ADD_INT` as ("ADD", "INT") if such a function exists in a typed form, else None."""
+def typed_name(name: str) -> tuple[str, Elementary | StringType] | None:
+    """`ADD_INT` as ("ADD", INT) if such a function exists in a typed form, else None."""
     match = _TYPED.fullmatch(name)
-    if match is None or long_name(match["type"]) not in ELEMENTARY:
+    kind = named_type(match["type"]) if match is not None else None
+    if match is None or kind is None:
         return None
     row = SIGNATURES.get(match["name"])
     if match["name"] in OPERATORS or row is not None and row.limits:
-        return match["name"], long_name(match["type"])
+        return match["name"], kind
     return None
 
 

@@ -7,7 +7,7 @@ from fbvm.base.types import ELEMENTARY, fold
 from fbvm.check.facts import Report
 from fbvm.syntax import tree
 
-RESERVED = frozenset(ELEMENTARY) | {"STRING", "WSTRING", "CHAR", "WCHAR", "TOD", "LTOD", "DT", "LDT"}
+RESERVED = frozenset(ELEMENTARY) | {"STRING", "WSTRING", "TOD", "LTOD", "DT", "LDT"}
 """The short forms T, D, LT and LD stay usable: they mean something in front of `#` only."""
 
 

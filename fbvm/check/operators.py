@@ -96,6 +96,8 @@ class Operators:
         if left is None or right is None:
             return None
         left, right = base(left), base(right)
+        left = self.expressions.as_character(expr.left, right) or left
+        right = self.expressions.as_character(expr.right, left) or right
         if expr.op == "**":
             return self._power(expr, left, right, want)
         timed = self._time(expr, left, right)

@@ -134,15 +134,9 @@ class Specs:
             return self._block(pou, spec, source)
         kind = self.elementary(folded)
         if kind is not None:
-            if folded == "WSTRING":
-                self.report.add("S0901", source, spec, "WSTRING is understood but not executed by this version")
-                return None
             return kind, default(kind)
         if folded in GENERIC:
             self.report.add("S0205", source, spec, f"{folded} is no type of a variable", "it is one of a parameter only")
-            return None
-        if folded in ("CHAR", "WCHAR"):
-            self.report.add("S0901", source, spec, f"{folded} is understood but not executed by this version")
             return None
         self.report.add("S0204", source, spec, f"there is no type or block {spec.text}", self._meant(spec.text))
         return None
@@ -201,19 +195,17 @@ class Specs:
     # --- forms ------------------------------------------------------------------------------------------------------
 
     def _string(self, spec: tree.StringSpec, source: Source) -> Resolved | None:
-        if spec.wide:
-            self.report.add("S0901", source, spec, "WSTRING is understood but not executed by this version")
-            return None
         if spec.length is None:
-            kind: Type = string()
+            kind: Type = string(wide=spec.wide)
         else:
             length = self.values.integer(spec.length, source)
             if length is None:
                 return None
             if not 1 <= length <= MAX_STRING:
-                self.report.add("S0704", source, spec.length, f"a STRING has 1 to {MAX_STRING} characters, not {length}")
+                self.report.add("S0704", source, spec.length, f"a {'WSTRING' if spec.wide else 'STRING'} has 1 to "
+                                                              f"{MAX_STRING} characters, not {length}")
                 return None
-            kind = string(length)
+            kind = string(length, spec.wide)
         return kind, default(kind)
 
     def _subrange(self, spec: tree.SubrangeSpec, source: Source, name: str) -> Resolved | None:

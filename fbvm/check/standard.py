@@ -30,9 +30,7 @@ from fbvm.syntax import tree
 if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
 
-RESULT_STRING = 255
-"""Characters that the result of a string function can have (as CODESYS)."""
-_SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations"}
+_SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations", "ANY_STRING": "STRING and WSTRING"}
 UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
 
 
@@ -65,10 +63,9 @@ class StandardCalls:
             return self._conversion(call, conversion)
         typed = functions.typed_name(name)
         if typed is not None:
-            kind = ELEMENTARY[typed[1]]
             if typed[0] in functions.OPERATORS:
-                return self._operator(call, typed[0], kind, want)
-            return self._signature(call, functions.SIGNATURES[typed[0]], kind, want)
+                return self._operator(call, *typed, want)
+            return self._signature(call, functions.SIGNATURES[typed[0]], typed[1], want)
         for argument in call.arguments:
             if argument.value is not None:
                 self.expressions.infer(argument.value)
@@ -83,7 +80,8 @@ class StandardCalls:
 
     # --- kinds ------------------------------------------------------------------------------------------------------
 
-    def _operator(self, call: tree.Call, name: str, kind: Elementary | None, want: Type | None) -> Type | None:
+    def _operator(self, call: tree.Call, name: str, kind: Elementary | StringType | None,
+                  want: Type | None) -> Type | None:
         """ADD(a, b, c) means a + b + c; NOT(a) means NOT a."""
         op = functions.OPERATORS[name]
         names = ["IN"] if name == "NOT" else ["IN1", "IN2"]
@@ -111,7 +109,8 @@ class StandardCalls:
             self.facts.constants[call] = self.facts.constants[meaning]
         return result
 
-    def _signature(self, call: tree.Call, row: Signature, fixed: Elementary | None, want: Type | None) -> Type | str | None:
+    def _signature(self, call: tree.Call, row: Signature, fixed: Elementary | StringType | None,
+                   want: Type | None) -> Type | str | None:
         values = Arguments(self.expressions, call, [name for name, _ in row.parameters], row.repeats).in_order()
         if values is None:
             return None
@@ -133,11 +132,9 @@ class StandardCalls:
         if whole and not self._as_a_whole(call, whole):
             return None
         self.facts.calls[call] = StandardCall(row.key, arguments, (variable,) if variable else ())
-        if row.result == "STRING":
-            return string(RESULT_STRING)
         if row.result == "T":
             assert variable is not None
-            return string(RESULT_STRING) if isinstance(variable, StringType) else variable
+            return variable
         return ELEMENTARY[row.result] if row.result else ""
 
     def _as_a_whole(self, call: tree.Call, values: list[tree.Expr]) -> bool:
@@ -163,8 +160,6 @@ class StandardCalls:
 
     def _parameter(self, value: tree.Expr, name: str) -> Type | None:
         """The type in which an argument is wanted whose parameter has its own type."""
-        if name == "STRING":
-            return string(RESULT_STRING)
         if name not in GENERIC:
             return ELEMENTARY[name]
         kind = self.expressions.settle(value)
@@ -187,7 +182,7 @@ class StandardCalls:
             if isinstance(kind, EnumType) or isinstance(bound, EnumType):
                 met = kind if bound in (None, kind) else None
             if isinstance(met, StringType):
-                met = string(RESULT_STRING)
+                met = string(functions.RESULT_STRING, met.wide)
             if met is None:
                 self.error("S0405", call, f"{bound} and {kind} have no type in common")
                 return None
@@ -218,6 +213,8 @@ class StandardCalls:
         good = set(row.limits) & families(bound) or isinstance(bound, EnumType) and "ENUMERATION" in row.limits
         if row.limits == ("ANY_REAL",) and not good and converts(bound, LREAL):
             return LREAL
+        if row.limits == ("ANY_STRING",) and is_any(bound, "ANY_CHAR"):
+            return string(functions.RESULT_STRING, bound.name == "WCHAR")
         if not good or is_block(bound):
             shown = " or ".join(_SHOWN.get(limit, limit) for limit in row.limits)
             self.error("S0405", call, f"{callee(call)} is defined for {shown}, not for {bound}",
@@ -244,7 +241,7 @@ class StandardCalls:
         if source is None or target is None or not self.expressions.fit(value, source, "S0405"):
             return None
         if isinstance(source, StringType):
-            source = string(RESULT_STRING)
+            source = string(functions.RESULT_STRING, source.wide)
         if not convertible(row.form, base(source), target):
             self.error("S0405", call, f"{callee(call)} is not defined for {source}", "")
             return None
@@ -252,6 +249,4 @@ class StandardCalls:
         return target
 
     def _named(self, name: str) -> Type | None:
-        if name == "STRING":
-            return string(RESULT_STRING)
-        return ELEMENTARY.get(name) or self.expressions.checker.specs.named_type(name, self.expressions.source)
+        return functions.named_type(name) or self.expressions.checker.specs.named_type(name, self.expressions.source)

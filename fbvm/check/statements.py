@@ -93,9 +93,9 @@ class Statements:
 
     def _case(self, node: tree.Case) -> None:
         kind = self.expressions.settle(node.selector)
-        if kind is not None and not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_STRING") and not isinstance(kind, EnumType):
+        if kind is not None and not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_CHARS") and not isinstance(kind, EnumType):
             self.error("S0503", node.selector,
-                       f"CASE chooses by an integer, a bit string, an enumeration or a STRING; {kind} is none",
+                       f"CASE chooses by an integer, a bit string, an enumeration or a text; {kind} is none",
                        "write IF and ELSIF")
             kind = None
         taken: list[tuple[int, int]] = []
@@ -119,7 +119,7 @@ class Statements:
         elif self.expressions.fit(low, kind, "S0503", "the label"):
             value = self.facts.constants.get(low)
             shown = self.expressions.text(low)
-            if not isinstance(value, bytes):
+            if not isinstance(value, bytes | str):
                 self._unknown_label(low)
             elif value in taken:
                 self.error("S0503", low, f"the label {shown} is taken by a label above")

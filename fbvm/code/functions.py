@@ -57,7 +57,7 @@ def as_count(node: Node, kind: Type) -> Node:
 def _chain(name: str) -> Lowering:
     """min, max, concat: from left to right."""
     def lower(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
-        form = "s8" if name == "concat" else _form(call)
+        form = _form(call)
         node = a[0]
         for following in a[1:]:
             node = body.measured((name, form, node, following))
@@ -95,7 +95,7 @@ def _text(name: str) -> Lowering:
     def lower(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
         operands = [node if isinstance(kind, StringType) else as_count(node, kind)
                     for node, (_, kind) in zip(a, call.arguments, strict=True)]
-        return (name, "s8", *operands, site)
+        return (name, _form(call), *operands, site)
     return lower
 
 
@@ -153,10 +153,14 @@ def _convert(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -
     source, target = call.detail[0], base(call.detail[1])
     node = a[0]
     if isinstance(target, StringType):
-        return to_text(source, node)
+        return in_width(to_text(source, node), machine(target))
     if isinstance(source, StringType):
+        if is_any(target, "ANY_CHAR"):
+            return ("first", machine(target), in_width(node, "s16" if target.name == "WCHAR" else "s8"))
         name = target.base.name if isinstance(target, EnumType) else target.name
-        return ("from_text", machine(target), name, node, site)
+        return ("from_text", machine(target), name, in_width(node, "s8"), site)
+    if source.name == "WCHAR" and target.name == "CHAR":
+        return _narrow(body, node)
     timed = is_any(source, "ANY_DURATION", "ANY_DATE"), is_any(target, "ANY_DURATION", "ANY_DATE")
     if all(timed):
         return _date_part(body, node, source, target)
@@ -168,12 +172,26 @@ def _convert(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -
 
 
 def to_text(source: Type, node: Node) -> Node:
-    """A value as text."""
+    """A value as text, of the width that comes first to it."""
     if isinstance(source, StringType):
         return node
+    if is_any(source, "ANY_CHAR"):
+        return ("character", "s16" if source.name == "WCHAR" else "s8", node)
     if isinstance(source, EnumType):
         return ("enum_text", "s8", tuple(sorted(source.shown.items())), ("convert", "i64", source.base.machine, node))
     return ("to_text", "s8", source.name, node)
+
+
+def in_width(node: Node, form: str) -> Node:
+    """A text as one of the form s8 or s16."""
+    return node if node[1] == form else ("recode", form, node)
+
+
+def _narrow(body: BodyLowering, node: Node) -> Node:
+    """A WCHAR as CHAR, `?` above 255."""
+    code = body.keep(node)
+    return ("select", "u8", ("gt", "b", "u16", code, ("const", "u16", 0xFF)), ("convert", "u8", "u16", code),
+            ("const", "u8", ord("?")))
 
 
 def number(node: Node, source: Type, target: Type, site: int) -> Node:

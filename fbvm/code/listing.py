@@ -241,5 +241,7 @@ _CONTROL: dict[str, Callable[..., None]] = {"if": _if, "case": _case, "loop": _l
 def _constant(machine: str, value: Any) -> str:
     if machine == "b":
         return "TRUE" if value else "FALSE"
+    if isinstance(value, str):
+        return '"' + repr(value)[1:-1] + '"'
     return repr(value)[1:] if isinstance(value, bytes) else repr(value)
 

@@ -283,10 +283,11 @@ class BodyLowering:
 
     def _text_case(self, node: tree.Case) -> None:
         """CASE of a text: the first branch one of whose labels equals it."""
-        selector = self.keep(self.value(node.selector), always=True)
+        kind = self.facts.types[node.selector]
+        form, selector = machine(kind), self.keep(self.value(node.selector), always=True)
         rows = []
         for branch in node.branches:
-            fits, *more = (("eq", "b", "s8", selector, self.value(label)) for label, _ in branch.labels)
+            fits, *more = (("eq", "b", form, selector, self.value(label, kind)) for label, _ in branch.labels)
             for fit in more:
                 fits = self.measured(("or", "b", fits, fit))
             rows.append((fits, self.inner(branch.body)))

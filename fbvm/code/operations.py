@@ -4,7 +4,7 @@ Code is plain data: nested tuples whose first item names the operation.  *Expres
 have no effect but a trap; *statements* are `(name, *operands)`.  `type` is a machine type:
 
     b            BOOL, 0 or 1 (a byte <> 0 is 1)  f32 f64   REAL, LREAL (NaN is stored canonical)
-    i8 .. i64    signed, two's complement         s8        STRING: bytes without the ending 0
+    i8 .. i64    signed, two's complement         s8  s16   STRING, WSTRING: characters without the ending 0
     u8 .. u64    unsigned, bit strings            ref       a reference (64 bits: object << 40 | offset << 8 | bit)
 
 *Addresses* say where a value lies in the flat buffer: `(base, offset, terms)`, offset a constant number of bytes and terms
@@ -37,6 +37,8 @@ Block = tuple[Node, ...]
 
 INTEGERS = ("i8", "i16", "i32", "i64", "u8", "u16", "u32", "u64")
 FLOATS = ("f32", "f64")
+TEXT_UNITS = {"s8": 1, "s16": 2}
+"""Bytes of a character of each form of text; constants are `bytes`, and for s16 a `str` of UTF-16 units."""
 SIZES = {"b": 1, "i8": 1, "u8": 1, "i16": 2, "u16": 2, "i32": 4, "u32": 4, "i64": 8, "u64": 8, "f32": 4, "f64": 8,
          "ref": 8}
 
@@ -55,11 +57,11 @@ class Operation:
 _EXPRESSIONS = """
 const      | value                  | any    |             | the value itself
 tmp        | number                 | any    |             | the temporary of that number
-load       | address                | not s8 |             | the value at a naturally aligned place
-load_raw   | address                | not s8 |             | the same at any place
+load       | address                | no text|             | the value at a naturally aligned place
+load_raw   | address                | no text|             | the same at any place
 load_bit   | address bit            | b      |             | bit 0..7 of the byte at the place
 load_flag  | address                | b      | R0110       | a BOOL behind a reference: its byte, or the bit it names
-load_text  | address capacity       | s8     |             | the bytes up to the first 0, at most capacity
+load_text  | address capacity       | text   |             | the characters up to the first 0, at most capacity
 add        | a b                    | number |             | sum; integers wrap; f32 is rounded to 32 bits
 sub        | a b                    | number |             | difference; likewise
 mul        | a b                    | number |             | product; likewise
@@ -78,9 +80,9 @@ shl        | a n site               | integer| R0106       | n is i64; n >= widt
 shr        | a n site               | integer| R0106       | zeros enter, also for signed types
 rol        | a n site               | integer| R0106       | n modulo width
 ror        | a n site               | integer| R0106       | n modulo width
-eq         | type a b               | b      |             | operands of `type`; NaN equals nothing; s8 by bytes
+eq         | type a b               | b      |             | operands of `type`; NaN equals nothing; texts by units
 ne         | type a b               | b      |             | not eq
-lt         | type a b               | b      |             | less; s8 by bytes, a prefix is less
+lt         | type a b               | b      |             | less; texts unit by unit, a prefix is less
 le         | type a b               | b      |             | less or equal
 gt         | type a b               | b      |             | greater
 ge         | type a b               | b      |             | greater or equal
@@ -102,17 +104,20 @@ now        |                        | i64    |             | the scan's time, ns
 from_bcd   | from a site            | integer| R0105       | decimal digits in nibbles to a number; a nibble above 9 traps
 to_bcd     | from a site            | integer| R0105       | the reverse; more digits than nibbles or a negative number trap
 length     | a                      | i16    |             | number of characters of a string
-left       | a n site               | s8     | R0108       | the first n characters; n is i64, negative traps
-right      | a n site               | s8     | R0108       | the last n characters
-mid        | a n p site             | s8     | R0108       | n characters from position p (first is 1; p < 1 traps)
-concat     | a b                    | s8     |             | a followed by b
-insert     | a b p site             | s8     | R0108       | b after character p of a; p = 0 in front; p < 0 traps
-delete     | a n p site             | s8     | R0108       | without n characters from p; p behind the end: unchanged
-replace    | a b n p site           | s8     | R0108       | n characters from p replaced by b; p behind the end: appended
+left       | a n site               | text   | R0108       | the first n characters; n is i64, negative traps
+right      | a n site               | text   | R0108       | the last n characters
+mid        | a n p site             | text   | R0108       | n characters from position p (first is 1; p < 1 traps)
+concat     | a b                    | text   |             | a followed by b
+insert     | a b p site             | text   | R0108       | b after character p of a; p = 0 in front; p < 0 traps
+delete     | a n p site             | text   | R0108       | without n characters from p; p behind the end: unchanged
+replace    | a b n p site           | text   | R0108       | n characters from p replaced by b; p behind the end: appended
 find       | a b                    | i16    |             | first position of b in a, 0 if none or b is empty
 to_text    | data_type a            | s8     |             | the value as a literal would be read back, by data type's name
 from_text  | data_type a site       | any    | R0111 R0105 | reads a literal with or without type prefix, spaces trimmed
 enum_text  | names a                | s8     |             | the member's name by value from `names`, else the number
+character  | a                      | text   |             | the one character of code a (u8 for s8, u16 for s16); none of code 0
+first      | a                      | u8, u16|             | the code of the first character of a text; 0 if it is empty
+recode     | a                      | text   |             | a text in the other width; to s8 a unit above 255 becomes ?
 reference  | address bit            | ref    |             | the place in object 1, or the base's; bit 0..7 or 255 (WHOLE_BYTES)
 bit_behind | a n                    | ref    |             | bit n (i64) on from where a points: bit 0 of a byte, or a bit
 """
@@ -122,7 +127,7 @@ store      | type address a         |        |             | a to a naturally al
 store_raw  | type address a         |        |             | the same to any place
 store_bit  | address bit a          |        |             | a to bit 0..7 of the byte
 store_flag | address a              |        | R0110       | a to a BOOL behind a reference
-store_text | address capacity a     |        |             | the bytes cut to capacity, then one 0
+store_text | address capacity a     |        |             | the characters cut to capacity, then one 0
 copy       | to from size           |        |             | size bytes as if all were read before any is written
 fill       | address bytes          |        |             | constant bytes (initial values of a frame)
 let        | number type a          |        |             | a becomes the temporary
@@ -158,4 +163,11 @@ OBSERVATIONS: dict[str, str] = {
     "read": "a variable was read; detail: (type, address, bit); bit 255 for a value that fills bytes",
     "write": "a variable was written; detail: (type, address, bit); observed after the store",
 }
-"""Kinds of `observe` and what their detail carries.  A text's type is ("s8", capacity), an aggregate's ("", size)."""
+"""Kinds of `observe` and what their detail carries.  A text's type is (form, capacity), an aggregate's ("", size)."""
+
+
+def detail_size(form: str | tuple[str, int]) -> int:
+    """Bytes of what the detail of a read or a write tells."""
+    if isinstance(form, str):
+        return SIZES[form]
+    return (form[1] + 1) * TEXT_UNITS[form[0]] if form[0] else form[1]

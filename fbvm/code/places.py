@@ -214,7 +214,7 @@ class Places:
         """The value that lies at a place (not for arrays and structures)."""
         kind = base(place.type)
         if isinstance(kind, StringType):
-            return ("load_text", "s8", place.address, kind.capacity)
+            return ("load_text", machine(kind), place.address, kind.capacity)
         form = machine(kind)
         if place.bit is not None:
             return ("load_bit", "b", place.address, place.bit)
@@ -259,7 +259,7 @@ def detail(place: Place) -> tuple[object, Address, int]:
     kind = base(place.type)
     form: object = machine(kind)
     if isinstance(kind, StringType):
-        form = ("s8", kind.capacity)
+        form = (machine(kind), kind.capacity)
     elif form == "":
         form = ("", kind.size)
     return form, place.address, WHOLE_BYTES if place.bit is None else place.bit

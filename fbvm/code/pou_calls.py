@@ -8,9 +8,9 @@ from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, machine
 from fbvm.check.constants import default
 from fbvm.check.facts import PouCall, Variable
 from fbvm.code.anything import described
-from fbvm.code.operations import Address, Block, Node
+from fbvm.code.operations import INTEGERS, Address, Block, Node
 from fbvm.code.places import Place
-from fbvm.code.values import is_aggregate
+from fbvm.code.values import is_aggregate, nothing
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -42,8 +42,10 @@ class CallLowering:
         place = self._place(called, result, None)
         after: Block = (("let", number, form, self.body.places.load(place)),)
         if called.enable is not None:
-            empty = b"" if form == "s8" else int.from_bytes(default(result.type), "little")
-            self.body.out.append(("let", number, form, ("const", form, float(0) if form[0] == "f" else empty)))
+            empty = nothing(form)
+            if form in INTEGERS:  # an enumeration begins with its first member
+                empty = ("const", form, int.from_bytes(default(result.type), "little"))
+            self.body.out.append(("let", number, form, empty))
         self._guarded(call, called, after)
         return ("tmp", form, number)
 

@@ -20,7 +20,7 @@ from fbvm.check.constants import convert as convert_constant
 from fbvm.check.facts import Guard, PouCall, StandardCall, Value
 from fbvm.check.values import is_any
 from fbvm.code.functions import FUNCTIONS
-from fbvm.code.operations import FLOATS, Node
+from fbvm.code.operations import FLOATS, TEXT_UNITS, Node
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -38,7 +38,12 @@ def constant(kind: Type, value: Value) -> Node:
     form = machine(kind)
     if form in FLOATS:
         return ("const", form, float(value))
-    return ("const", form, int(value) if form != "s8" else value)
+    return ("const", form, int(value) if form not in TEXT_UNITS else value)
+
+
+def nothing(form: str) -> Node:
+    """The constant that a value of a form is at first."""
+    return ("const", form, b"" if form == "s8" else "" if form == "s16" else float(0) if form in FLOATS else 0)
 
 
 class ValueLowering:
@@ -56,7 +61,7 @@ class ValueLowering:
         target = base(want) if want is not None else base(kind)
         known = self.facts.constants.get(expr)
         if known is not None:
-            if machine(target) in FLOATS or machine(target) == "b":
+            if machine(target) in FLOATS or machine(target) == "b" or machine(target) in TEXT_UNITS:
                 known = convert_constant(known, target)
             return constant(target, known)
         return self.body.measured(self.converted(self._plain(expr), kind, target))
@@ -64,8 +69,10 @@ class ValueLowering:
     def converted(self, node: Node, kind: Type, target: Type) -> Node:
         """A value of `kind` as one of `target`, to which it converts by itself."""
         source, wanted = machine(kind), machine(target)
-        if source == wanted or wanted in ("s8", "ref", ""):
+        if source == wanted or wanted in ("ref", ""):
             return node
+        if wanted in TEXT_UNITS:
+            return ("character", wanted, node)
         return ("convert", wanted, source, node)
 
     def sequence(self, thunks: list[Callable[[], Node]]) -> list[Node]:
@@ -97,8 +104,7 @@ class ValueLowering:
         body = self.body
         enable = body.keep(self.value(guard.enable, BOOL)) if guard.enable is not None else ("const", "b", 1)
         form = machine(self.facts.types[call])
-        empty: Node = ("const", form, b"" if form == "s8" else float(0) if form in FLOATS else 0)
-        kept = body.keep(empty, always=True)
+        kept = body.keep(nothing(form), always=True)
         with body.block() as inner:
             inner.append(("let", kept[2], form, self._unguarded(call)))
         body.out.append(("if", ((enable, tuple(inner)),), ()))

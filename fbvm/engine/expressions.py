@@ -9,7 +9,7 @@ from typing import Any
 
 from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import width
-from fbvm.code.operations import INTEGERS, SIZES, Address, Node
+from fbvm.code.operations import INTEGERS, SIZES, TEXT_UNITS, Address, Node
 from fbvm.engine.ranges import fits, is_float, mask, may_trap, number, span
 from fbvm.engine.writer import Expressions, Rows, bare
 
@@ -231,7 +231,7 @@ def flag_operands(e: Expressions, address: Address) -> str:
 
 
 def _load_text(e: Expressions, machine: str, address: Address, capacity: int) -> str:
-    return f"get_text({bare(e.place(address, capacity))}, {capacity})"
+    return f"get_{machine}({bare(e.place(address, capacity * TEXT_UNITS[machine]))}, {capacity})"
 
 
 def _reference(e: Expressions, machine: str, address: Address, bit: int) -> str:
@@ -289,6 +289,9 @@ VALUES: dict[str, Callable[..., str]] = {
     "concat": lambda e, machine, a, b: f"({e.value(a)} + {e.value(b)})",
     "find": lambda e, machine, a, b: e.bring(f"find({bare(e.value(a))}, {bare(e.value(b))})", machine),
     "to_text": _call("to_text"), "from_text": _call("from_text"), "enum_text": _enum_text,
+    "character": lambda e, machine, a: f"character_{machine}({bare(e.value(a))})",
+    "first": lambda e, machine, a: f"first({bare(e.value(a))})",
+    "recode": lambda e, machine, a: f"{'widened' if machine == 's16' else 'narrowed'}({bare(e.value(a))})",
     "reference": _reference, "bit_behind": _call("bit_behind"),
 }
 """How each operation is written: called with the operands of its row."""

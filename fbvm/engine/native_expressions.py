@@ -9,8 +9,8 @@ from collections.abc import Callable
 from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import limits, width
 from fbvm.base.memory import WHOLE_BYTES
-from fbvm.code.operations import SIZES, Address, Node
-from fbvm.engine.native_writer import NAN_BITS, Writer, ir, literal, stored
+from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Node
+from fbvm.engine.native_writer import NAN_BITS, Text, Writer, ir, literal, stored
 from fbvm.engine.ranges import is_float, may_trap, span
 
 Row = Callable[..., str]
@@ -246,9 +246,9 @@ def cut(w: Writer, number: str, machine: str) -> str:
 
 def _compare(name: str) -> Row:
     def emit(w: Writer, machine: str, kind: str, a: Node, b: Node) -> str:
-        if kind == "s8":
+        if kind in TEXT_UNITS:
             left, right = w.text(a), w.text(b)
-            order = w.call("text_order", w.integer(left.at), left.length, w.integer(right.at), right.length)
+            order = text_order(w, left, right)
             return w.new(f"icmp {name if name in ('eq', 'ne') else 's' + name} i64 {order}, 0")
         left_value, right_value = w.value(a), w.value(b)
         return w.new(f"{_comparison(name, kind)} {ir(kind)} {left_value}, {right_value}")
@@ -400,13 +400,27 @@ PATTERNS = {"f32": ((1 << 31) - 1, 0xFF << 23, 0x1FF << 22), "f64": ((1 << 63) -
 # --- texts ----------------------------------------------------------------------------------------------------------
 
 
+def text_order(w: Writer, left: Text, right: Text) -> str:
+    """Below 0, 0 or above: how a text stands to another of its width."""
+    routine = "text_order" if left.unit == 1 else "wide_order"
+    return w.call(routine, w.integer(left.at), left.length, w.integer(right.at), right.length)
+
+
 def _length(w: Writer, machine: str, a: Node) -> str:
     return cut(w, w.text(a).length, machine)
 
 
 def _find(w: Writer, machine: str, a: Node, b: Node) -> str:
     text, wanted = w.text(a), w.text(b)
-    return cut(w, w.call("text_find", w.integer(text.at), text.length, w.integer(wanted.at), wanted.length), machine)
+    routine = "text_find" if text.unit == 1 else "wide_find"
+    return cut(w, w.call(routine, w.integer(text.at), text.length, w.integer(wanted.at), wanted.length), machine)
+
+
+def _first(w: Writer, machine: str, a: Node) -> str:
+    text, kind = w.text(a), ir(machine)
+    empty = w.new(f"icmp eq i64 {text.length}, 0")
+    at = w.new(f"select i1 {empty}, ptr %c, ptr {text.at}")  # behind an empty text nothing may be read
+    return w.new(f"select i1 {empty}, {kind} 0, {kind} {w.new(f'load {kind}, ptr {at}, align 1')}")
 
 
 VALUES: dict[str, Row] = {
@@ -423,7 +437,7 @@ VALUES: dict[str, Row] = {
     "is_set": _is_set, "select": _select, "mux": _mux, "min": _extreme("min"), "max": _extreme("max"),
     "check": _check, "within": _within, "math": _math, "atan2": _arctangent, "floor_div": _floor_divide,
     "now": lambda w, machine: w.system(NOW),
-    "from_bcd": _bcd_number, "to_bcd": _bcd_digits, "length": _length, "find": _find, "reference": _reference,
-    "bit_behind": _bit_behind,
+    "from_bcd": _bcd_number, "to_bcd": _bcd_digits, "length": _length, "find": _find, "first": _first,
+    "reference": _reference, "bit_behind": _bit_behind,
 }
 """How each operation is written but those that yield or read a text: called with the operands of its row."""

@@ -50,6 +50,69 @@ def text_find(a: int, m: int, b: int, n: int) -> int:
     return 0
 
 
+# --- characters of two bytes ----------------------------------------------------------------------------------------
+
+
+def wide(at: int, i: int) -> int:
+    """The code of character i of a WSTRING."""
+    return peek(at + 2 * i) + 256 * peek(at + 2 * i + 1)
+
+
+def wide_length(at: int, capacity: int) -> int:
+    """Characters up to the first 0, at most the capacity."""
+    n = 0
+    while n < capacity and wide(at, n) != 0:
+        n += 1
+    return n
+
+
+def wide_order(a: int, m: int, b: int, n: int) -> int:
+    """Below 0, 0 or above: how text a stands to text b."""
+    i = 0
+    while i < m and i < n:
+        if wide(a, i) != wide(b, i):
+            return wide(a, i) - wide(b, i)
+        i += 1
+    return m - n
+
+
+def wide_find(a: int, m: int, b: int, n: int) -> int:
+    """Position of the first b in a; 0 if there is none or b is empty."""
+    if n == 0:
+        return 0
+    i = 0
+    while i + n <= m:
+        if wide_order(a + 2 * i, n, b, n) == 0:
+            return i + 1
+        i += 1
+    return 0
+
+
+def widen(out: int, at: int, n: int) -> int:
+    """n characters of one byte as characters of two."""
+    i = 0
+    while i < n:
+        poke(out + 2 * i, peek(at + i))
+        poke(out + 2 * i + 1, 0)
+        i += 1
+    return n
+
+
+def narrow(out: int, at: int, n: int) -> int:
+    """n characters of two bytes as characters of one; `?` for those above 255."""
+    i = 0
+    while i < n:
+        if peek(at + 2 * i + 1) == 0:
+            poke(out + i, peek(at + 2 * i))
+        else:
+            poke(out + i, ord("?"))
+        i += 1
+    return n
+
+
+# --- decimal digits in nibbles --------------------------------------------------------------------------------------
+
+
 def bcd_number(a: int) -> int:
     """The number that decimal nibbles form; -1 if one is above 9."""
     number = 0

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.areas import BUDGET, DUE
-from fbvm.code.operations import SIZES, Address, Block, Node
+from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
 from fbvm.engine.native_expressions import flag_mask, signed
 from fbvm.engine.native_guard import observe
-from fbvm.engine.native_texts import keep
+from fbvm.engine.native_texts import in_bytes, keep
 from fbvm.engine.native_writer import TRAPPED, Writer, ir, stored
 from fbvm.engine.ranges import is_float
 from fbvm.engine.statements import case_table
@@ -80,12 +80,16 @@ def _store_flag(w: Writer, address: Address, a: Node) -> None:
 
 
 def _store_text(w: Writer, address: Address, capacity: int, a: Node) -> None:
-    pointer = w.pointer(address, capacity + 1)
+    unit = TEXT_UNITS[a[1]]
+    size = (capacity + 1) * unit
+    pointer = w.pointer(address, size)
     text = w.text(a)
     length = w.new(f"call i64 @llvm.umin.i64(i64 {text.length}, i64 {capacity})")
-    w.emit(f"call void @llvm.memmove.p0.p0.i64(ptr {pointer}, ptr {text.at}, i64 {length}, i1 false)")
-    w.emit(f"store i8 0, ptr {w.new(f'getelementptr inbounds i8, ptr {pointer}, i64 {length}')}")
-    w.reload(w.scope(address, capacity + 1))
+    count = in_bytes(w, length, unit)
+    w.emit(f"call void @llvm.memmove.p0.p0.i64(ptr {pointer}, ptr {text.at}, i64 {count}, i1 false)")
+    end = w.new(f"getelementptr inbounds i8, ptr {pointer}, i64 {count}")
+    w.emit(f"store i{8 * unit} 0, ptr {end}, align 1")
+    w.reload(w.scope(address, size))
 
 
 def _copy(w: Writer, to: Address, source: Address, size: int) -> None:
@@ -105,7 +109,7 @@ def _fill(w: Writer, address: Address, pattern: bytes) -> None:
 
 
 def _let(w: Writer, number: int, machine: str, a: Node) -> None:
-    if machine == "s8":
+    if machine in TEXT_UNITS:
         keep(w, number, a)
         return
     value = w.value(a)

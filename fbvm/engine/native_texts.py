@@ -1,4 +1,4 @@
-"""Text operations as instructions of LLVM: a text is the place of its bytes and their number.
+"""Text operations as instructions of LLVM: a text is the place of its characters, their number and their width.
 
 What only looks at a part of a text copies nothing; what makes a new one writes it to scratch bytes of the context, whose
 size is known before because every text has a greatest length."""
@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from typing import Any
 
+from fbvm.base.strings import packed
 from fbvm.base.types import SHORT_NAMES
-from fbvm.code.operations import Address, Block, Node
+from fbvm.code.operations import TEXT_UNITS, Address, Block, Node
 from fbvm.code.shapes import statements
-from fbvm.engine.native_expressions import as_double, chooser, cut
+from fbvm.engine.native_expressions import as_double, chooser, cut, text_order
 from fbvm.engine.native_reading import KINDS
 from fbvm.engine.native_writer import Text, Unsupported, Writer
 from fbvm.engine.ranges import is_float
 
-EMPTY = Text("%c", "0")
 LONGEST_NUMBER = 48
 """Bytes that hold any number, time or date as text."""
 
@@ -25,7 +25,7 @@ LONGEST_NUMBER = 48
 
 
 def capacity(w: Writer, node: Node) -> int:
-    """Bytes that a text has at most."""
+    """Characters that a text has at most."""
     name, operands = node[0], node[2:]
     if name == "const":
         return len(operands[0])
@@ -37,13 +37,15 @@ def capacity(w: Writer, node: Node) -> int:
         return max((len(text) for _, text in operands[0]), default=0) + LONGEST_NUMBER
     if name == "to_text":
         return LONGEST_NUMBER
-    texts = [item for item in (operands[1] if name == "mux" else operands) if isinstance(item, tuple) and item[1] == "s8"]
+    if name == "character":
+        return 1
+    texts = [item for item in (operands[1] if name == "mux" else operands) if isinstance(item, tuple) and item[1] in TEXT_UNITS]
     sizes = [capacity(w, text) for text in texts]
     return max(sizes) if name in ("select", "mux", "min", "max") else sum(sizes)
 
 
 def kept(w: Writer) -> dict[int, tuple[int, int]]:
-    """For each text temporary of the body where its bytes are kept in the context, and how many they are at most."""
+    """For each text temporary of the body where it is kept in the context, and how many characters it has at most."""
     if w.capacities is not None:
         return w.capacities
     lets = list(_text_lets(w.body.code))
@@ -56,21 +58,22 @@ def kept(w: Writer) -> dict[int, tuple[int, int]]:
             break
     else:
         raise Unsupported(f"a text of {w.body.name} grows without bound")
-    w.capacities = {number: (w.module.room(size), size) for number, (_, size) in w.capacities.items()}
+    units = {number: TEXT_UNITS[node[1]] for number, node in lets}
+    w.capacities = {number: (w.module.room(size * units[number]), size) for number, (_, size) in w.capacities.items()}
     return w.capacities
 
 
 def _text_lets(block: Block) -> Iterator[tuple[int, Node]]:
     for node in statements(block):
-        if node[0] == "let" and node[2] == "s8":
+        if node[0] == "let" and node[2] in TEXT_UNITS:
             yield node[1], node[3]
 
 
 def keep(w: Writer, number: int, a: Node) -> None:
-    """`let` of a text: its bytes are copied."""
+    """`let` of a text: its characters are copied."""
     text = w.text(a)
-    place = _kept_place(w, number)
-    w.emit(f"call void @llvm.memmove.p0.p0.i64(ptr {place}, ptr {text.at}, i64 {text.length}, i1 false)")
+    place, count = _kept_place(w, number), in_bytes(w, text.length, text.unit)
+    w.emit(f"call void @llvm.memmove.p0.p0.i64(ptr {place}, ptr {text.at}, i64 {count}, i1 false)")
     w.emit(f"store i64 {text.length}, ptr {w.temporary(number, 'i64')}, align 8")
 
 
@@ -78,20 +81,29 @@ def _kept_place(w: Writer, number: int) -> str:
     return w.new(f"getelementptr inbounds i8, ptr %c, i64 {kept(w)[number][0]}")
 
 
-def _tmp(w: Writer, number: int) -> Text:
-    return Text(_kept_place(w, number), w.new(f"load i64, ptr {w.temporary(number, 'i64')}, align 8"))
+def _tmp(w: Writer, form: str, number: int) -> Text:
+    return Text(_kept_place(w, number), w.new(f"load i64, ptr {w.temporary(number, 'i64')}, align 8"), TEXT_UNITS[form])
+
+
+def in_bytes(w: Writer, length: str, unit: int) -> str:
+    """How many bytes that many characters take."""
+    return length if unit == 1 else w.new(f"mul i64 {length}, {unit}")
 
 
 # --- parts ----------------------------------------------------------------------------------------------------------
 
 
-def _const(w: Writer, value: bytes) -> Text:
-    return Text(w.module.constant(value), str(len(value))) if value else EMPTY
+def _const(w: Writer, form: str, value: bytes | str) -> Text:
+    if not value:
+        return Text("%c", "0", TEXT_UNITS[form])
+    data = value if isinstance(value, bytes) else packed(value)
+    return Text(w.module.constant(data), str(len(data) // TEXT_UNITS[form]), TEXT_UNITS[form])
 
 
-def _load_text(w: Writer, address: Address, size: int) -> Text:
-    pointer = w.pointer(address, size)
-    return Text(pointer, w.call("text_length", w.integer(pointer), str(size)))
+def _load_text(w: Writer, form: str, address: Address, size: int) -> Text:
+    unit = TEXT_UNITS[form]
+    pointer = w.pointer(address, size * unit)
+    return Text(pointer, w.call("text_length" if unit == 1 else "wide_length", w.integer(pointer), str(size)), unit)
 
 
 def _not_less(w: Writer, low: int, value: str, site: int) -> None:
@@ -102,21 +114,22 @@ def _lesser(w: Writer, a: str, b: str) -> str:
     return w.new(f"call i64 @llvm.umin.i64(i64 {a}, i64 {b})")
 
 
-def _moved(w: Writer, pointer: str, by: str) -> str:
-    return w.new(f"getelementptr i8, ptr {pointer}, i64 {by}")
+def _from(w: Writer, text: Text, start: str, length: str) -> Text:
+    """So many characters of a text, from one on that is counted from 0."""
+    return Text(w.new(f"getelementptr i{8 * text.unit}, ptr {text.at}, i64 {start}"), length, text.unit)
 
 
-def _left(w: Writer, a: Node, n: Node, site: int) -> Text:
+def _left(w: Writer, form: str, a: Node, n: Node, site: int) -> Text:
     text, count = w.text(a), w.value(n)
     _not_less(w, 0, count, site)
-    return Text(text.at, _lesser(w, text.length, count))
+    return Text(text.at, _lesser(w, text.length, count), text.unit)
 
 
-def _right(w: Writer, a: Node, n: Node, site: int) -> Text:
+def _right(w: Writer, form: str, a: Node, n: Node, site: int) -> Text:
     text, count = w.text(a), w.value(n)
     _not_less(w, 0, count, site)
     length = _lesser(w, text.length, count)
-    return Text(_moved(w, text.at, w.new(f"sub i64 {text.length}, {length}")), length)
+    return _from(w, text, w.new(f"sub i64 {text.length}, {length}"), length)
 
 
 def _span(w: Writer, text: Text, n: str, p: str) -> tuple[str, str]:
@@ -125,29 +138,29 @@ def _span(w: Writer, text: Text, n: str, p: str) -> tuple[str, str]:
     return start, _lesser(w, n, w.new(f"sub i64 {text.length}, {start}"))
 
 
-def _mid(w: Writer, a: Node, n: Node, p: Node, site: int) -> Text:
+def _mid(w: Writer, form: str, a: Node, n: Node, p: Node, site: int) -> Text:
     text, count, position = w.text(a), w.value(n), w.value(p)
     _not_less(w, 0, count, site)
     _not_less(w, 1, position, site)
     start, length = _span(w, text, count, position)
-    return Text(_moved(w, text.at, start), length)
+    return _from(w, text, start, length)
 
 
 # --- new texts ------------------------------------------------------------------------------------------------------
 
 
 def _joined(w: Writer, size: int, *parts: Text) -> Text:
-    """The texts one after the other, at most so many bytes."""
-    at = w.scratch(size)
-    length = "0"
+    """The texts one after the other, at most so many characters."""
+    unit = parts[0].unit
+    made = Text(w.scratch(size * unit), "0", unit)
     for part in parts:
-        end = _moved(w, at, length)
-        w.emit(f"call void @llvm.memcpy.p0.p0.i64(ptr {end}, ptr {part.at}, i64 {part.length}, i1 false)")
-        length = w.new(f"add i64 {length}, {part.length}")
-    return Text(at, length)
+        end, count = _from(w, made, made.length, part.length).at, in_bytes(w, part.length, unit)
+        w.emit(f"call void @llvm.memcpy.p0.p0.i64(ptr {end}, ptr {part.at}, i64 {count}, i1 false)")
+        made = Text(made.at, w.new(f"add i64 {made.length}, {part.length}"), unit)
+    return made
 
 
-def _concat(w: Writer, a: Node, b: Node) -> Text:
+def _concat(w: Writer, form: str, a: Node, b: Node) -> Text:
     left, right = w.text(a), w.text(b)
     return _joined(w, capacity(w, a) + capacity(w, b), left, right)
 
@@ -155,11 +168,11 @@ def _concat(w: Writer, a: Node, b: Node) -> Text:
 def _spliced(w: Writer, size: int, text: Text, between: Text, start: str, dropped: str) -> Text:
     """A text with another one in place of `dropped` characters."""
     end = w.new(f"add i64 {start}, {dropped}")
-    rest = Text(_moved(w, text.at, end), w.new(f"sub i64 {text.length}, {end}"))
-    return _joined(w, size, Text(text.at, start), between, rest)
+    rest = _from(w, text, end, w.new(f"sub i64 {text.length}, {end}"))
+    return _joined(w, size, Text(text.at, start, text.unit), between, rest)
 
 
-def _insert(w: Writer, a: Node, b: Node, p: Node, site: int) -> Text:
+def _insert(w: Writer, form: str, a: Node, b: Node, p: Node, site: int) -> Text:
     text, between, position = w.text(a), w.text(b), w.value(p)
     _not_less(w, 0, position, site)
     return _spliced(w, capacity(w, a) + capacity(w, b), text, between, _lesser(w, text.length, position), "0")
@@ -171,12 +184,12 @@ def _replaced(w: Writer, size: int, text: Text, between: Text, n: str, p: str, s
     return _spliced(w, size, text, between, *_span(w, text, n, p))
 
 
-def _delete(w: Writer, a: Node, n: Node, p: Node, site: int) -> Text:
+def _delete(w: Writer, form: str, a: Node, n: Node, p: Node, site: int) -> Text:
     text, count, position = w.text(a), w.value(n), w.value(p)
-    return _replaced(w, capacity(w, a), text, EMPTY, count, position, site)
+    return _replaced(w, capacity(w, a), text, _const(w, form, b""), count, position, site)
 
 
-def _replace(w: Writer, a: Node, b: Node, n: Node, p: Node, site: int) -> Text:
+def _replace(w: Writer, form: str, a: Node, b: Node, n: Node, p: Node, site: int) -> Text:
     text, between, count, position = w.text(a), w.text(b), w.value(n), w.value(p)
     return _replaced(w, capacity(w, a) + capacity(w, b), text, between, count, position, site)
 
@@ -186,28 +199,44 @@ def _replace(w: Writer, a: Node, b: Node, n: Node, p: Node, site: int) -> Text:
 
 def _either(w: Writer, condition: str, yes: Text, no: Text) -> Text:
     return Text(w.new(f"select i1 {condition}, ptr {yes.at}, ptr {no.at}"),
-                w.new(f"select i1 {condition}, i64 {yes.length}, i64 {no.length}"))
+                w.new(f"select i1 {condition}, i64 {yes.length}, i64 {no.length}"), yes.unit)
 
 
-def _select(w: Writer, g: Node, a: Node, b: Node) -> Text:
+def _select(w: Writer, form: str, g: Node, a: Node, b: Node) -> Text:
     chosen, left, right = w.value(g), w.text(a), w.text(b)
     return _either(w, chosen, right, left)
 
 
-def _mux(w: Writer, k: Node, choices: tuple[Node, ...], site: int) -> Text:
+def _mux(w: Writer, form: str, k: Node, choices: tuple[Node, ...], site: int) -> Text:
     number = w.value(k)
     texts = [w.text(choice) for choice in choices]
     choose = chooser(w, number, len(texts), site)
-    return Text(choose("ptr", [text.at for text in texts]), choose("i64", [text.length for text in texts]))
+    return Text(choose("ptr", [text.at for text in texts]), choose("i64", [text.length for text in texts]), TEXT_UNITS[form])
 
 
 def _extreme(comparison: str) -> Callable[..., Text]:
-    def emit(w: Writer, a: Node, b: Node) -> Text:
+    def emit(w: Writer, form: str, a: Node, b: Node) -> Text:
         left, right = w.text(a), w.text(b)
-        order = w.call("text_order", w.integer(left.at), left.length, w.integer(right.at), right.length)
-        return _either(w, w.new(f"icmp {comparison} i64 {order}, 0"), left, right)
+        return _either(w, w.new(f"icmp {comparison} i64 {text_order(w, left, right)}, 0"), left, right)
 
     return emit
+
+
+# --- characters -----------------------------------------------------------------------------------------------------
+
+
+def _character(w: Writer, form: str, a: Node) -> Text:
+    unit = TEXT_UNITS[form]
+    code, at = w.value(a), w.scratch(unit)
+    w.emit(f"store i{8 * unit} {code}, ptr {at}, align 1")
+    return Text(at, w.new(f"zext i1 {w.new(f'icmp ne i{8 * unit} {code}, 0')} to i64"), unit)
+
+
+def _recode(w: Writer, form: str, a: Node) -> Text:
+    text, unit = w.text(a), TEXT_UNITS[form]
+    at = w.scratch(capacity(w, a) * unit)
+    w.call("widen" if unit == 2 else "narrow", w.integer(at), w.integer(text.at), text.length)
+    return Text(at, text.length, unit)
 
 
 # --- values ---------------------------------------------------------------------------------------------------------
@@ -220,11 +249,11 @@ _WRITERS = {
 """The routine that writes a value of each data type; the others are integers."""
 
 
-def _to_text(w: Writer, data_type: str, a: Node) -> Text:
+def _to_text(w: Writer, form: str, data_type: str, a: Node) -> Text:
     data_type = SHORT_NAMES.get(data_type, data_type)
     if data_type == "BOOL":
         value = w.value(a) if a[1] == "b" else w.new(f"icmp ne i64 {w.wide(a)}, 0")
-        return _either(w, value, _const(w, b"TRUE"), _const(w, b"FALSE"))
+        return _either(w, value, _const(w, "s8", b"TRUE"), _const(w, "s8", b"FALSE"))
     number = as_bits(w, a) if is_float(a[1]) else w.wide(a)
     return _written(w, _WRITERS.get(data_type, "put_integer"), number)
 
@@ -239,9 +268,9 @@ def _written(w: Writer, routine: str, number: str) -> Text:
     return Text(at, w.call(routine, w.integer(at), number))
 
 
-def _enum_text(w: Writer, names: tuple[tuple[int, str], ...], a: Node) -> Text:
+def _enum_text(w: Writer, form: str, names: tuple[tuple[int, str], ...], a: Node) -> Text:
     value, after, other = w.wide(a), w.label(), w.label()
-    rows = [(number, _const(w, name.encode("latin-1", "replace")), w.label()) for number, name in dict(names).items()]
+    rows = [(number, _const(w, "s8", name.encode("latin-1", "replace")), w.label()) for number, name in dict(names).items()]
     w.emit(f"switch i64 {value}, label %{other} [ {' '.join(f'i64 {n}, label %{label}' for n, _, label in rows)} ]")
     for _, _, label in rows:
         w.begin(label)
@@ -277,5 +306,6 @@ TEXTS: dict[str, Callable[..., Text]] = {
     "const": _const, "tmp": _tmp, "load_text": _load_text, "left": _left, "right": _right, "mid": _mid,
     "concat": _concat, "insert": _insert, "delete": _delete, "replace": _replace, "select": _select, "mux": _mux,
     "min": _extreme("sle"), "max": _extreme("sge"), "to_text": _to_text, "enum_text": _enum_text,
+    "character": _character, "recode": _recode,
 }
 """How each operation is written that yields a text: called with the operands of its row."""

@@ -57,10 +57,11 @@ def literal(machine: str, value: Any) -> str:
 
 
 class Text(NamedTuple):
-    """A string as code has it: where its bytes begin, and how many they are."""
+    """A string as code has it: where its characters begin, how many they are, and the bytes of each."""
 
     at: str
     length: str
+    unit: int = 1
 
 
 class Unsupported(ValueError):
@@ -181,7 +182,7 @@ class Writer:
 
     def text(self, node: Node) -> Text:
         """The value of a text expression.  Its bytes stay as they are until the next statement."""
-        return self.texts[node[0]](self, *node[2:])
+        return self.texts[node[0]](self, *node[1:])
 
     def wide(self, node: Node) -> str:
         """The value of an integer expression in 64 bits."""

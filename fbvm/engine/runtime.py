@@ -90,6 +90,18 @@ def bit_behind(reference: int, n: int) -> int:
     return reference >> OBJECT_SHIFT << OBJECT_SHIFT | offset << OFFSET_SHIFT | n & 7
 
 
+def character_s8(code: int) -> bytes:
+    return bytes((code,)) if code else b""
+
+
+def character_s16(code: int) -> str:
+    return chr(code) if code else ""
+
+
+def first(text: bytes | str) -> int:
+    return ord(text[:1]) if text else 0
+
+
 def enum_text(names: Mapping[int, str], value: int) -> bytes:
     name = names.get(value)
     return str(int(value)).encode() if name is None else name.encode("latin-1", "replace")
@@ -102,6 +114,8 @@ _PURE: dict[str, Any] = {
     "single": arithmetic.single, "single_of_integer": arithmetic.single_of_integer, "bits": arithmetic.bits,
     "arctangent": arithmetic.arctangent, "find": strings.find, "to_text": texts.to_text, "enum_text": enum_text,
     "bit_behind": bit_behind,
+    "character_s8": character_s8, "character_s16": character_s16, "first": first, "widened": strings.widened,
+    "narrowed": strings.narrowed,
     **{function.__name__: sited(function) for function in (
         arithmetic.nearest, arithmetic.truncate, arithmetic.from_bcd, arithmetic.to_bcd, arithmetic.shift_left,
         arithmetic.shift_right, arithmetic.rotate_left, arithmetic.rotate_right, strings.left, strings.right,
@@ -150,12 +164,19 @@ def _references(memory: Memory) -> dict[str, Any]:
 def _texts(memory: Memory) -> dict[str, Any]:
     buffer, u8 = memory.map, memory.u8
 
-    def get_text(offset: int, capacity: int) -> bytes:
+    def get_s8(offset: int, capacity: int) -> bytes:
         return buffer[offset:offset + capacity].partition(b"\0")[0]
 
-    def put_text(offset: int, capacity: int, text: bytes) -> None:
+    def put_s8(offset: int, capacity: int, text: bytes) -> None:
         text = text[:capacity] + b"\0"
         u8[offset:offset + len(text)] = text
+
+    def get_s16(offset: int, capacity: int) -> str:
+        return strings.units(buffer[offset:offset + 2 * capacity]).partition("\0")[0]
+
+    def put_s16(offset: int, capacity: int, text: str) -> None:
+        data = strings.packed(text[:capacity]) + b"\0\0"
+        u8[offset:offset + len(data)] = data
 
     def copy(to: int, source: int, count: int) -> None:
         u8[to:to + count] = u8[source:source + count]
@@ -163,4 +184,4 @@ def _texts(memory: Memory) -> dict[str, Any]:
     def fill(to: int, pattern: bytes) -> None:
         u8[to:to + len(pattern)] = pattern
 
-    return {"get_text": get_text, "put_text": put_text, "copy": copy, "fill": fill}
+    return {"get_s8": get_s8, "put_s8": put_s8, "get_s16": get_s16, "put_s16": put_s16, "copy": copy, "fill": fill}

@@ -13,7 +13,7 @@ from typing import Any
 from fbvm.base.areas import BUDGET, DUE
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.image import Body, Image
-from fbvm.code.operations import SIZES, Address, Block, Node
+from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
 from fbvm.engine.expressions import ROWS, flag_operands, view
 from fbvm.engine.ranges import may_trap
 from fbvm.engine.runtime import NO_SITE
@@ -194,7 +194,8 @@ def _store_flag(w: BodyWriter, address: Address, a: Node) -> None:
 
 
 def _store_text(w: BodyWriter, address: Address, capacity: int, a: Node) -> None:
-    w.line(f"put_text({bare(w.place(address, capacity + 1))}, {capacity}, {bare(w.value(a))})")
+    place = w.place(address, (capacity + 1) * TEXT_UNITS[a[1]])
+    w.line(f"put_{a[1]}({bare(place)}, {capacity}, {bare(w.value(a))})")
 
 
 def _copy(w: BodyWriter, to: Address, source: Address, size: int) -> None:

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 from mmap import mmap
 from typing import NamedTuple, TypeAlias
 
-from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
+from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Image
+from fbvm.code.operations import detail_size
 from fbvm.engine.python import PythonEngine
 from fbvm.engine.runtime import NO_SITE, Observation
 from fbvm.engine.tiers import substitutes_of
@@ -135,7 +136,7 @@ class Inside:
             return Statement(site, frame)
         if kind == "read" or kind == "write":
             form, offset, bit = detail
-            size = form[1] + (form[0] == "s8") if isinstance(form, tuple) else STRUCTS[form].size
+            size = detail_size(form)
             value = value_at(self.memory.map, offset, size, bit)
             if kind == "read":
                 return Read(site, frame, offset, bit, value)

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, TextIO
 
-from fbvm.base.types import Elementary, EnumType, StringType, base
+from fbvm.base.types import Elementary, EnumType, StringType, Type, base, families
 from fbvm.record.recorder import Recording, Signal, Track
 from fbvm.watch.values import Value
 
@@ -68,9 +68,7 @@ def _kind(signal: Signal) -> tuple[str, int | None]:
     kind = base(signal.place.type)
     if signal.is_bit:
         return "wire", 1
-    if isinstance(kind, StringType):
-        return "string", None
-    if isinstance(kind, EnumType):
+    if _is_text(kind):
         return "string", None
     if isinstance(kind, Elementary) and kind.machine in ("f32", "f64"):
         return "real", 64
@@ -78,8 +76,12 @@ def _kind(signal: Signal) -> tuple[str, int | None]:
     return ("integer" if signed else "wire"), kind.size * 8
 
 
+def _is_text(kind: Type) -> bool:
+    return isinstance(kind, EnumType | StringType) or "ANY_CHAR" in families(kind)
+
+
 def _plain(signal: Signal, value: Value) -> Any:
     """A value as pyvcd takes it; text has no blanks in a dump."""
-    if isinstance(base(signal.place.type), EnumType | StringType):
-        return re.sub(r"\s", "_", signal.text(value).strip("'"))
+    if _is_text(base(signal.place.type)):
+        return re.sub(r"\s", "_", signal.text(value).strip("'\""))
     return int(value) if isinstance(value, bool) else value

@@ -49,6 +49,8 @@ def values(kind: Type) -> st.SearchStrategy[Any]:
         return st.lists(values(plain.element), min_size=plain.count, max_size=plain.count)
     if isinstance(plain, StructType):
         return st.fixed_dictionaries({field.name: values(field.type) for field in plain.fields.values() if not field.constant})
+    if isinstance(plain, Elementary) and "ANY_CHAR" in plain.families:
+        return st.characters(min_codepoint=0, max_codepoint=plain.high, categories=("L", "N", "P", "S", "Z"))
     if isinstance(plain, Elementary) and plain.machine in ("f32", "f64"):
         return st.floats(width=32 if plain.machine == "f32" else 64)
     if isinstance(plain, Elementary) and plain.name in DURATIONS:

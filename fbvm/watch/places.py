@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
-from fbvm.base.types import AnyType, ArrayType, OpenArrayType, StringType, StructType, Type, base, machine
+from fbvm.base.strings import packed, units
+from fbvm.base.types import AnyType, ArrayType, OpenArrayType, StringType, StructType, Type, base, families, machine
 from fbvm.watch.paths import Place, member
 from fbvm.watch.values import Value, conform
 
@@ -70,6 +71,8 @@ def _read(memory: Memory, kind: Type, offset: int, bit: int | None) -> Value:
         return bool(value)
     if form == "ref":
         return int(value) or None
+    if "ANY_CHAR" in families(plain):
+        return chr(int(value))
     return value
 
 
@@ -81,7 +84,9 @@ def _element(kind: ArrayType, offset: int, bit: int | None, number: int) -> tupl
 
 def _text(memory: Memory, kind: StringType, offset: int) -> str:
     data = bytes(memory.u8[offset : offset + kind.size])
-    return data.decode("utf-16-le" if kind.wide else "latin-1", "replace").partition("\0")[0]
+    if not kind.wide:
+        return data.decode("latin-1").partition("\0")[0]
+    return packed(units(data).partition("\0")[0]).decode("utf-16-le", "replace")
 
 
 def _pieces(memory: Memory, place: Place, value: object) -> Iterator[tuple[int, bytes, int | None]]:
@@ -109,5 +114,7 @@ def _pieces(memory: Memory, place: Place, value: object) -> Iterator[tuple[int, 
 
 def _encoded(kind: Type, value: Value) -> bytes:
     if isinstance(kind, StringType) and isinstance(value, str):
-        return f"{value}\0".encode("utf-16-le" if kind.wide else "latin-1")
+        return packed(f"{value}\0") if kind.wide else f"{value}\0".encode("latin-1")
+    if isinstance(value, str):
+        value = ord(value)
     return STRUCTS[machine(kind)].pack(value)

@@ -1,7 +1,8 @@
 """Values of the program as Python values: checked on the way in, shown readably on the way out.
 
-BOOL is bool, integers and bit strings are int, REAL and LREAL float, TIME and dates int nanoseconds, STRING str, an
-enumeration its number (its member's name is taken on the way in), arrays are lists, structures dicts by name.
+BOOL is bool, integers and bit strings are int, REAL and LREAL float, TIME and dates int nanoseconds, STRING and WSTRING
+str, CHAR and WCHAR a str of one character, an enumeration its number (its member's name is taken on the way in), arrays
+are lists, structures dicts by name.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import re
 import struct
 from typing import TypeAlias
 
+from fbvm.base.strings import packed
 from fbvm.base.types import (
     BOOL,
     ELEMENTARY,
@@ -75,7 +77,7 @@ def sort_of(kind: Type) -> str:
     plain = base(kind)
     if isinstance(plain, EnumType):
         return "enumeration"
-    if isinstance(plain, StringType):
+    if isinstance(plain, StringType) or "ANY_CHAR" in families(plain):
         return "text"
     if not isinstance(plain, Elementary):
         return ""
@@ -130,6 +132,8 @@ def conform(kind: Type, value: object, name: str) -> Value:
         return _enumerated(plain, value, name)
     if isinstance(plain, StringType):
         return _text(plain, value, name)
+    if "ANY_CHAR" in families(plain):
+        return _character(plain, value, name)
     if not isinstance(plain, Elementary):
         raise TypeError(f"{name} is {kind.name}; write its members one by one")
     if plain is BOOL:
@@ -170,12 +174,22 @@ def _real(kind: Elementary, value: object, name: str) -> float:
 def _text(kind: StringType, value: object, name: str) -> str:
     if not isinstance(value, str):
         raise refusal(kind, name, repr(value))
-    if len(value) > kind.capacity:
-        raise ValueError(f"{name}: {len(value)} characters are out of range of {kind.name}")
-    highest = 0xFFFF if kind.wide else 0xFF
-    wrong = [c for c in value if not 0 < ord(c) <= highest]
+    size = len(packed(value)) // 2 if kind.wide else len(value)
+    if size > kind.capacity:
+        raise ValueError(f"{name}: {size} characters are out of range of {kind.name}")
+    wrong = [c for c in value if c == "\0" or not kind.wide and ord(c) > 0xFF]
     if wrong:
         raise ValueError(f"{name}: {kind.name} cannot hold the character {wrong[0]!r}")
+    return value
+
+
+def _character(kind: Type, value: object, name: str) -> str:
+    if not isinstance(value, str):
+        raise refusal(kind, name, repr(value))
+    if len(value) != 1:
+        raise ValueError(f"{name} is {kind.name} and takes one character, not {len(value)}")
+    if ord(value) >= 1 << 8 * kind.size:
+        raise ValueError(f"{name}: {kind.name} cannot hold the character {value!r}")
     return value
 
 
@@ -224,7 +238,7 @@ def literal(text: str) -> tuple[Value, Type | None]:
     raise ValueError(f"{text!r} is no literal")
 
 
-_QUOTED = re.compile(r"(W?STRING#)?['\"]", re.I)
+_QUOTED = re.compile(r"(W?(STRING|CHAR)#)?['\"].", re.I | re.S)
 _BITS = {"TRUE": True, "FALSE": False, "ON": True, "OFF": False}
 
 
@@ -242,7 +256,7 @@ def parse_value(kind: Type, text: str, name: str) -> Value:
     if isinstance(plain, EnumType) and not _INTEGER.fullmatch(text):
         front, dot, member = text.rpartition(".")
         return conform(kind, member if dot and fold(front) == fold(kind.name) else text, name)
-    if isinstance(plain, StringType) and not _QUOTED.match(text):
+    if sort_of(kind) == "text" and not _QUOTED.match(text):
         return conform(kind, text, name)
     try:
         value, shown = literal(text if sort_of(kind) not in DATES or "#" in text else f"{plain.name}#{text}")
@@ -277,6 +291,17 @@ def split_list(text: str) -> list[str]:
 # --- out --------------------------------------------------------------------------------------------------------------
 
 
+_ESCAPES = {"$": "$$", "\n": "$L", "\f": "$P", "\r": "$R", "\t": "$T"}
+
+
+def _quoted(kind: Type, text: str) -> str:
+    """A text as a literal: WSTRING and WCHAR in double quotes; what cannot be printed is escaped."""
+    wide = isinstance(kind, StringType) and kind.wide or kind.name == "WCHAR"
+    quote, digits = ('"', 4) if wide else ("'", 2)
+    shown = (_ESCAPES.get(c) or (f"${c}" if c == quote else c if c.isprintable() else f"${ord(c):0{digits}X}") for c in text)
+    return f"{quote}{''.join(shown)}{quote}"
+
+
 _PINS = {"VAR_INPUT": 0, "VAR_IN_OUT": 1, "VAR_OUTPUT": 2}
 
 
@@ -306,7 +331,7 @@ def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
     if isinstance(plain, EnumType) and isinstance(value, int):
         return f"{plain.shown.get(value, '?')} ({value})"
     if isinstance(value, str):
-        return f"'{value}'"
+        return _quoted(plain, value)
     if isinstance(plain, RefType):
         return f"reference {value}"
     if isinstance(value, float) and plain is REAL:

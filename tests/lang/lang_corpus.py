@@ -22,10 +22,11 @@ from pathlib import Path
 
 HERE = Path(__file__).parent
 WORDS = ("error", "warning", "trap", "expect", "set", "cycle")
-_COMMENT = re.compile(rf"//\s*({'|'.join(WORDS)})\b((?:'(?:\$.|[^'$])*'|(?!//).)*)")
+_TEXT = r"""'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*\""""
+_COMMENT = re.compile(rf"//\s*({'|'.join(WORDS)})\b((?:{_TEXT}|(?!//).)*)")
 _CODE = re.compile(r"\s*([SR]\d{4})\s*(?::\s*(.*?))?\s*")
 _AT_SCAN = re.compile(r"(?:\s*scan\s+(\d+)\s*:)?(.*)", re.S)
-_ITEM = re.compile(r"((?:[^,\[\]'=]|\[[^\]]*\])+)=\s*((?:[^,\[\]']|'(?:\$.|[^'$])*'|\[[^\]]*\])+)(?:,|$)")
+_ITEM = re.compile(rf"((?:[^,\[\]'\"=]|\[[^\]]*\])+)=\s*((?:[^,\[\]'\"]|{_TEXT}|\[(?:{_TEXT}|[^\]])*\])+)(?:,|$)")
 _SECONDS = {"ms": 1_000_000, "us": 1_000, "s": 1_000_000_000}
 
 

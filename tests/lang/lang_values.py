@@ -12,7 +12,7 @@ from fbvm.base.types import ArrayType, Elementary, EnumType, StringType, Type, b
 _NS = {"d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
        "us": 1_000, "ns": 1}  # fmt: skip
 _REALS = {"INF": math.inf, "-INF": -math.inf, "NAN": math.nan}
-_ESCAPES = {"T": "\t", "L": "\n", "N": "\n", "R": "\r", "P": "\f", "$": "$", "'": "'"}
+_ESCAPES = {"T": "\t", "L": "\n", "N": "\n", "R": "\r", "P": "\f", "$": "$", "'": "'", '"': '"'}
 _EPOCH = datetime.datetime(1970, 1, 1)
 
 
@@ -26,8 +26,10 @@ def value(kind: Type, text: str) -> object:
     if isinstance(kind, EnumType):
         return kind.members[text.upper()]
     if isinstance(kind, StringType):
-        return _string(text)
+        return _string(text, '"' if kind.wide else "'")
     assert isinstance(kind, Elementary), f"{kind.name} is looked at member by member"
+    if kind.name in ("CHAR", "WCHAR"):
+        return _string(text, '"' if kind.name == "WCHAR" else "'")
     if kind.machine == "b":
         return {"TRUE": True, "FALSE": False}[text]
     if kind.machine in ("f32", "f64"):
@@ -48,7 +50,7 @@ def same(got: object, want: object) -> bool:
 
 def parts(text: str) -> list[str]:
     """The items of a list."""
-    return re.findall(r"'(?:\$.|[^'$])*'|[^,]+", text)
+    return re.findall(r"""'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*"|[^,]+""", text)
 
 
 def _real(text: str, machine: str) -> float:
@@ -56,10 +58,11 @@ def _real(text: str, machine: str) -> float:
     return float(struct.unpack("<f", struct.pack("<f", number))[0]) if machine == "f32" else number
 
 
-def _string(text: str) -> str:
-    if not re.fullmatch(r"'(\$.|[^'$])*'", text):
-        raise ValueError(f"{text} is no text in single quotes")
-    return re.sub(r"\$([0-9A-F]{2}|.)", lambda m: _ESCAPES.get(m[1]) or chr(int(m[1], 16)), text[1:-1])
+def _string(text: str, quote: str) -> str:
+    if not re.fullmatch(rf"{quote}(\$.|[^{quote}$])*{quote}", text):
+        raise ValueError(f"{text} is no text in {quote}")
+    digits = 2 if quote == "'" else 4
+    return re.sub(rf"\$([0-9A-F]{{{digits}}}|.)", lambda m: _ESCAPES.get(m[1]) or chr(int(m[1], 16)), text[1:-1])
 
 
 def _time(text: str) -> int:

@@ -20,7 +20,7 @@ from fbvm.base.arithmetic import single
 from fbvm.base.memory import Memory
 from fbvm.base.types import ELEMENTARY
 from fbvm.code.image import Image
-from fbvm.code.operations import INTEGERS, SIZES, Address, Block, Node, limits
+from fbvm.code.operations import INTEGERS, SIZES, TEXT_UNITS, Address, Block, Node, limits
 from fbvm.engine.native import NativeEngine
 from fbvm.engine.python import PythonEngine
 
@@ -38,7 +38,7 @@ INSTANCE_BYTES = 512
 EDGES = (0, 1, -1, 2, 7, 127, 128, -128, 255, 32767, -32768, 65535, 2**31 - 1, -(2**31), 2**32 - 1, 2**63 - 1, -(2**63))
 REALS = (0.0, -0.0, 1.0, -1.5, 0.1, 2.5, 1e10, -1e-10, 1e38, 3.4e38, 1e-45, 255.5, -128.5, 32767.5, math.inf, -math.inf, math.nan)
 LETTERS = (b"", b"a", b"AB", b"12", b"-7", b"1.5", b"TRUE", b"xyzxyz", b"T#1s", b"\xe4$ ", b"INT#5", b"0123456789")
-DATA_TYPES = {name: kind.machine for name, kind in ELEMENTARY.items() if kind.machine in FORMS}
+DATA_TYPES = {name: kind.machine for name, kind in ELEMENTARY.items() if "ANY_CHAR" not in kind.families}
 
 
 class Maker:
@@ -116,11 +116,11 @@ class Maker:
                 return self.constant(form)
             if what == 1 and known:
                 return "tmp", form, self.pick(known)
-            if form == "s8":
-                return "load_text", "s8", self.text_place(), TEXT_CAPACITY
+            if form in TEXT_UNITS:
+                return "load_text", form, self.text_place(), TEXT_CAPACITY // TEXT_UNITS[form]
             return self.pick(("load", "load", "load_raw")), form, self.address(form)
-        if form == "s8":
-            return self.text(depth - 1)
+        if form in TEXT_UNITS:
+            return self.text(form, depth - 1)
         if form == "b":
             return self.condition(depth - 1)
         return self.real(form, depth - 1) if form in FLOATS else self.integer(form, depth - 1)
@@ -128,6 +128,8 @@ class Maker:
     def constant(self, form: str) -> Node:
         if form == "s8":
             return const("s8", self.pick(LETTERS))
+        if form == "s16":
+            return const("s16", self.pick(LETTERS).decode("latin-1") + self.pick(("", "", "\u20ac", "\ud83d\ude00")))
         if form in FLOATS:
             number = self.pick(REALS)
             return const(form, single(number) if form == "f32" else number)
@@ -188,7 +190,10 @@ class Maker:
     def special(self, form: str, d: int) -> Node:
         site = self.site()
         if form == "i16":
-            return self.pick((("length", "i16", self.value("s8", d)), ("find", "i16", self.value("s8", d), self.value("s8", d))))
+            text = self.pick(TEXT_UNITS)
+            return self.pick((("length", "i16", self.value(text, d)), ("find", "i16", self.value(text, d), self.value(text, d))))
+        if form in ("u8", "u16") and self.random.randrange(2):
+            return "first", form, self.value("s8" if form == "u8" else "s16", d)
         if form == "i64":
             high = self.small_number(63, d)
             return self.pick((("now", "i64"), ("floor_div", "i64", self.value("i64", d), const("i64", self.pick((1, 3, 1000)))),
@@ -229,7 +234,7 @@ class Maker:
         what = self.random.randrange(9)
         v = self.value
         if what < 3:
-            form = self.pick((*FORMS, "s8"))
+            form = self.pick((*FORMS, *TEXT_UNITS))
             return self.pick(("eq", "ne", "lt", "le", "gt", "ge")), "b", form, v(form, d), v(form, d)
         if what < 5:
             return self.pick(("and", "or", "xor", "and_then", "or_else")), "b", v("b", d), v("b", d)
@@ -240,27 +245,31 @@ class Maker:
                               ("load_flag", "b", self.flag())))
         return self.either("b", d)
 
-    def text(self, d: int) -> Node:
-        what = self.random.randrange(8)
+    def text(self, form: str, d: int) -> Node:
+        what = self.random.randrange(10)
         v, site = self.value, self.site()
         n, p = (self.pick((const("i64", self.random.randrange(1, 8)), ("add", "i64", self.small_number(7, 0), const("i64", 1))))
                 for _ in range(2))
         if what == 0:
-            return self.pick(("left", "right")), "s8", v("s8", d), n, site
+            return self.pick(("left", "right")), form, v(form, d), n, site
         if what == 1:
-            return self.pick(("mid", "delete")), "s8", v("s8", d), n, p, site
+            return self.pick(("mid", "delete")), form, v(form, d), n, p, site
         if what == 2:
-            return "insert", "s8", v("s8", d), v("s8", d), p, site
+            return "insert", form, v(form, d), v(form, d), p, site
         if what == 3:
-            return "replace", "s8", v("s8", d), v("s8", d), n, p, site
+            return "replace", form, v(form, d), v(form, d), n, p, site
         if what == 4:
-            return "concat", "s8", v("s8", d), v("s8", d)
+            return "concat", form, v(form, d), v(form, d)
         if what == 5:
+            return "recode", form, v("s16" if form == "s8" else "s8", d)
+        if what == 6:
+            return "character", form, v("u8" if form == "s8" else "u16", d)
+        if what == 7 and form == "s8":
             name = self.pick(DATA_TYPES)
             return "to_text", "s8", name, v(DATA_TYPES[name], min(d, 1))
-        if what == 6:
+        if what == 8 and form == "s8":
             return "enum_text", "s8", ((1, "Red"), (-2, "Blue"), (7, "Grün")), v("i64", d)
-        return self.either("s8", d)
+        return self.either(form, d)
 
     # --- statements
 
@@ -297,14 +306,15 @@ class Maker:
         return self.pick(("store", "store", "store_raw")), form, self.address(form), self.value(form, 4)
 
     def let(self) -> Node:
-        form = self.pick((*FORMS, "s8"))
+        form = self.pick((*FORMS, *TEXT_UNITS))
         value = self.value(form, 3)
         self.count += 1
         self.temporaries.append((self.count, form))
         return "let", self.count, form, value
 
     def text_store(self) -> Node:
-        return "store_text", self.text_place(), TEXT_CAPACITY, self.value("s8", 3)
+        form = self.pick(TEXT_UNITS)
+        return "store_text", self.text_place(), TEXT_CAPACITY // TEXT_UNITS[form], self.value(form, 3)
 
     def small(self) -> Node:
         place = 64 * self.random.randrange(10)

@@ -73,6 +73,10 @@ class Rig:
     def text(self, offset: int, capacity: int = 80) -> bytes:
         return self.memory.read_text(SLOTS_OFFSET + offset, capacity)
 
+    def wide_text(self, offset: int, capacity: int = 80) -> str:
+        at = SLOTS_OFFSET + offset
+        return bytes(self.memory.u8[at:at + 2 * capacity]).decode("utf-16-le").partition("\0")[0]
+
 
 def power_on(program: Image, before: dict[int, bytes] | None = None, budget: int = 100_000) -> Memory:
     """A memory with the system page set and `before` written among the slots."""
@@ -111,6 +115,9 @@ def yields(machine: str, expression: Node, before: dict[int, bytes] | None = Non
     if machine == "s8":
         rig = execute((("store_text", at(100), 200, expression),), before=before)
         return rig.trap.code if rig.trap else rig.text(100, 200)
+    if machine == "s16":
+        rig = execute((("store_text", at(101), 200, expression),), before=before)
+        return rig.trap.code if rig.trap else rig.wide_text(101, 200)
     rig = execute((
         store(machine, 104, expression), ("let", 1, machine, expression), store(machine, 112, ("tmp", machine, 1)),
         ("store_raw", machine, at(121), expression)), before=before)

@@ -258,6 +258,23 @@ RUNS: list[tuple[str, Node, dict[int, bytes], Any]] = [
     ("b", ("gt", "b", "s8", const("s8", b"\xe4"), const("s8", b"z")), {}, True),
     ("s8", ("min", "s8", const("s8", b"b"), const("s8", b"a")), {}, b"a"),
     ("s8", ("select", "s8", const("b", 1), const("s8", b"b"), const("s8", b"a")), {}, b"a"),
+    ("s16", ("load_text", "s16", at(1), 2), {1: b"a\0\xac\x20c\0"}, "a\u20ac"),
+    ("s16", ("load_text", "s16", at(0), 9), {0: b"a\0b\1\0\0c\0"}, "a\u0162"),
+    ("i16", ("length", "i16", ("load_text", "s16", at(0), 9)), {0: b"\0\1\1\0"}, 2),
+    ("i16", ("find", "i16", const("s16", "abcab\u0163"), const("s16", "b\u0163")), {}, 5),
+    ("i16", ("find", "i16", const("s16", "\u6161b"), const("s16", "ab")), {}, 0),
+    ("b", ("lt", "b", "s16", const("s16", "\u00ff"), const("s16", "\u0100")), {}, True),
+    ("b", ("eq", "b", "s16", ("load_text", "s16", at(0), 3), const("s16", "\u1234")), {0: b"\x34\x12"}, True),
+    ("s16", ("max", "s16", const("s16", "\uff00"), const("s16", "\ud83d")), {}, "\uff00"),
+    ("s8", ("character", "s8", load("u8", 0)), {0: b"\xe4"}, b"\xe4"), ("s8", ("character", "s8", load("u8", 0)), {}, b""),
+    ("s16", ("character", "s16", load("u16", 0)), {0: b"\xac\x20"}, "\u20ac"),
+    ("s16", ("character", "s16", load("u16", 0)), {}, ""),
+    ("u8", ("first", "u8", ("load_text", "s8", at(0), 3)), {0: b"xyz"}, ord("x")),
+    ("u8", ("first", "u8", ("load_text", "s8", at(0), 3)), {}, 0), ("u8", ("first", "u8", const("s8", b"")), {}, 0),
+    ("u16", ("first", "u16", ("load_text", "s16", at(0), 3)), {0: b"\xac\x20x\0"}, 0x20AC),
+    ("u16", ("first", "u16", ("mid", "s16", const("s16", "ab"), const("i64", 1), const("i64", 3), 3)), {}, 0),
+    ("s16", ("recode", "s16", ("load_text", "s8", at(0), 9)), {0: b"\xe4b"}, "\u00e4b"),
+    ("s8", ("recode", "s8", ("load_text", "s16", at(0), 9)), {0: b"\xe4\0\xac\x20b\0"}, b"\xe4?b"),
 ]
 TEXT = const("s8", b"ABCDE")
 
@@ -298,6 +315,18 @@ def test_expression(machine: str, expression: Node, before: dict[int, bytes], wa
 @pytest.mark.parametrize(("expression", "wanted"), STRINGS)
 def test_string_function(expression: Node, wanted: Any) -> None:
     assert yields("s8", expression) == wanted
+
+
+@pytest.mark.parametrize(("expression", "wanted"), STRINGS)
+def test_wide_string_function(expression: Node, wanted: Any) -> None:
+    assert yields("s16", wide(expression)) == wide(wanted)
+
+
+def wide(item: Any) -> Any:
+    """Code over STRING as code over WSTRING, whose characters take both bytes."""
+    if isinstance(item, tuple):
+        return tuple(map(wide, item))
+    return "s16" if item == "s8" else "".join(chr(byte * 257) for byte in item) if isinstance(item, bytes) else item
 
 
 @pytest.mark.parametrize(("bit", "byte", "wanted"),

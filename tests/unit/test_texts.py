@@ -14,6 +14,8 @@ from fbvm.base.arithmetic import Undefined
 from fbvm.base.types import ELEMENTARY
 from fbvm.engine.texts import from_text, to_text
 
+WRITTEN = sorted(name for name, kind in ELEMENTARY.items() if "ANY_CHAR" not in kind.families)
+
 SHOWN = [
     ("BOOL", 1, "TRUE"), ("BOOL", False, "FALSE"), ("INT", -5, "-5"), ("ULINT", 2**64 - 1, "18446744073709551615"),
     ("WORD", 255, "255"), ("REAL", 1.5, "1.5"), ("REAL", 1.0, "1.0"),
@@ -70,7 +72,7 @@ def test_other_text_is_refused(data_type: str, text: str, code: str) -> None:
     assert (caught.value.code, caught.value.values) == (code, (text.encode("latin-1"), data_type))
 
 
-@given(data_type=st.sampled_from(sorted(ELEMENTARY)), data=st.data())
+@given(data_type=st.sampled_from(WRITTEN), data=st.data())
 def test_every_value_reads_back(data_type: str, data: st.DataObject) -> None:
     kind = ELEMENTARY[data_type]
     if kind.machine[0] == "f":
@@ -86,7 +88,7 @@ def test_every_value_reads_back(data_type: str, data: st.DataObject) -> None:
     assert repr(from_text(data_type, to_text(data_type, value))) in (repr(value), repr(bool(value)))
 
 
-@given(data_type=st.sampled_from(sorted(ELEMENTARY)), text=st.binary(max_size=30))
+@given(data_type=st.sampled_from(WRITTEN), text=st.binary(max_size=30))
 def test_any_text_is_a_value_or_undefined(data_type: str, text: bytes) -> None:
     try:
         value = from_text(data_type, text)
