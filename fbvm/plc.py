@@ -138,6 +138,7 @@ class Plc:
         self._mode = Mode.RUN
         self._first = True
         self._forces: dict[Place, Value] = {}
+        self._found: dict[str, Place | Span] = {}
         self._past: deque[State] = deque(maxlen=0)
         self._due: deque[int] = deque()
         self.breakpoints = Breakpoints(self)
@@ -280,7 +281,10 @@ class Plc:
 
     def find(self, text: str) -> Place | Span:
         """The place or span of places that `text` names.  Raises UnknownPlace."""
-        return find(self.image.symbols, self.memory.areas, text)
+        found = self._found.get(text)
+        if found is None:
+            found = self._found[text] = find(self.image.symbols, self.memory.areas, text)
+        return found
 
     def read(self, where: str | Place | Span) -> Value:
         """The value of a variable, address or range.  Raises UnknownPlace."""

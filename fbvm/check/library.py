@@ -14,11 +14,12 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 from fbvm.base.areas import Mailbox, refusal
 from fbvm.base.data import data_folder
-from fbvm.base.diagnostics import Source
+from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.types import fold
 from fbvm.check.facts import Report
 from fbvm.syntax import tree
@@ -110,10 +111,18 @@ class Libraries:
         if path.name in library.loaded:
             return None
         library.loaded.add(path.name)
-        source = read(path, f"{library.name}/{path.name}", library.name)
-        if not isinstance(source, Source):
-            report.diagnostics.append(source)
+        found = read(path, f"{library.name}/{path.name}", library.name)
+        if not isinstance(found, Source):
+            report.diagnostics.append(found)
             return None
-        text, diagnostics = parse(source)
+        source, text, diagnostics = _parsed(found.name, found.text, found.library)
         report.diagnostics.extend(diagnostics)
         return source, text
+
+
+@lru_cache(maxsize=512)
+def _parsed(name: str, text: str, library: str) -> tuple[Source, tree.SourceText, tuple[Diagnostic, ...]]:
+    """The tree of a library's file, kept as long as the text stays: trees are values, and tests compile them often."""
+    source = Source(name, text, library)
+    parsed, diagnostics = parse(source)
+    return source, parsed, tuple(diagnostics)

@@ -35,6 +35,8 @@ def image_of(text: str) -> Image:
     return made.image
 
 
+BITS = [bytes(byte >> bit & 1 for bit in range(8)) for byte in range(256)]
+"""The bits of a byte, lowest first, as a server keeps coils."""
 OWN_CIO, OWN_DM = range(1500, 1525), range(30000, 30100)
 """Words of the unit."""
 AREAS = ("CIO", "W", "H", "A", "D")
@@ -191,8 +193,7 @@ class Model:
             discrete_inputs=5120, holding_registers=32768, input_registers=5801, functions=codes
         )
         self.cio = rig.words("CIO").tolist()
-        for word, value in enumerate(self.cio[:4096]):
-            self.server.coils[16 * word : 16 * word + 16] = bytes(value >> bit & 1 for bit in range(16))
+        self.server.coils[:65536] = b"".join(BITS[word & 0xFF] + BITS[word >> 8] for word in self.cio[:4096])
         self.server.discrete_inputs[:] = self.server.coils[:5120]
         self.server.input_registers[:] = array("H", self.cio[:5801])
         self.server.holding_registers[:] = array("H", rig.words("D").tolist())

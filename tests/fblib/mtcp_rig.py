@@ -4,13 +4,15 @@ A rig is told its blocks as the program calls them, without the pins that it dri
 
     Rig(rd="Fn03(Register_Address := 1000, Register_Qty := 3, RespData_DM := 200)")
 
-gives the program an instance `rd` with EN from `conn.ENO AND rd_EN` and its command from `rd_Cmd`.
+gives the program an instance `rd` with EN from `conn.ENO AND rd_EN` and its command from `rd_Cmd`.  Numbers on pins
+become variables (`rd_Register_Qty`), so that rigs which differ in numbers share one image.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from array import array
+from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from textwrap import dedent
 
@@ -32,6 +34,8 @@ OWN = (range(30000, 30100), range(32500, 32643))
 """D words of the unit and of the blocks: the sheet's two areas, and the gap between them for long requests."""
 WRITERS = ("05", "06", "0F", "10")
 
+NUMBER = re.compile(r"(\w+) := (\d+|TRUE|FALSE)(?=, |$)")
+
 CONNECT = "IP_Address1 := Octet1, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 2, Connect := Connect"
 
 
@@ -44,20 +48,33 @@ def image_of(text: str) -> Image:
 
 
 def program(
-    blocks: dict[str, str], *, connect_last: bool = False, wired: bool = True, more: str = "", more_variables: str = ""
-) -> str:
-    """The text of a program with one `conn` and these blocks, in this order; `wired`: EN comes from `conn.ENO`."""
+    blocks: dict[str, str], *, any_order: bool = False, wired: bool = True, more: str = "", more_variables: str = ""
+) -> tuple[str, dict[str, int]]:
+    """The text of a program with `conn` and these blocks, called in this order, and the values of its variables.
+
+    `wired`: EN comes from `conn.ENO`.  `any_order`: calls follow `Order`, in which 0 is `conn`, 1 the first block."""
     variables = ["conn : MTCP_ETN_Connect; conn_EN, Connect : BOOL := TRUE; Octet1 : UINT := 192;", more_variables]
-    calls = []
+    calls = [f"conn(EN := conn_EN, {CONNECT});"]
+    pin_variables: list[str] = []
+    values: dict[str, int] = {}
     for name, call in blocks.items():
         block, pins = re.fullmatch(r"(\w+)\((.*)\)", call).groups()  # type: ignore[union-attr]
+        for pin, number in NUMBER.findall(pins):
+            kind = "BOOL" if number in ("TRUE", "FALSE") else "WORD" if pin == "SlaveID" else "UINT"
+            pin_variables.append(f"{name}_{pin} : {kind};")
+            values[f"{name}_{pin}"] = number == "TRUE" if kind == "BOOL" else int(number)
+        pins = NUMBER.sub(rf"\1 := {name}_\1", pins)
         command = "Cmd_Write" if block[2:] in WRITERS else "Cmd_Read"
         enable = f"conn.ENO AND {name}_EN" if wired else f"{name}_EN"
         variables.append(f"{name} : MTCP_ETN_{block}; {name}_EN : BOOL := TRUE; {name}_Cmd : BOOL;")
         calls.append(f"{name}(EN := {enable}, {pins}, {command} := {name}_Cmd);")
-    connect = f"conn(EN := conn_EN, {CONNECT});"
-    body = [*calls, connect] if connect_last else [connect, *calls]
-    return "\n".join(["PROGRAM Main", "VAR", *variables, "END_VAR", *body, more, "END_PROGRAM"])
+    if any_order:
+        pin_variables.append(f"Order : ARRAY[0..{len(blocks)}] OF INT;")
+        variables.append("Place : INT;")
+        cases = [f"{number}: {call}" for number, call in enumerate(calls)]
+        calls = [f"FOR Place := 0 TO {len(blocks)} DO CASE Order[Place] OF", *cases, "END_CASE; END_FOR;"]
+    sections = ["VAR RETAIN", *pin_variables, "END_VAR", "VAR", *variables, "END_VAR"]
+    return "\n".join(["PROGRAM Main", *sections, *calls, more, "END_PROGRAM"]), values
 
 
 class Rig:
@@ -70,22 +87,26 @@ class Rig:
         timing: str = "exact",
         seed: int = 0,
         text: str = "",
-        connect_last: bool = False,
+        order: Sequence[str] = (),
         wired: bool = True,
         more: str = "",
         more_variables: str = "",
         refused: bool = False,
         **blocks: str,
     ) -> None:
-        made = text or program(blocks, connect_last=connect_last, wired=wired, more=more, more_variables=more_variables)
+        made, values = program(blocks, any_order=bool(order), wired=wired, more=more, more_variables=more_variables)
         self.peer = peer if isinstance(peer, ModbusPeer) else ModbusPeer()
         self.server = self.peer.server
         self.network = LoopNetwork(seed)
         if not refused:
             self.network.place(SERVER, peer or self.peer)
         self.unit = Etn21(0, "192.168.250.1", timing=timing, seed=seed)
-        self.plc = Plc(image_of(dedent(made)), CYCLE_NS)
+        self.plc = Plc(image_of(dedent(text or made)), CYCLE_NS)
         self.plc.attach(self.unit, self.network)
+        for name, value in () if text else values.items():
+            self.set(name, value)
+        for place, name in enumerate(order):
+            self.set(f"Order[{place}]", ["conn", *blocks].index(name))
 
     # --- running ------------------------------------------------------------------------------------------------------
 
@@ -129,15 +150,15 @@ class Rig:
 
     def words(self, first: int, count: int) -> list[int]:
         """D words."""
-        return list(self.plc.memory.words("D")[first : first + count])
+        return self.plc.memory.words("D")[first : first + count].tolist()
 
-    def fill(self, first: int, words: list[int]) -> None:
-        for offset, word in enumerate(words):
-            self.plc.memory.words("D")[first + offset] = word
+    def fill(self, first: int, words: Iterable[int]) -> None:
+        data = array("H", words)
+        self.plc.memory.words("D")[first : first + len(data)] = memoryview(data)
 
     def all_words(self) -> list[int]:
         """All D words, those of the unit and of the blocks as 0."""
-        words = list(self.plc.memory.words("D"))
+        words = self.plc.memory.words("D").tolist()
         for area in OWN:
             words[area.start : area.stop] = [0] * len(area)
         return words

@@ -25,6 +25,7 @@ from fbvm.wire.modbus import Adu
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 SERVER = Peer("192.168.250.1", 502)
+TIMINGS = pytest.mark.parametrize("timing", ["exact", pytest.param("real", marks=pytest.mark.slow)])
 TEXT = """
 PROGRAM Main
 VAR
@@ -230,8 +231,10 @@ def recovers(rig: Rig) -> None:
     raise AssertionError("it does not recover")
 
 
-@pytest.mark.parametrize("timing", ["exact", "real"])
-@pytest.mark.parametrize("misdeed", MISDEEDS)
+@TIMINGS
+@pytest.mark.parametrize(
+    "misdeed", [pytest.param(name, marks=[pytest.mark.slow] * ("flood" in name)) for name in MISDEEDS]
+)
 def test_a_server_that_misbehaves(misdeed: str, timing: str) -> None:
     """What the PDU of a reply says is the user's to judge; everything around it the block's."""
     rig = Rig(ModbusPeer(None, MISDEEDS[misdeed]), timing=timing).connect()
@@ -246,7 +249,7 @@ def test_a_server_that_misbehaves(misdeed: str, timing: str) -> None:
     recovers(rig)
 
 
-@pytest.mark.parametrize("timing", ["exact", "real"])
+@TIMINGS
 @pytest.mark.parametrize(
     "rude", [pytest.param(name, marks=[pytest.mark.slow] * ("flood" in name)) for name in RUDE_PEERS]
 )
@@ -285,6 +288,7 @@ NAMES_OF_HAPPENINGS = ["ask", "mode", "restart", "silence", "fault", "connect"]
 HAPPENINGS = st.lists(st.tuples(st.sampled_from(NAMES_OF_HAPPENINGS), st.integers(0, 12)), max_size=20)
 
 
+@pytest.mark.slow
 @given(st.sampled_from(["exact", "real"]), st.integers(0, 10**6), HAPPENINGS)
 @settings(max_examples=50, deadline=None)
 def test_any_life(timing: str, seed: int, happenings: list[tuple[str, int]]) -> None:
@@ -331,7 +335,7 @@ def plc_of(source: str | Path, network: LoopNetwork, address: str, timing: str, 
     return plc
 
 
-@pytest.mark.parametrize("timing", ["exact", "real"])
+@TIMINGS
 def test_the_two_programs_of_the_project(timing: str) -> None:
     network = LoopNetwork()
     server = plc_of(EXAMPLES / "server.st", network, "192.168.250.1", timing)
@@ -375,7 +379,7 @@ END_PROGRAM
 """
 
 
-@pytest.mark.parametrize("timing", ["exact", "real"])
+@TIMINGS
 @pytest.mark.parametrize("cut", [0, 7])
 @pytest.mark.parametrize("fn0f", [False, True])
 def test_the_mtcp_etn_blocks_against_the_server_program(timing: str, cut: int, fn0f: bool) -> None:

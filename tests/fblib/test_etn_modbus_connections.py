@@ -24,7 +24,7 @@ from fbvm.wire.modbus import Adu
 
 ECHO = "08 00 00 12 34"
 ECHO_FRAME = Adu(1, 255, bytes.fromhex(ECHO)).to_bytes()
-TIMINGS = pytest.mark.parametrize("timing", ["exact", "real"])
+TIMINGS = pytest.mark.parametrize("timing", ["exact", pytest.param("real", marks=pytest.mark.slow)])
 
 
 NAMES = descriptions(Layout.of(0))
@@ -131,6 +131,7 @@ def test_a_second_client_is_refused_while_the_first_is_there() -> None:
     assert second.ask(ECHO) == ECHO
 
 
+@pytest.mark.slow
 @TIMINGS
 def test_a_client_that_vanishes_is_left_after_the_idle_time(timing: str) -> None:
     rig = Rig(timing=timing)
@@ -152,6 +153,7 @@ def test_a_client_that_asks_now_and_then_is_not_left() -> None:
         assert client.ask(ECHO) == ECHO
 
 
+@pytest.mark.slow
 def test_the_idle_time_may_be_without_end() -> None:
     rig = Rig("Idle_Time := T#0s")
     client = rig.client()
@@ -175,6 +177,7 @@ def test_dripping_bytes_is_not_asking(pins: str) -> None:
     assert rig.client().ask(ECHO) == ECHO
 
 
+@pytest.mark.slow
 def test_a_client_that_does_not_take_its_replies_is_left() -> None:
     rig = Rig()
     deaf = rig.client()
@@ -384,7 +387,7 @@ def test_whatever_the_last_program_left_open(before: str, timing: str) -> None:
 
 
 @pytest.mark.parametrize("code", [0x0302, 0x0105, 0x003E, 0x0049, 0x0081, 0x220F, 0x2210, 0x2211, 0x2606, 0x2607])
-@pytest.mark.parametrize("count", [1, 12])
+@pytest.mark.parametrize("count", [1, pytest.param(12, marks=pytest.mark.slow)])
 def test_any_response_code_of_the_unit(code: int, count: int) -> None:
     """So many requests in a row end with it, from each stage on."""
     for scans in (0, 2, 8):
@@ -425,6 +428,7 @@ OWN_WORDS = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 @TIMINGS
 @pytest.mark.parametrize("pins", ["", "Sockets := 2"])
 def test_a_client_writes_into_the_words_of_the_unit(timing: str, pins: str) -> None:
@@ -478,6 +482,7 @@ def happen(rig: Rig, client: Client, what: str) -> None:
             rig.unit.faults.append(UnitFault(0x2211))
 
 
+@pytest.mark.slow
 @given(st.sampled_from(["exact", "real"]), st.integers(0, 10**6), st.sampled_from(["", ", Sockets := 2"]), HAPPENINGS)
 @settings(max_examples=80, deadline=None)
 def test_any_life(timing: str, seed: int, pins: str, happenings: list[tuple[str, int]]) -> None:

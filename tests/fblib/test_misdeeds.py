@@ -166,7 +166,7 @@ def test_a_wrong_answer(name: str, timing: str) -> None:
         rig.peer.reply = by_script(name)
         ended = command_all(rig, watch, [block])
         assert set(ended.values()) <= EXPECTED.get(name, {"0080"})
-        rig.scan(150)
+        rig.scan(80)
     good_again(rig)
 
 

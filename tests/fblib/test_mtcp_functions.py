@@ -16,11 +16,11 @@ def filled(seed: int, **blocks: str) -> Rig:
     """A connected rig whose server and D words (but those of the unit) hold random values."""
     rig = Rig(**blocks)  # type: ignore[arg-type]
     dice = random.Random(seed)
-    rig.fill(0, [dice.randrange(65536) for _ in range(30000)])
-    rig.server.coils[:4096] = bytes(dice.randrange(2) for _ in range(4096))
-    rig.server.discrete_inputs[:4096] = bytes(dice.randrange(2) for _ in range(4096))
-    rig.server.holding_registers[:2048] = array("H", [dice.randrange(65536) for _ in range(2048)])
-    rig.server.input_registers[:2048] = array("H", [dice.randrange(65536) for _ in range(2048)])
+    rig.fill(0, array("H", dice.randbytes(60000)))
+    rig.server.coils[:4096] = bytes(byte & 1 for byte in dice.randbytes(4096))
+    rig.server.discrete_inputs[:4096] = bytes(byte & 1 for byte in dice.randbytes(4096))
+    rig.server.holding_registers[:2048] = array("H", dice.randbytes(4096))
+    rig.server.input_registers[:2048] = array("H", dice.randbytes(4096))
     return rig.connect()
 
 

@@ -58,8 +58,9 @@ def test_two_commands_in_one_scan() -> None:
 @pytest.mark.parametrize("connect_last", [False, True])
 @pytest.mark.parametrize("order", [1, -1])
 def test_any_order_of_calls(order: int, connect_last: bool) -> None:
-    blocks = dict(list(ALL.items())[::order])
-    rig = Rig(connect_last=connect_last, **blocks).connect()  # type: ignore[arg-type]
+    names = list(ALL)[::order]
+    names.insert(len(names) if connect_last else 0, "conn")
+    rig = Rig(order=names, **ALL).connect()  # type: ignore[arg-type]
     server = rig.server
     server.coils[16:32] = bytes(n % 3 == 0 for n in range(16))
     server.discrete_inputs[32:48] = bytes(n % 5 == 0 for n in range(16))
@@ -79,12 +80,12 @@ def test_any_order_of_calls(order: int, connect_last: bool) -> None:
 def test_nobody_is_overtaken() -> None:
     """All blocks command again as soon as they have ended: each gets as many turns as the others."""
     rig = Rig(**ALL).connect()  # type: ignore[arg-type]
-    for _ in range(2000):
+    for _ in range(800):
         for name in ALL:
             rig.set(f"{name}_Cmd", rig.get(f"{name}.Exchange.State") == 0 and not rig.get(f"{name}_Cmd"))
         rig.scan()
     served = [rig.result(name)[0] for name in ALL]
-    assert min(served) >= 40
+    assert min(served) >= 16
     assert max(served) - min(served) <= 1
 
 
@@ -192,7 +193,7 @@ def test_blocks_in_tasks_of_different_intervals(slow: int) -> None:
     plc = rig.plc
     plc.run(until="conn.ENO", max_ns=10**9)
     served, quiet = 0, 0
-    for _ in range(3000):
+    for _ in range(1500):
         plc.write("a_Cmd", not plc.read("a_Cmd"))
         quiet = 0 if plc.read("b.Rcv_Counter") == served else quiet + 1
         if quiet > slow // 10:
@@ -200,5 +201,5 @@ def test_blocks_in_tasks_of_different_intervals(slow: int) -> None:
         plc.write("b_Cmd", plc.read("b.Rcv_Counter") == served)
         assert plc.scan() is None
         assert plc.read("b.Error_Code") == 0
-    assert served > 3000 // (6 * (slow // 10) + 12)
+    assert served > 1500 // (6 * (slow // 10) + 12)
     assert plc.read("a.Rcv_Counter") > 0  # type: ignore[operator]
