@@ -21,7 +21,7 @@ from fbvm.engine.trap import Trap
 from fbvm.flags import Flags
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
-from fbvm.scan_times import ScanTimes
+from fbvm.scan_times import Lateness, ScanTimes
 from fbvm.schedule import Schedule, hurried
 from fbvm.units.unit import Unit
 from fbvm.watch import places
@@ -132,8 +132,10 @@ class Plc:
         self.scans = 0
         self.warnings = tuple(hurried(image.tasks, cycle_ns))
         """What the program asks and this PLC does not do, for people: tasks that want to be quicker than the cycle."""
-        self.scan_times = ScanTimes()
+        self.scan_times = ScanTimes(cycle_ns)
         """How long scans took, where somebody with a clock measured it (`fbvm.run`)."""
+        self.lateness = Lateness()
+        """How late they began, where time is real."""
         self.trap: Trap | None = None
         self._mode = Mode.RUN
         self._first = True
@@ -164,7 +166,8 @@ class Plc:
             self.trap = self._execute()
             if self.halted:
                 return None
-            self._apply_forces()
+            if self._forces:
+                self._apply_forces()
             self._over(Phase.PROGRAM)
         self._end()
         return self.trap
@@ -176,7 +179,8 @@ class Plc:
             self._journal.before(self.scans, now_ns, self.budget, self.forces)
         self._oversee(now_ns)
         if self._mode is Mode.RUN:
-            self._apply_forces()
+            if self._forces:
+                self._apply_forces()
             self._over(Phase.INPUTS)
             self._due.extend(self._schedule.due(now_ns))
 

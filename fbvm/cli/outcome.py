@@ -56,6 +56,8 @@ class Outcome:
             click.echo(f"{text} = {shown(place, self.plc.read(place))}")
         if self.scan_time:
             click.echo(str(self.plc.scan_times), err=True)
+            if self.plc.lateness.count:
+                click.echo(str(self.plc.lateness), err=True)
         if self.plc.trap:
             click.secho(str(self.plc.trap), fg="red", err=True)
         elif self.reason == "max":
@@ -75,7 +77,7 @@ class Outcome:
                 "code": trap.code, "file": site.file, "pou": site.pou, "line": site.line, "column": site.column,
                 "message": trap.message,
             },
-            **({"scan_time": plc.scan_times.as_dict()} if self.scan_time else {}),
+            **({"scan_time": plc.scan_times.as_dict(), "lateness": plc.lateness.as_dict()} if self.scan_time else {}),
         }  # fmt: skip
 
 

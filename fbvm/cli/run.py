@@ -28,7 +28,7 @@ from fbvm.record.pcapng import Capture
 from fbvm.record.recorder import Recorder
 from fbvm.record.trace_writer import Depth
 from fbvm.run import loop
-from fbvm.run.loop import TimedWrite
+from fbvm.run.running import EVENT, PACES, TimedWrite
 from fbvm.units.etn21 import Etn21
 from fbvm.watch.paths import Place
 from fbvm.watch.values import parse_value, split_list
@@ -57,7 +57,7 @@ UNIT_ADDRESS = "192.168.250.21"
               help="loop: in memory, virtual time.  tcp: real connections, real time.")
 @click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=HOST:PORT|peer",
               help="Where an endpoint that the program names really is.")
-@click.option("--pace", type=click.Choice([loop.CYCLIC, loop.EVENT]), default=loop.CYCLIC, show_default=True,
+@click.option("--pace", type=click.Choice(PACES), default=PACES[0], show_default=True,
               help="With tcp: keep the cycle, or scan again at once when something arrived.")
 @click.option("--pcap", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Write what passed the network, for Wireshark.")
@@ -75,7 +75,7 @@ UNIT_ADDRESS = "192.168.250.21"
               help="auto: Python first, machine code when that pays.")
 @click.option("--seed", type=int, default=0, metavar="N", help="What chance begins with: the same again with the same N.")
 @click.option("--scan-time", is_flag=True,
-              help="Say how long scans took; a run over tcp on a terminal does so by itself.")
+              help="Say how long scans took and how late they began; a run over tcp on a terminal does so by itself.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int, as_json: bool,
@@ -211,5 +211,5 @@ def _check_usage(
             raise click.UsageError(f"--map {row.said}={row.host}:{row.port} leaves memory: add --net tcp")
         if net == "tcp" and row.host is None:
             raise click.UsageError(f"--map {row.said}=peer is in memory: leave out --net tcp, or use `fbvm peer`")
-    if pace == loop.EVENT and net == "loop":
+    if pace == EVENT and net == "loop":
         raise click.UsageError("--pace event is for real time: add --net tcp")

@@ -24,6 +24,7 @@ from fbvm.plc import Plc
 from fbvm.record import images
 from fbvm.record.requests import RequestLog
 from fbvm.run import loop
+from fbvm.run.running import EVENT
 from fbvm.units.etn21 import Etn21
 from fbvm.wire.link import Peer
 
@@ -70,7 +71,7 @@ def command(
         plc.attach(Etn21(0, UNIT_ADDRESS), network)
         reason = _start(plc, network)
         while reason != "trap" and not signals.end:
-            reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=loop.EVENT)
+            reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=EVENT)
             signals.save = False
             _save(plc, image)
     if plc.trap:
@@ -116,9 +117,9 @@ def _network(bind: str, port: int) -> TcpNetwork:
 def _start(plc: Plc, network: TcpNetwork) -> str:
     """Runs until the unit listens and says so; what else ended it if it does not get there."""
     opening, failed = plc.find("CIO 1509.00"), plc.find("Main.Server.Error_Code")
-    reason = loop.run(plc, until=lambda _: bool(plc.read(opening)), max_ns=START_LIMIT_NS, pace=loop.EVENT)
+    reason = loop.run(plc, until=lambda _: bool(plc.read(opening)), max_ns=START_LIMIT_NS, pace=EVENT)
     if reason == "until":
-        reason = loop.run(plc, scans=SCANS_OF_AN_OPEN, pace=loop.EVENT)
+        reason = loop.run(plc, scans=SCANS_OF_AN_OPEN, pace=EVENT)
     real = network.host_endpoint(ENDPOINT)
     if reason == "max" or plc.read(failed):
         _unusable(real, f"response code {plc.read(failed):04X}")

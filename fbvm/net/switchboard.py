@@ -53,6 +53,9 @@ class HasFileno(Protocol):
 class Watcher(ABC):
     """Somebody who is told when the host is ready, and who can let go of what the host lent."""
 
+    link: ChannelLink
+    """Whose it is."""
+
     @abstractmethod
     def ready(self, ready: int, now_ns: int) -> None:
         """The host is ready for what was wanted (READ, WRITE)."""
@@ -93,14 +96,17 @@ class Switchboard(ABC):
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
         """Where on the host a unit's own endpoint is."""
 
-    def wait(self, timeout_s: float) -> bool:
-        """Sleep until a connection wants attention or the time is over; True if there is something to fetch."""
-        if self.closed or any(link.told for link in self.links.values()):
-            return True
+    def wait(self, timeout_s: float) -> list[ChannelLink]:
+        """Sleep until a connection wants attention or the time is over; the links that have something to fetch."""
+        told = [link for link in self.links.values() if link.told]
+        if self.closed or told:
+            return told
         timeout_s = max(timeout_s, 0.0)
-        if self._number is not None:
-            return bool(select.select([self._number], [], [], timeout_s)[0])
-        return bool(self._selector.select(timeout_s))
+        if self._number is None:
+            return [key.data.link for key, _ in self._selector.select(timeout_s)]
+        if select.select([self._number], [], [], timeout_s)[0]:
+            return [key.data.link for key, _ in self._selector.select(0)]
+        return []
 
     def serve(self, now_ns: int) -> None:
         """Do everything that the host is ready for."""

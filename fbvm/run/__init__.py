@@ -1,5 +1,6 @@
 """Running PLCs by the clock of the host: the only room that knows what time it really is."""
 
-from fbvm.run.loop import TimedWrite, run
+from fbvm.run.loop import run, run_all
+from fbvm.run.running import Running, TimedWrite
 
-__all__ = ["TimedWrite", "run"]
+__all__ = ["Running", "TimedWrite", "run", "run_all"]

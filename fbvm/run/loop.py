@@ -1,30 +1,21 @@
-"""The loop that runs a PLC: scan, wait for the next period, scan again; in virtual time without waiting.
+"""The loop that runs PLCs: scan the one that is due, wait for the next; in virtual time without waiting.
 
-Time is real as soon as one attached network is real.  One thread, no sleep longer than to the next scan.
+Time is real as soon as one attached network is real.  One thread, one selector, no sleep longer than to the next scan.
 """
 
 from __future__ import annotations
 
+import heapq
 import time
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from typing import Protocol
 
-from fbvm.goal import Goal
 from fbvm.plc import Plc
-from fbvm.watch.paths import Place, Span
+from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
+from fbvm.wire.link import Link
 
 PROGRESS_NS = 100_000_000
 """How often progress is told, at most."""
-CYCLIC, EVENT = "cyclic", "event"
-
-
-@dataclass(frozen=True)
-class TimedWrite:
-    """A value to be written once, before the first scan at or after `at_ns`."""
-
-    where: Place | Span
-    value: object
-    at_ns: int = 0
 
 
 def run(
@@ -41,73 +32,134 @@ def run(
     """Runs until the first of the bounds, as `Plc.run` has them; returns its name, or "interrupted" after Ctrl-C.
 
     `pace` "cyclic" keeps the period of the PLC; "event" (real time only) scans again at once when a unit or its network
-    changed something, and at the latest when the period ends.  `progress` is called now and then, not in each scan.  How
-    long scans took is in `plc.scan_times`."""
-    if pace not in (CYCLIC, EVENT):
-        raise ValueError(f"pace is {CYCLIC} or {EVENT}, not {pace!r}")
-    goal = Goal(plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
-    networks = {id(unit.network): unit.network for unit in plc.units if not unit.network.virtual_time}
-    clock = _Real(plc, list(networks.values()), pace) if networks else _Virtual(plc)
-    waiting = sorted(writes, key=lambda write: write.at_ns)
+    has news, else when a timer ends, and at the latest when the period ends.  `progress` is called now and then, not in
+    each scan.  How long scans took is in `plc.scan_times`, how late they began in `plc.lateness`."""
+    running = Running(plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes, pace=pace)
+    run_all([running], (lambda: progress(plc)) if progress else None)
+    return running.reason
+
+
+def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None) -> None:
+    """Runs several PLCs side by side, each until its own end; the `reason` of each says what that was.
+
+    They share one time: real if a network of any of them is, so that a network may have units of several PLCs."""
+    networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
+    if not networks:  # nothing happens between two periods of virtual time
+        for run in runs:
+            run.pace = CYCLIC
+    clock = _Real(list(networks.values()), runs) if networks else _Virtual()
+    queue = _Queue(runs)
     told_ns = time.monotonic_ns()
     try:
-        while not (reason := goal.reached()):
-            now_ns = clock.next_scan_ns()
-            while waiting and waiting[0].at_ns <= now_ns:
-                write = waiting.pop(0)
-                plc.write(write.where, write.value)
-            began_ns = time.monotonic_ns()
-            plc.scan(now_ns)
-            if plc.halted:
-                continue
-            plc.scan_times.note(plc.scans - 1, time.monotonic_ns() - began_ns, plc.cycle_ns)
+        while (due_ns := queue.next_ns()) is not None:
+            now_ns = clock.reach(due_ns)
+            for number in clock.woken:
+                queue.hasten(number, now_ns)
+            _scan_all(queue, now_ns, clock.real)
             if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
                 told_ns = time.monotonic_ns()
-                progress(plc)
+                progress()
     except KeyboardInterrupt:
-        return "interrupted"
-    return reason
+        for run in runs:
+            run.reason = run.reason or "interrupted"
+
+
+def _scan_all(queue: _Queue, now_ns: int, real: bool) -> None:
+    """One scan of everybody whose time has come, with the same time for all."""
+    first_ns = began_ns = time.monotonic_ns()
+    for run in queue.due(now_ns):
+        plc, scan, due_ns = run.plc, run.plc.scans, run.due_ns
+        run.scan(now_ns)
+        if plc.scans > scan:
+            ended_ns = time.monotonic_ns()
+            plc.scan_times.note(scan, ended_ns - began_ns)
+            if real and run.pace == CYCLIC:
+                plc.lateness.note(scan, now_ns - due_ns + began_ns - first_ns)
+            began_ns = ended_ns
+
+
+class _Queue:
+    """Who scans when."""
+
+    def __init__(self, runs: Sequence[Running]) -> None:
+        self._runs = runs
+        self._rows = [(run.due_ns, number) for number, run in enumerate(runs) if not run.reason]
+        self._queued = {number: due_ns for due_ns, number in self._rows}
+        """The row of each that counts; others of its number are out of date."""
+
+    def next_ns(self) -> int | None:
+        """When somebody is due; None if all have ended."""
+        while self._rows and self._queued.get(self._rows[0][1]) != self._rows[0][0]:
+            heapq.heappop(self._rows)
+        return self._rows[0][0] if self._rows else None
+
+    def hasten(self, number: int, now_ns: int) -> None:
+        """Let one be due already now."""
+        if self._queued.get(number, now_ns) > now_ns:
+            self._runs[number].due_ns = now_ns
+            self._put(number, now_ns)
+
+    def due(self, now_ns: int) -> Iterator[Running]:
+        """Takes out those that are due, each once; when the caller has scanned it, it is put back."""
+        taken = []
+        while (next_ns := self.next_ns()) is not None and next_ns <= now_ns:
+            number = heapq.heappop(self._rows)[1]
+            del self._queued[number]
+            taken.append(number)
+        for number in taken:
+            run = self._runs[number]
+            yield run
+            if not run.reason:
+                self._put(number, run.due_ns)
+
+    def _put(self, number: int, due_ns: int) -> None:
+        self._queued[number] = due_ns
+        heapq.heappush(self._rows, (due_ns, number))
+
+
+class _Clock(Protocol):
+    """The time of the loop, which begins with 0."""
+
+    real: bool
+    woken: Sequence[int]
+    """Numbers of the runs that have news before their time."""
+
+    def reach(self, due_ns: int) -> int:
+        """Waits until then, or until somebody is woken; the time."""
 
 
 class _Virtual:
-    """Time that a scan moves."""
+    """Time that goes where the next scan is."""
 
-    def __init__(self, plc: Plc) -> None:
-        self._plc = plc
+    real = False
+    woken: Sequence[int] = ()
 
-    def next_scan_ns(self) -> int:
-        return self._plc.elapsed_ns
+    def reach(self, due_ns: int) -> int:
+        return due_ns
 
 
 class _Real:
-    """The host's time, counted on from where the PLC's time stands."""
+    """The host's time."""
 
-    def __init__(self, plc: Plc, networks: Sequence[object], pace: str) -> None:
-        self._plc = plc
-        self._waits = [wait for network in networks if (wait := getattr(network, "wait", None))]
-        self._pace = pace
-        self._zero_ns = time.monotonic_ns() - plc.elapsed_ns
-        self._planned_ns = plc.elapsed_ns
+    real = True
 
-    def next_scan_ns(self) -> int:
-        """Waits until the next scan is to begin; its time.  A period that was overrun is not made up for."""
-        if self._pace == EVENT and len(self._waits) == 1:
-            self._wait_for_events(self._waits[0])
-        else:
-            while (left_ns := self._planned_ns - self._now_ns()) > 0:
+    def __init__(self, networks: Sequence[object], runs: Sequence[Running]) -> None:
+        self.woken: Sequence[int] = ()
+        waits: list[Callable[[float], Collection[Link]]] = [
+            wait for network in networks if (wait := getattr(network, "wait", None))]  # fmt: skip
+        self._numbers = {id(unit.link): number for number, run in enumerate(runs) if run.pace == EVENT
+                         for unit in run.plc.units}  # fmt: skip
+        self._wait = waits[0] if len(waits) == 1 and self._numbers else None
+        self._zero_ns = time.monotonic_ns()
+
+    def reach(self, due_ns: int) -> int:
+        self.woken = ()
+        while (left_ns := due_ns - (time.monotonic_ns() - self._zero_ns)) > 0:
+            if self._wait is None:
                 time.sleep(left_ns / 1e9)
-        now_ns = max(self._now_ns(), self._plc.now_ns)
-        self._planned_ns += self._plc.cycle_ns
-        if self._pace == EVENT or self._planned_ns <= now_ns:
-            self._planned_ns = now_ns + self._plc.cycle_ns
-        return now_ns
-
-    def _wait_for_events(self, wait: Callable[[float], bool]) -> None:
-        due_ns = self._plc.due_ns
-        if due_ns > self._plc.now_ns:
-            wait((min(due_ns, self._planned_ns) - self._now_ns()) / 1e9)
-
-    def _now_ns(self) -> int:
+            elif woken := self._wait(left_ns / 1e9):
+                self.woken = [self._numbers[id(link)] for link in woken if id(link) in self._numbers]
+                break
         return time.monotonic_ns() - self._zero_ns
 
 

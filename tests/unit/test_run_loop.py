@@ -11,7 +11,7 @@ import pytest
 from images import counter_image, task
 
 from fbvm.plc import Plc
-from fbvm.run import TimedWrite, loop, run
+from fbvm.run import Running, TimedWrite, loop, run, run_all
 from fbvm.units.unit import AreaMemory
 from fbvm.wire.link import Event, Link, Request
 
@@ -43,17 +43,22 @@ class RealNetwork:
     def __init__(self, clock: Clock, *happenings_ms: int) -> None:
         self.clock = clock
         self.waits_ms: list[float] = []
+        self._attached = False
         self._happenings_ns = [clock.now_ns + at_ms * MS for at_ms in happenings_ms]
 
     def attach(self, address: str) -> Link:
-        return self
+        """The first unit's link is the network itself, to which everything happens."""
+        if not self._attached:
+            self._attached = True
+            return self
+        return RealNetwork(self.clock)
 
-    def wait(self, timeout_s: float) -> bool:
+    def wait(self, timeout_s: float) -> list[Link]:
         self.waits_ms.append(round(timeout_s * 1e3))
         until_ns = self.clock.now_ns + max(0, round(timeout_s * 1e9))
         early = self._happenings_ns.pop(0) if self._happenings_ns and self._happenings_ns[0] < until_ns else None
         self.clock.now_ns = max(self.clock.now_ns, until_ns if early is None else early)
-        return early is not None
+        return [] if early is None else [self]
 
     def events(self, now_ns: int) -> list[Event]:
         return []
@@ -176,3 +181,61 @@ def test_event_pace_wakes_for_a_tasks_interval(clock: Clock) -> None:
     plc, network = Plc(counter_image(task("fast", interval_ns=4 * MS))), RealNetwork(clock)
     plc.attach(Idle(), network)
     assert scan_times_ms(plc, scans=4, pace="event") == [0, 4, 8, 12]
+
+
+def test_event_pace_sleeps_until_a_unit_has_work(clock: Clock) -> None:
+    plc, network = real_plc(clock)
+    unit = plc.units[0].unit
+    plc.watchers.append(lambda plc: setattr(unit, "wake_ns", [0, 7 * MS, 1 << 63][min(plc.scans - 1, 2)]))
+    assert scan_times_ms(plc, scans=4, pace="event") == [0, 0, 7, 17]
+    assert network.waits_ms == [7, 10]
+
+
+def test_how_late_scans_begin_is_measured(clock: Clock) -> None:
+    plc, _ = real_plc(clock)
+
+    def long(plc: Plc) -> None:
+        clock.now_ns += 25 * MS if plc.scans == 2 else MS
+
+    plc.watchers.append(long)
+    run(plc, scans=5)
+    assert (plc.scan_times.count, plc.scan_times.overruns) == (5, 1)
+    assert (plc.lateness.count, plc.lateness.missed, plc.lateness.longest_scan) == (5, 1, 2)
+    assert 14 * MS < plc.lateness.longest_ns < 16 * MS
+
+
+# --- several PLCs -----------------------------------------------------------------------------------------------------
+
+
+def test_plcs_take_turns_by_their_cycles() -> None:
+    scans: list[tuple[str, int]] = []
+    runs = []
+    for name, cycle_ms in (("a", 10), ("b", 4)):
+        plc = Plc(counter_image(), cycle_ms * MS)
+        plc.watchers.append(lambda plc, name=name: scans.append((name, plc.now_ns // MS)))  # type: ignore[misc]
+        runs.append(Running(plc, for_ns=20 * MS))
+    run_all(runs)
+    assert scans == [("a", 0), ("b", 0), ("b", 4), ("b", 8), ("a", 10), ("b", 12), ("b", 16)]
+    assert [run.reason for run in runs] == ["time", "time"]
+
+
+def test_each_plc_has_its_own_end() -> None:
+    plcs = [Plc(counter_image()) for _ in range(3)]
+    runs = [Running(plcs[0], scans=2), Running(plcs[1], until="Main.n >= 5"), Running(plcs[2], until="Main.n > 9", max_ns=MS)]
+    run_all(runs)
+    assert [(run.reason, run.plc.scans) for run in runs] == [("scans", 2), ("until", 5), ("max", 1)]
+
+
+def test_news_wake_only_whose_they_are(clock: Clock) -> None:
+    scans: list[tuple[str, int]] = []
+    network, runs = RealNetwork(clock, 3, 4), []
+    for name in ("with", "without", "cyclic"):
+        plc = Plc(counter_image())
+        unit = Idle()
+        plc.attach(unit, network)
+        plc.watchers.append(lambda plc, name=name: scans.append((name, plc.now_ns // MS)))  # type: ignore[misc]
+        runs.append(Running(plc, scans=3, pace="cyclic" if name == "cyclic" else "event"))
+    run_all(runs)
+    assert scans[3:5] == [("with", 3), ("with", 4)]
+    for other in ("without", "cyclic"):
+        assert [at_ms for name, at_ms in scans if name == other] == [0, 10, 20]

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from fbvm.scan_times import ScanTimes
+from fbvm.scan_times import Lateness, ScanTimes
 
 
 def test_nothing_measured() -> None:
-    assert str(ScanTimes()) == "no scan was measured"
-    assert set(ScanTimes().as_dict().values()) == {0}
+    assert str(ScanTimes(1)) == "no scan was measured"
+    assert str(Lateness()) == "no period was measured"
+    assert {*ScanTimes(1).as_dict().values(), *Lateness().as_dict().values()} == {0}
 
 
 def test_a_hundred_scans() -> None:
-    times = ScanTimes()
+    times = ScanTimes(10_000_000)
     for scan in range(100):
-        times.note(scan, 12_000_000 if scan == 70 else 100_000 + scan, 10_000_000)
+        times.note(scan, 12_000_000 if scan == 70 else 100_000 + scan)
     assert (times.count, times.longest_ns, times.longest_scan, times.overruns) == (100, 12_000_000, 70, 1)
     assert times.mean_ns == (12_000_000 + sum(100_000 + scan for scan in range(100) if scan != 70)) // 100
     assert str(times) == (
@@ -24,8 +25,31 @@ def test_a_hundred_scans() -> None:
 
 
 def test_a_share_is_true_to_three_percent() -> None:
-    times = ScanTimes()
+    times = ScanTimes(10_000_000)
     for duration_ns in range(1, 20_001):
-        times.note(duration_ns, duration_ns, 10**9)
+        times.note(duration_ns, duration_ns)
     for share in (0.1, 0.5, 0.9, 0.99):
         assert share * 20_000 <= times.within_ns(share) <= share * 20_000 * 1.033
+
+
+def test_how_late_scans_began() -> None:
+    late = Lateness()
+    for scan in range(50):
+        late.note(scan, 50_000 + 1_000_000 * (scan == 7))
+    late.missed = 3
+    assert str(late) == (
+        "scans began late by 0.07 ms on average, 99 % within 1.05 ms, at most 1.05 ms (scan 7); 3 periods missed"
+    )
+    assert late.as_dict()["missed_periods"] == 3
+
+
+def test_many_plcs_are_one_measure() -> None:
+    all_of_them, one, other = ScanTimes(100), ScanTimes(100), ScanTimes(100)
+    one.note(0, 10)
+    other.note(0, 30)
+    other.note(1, 500)
+    all_of_them.add(one)
+    all_of_them.add(other)
+    assert (all_of_them.count, all_of_them.mean_ns, all_of_them.longest_ns, all_of_them.longest_scan) == (3, 180, 500, 1)
+    assert all_of_them.overruns == 1
+    assert all_of_them.within_ns(0.6) == 30

@@ -1,0 +1,72 @@
+"""One PLC on its run: what ends it, what is written into it and when, and when it scans next.
+
+Knows no clock: the loop tells the time and asks for the next one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from fbvm.goal import Goal
+from fbvm.plc import Plc
+from fbvm.watch.paths import Place, Span
+
+CYCLIC, EVENT = "cyclic", "event"
+PACES = (CYCLIC, EVENT)
+"""cyclic: a fixed period.  event: at once when there is something new to see, else at the earliest time that matters."""
+
+
+@dataclass(frozen=True)
+class TimedWrite:
+    """A value to be written once, before the first scan at or after `at_ns`."""
+
+    where: Place | Span
+    value: object
+    at_ns: int = 0
+
+
+class Running:
+    """A PLC and the bounds of its run, which are those of `Plc.run`.  Raises ValueError for ones that make no sense.
+
+    Times are of the loop, which begin with 0 when it does."""
+
+    def __init__(
+        self,
+        plc: Plc,
+        *,
+        scans: int | None = None,
+        for_ns: int | None = None,
+        until: str | Callable[[Plc], bool] | None = None,
+        max_ns: int | None = None,
+        writes: Iterable[TimedWrite] = (),
+        pace: str = CYCLIC,
+    ) -> None:
+        if pace not in PACES:
+            raise ValueError(f"pace is {CYCLIC} or {EVENT}, not {pace!r}")
+        self.plc = plc
+        self.pace = pace
+        self._goal = Goal(plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
+        self.reason = self._goal.reached()
+        """What ended the run, by the names of `Plc.run`; "" while it goes on."""
+        self.due_ns = 0
+        """When the next scan is to begin."""
+        self._ahead_ns = plc.elapsed_ns
+        self._writes = sorted(writes, key=lambda write: write.at_ns)
+
+    def scan(self, now_ns: int) -> None:
+        """One scan at this time, and the plan for the next.  A period that was overrun is not made up for."""
+        plc, told_ns = self.plc, max(now_ns + self._ahead_ns, self.plc.now_ns)
+        while self._writes and self._writes[0].at_ns <= told_ns:
+            write = self._writes.pop(0)
+            plc.write(write.where, write.value)
+        plc.scan(told_ns)
+        self.reason = self._goal.reached()
+        if plc.halted:
+            return
+        if self.pace == EVENT:
+            self.due_ns = max(now_ns, min(now_ns + plc.cycle_ns, plc.due_ns - self._ahead_ns))
+        elif now_ns < self.due_ns + plc.cycle_ns:
+            self.due_ns += plc.cycle_ns
+        else:
+            plc.lateness.missed += (now_ns - self.due_ns) // plc.cycle_ns
+            self.due_ns = now_ns + plc.cycle_ns
