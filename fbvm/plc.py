@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
@@ -15,7 +14,7 @@ from enum import Enum
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
 from fbvm.base.memory import Memory, Snapshot
 from fbvm.breakpoints import Breakpoints, Halt
-from fbvm.code.image import Image
+from fbvm.code.image import Image, fingerprint
 from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
 from fbvm.flags import Flags
@@ -54,21 +53,6 @@ class Stopped(RuntimeError):
     def __init__(self, trap: Trap) -> None:
         super().__init__(f"the PLC has stopped: {trap.message}")
         self.trap = trap
-
-
-def fingerprint(image: Image) -> str:
-    """A number in hexadecimal that another program, or the same in another layout, does not have."""
-    said = hashlib.sha256()
-    bodies = tuple((body.name, body.code, body.instance_size) for body in image.bodies)
-    left: list[object] = [(image.layout, image.tasks, image.initial, image.retained, bodies)]
-    while left:  # code may be nested deeper than the host recurses
-        item = left.pop()
-        if isinstance(item, tuple):
-            said.update(b"(%d" % len(item))
-            left += item
-        else:
-            said.update(repr(item).encode())
-    return said.hexdigest()[:32]
 
 
 @dataclass(frozen=True)

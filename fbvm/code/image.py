@@ -5,6 +5,7 @@ All code is plain data (see `operations`).  Names of sources stand in `sites`' t
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field, replace
 
 from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, Area, Mailbox, e_bank
@@ -114,3 +115,18 @@ class Image:
     sites: tuple[Site, ...]
     types: dict[str, Type] = field(default_factory=dict)
     """Derived types and blocks by folded name."""
+
+
+def fingerprint(image: Image) -> str:
+    """A number in hexadecimal that another program, or the same in another layout, does not have."""
+    said = hashlib.sha256()
+    bodies = tuple((body.name, body.code, body.instance_size) for body in image.bodies)
+    left: list[object] = [(image.layout, image.tasks, image.initial, image.retained, bodies)]
+    while left:  # code may be nested deeper than the host recurses
+        item = left.pop()
+        if isinstance(item, tuple):
+            said.update(b"(%d" % len(item))
+            left += item
+        else:
+            said.update(repr(item).encode())
+    return said.hexdigest()[:32]

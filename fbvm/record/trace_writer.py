@@ -11,8 +11,8 @@ from enum import Enum
 from typing import Any, BinaryIO
 
 from fbvm.base.areas import AREAS
-from fbvm.code.image import Image
-from fbvm.plc import Phase, Plc, fingerprint
+from fbvm.code.image import Image, fingerprint
+from fbvm.plc import Phase, Plc
 from fbvm.record import symbols
 from fbvm.record.history import looking
 from fbvm.record.inside import Began, Contact, Ended, Event, Frame, Read, Statement, Write

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from fbvm.code.image import Image
+from fbvm.code.image import Image, fingerprint
 from fbvm.goal import Goal
 from fbvm.net.journal import Act, End, Entry, Fingerprint, Header, JournalError, Scan
-from fbvm.plc import Mode, Plc, Stopped, fingerprint
+from fbvm.plc import Mode, Plc, Stopped
 from fbvm.units.etn21 import Etn21
 from fbvm.units.unit import Unit
 from fbvm.wire.link import Event, Request
