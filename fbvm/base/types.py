@@ -137,9 +137,10 @@ class SubrangeType(Type):
 
 @dataclass(frozen=True)
 class RefType(Type):
-    """REF_TO target; `target` None is the type of NULL."""
+    """REF_TO target, or POINTER TO target, which `moves` by arithmetic; `target` None is the type of NULL."""
 
     target: Type | None
+    moves: bool = False
 
 
 _PARENTS = {
@@ -205,6 +206,11 @@ def reference(target: Type) -> RefType:
 def character(kind: StringType) -> Elementary:
     """The type of one character of a string."""
     return ELEMENTARY["WCHAR" if kind.wide else "CHAR"]
+
+
+def pointer(target: Type) -> RefType:
+    """POINTER TO target."""
+    return RefType(f"POINTER TO {target.name}", 8, 8, target, True)
 
 
 @cache
@@ -280,7 +286,7 @@ def converts(source: Type, target: Type) -> bool:
     if isinstance(target, StringType):
         return source is character(target)
     if isinstance(source, RefType) and isinstance(target, RefType):
-        return source.target is None or source.target == target.target
+        return source.target is None or source.target == target.target or source.moves and target.moves
     return isinstance(source, Elementary) and target.name in IMPLICIT.get(source.name, ()) \
         and isinstance(target, Elementary)
 

@@ -34,7 +34,6 @@ from fbvm.base.types import (
     fold,
     open_array,
 )
-from fbvm.check.facts import is_block
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -71,13 +70,6 @@ def type_class(kind: Type) -> str:
     if isinstance(kind, Elementary):
         return f"TYPE_{_CLASSES.get(kind.name, kind.name)}"
     return f"TYPE_{_DERIVED[type(kind)]}"
-
-
-def contents_hidden(kind: Type) -> bool:
-    """True for what has no bytes that a program may look at: instances, and what holds them."""
-    if isinstance(kind, ArrayType):
-        return contents_hidden(kind.element)
-    return is_block(kind) or isinstance(kind, StructType) and any(contents_hidden(f.type) for f in kind.fields.values())
 
 
 def is_array(expr: tree.Member) -> bool:

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, StringType, StructType, Type, base, fold
-from fbvm.check.anything import contents_hidden
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
-from fbvm.check.facts import Pou, PouCall, Variable, is_block
+from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
 from fbvm.check.fitting import assignable, holds, same
 from fbvm.check.standard import StandardCalls
 from fbvm.check.writes import note_count, writable
@@ -192,7 +191,7 @@ class Calls:
         if not self.expressions.is_variable(value):
             self.error("S0407", value, f"the in-out {variable.name} needs a variable, not a value")
             return False
-        if isinstance(variable.type, AnyType) and contents_hidden(kind):
+        if isinstance(variable.type, AnyType) and holds_block(kind):
             self.error("S0405", value, f"{variable.name} is {variable.type}, and {kind} is or holds an instance",
                        "pass a variable of it")
             return False

@@ -44,7 +44,7 @@ class Checker:
         self.bodies: list[Pou] = []
         """POUs with checked bodies; their `number` is the position here."""
         self._scope: Pou | None = None
-        self._blocks: dict[str, Pou] = {}
+        self._blocks: dict[int, Pou] = {}
 
     def check(self, program: str | None = None) -> None:
         """Check everything that the user wrote and what it uses of libraries; choose what the tasks run."""
@@ -83,7 +83,7 @@ class Checker:
         return fold(name) in pou.damaged
 
     def block_of(self, kind: StructType) -> Pou:
-        return self._blocks[kind.name]
+        return self._blocks[id(kind)]
 
     def interface(self, pou: Pou, source: Source, node: tree.Node) -> bool:
         """Make the variables and layout of a POU known; False if it holds itself."""
@@ -101,7 +101,7 @@ class Checker:
         pou.resolved = True
         settle(pou.awaited, pou.type)
         if pou.type is not None:
-            self._blocks[pou.type.name] = pou
+            self._blocks[id(pou.type)] = pou
         if pou.source.library:
             self._body(pou)
         return True

@@ -291,7 +291,9 @@ class Expressions:
         if isinstance(whole, AnyType):
             return anything.member(self, expr, whole)
         if not isinstance(whole, StructType):
-            self.error("S0304", expr.of, f"this is {whole} and has no members")
+            self.error("S0304", expr.of, f"this is {whole} and has no members",
+                       f"what it points to has: write {self.text(expr.of)}^.{expr.name.text}"
+                       if isinstance(whole, RefType) and isinstance(whole.target, StructType) else "")
             return None
         member = whole.member(expr.name.text)
         if member is None and whole.block and self.checker.is_damaged(self.checker.block_of(whole), expr.name.text):
@@ -328,9 +330,8 @@ class Expressions:
         return part
 
     def _is_variable(self, expr: tree.Expr) -> bool:
-        while isinstance(expr, tree.Index | tree.Member | tree.Part):
-            expr = expr.of
-        return isinstance(expr, tree.Deref) or expr in self.facts.variables or expr in self.facts.directs
+        expr = self.facts.root(expr)
+        return isinstance(expr, tree.Deref | tree.Index) or expr in self.facts.variables or expr in self.facts.directs
 
     def is_variable(self, expr: tree.Expr) -> bool:
         """True for an expression that names a place in memory."""

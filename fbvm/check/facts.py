@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TypeGuard
 
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.base.types import Elementary, EnumType, Field, RefType, StructType, Type, fold
+from fbvm.base.types import ArrayType, Elementary, EnumType, Field, RefType, StructType, Type, fold
 from fbvm.syntax import tree
 from fbvm.syntax.tree import Node
 
@@ -49,6 +50,9 @@ class Variable:
     location: Address | None = None
     edge: str = ""
     written: bool = False
+    object: int | None = None
+    """Of a variable that something refers to: the number of its object (see code.operations), or of one that every
+    instance has, its position among those.  Known after layout, or when it is referred to."""
 
 
 @dataclass(eq=False)
@@ -86,6 +90,10 @@ class Pou:
     awaited: list[RefType] = field(default_factory=list)
     """References to instances that were met while the POU was being resolved."""
     edges: list[Edge] = field(default_factory=list)
+    referred: list[Variable] = field(default_factory=list)
+    """Variables of an instance that something refers to; each is an object of its own."""
+    leases: list[int] = field(default_factory=list)
+    """Leases that its body holds until it ends."""
 
     @property
     def is_function(self) -> bool:
@@ -138,6 +146,16 @@ class Guard:
     enabled: list[tuple[tree.Expr, bool]] = field(default_factory=list)
 
 
+@dataclass(frozen=True, eq=False)
+class Holder:
+    """What lies around a place that a reference is made to: `expr` is the variable or the address, None where the
+    place lies behind a reference already.  A `lease` ends with the body."""
+
+    expr: tree.Expr | None = None
+    variable: Variable | None = None
+    lease: int | None = None
+
+
 @dataclass
 class Facts:
     """Side tables by node."""
@@ -159,6 +177,21 @@ class Facts:
     text_cases: set[tree.Case] = field(default_factory=set)
     """CASE statements that choose by a STRING."""
     sources: dict[tree.Node, Source] = field(default_factory=dict)
+    holders: dict[tree.Expr, Holder] = field(default_factory=dict)
+    """For each place that a reference is made to, what the reference can be moved in."""
+    leases: dict[Variable, int] = field(default_factory=dict)
+    referred: list[Variable] = field(default_factory=list)
+    """Variables with one place that something refers to."""
+
+    def is_part(self, expr: tree.Expr) -> TypeGuard[tree.Member | tree.Index | tree.Part]:
+        """True for a member, element or bit, which lies in what it is of; not for an element behind a pointer."""
+        return isinstance(expr, tree.Member | tree.Index | tree.Part) and not isinstance(self.types.get(expr.of), RefType)
+
+    def root(self, expr: tree.Expr) -> tree.Expr:
+        """The variable, address, dereference or element behind a pointer that a place begins with."""
+        while self.is_part(expr):
+            expr = expr.of
+        return expr
 
 
 @dataclass
@@ -190,6 +223,13 @@ class Report:
 def is_block(kind: Type) -> bool:
     """True for the type of a function block's or program's instances."""
     return isinstance(kind, StructType) and kind.block
+
+
+def holds_block(kind: Type) -> bool:
+    """True for an instance, and for arrays and structures that hold one."""
+    if isinstance(kind, ArrayType):
+        return holds_block(kind.element)
+    return is_block(kind) or isinstance(kind, StructType) and any(holds_block(f.type) for f in kind.fields.values())
 
 
 def enum_member(kind: EnumType, name: str) -> int | None:

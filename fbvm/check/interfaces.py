@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, AnyType, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold
-from fbvm.check.facts import Edge, Pou, Variable, is_block
+from fbvm.check.facts import Edge, Pou, Variable, holds_block, is_block
 from fbvm.check.names import refuse_reserved
 from fbvm.check.specs import MAX_SIZE
 from fbvm.check.statements import assigns_to
@@ -21,8 +21,8 @@ from fbvm.syntax import tree
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
 
-HEADER_BYTES = 8
-"""Type identifier (32 bits) and 32 bits in reserve at the start of each instance."""
+OBJECTS_AT = 4
+"""Where an instance has the number of the first of its objects: behind its type identifier, 32 bits each."""
 _SECTIONS = {
     "FUNCTION": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL"),
     "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL"),
@@ -172,7 +172,7 @@ class Interfaces:
                             f"{address} is a word and {kind} needs " + ("a bit" if base(kind) == BOOL else "more"),
                             "name a bit, such as CIO 1519.03" if base(kind) == BOOL else "")
             return False
-        if is_block(kind) or _holds_block(kind):
+        if holds_block(kind):
             self.report.add("S0604", source, node, "instances of blocks have no location")
             return False
         self.checker.use_area(address.area)
@@ -333,9 +333,3 @@ def _field(variable: Variable) -> Field:
     """The variable as a member of its block's type; a location is filled in when the layout is known."""
     return Field(variable.name, variable.type, variable.offset, variable.kind, absolute=variable.place == "area",
                  reference=variable.reference, constant=variable.constant)
-
-
-def _holds_block(kind: Type) -> bool:
-    if isinstance(kind, ArrayType):
-        return is_block(kind.element) or _holds_block(kind.element)
-    return isinstance(kind, StructType) and any(is_block(f.type) or _holds_block(f.type) for f in kind.fields.values())

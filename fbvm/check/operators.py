@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import (
     BOOL,
     DATE,
+    DINT,
     DT,
     ELEMENTARY,
     LINT,
     LREAL,
+    NULL,
     REAL,
     TIME,
     TOD,
@@ -100,6 +102,8 @@ class Operators:
         right = self.expressions.as_character(expr.right, left) or right
         if expr.op == "**":
             return self._power(expr, left, right, want)
+        if isinstance(left, RefType) or isinstance(right, RefType):
+            return self._reference(expr)
         timed = self._time(expr, left, right)
         if timed is not None:
             return self._folded(expr, timed, timed)
@@ -112,6 +116,35 @@ class Operators:
                 if side_kind in (UNTYPED_INT, UNTYPED_REAL) and self.expressions.adopt(side, kind) is None:
                     return None
         return self._folded(expr, kind, BOOL if expr.op in COMPARISONS else kind)
+
+    def _reference(self, expr: tree.Binary) -> Type | None:
+        """References are compared; pointers are ordered too, and moved by numbers of bytes."""
+        left, right = (self._beside_reference(expr, side) for side in (expr.left, expr.right))
+        moves = [isinstance(kind, RefType) and kind.moves for kind in (left, right)]
+        refers = isinstance(left, RefType) and isinstance(right, RefType)
+        result: Type | None = None
+        if expr.op in COMPARISONS:
+            same = expr.op in ("=", "<>") and refers and common(left, right) is not None
+            result = BOOL if all(moves) or same else None
+        elif expr.op == "-" and all(moves):
+            result = DINT
+        elif expr.op in ("+", "-") and moves[0] and is_any(right, "ANY_INT", "ANY_BIT"):
+            result = left
+        elif expr.op == "+" and moves[1] and is_any(left, "ANY_INT", "ANY_BIT"):
+            result = right
+        if result is None:
+            self._undefined(expr, left, right)
+            return None
+        self.facts.operands[expr] = NULL
+        return result
+
+    def _beside_reference(self, expr: tree.Binary, side: tree.Expr) -> Type:
+        """The type of an operand of an operator on references; a literal 0 that is compared is NULL."""
+        kind = self.facts.types[side]
+        if kind is UNTYPED_INT:
+            null = expr.op in COMPARISONS and self.facts.constants[side] == 0
+            kind = self.expressions.adopt(side, NULL if null else LINT) or kind
+        return kind
 
     def _operand_type(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
         """The type in which both operands meet."""

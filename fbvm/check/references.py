@@ -1,15 +1,27 @@
 """References: what may be referred to, REF(), ADR(), SIZEOF() and REF= (IEC 61131-3 ed. 3, table 12, and CODESYS's forms).
 
-A reference is bound to a variable that lives as long as the program: never to VAR_TEMP, to variables of functions or to
-what an in-out stands for, which may be gone when the reference is followed.  There is no arithmetic on references.
+REF() refers to a variable that lives as long as the program: never to VAR_TEMP, to variables of functions or to what an
+in-out stands for.  ADR() and REF= refer to these too; following such a pointer after its POU has ended stops the program.
+A pointer is moved in the variable that it was made of, or, in an instance, in its member: that is an object of its own.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import DINT, UDINT, AnyType, ArrayType, OpenArrayType, Type, reference
-from fbvm.check.facts import StandardCall, Variable
+from fbvm.base.types import (
+    DINT,
+    UDINT,
+    AnyType,
+    ArrayType,
+    OpenArrayType,
+    StructType,
+    Type,
+    fold,
+    pointer,
+    reference,
+)
+from fbvm.check.facts import UNTYPED_INT, Holder, StandardCall, Variable
 from fbvm.check.writes import writable
 from fbvm.syntax import tree
 
@@ -19,29 +31,64 @@ if TYPE_CHECKING:
 MAKERS = ("REF", "ADR")
 
 
-def refer(expressions: Expressions, expr: tree.Expr) -> Type | None:
-    """The type of the variable that a reference is made to, or None after a diagnostic."""
+def refer(expressions: Expressions, expr: tree.Expr, lasting: bool) -> Type | None:
+    """The type of the variable that a reference is made to, or None after a diagnostic.
+
+    It has to be `lasting` for REF(), which gives a reference that can be written through."""
     kind = expressions.infer(expr)
     if kind is None:
         return None
     if not expressions.is_variable(expr):
         expressions.error("S0407", expr, "a reference can be made to a variable only, not to a value")
         return None
-    root = root_of(expr)
+    root = expressions.facts.root(expr)
     variable = expressions.facts.variables.get(root)
-    if variable is not None and (reason := _short_lived(variable)):
-        expressions.error("S0407", expr, f"{variable.name} is {reason}, which may end before the reference is followed")
+    if lasting and variable is not None and (reason := _short_lived(variable)):
+        expressions.error("S0407", expr, f"{variable.name} is {reason}, which may end before the reference is followed",
+                          "ADR gives a pointer to it that holds until then")
         return None
-    if not writable(expressions, expr, "be referred to"):
+    if lasting and not writable(expressions, expr, "be referred to"):
         return None
+    if variable is not None:
+        variable.written = True
+    expressions.facts.holders[expr] = _holder(expressions, expr)
     return kind
 
 
-def root_of(expr: tree.Expr) -> tree.Expr:
-    """The variable, address or dereference that a place begins with."""
-    while isinstance(expr, tree.Index | tree.Member | tree.Part):
+def _holder(expressions: Expressions, expr: tree.Expr) -> Holder:
+    """What a reference to this place can be moved in."""
+    facts = expressions.facts
+    while facts.is_part(expr):
+        whole = facts.types[expr.of]
+        if isinstance(expr, tree.Member) and isinstance(whole, StructType) and whole.block:
+            member = expressions.checker.block_of(whole).variables[fold(expr.name.text)]
+            return _held(expressions, expr, member)
         expr = expr.of
-    return expr
+    if isinstance(expr, tree.Direct):
+        return Holder(expr)
+    variable = facts.variables.get(expr)
+    return Holder() if variable is None else _held(expressions, expr, variable)
+
+
+def _held(expressions: Expressions, expr: tree.Expr, variable: Variable) -> Holder:
+    """The holder for a variable, which is an object from now on."""
+    facts = expressions.facts
+    if variable.kind == "VAR_IN_OUT" or variable.place == "frame":
+        number = facts.leases.setdefault(variable, len(facts.leases))
+        assert expressions.pou is not None
+        if number not in expressions.pou.leases:
+            expressions.pou.leases.append(number)
+        return Holder(expr, variable, number)
+    if variable.reference:
+        return Holder()
+    row = facts.referred
+    if variable.place == "self":
+        assert variable.owner is not None
+        row = variable.owner.referred
+    if variable not in row:
+        variable.object = len(row)
+        row.append(variable)
+    return Holder(expr, variable)
 
 
 def _short_lived(variable: Variable) -> str:
@@ -52,12 +99,12 @@ def _short_lived(variable: Variable) -> str:
     return "a variable of a function" if variable.owner is not None and variable.owner.is_function else ""
 
 
-def make(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:
+def make(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr) -> Type | None:
     """REF(x) and ADR(x)."""
-    kind = refer(expressions, value)
+    kind = refer(expressions, value, lasting=name == "REF")
     if kind is None:
         return None
-    made = reference(kind)
+    made = reference(kind) if name == "REF" else pointer(kind)
     expressions.facts.calls[call] = StandardCall("REF", [(value, kind)], (made,))
     return made
 
@@ -83,10 +130,13 @@ def bound(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr
 
 
 def size(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:
-    """SIZEOF(x) of a variable or a type: bytes, known before the program runs but for ANY."""
+    """SIZEOF(x) of a variable or a type: bytes, as a literal would be written but for ANY."""
     kind: Type | None = None
     if isinstance(value, tree.NameRef) and expressions.variable(value.text) is None:
         kind = expressions.checker.specs.named_type(value.text, expressions.source)
+        pou = expressions.project.pou(value.text, expressions.source) if kind is None else None
+        if pou is not None and pou.kind == "FUNCTION_BLOCK" and expressions.checker.interface(pou, expressions.source, value):
+            kind = pou.type
     if kind is None:
         kind = expressions.settle(value)
     if kind is None:
@@ -95,7 +145,7 @@ def size(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | 
         expressions.facts.calls[call] = StandardCall("SIZEOF", [(value, kind)])
         return UDINT
     expressions.facts.constants[call] = kind.size
-    return UDINT
+    return UNTYPED_INT
 
 
 def bind(expressions: Expressions, node: tree.Assign) -> None:
@@ -112,6 +162,6 @@ def bind(expressions: Expressions, node: tree.Assign) -> None:
         return
     if isinstance(node.value, tree.NullLiteral):
         return
-    bound = refer(expressions, node.value)
+    bound = refer(expressions, node.value, lasting=False)
     if bound is not None and bound != kind:
         expressions.error("S0301", node.value, f"{variable.name} refers to {kind}, this is {bound}")

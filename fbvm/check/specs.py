@@ -23,6 +23,7 @@ from fbvm.base.types import (
     array,
     fold,
     open_array,
+    pointer,
     reference,
     string,
 )
@@ -103,11 +104,13 @@ class Specs:
             pou = self.project.pou(target.text, source) if entry is None else None
             awaiting = entry if entry is not None and entry.busy else pou if pou is not None and pou.busy else None
             if awaiting is not None:
-                made = RefType(f"REF_TO {awaiting.tree.name.text}", 8, 8, None)
+                name = awaiting.tree.name.text
+                made = RefType(f"{spec.kind} {name}", 8, 8, None, spec.kind == "POINTER TO")
                 awaiting.awaited.append(made)
                 return made, bytes(8)
         resolved = self.resolve(target, source)
-        return (reference(resolved[0]), bytes(8)) if resolved is not None else None
+        make = pointer if spec.kind == "POINTER TO" else reference
+        return (make(resolved[0]), bytes(8)) if resolved is not None else None
 
     # --- names ------------------------------------------------------------------------------------------------------
 

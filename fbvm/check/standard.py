@@ -48,7 +48,9 @@ class StandardCalls:
             values = Arguments(self.expressions, call, ["IN"]).in_order()
             if values is None:
                 return None
-            return (references.size if name == "SIZEOF" else references.make)(self.expressions, call, values[0])
+            if name == "SIZEOF":
+                return references.size(self.expressions, call, values[0])
+            return references.make(self.expressions, call, name, values[0])
         if name in ("LOWER_BOUND", "UPPER_BOUND"):
             values = Arguments(self.expressions, call, ["ARR", "DIM"]).in_order()
             return references.bound(self.expressions, call, name, *values) if values is not None else None

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, StringType, Type
+from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, RefType, StringType, Type
 from fbvm.check.fitting import fitting_hint
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
+
+
+_ANY_NUMBER = -(1 << 63), (1 << 63) - 1
+"""Bounds that are known only when the program runs."""
 
 
 class Subscripts:
@@ -29,6 +33,8 @@ class Subscripts:
             return None
         if isinstance(whole, OpenArrayType):
             return self._open(expr, whole, kinds)
+        if isinstance(whole, RefType) and whole.moves:
+            return self._behind(expr, whole, kinds)
         if not isinstance(whole, ArrayType):
             self.error("S0304", expr.of, f"this is {whole}, not an array",
                        "MID(s, 1, n) is character n of a text" if isinstance(whole, StringType) else "")
@@ -51,11 +57,17 @@ class Subscripts:
         if len(kinds) != whole.dimensions:
             self._wrong_number(expr, whole, whole.dimensions)
             return None
-        least, most = -(1 << 63), (1 << 63) - 1
         for subscript, kind in zip(expr.subscripts, kinds, strict=True):
-            if not self._fits(subscript, kind, least, most, whole):
+            if not self._fits(subscript, kind, *_ANY_NUMBER, whole):
                 return None
         return whole.element
+
+    def _behind(self, expr: tree.Index, whole: RefType, kinds: list[Type | None]) -> Type | None:
+        """`p[i]` of a pointer: what lies i times the size of its target further on."""
+        if len(kinds) != 1:
+            self._wrong_number(expr, whole, 1)
+            return None
+        return whole.target if self._fits(expr.subscripts[0], kinds[0], *_ANY_NUMBER, whole) else None
 
     def _wrong_number(self, expr: tree.Index, whole: Type, needed: int) -> None:
         written = len(expr.subscripts)

@@ -26,7 +26,7 @@ def writable(expressions: Expressions, expr: tree.Expr, purpose: str) -> bool:
             what = "a constant" if member.constant else "an output"
             expressions.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here")
             return False
-        if not isinstance(inner, tree.Member | tree.Index | tree.Part):
+        if not facts.is_part(inner):
             break
         inner = inner.of
     address = facts.directs.get(inner)
@@ -58,7 +58,7 @@ def _note_input(expressions: Expressions, expr: tree.Expr, variable: Variable) -
 
 def place(facts: Facts, expr: tree.Expr) -> Path | None:
     """The path of a variable or a part of one; None if a subscript is not known."""
-    if not isinstance(expr, tree.Member | tree.Index | tree.Part):
+    if not facts.is_part(expr):
         root = facts.variables.get(expr) or facts.directs.get(expr)
         return (root,) if root is not None else None
     outer = place(facts, expr.of)

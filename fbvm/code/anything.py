@@ -33,7 +33,7 @@ def described(body: BodyLowering, expr: tree.Expr) -> list[tuple[int, Node]]:
     kind = body.facts.types[expr]
     if isinstance(kind, AnyType):
         return [(offset, _narrow(body.places.any_number(expr, offset))) for offset in NUMBERS]
-    size = _size(body, expr, kind)
+    size = size_of(body, expr, kind)
     rows: tuple[Node, Node, Node]
     if base(kind) == BOOL:
         fills = _fills_bytes(body.places.of(expr))
@@ -57,7 +57,7 @@ def _leaf(kind: Type) -> Type:
     return base(kind)
 
 
-def _size(body: BodyLowering, expr: tree.Expr, kind: Type) -> Node:
+def size_of(body: BodyLowering, expr: tree.Expr, kind: Type) -> Node:
     """Bytes of a variable, as i64; of ARRAY [*] by the bounds that it brings."""
     if not isinstance(kind, OpenArrayType):
         return ("const", "i64", kind.size)

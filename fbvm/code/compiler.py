@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fbvm.base.areas import Area
@@ -16,9 +16,10 @@ from fbvm.check.facts import Pou, Report, TaskFact
 from fbvm.check.library import Libraries
 from fbvm.check.project import Project
 from fbvm.code.damage import Damage
-from fbvm.code.image import Image, ProgramRun, Site, TaskRow
+from fbvm.code.image import Image, Objects, ProgramRun, Site, TaskRow
 from fbvm.code.layout import Placed, place
 from fbvm.code.lower import BodyLowering
+from fbvm.code.operations import FIRST_OBJECT
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
@@ -45,6 +46,9 @@ class Program:
     def __init__(self, placed: Placed) -> None:
         self.areas: dict[str, Area] = placed.layout.areas
         self.sites: list[Site] = []
+        self.leases_at, self.held_bits = placed.objects.leases_at, placed.objects.held_bits
+        self._objects = placed.objects
+        self._area_objects: dict[str, tuple[int, int]] = {}
         self._numbers: dict[tuple[str, str, int], int] = {}
 
     def site(self, pou: Pou, node: tree.Node) -> int:
@@ -56,6 +60,17 @@ class Program:
             line, column = pou.source.place(node.start)
             self.sites.append(Site(pou.source.name, pou.name, line, column))
         return number
+
+    def area_object(self, area: str) -> int:
+        """The number of the object that a whole area is."""
+        row = self.areas[area]
+        self._area_objects.setdefault(area, (row.offset, row.offset + row.size_bytes))
+        return FIRST_OBJECT + len(self._objects.extents) + list(self._area_objects).index(area)
+
+    @property
+    def objects(self) -> Objects:
+        """What pointers may be moved in, areas that were asked for included."""
+        return replace(self._objects, extents=(*self._objects.extents, *self._area_objects.values()))
 
     def located(self, member: Field, whole: Type) -> Field:
         """A located member of a block with its final place."""
@@ -148,7 +163,7 @@ def _image(checker: Checker) -> Image:
         if entry.resolved is not None:
             types.setdefault(name, entry.resolved[0])
     return Image(placed.layout, bodies, tuple(tasks), placed.symbols, tuple(placed.initial), tuple(placed.retained),
-                 tuple(program.sites), types)
+                 tuple(program.sites), types, program.objects)
 
 
 def _task(task: TaskFact) -> TaskRow:

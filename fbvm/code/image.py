@@ -100,6 +100,23 @@ class Retained:
 
 
 @dataclass(frozen=True)
+class Objects:
+    """What pointers may be moved in.  `extents` are offsets of first bytes and of first bytes behind, of variables that
+    live as long as the program, for the objects from FIRST_OBJECT on.
+
+    `leases` are so many rows in the buffer, from `leases_at` on (see LEASE_BYTES).  The object of one is LEASED + row <<
+    `held_bits` + the number under which it is held: a pointer of an earlier lease of the same row is told from it."""
+
+    extents: tuple[tuple[int, int], ...] = ()
+    leases: int = 0
+    leases_at: int = 0
+
+    @property
+    def held_bits(self) -> int:
+        return 23 - max(self.leases - 1, 0).bit_length()
+
+
+@dataclass(frozen=True)
 class Image:
     """A compiled program."""
 
@@ -115,13 +132,14 @@ class Image:
     sites: tuple[Site, ...]
     types: dict[str, Type] = field(default_factory=dict)
     """Derived types and blocks by folded name."""
+    objects: Objects = field(default_factory=Objects)
 
 
 def fingerprint(image: Image) -> str:
     """A number in hexadecimal that another program, or the same in another layout, does not have."""
     said = hashlib.sha256()
     bodies = tuple((body.name, body.code, body.instance_size) for body in image.bodies)
-    left: list[object] = [(image.layout, image.tasks, image.initial, image.retained, bodies)]
+    left: list[object] = [(image.layout, image.tasks, image.initial, image.retained, image.objects, bodies)]
     while left:  # code may be nested deeper than the host recurses
         item = left.pop()
         if isinstance(item, tuple):

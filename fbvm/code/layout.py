@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.base.types import ArrayType, Field, StructType, Type, fold
 from fbvm.check.checker import Checker
-from fbvm.check.facts import Pou, Variable
-from fbvm.code.image import Layout, Retained
+from fbvm.check.facts import Pou, Variable, holds_block
+from fbvm.code.image import Layout, Objects, Retained
+from fbvm.code.objects import Numbering
+from fbvm.code.operations import LEASE_BYTES
 
 _CHUNK = 64
 """Initial bytes are kept in runs of chunks that are not all zero."""
@@ -23,6 +25,7 @@ class Placed:
     symbols: dict[str, Field] = field(default_factory=dict)
     initial: list[tuple[int, bytes]] = field(default_factory=list)
     retained: list[Retained] = field(default_factory=list)
+    objects: Objects = field(default_factory=Objects)
 
 
 def place(checker: Checker) -> Placed:
@@ -38,18 +41,38 @@ def place(checker: Checker) -> Placed:
         frames += -frames % 8
         pou.frame_offset = SLOTS_OFFSET + frames
         frames += pou.frame_size
+    frames += -frames % 8
+    leases, leases_at = len(checker.project.facts.leases), SLOTS_OFFSET + frames
+    frames += leases * LEASE_BYTES
     placed = Placed(Layout(frames, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values())))
-    placed.initial += _runs(slots)
     located = [v for v in checker.global_order if v.place == "area"]
     for pou in checker.bodies:
         located += [v for v in pou.order if v.place == "area"]
     _place_located(located, placed)
     for pou in checker.bodies:
         _fill_in(pou)
+    placed.objects = Objects(_numbered(checker, slots), leases, leases_at)
+    placed.initial += _runs(slots)
     for variable in checker.global_order:
         placed.symbols.setdefault(fold(variable.name), _symbol(variable))
         placed.retained += _retained(variable, checker)
     return placed
+
+
+def _numbered(checker: Checker, slots: bytearray) -> tuple[tuple[int, int], ...]:
+    """Give numbers to all objects; instances learn those of their variables in their initial bytes."""
+    numbering = Numbering(checker)
+    numbering.single()
+    for variable in checker.global_order:
+        if variable.place == "abs":
+            numbering.instances(slots, variable.type, variable.offset)
+    for pou in checker.bodies:
+        frame = bytearray(pou.frame_initial)
+        for variable in pou.order:
+            if variable.place == "frame" and not variable.reference:
+                numbering.instances(frame, variable.type, pou.frame_offset + variable.offset, pou.frame_offset)
+        pou.frame_initial = bytes(frame)
+    return tuple(numbering.extents)
 
 
 def _place_located(variables: list[Variable], placed: Placed) -> None:
@@ -102,23 +125,23 @@ def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:
 
 
 def _retained(variable: Variable, checker: Checker) -> Iterator[Retained]:
-    if variable.retain and variable.place == "abs":
-        yield Retained(variable.name, variable.offset, variable.type.size)
-    elif variable.place == "abs":
-        yield from _retained_in(variable.type, variable.offset, variable.name, checker)
+    if variable.place == "abs":
+        yield from _retained_in(variable.type, variable.offset, variable.name, checker, variable.retain)
 
 
-def _retained_in(kind: Type, offset: int, path: str, checker: Checker) -> Iterator[Retained]:
-    """RETAIN variables of instances inside a value."""
-    if isinstance(kind, ArrayType) and isinstance(kind.element, StructType):
+def _retained_in(kind: Type, offset: int, path: str, checker: Checker, whole: bool) -> Iterator[Retained]:
+    """A `whole` value, or RETAIN variables of instances inside it; headers of instances belong to the program."""
+    if whole and not holds_block(kind):
+        yield Retained(path, offset, kind.size)
+    elif isinstance(kind, ArrayType) and isinstance(kind.element, StructType | ArrayType):
         for index in range(kind.count):
-            yield from _retained_in(kind.element, offset + index * kind.element.size, f"{path}[{index}]", checker)
+            yield from _retained_in(kind.element, offset + index * kind.element.size, f"{path}[{index}]", checker, whole)
+    elif isinstance(kind, StructType) and not kind.block:
+        for member in kind.fields.values():
+            yield from _retained_in(member.type, offset + member.offset, f"{path}.{member.name}", checker, whole)
     elif isinstance(kind, StructType) and kind.block:
         for variable in checker.block_of(kind).order:
             if variable.place != "self" or variable.reference:
                 continue
             name = f"{path}.{variable.name}"
-            if variable.retain:
-                yield Retained(name, offset + variable.offset, variable.type.size)
-            else:
-                yield from _retained_in(variable.type, offset + variable.offset, name, checker)
+            yield from _retained_in(variable.type, offset + variable.offset, name, checker, whole or variable.retain)

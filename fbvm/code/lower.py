@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import BOOL, NULL, Type, base, machine
 from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, PouCall, StandardCall
-from fbvm.check.references import root_of
 from fbvm.code.functions import FUNCTIONS
 from fbvm.code.image import Body
 from fbvm.code.loops import LoopLowering
 from fbvm.code.operations import Block, Node
 from fbvm.code.places import Place, Places, detail
+from fbvm.code.pointers import PointerLowering
 from fbvm.code.pou_calls import CallLowering
 from fbvm.code.values import DEEPEST, ValueLowering, is_aggregate
 from fbvm.code.weights import counted
@@ -38,6 +38,7 @@ class BodyLowering:
         self.places = Places(self)
         self.values = ValueLowering(self)
         self.calls = CallLowering(self)
+        self.pointers = PointerLowering(self)
         self.loops = LoopLowering(self)
         self.value = self.values.value
         self.entry_site = self.site(pou.tree.name)
@@ -50,6 +51,7 @@ class BodyLowering:
         self.out.append(("charge", count + 1, self.entry_site))
         self._entry()
         self.block_into(self.pou.tree.body)
+        self.out += self.pointers.released()
         size = self.pou.type.size if self.pou.type is not None else 0
         return Body(self.pou.name, self.pou.kind, tuple(self.out), size, count)
 
@@ -132,7 +134,7 @@ class BodyLowering:
     def note_read(self, place: Place, expr: tree.Expr) -> None:
         """Remember a variable that the statement reads, if looking at it beforehand can do no harm: its place needs no
         subscripts, and no reference that might be null."""
-        root = self.facts.variables.get(root_of(expr))
+        root = self.facts.variables.get(self.facts.root(expr))
         if not place.address[2] and (not place.is_reference or (root is not None and root.kind == "VAR_IN_OUT")):
             self.reads.append(place)
 
@@ -179,7 +181,7 @@ class BodyLowering:
         """`r REF= x`: the slot of r takes a reference to x."""
         slot = self.places.slot(self.facts.variables[node.targets[0]])
         null = isinstance(node.value, tree.NullLiteral)
-        pointer: Node = ("const", "ref", 0) if null else self.places.reference(self.places.of(node.value))
+        pointer: Node = ("const", "ref", 0) if null else self.pointers.to(node.value)
         self.out.append(("store", "ref", slot.address, pointer))
 
     def assign(self, target: tree.Expr, value: tree.Expr, site: int) -> None:
@@ -317,7 +319,7 @@ class BodyLowering:
                 self.copy(place, self.aggregate(node.value), site)
             else:
                 self.write(place, self.value(node.value, place.type), site)
-        self.out.append(("return",))
+        self.out += [*self.pointers.released(), ("return",)]
 
 
 _LOWER: dict[type, Callable[..., None]] = {

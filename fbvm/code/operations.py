@@ -13,10 +13,12 @@ a tuple of `(stride, expression i64)` to be added.  `base` is
     "abs"                          offset counts from the start of the buffer
     "self"                         from the start of the instance that is executed
     ("ref", expression, site)      from where a reference points (R0110 if it is null or its object has ended, or if
-                                   not all bytes of the access lie in the buffer; found when the terms are evaluated)
+                                   not all bytes of the access lie in the object; found when the terms are evaluated)
 
-A reference's offset is one of the buffer; its object number selects a row of the extents; its bit is 0 to 7 for a located
-BOOL and 255 for a value that fills bytes.  `site` is the number of a place in the source (Image.sites), for traps.
+A reference's offset is one of the buffer, its bit 0 to 7 for a located BOOL and 255 for a value that fills bytes.  Its
+object (Image.objects) says how far the reference may be moved: 0 is null, 1 the whole buffer, from 2 on a row of the
+extents each; those from LEASED on are leases, for what may end while pointers to it are kept.  `site` is the number of a
+place in the source (Image.sites), for traps.
 Operands are evaluated from left to right, an address where it stands.  `let` temporaries belong to one execution of one
 body.  `math`, `pow` and `atan2` of f32 are worked out in 64 bits and rounded once.
 Meaning: IEC 61131-3 ed. 3 with the decisions on edges that are stated beside each row.
@@ -39,6 +41,13 @@ INTEGERS = ("i8", "i16", "i32", "i64", "u8", "u16", "u32", "u64")
 FLOATS = ("f32", "f64")
 TEXT_UNITS = {"s8": 1, "s16": 2}
 """Bytes of a character of each form of text; constants are `bytes`, and for s16 a `str` of UTF-16 units."""
+OBJECT_SHIFT, OFFSET_SHIFT, OFFSET_MASK, BIT_MASK = 40, 8, (1 << 32) - 1, 255
+"""Where the parts of a reference lie in its 64 bits."""
+BUFFER_OBJECT, FIRST_OBJECT, LEASED = 1, 2, 1 << 23
+"""Numbers of objects: the whole buffer, the first row of the extents, the first lease."""
+LEASE_BYTES = 16
+"""A lease in the buffer: offset of the first byte and of the first behind, the number under which it is held now (0:
+it has ended), how often it was given; 32 bits each."""
 SIZES = {"b": 1, "i8": 1, "u8": 1, "i16": 2, "u16": 2, "i32": 4, "u32": 4, "i64": 8, "u64": 8, "f32": 4, "f64": 8,
          "ref": 8}
 

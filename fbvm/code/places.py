@@ -86,6 +86,8 @@ class Places:
             return self._part(expr, kind)
         if isinstance(expr, tree.Call):
             return self.body.aggregate(expr)
+        if isinstance(expr, tree.Index) and not self.facts.is_part(expr):
+            return self.body.pointers.element(expr)
         if isinstance(expr, tree.Deref):
             return Place((("ref", self.body.value(expr.of), self.body.site(expr)), 0, ()), kind)
         assert isinstance(expr, tree.Index)

@@ -10,6 +10,7 @@ from fbvm.base.types import (
     BOOL,
     DAY_NS,
     LREAL,
+    NULL,
     EnumType,
     StringType,
     Type,
@@ -144,7 +145,7 @@ class ValueLowering:
     def standard(self, called: StandardCall, expr: tree.Call) -> Node:
         """A call of a standard function."""
         if called.key == "REF":
-            return self.body.places.reference(self.body.places.of(called.arguments[0][0]))
+            return self.body.pointers.to(called.arguments[0][0])
         if called.key == "SIZEOF":
             return ("convert", "u32", "i64", self.body.places.any_number(called.arguments[0][0], ANY_SIZE))
         if called.key in ("LOWER_BOUND", "UPPER_BOUND"):
@@ -156,6 +157,8 @@ class ValueLowering:
         if expr.op in ("AND_THEN", "OR_ELSE"):
             return self._short(expr)
         operand = base(self.facts.operands[expr])
+        if operand == NULL:
+            return self.body.pointers.binary(expr)
         left, right = base(self.facts.types[expr.left]), base(self.facts.types[expr.right])
         if is_any(operand, "ANY_DURATION", "ANY_DATE") and expr.op not in _COMPARE:
             return self._time(expr, left, right, operand)

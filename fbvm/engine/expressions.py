@@ -9,7 +9,7 @@ from typing import Any
 
 from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import width
-from fbvm.code.operations import INTEGERS, SIZES, TEXT_UNITS, Address, Node
+from fbvm.code.operations import BUFFER_OBJECT, INTEGERS, OBJECT_SHIFT, SIZES, TEXT_UNITS, Address, Node
 from fbvm.engine.ranges import fits, is_float, mask, may_trap, number, span
 from fbvm.engine.writer import Expressions, Rows, bare
 
@@ -235,7 +235,11 @@ def _load_text(e: Expressions, machine: str, address: Address, capacity: int) ->
 
 
 def _reference(e: Expressions, machine: str, address: Address, bit: int) -> str:
-    place, rest = e.place(address, 1), (1 << 40) + bit
+    if isinstance(address[0], tuple):
+        (_, reference, site), offset, terms = address
+        delta = bare(e.place(("abs", offset, terms), 1))
+        return f"moved({bare(e.value(reference))}, {delta}, {bit}, {site})"
+    place, rest = e.place(address, 1), (BUFFER_OBJECT << OBJECT_SHIFT) + bit
     return str((int(place) << 8) + rest) if place.isdigit() else f"(({place} << 8) + {rest})"
 
 

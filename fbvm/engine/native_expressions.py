@@ -9,7 +9,7 @@ from collections.abc import Callable
 from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import limits, width
 from fbvm.base.memory import WHOLE_BYTES
-from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Node
+from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, SIZES, TEXT_UNITS, Address, Node
 from fbvm.engine.native_writer import NAN_BITS, Text, Writer, ir, literal, stored
 from fbvm.engine.ranges import is_float, may_trap, span
 
@@ -62,7 +62,10 @@ def flag_mask(w: Writer, address: Address) -> tuple[str, str]:
 
 def _reference(w: Writer, machine: str, address: Address, bit: int) -> str:
     moved = w.new(f"shl i64 {w.offset(address, 1)}, 8")
-    return w.new(f"add i64 {moved}, {(1 << 40) + bit}")
+    if not w.loose(address):
+        return w.new(f"add i64 {moved}, {(BUFFER_OBJECT << OBJECT_SHIFT) + bit}")
+    whose = w.new(f"and i64 {w.value(address[0][1])}, {-1 << OBJECT_SHIFT}")
+    return w.new(f"or i64 {whose}, {w.new(f'or i64 {moved}, {bit}')}")
 
 
 def _bit_behind(w: Writer, machine: str, a: Node, n: Node) -> str:

@@ -18,6 +18,7 @@ from fbvm.engine.native_context import Point
 from fbvm.engine.native_expressions import VALUES
 from fbvm.engine.native_guard import GUARD, at_end
 from fbvm.engine.native_library import declaration, definitions
+from fbvm.engine.native_objects import objects
 from fbvm.engine.native_regions import FIRST_NUMBER, METADATA
 from fbvm.engine.native_statements import EMITTERS
 from fbvm.engine.native_texts import TEXTS, from_text
@@ -53,6 +54,7 @@ attributes #1 = { nounwind noinline }
 attributes #2 = { nounwind willreturn memory(none) }
 attributes #3 = { nounwind alwaysinline }
 attributes #4 = { nounwind noinline }
+attributes #5 = { nounwind willreturn memory(read) }
 """
 
 
@@ -90,8 +92,8 @@ def translate(image: Image, stops: bool = False) -> Translation:
         bodies = [_body(module, number, metadata) for number in module.heights]
     tasks = [_task(module, number) for number in range(len(image.tasks))]
     routines = [declaration(name) for name in sorted(module.routines)]
-    text = "\n".join([*definitions(module.constants), *bodies, *tasks, *routines, *_declarations(), ATTRIBUTES, METADATA,
-                      *metadata, *[GUARD] * stops])
+    text = "\n".join([*definitions(module.constants), objects(image.objects), *bodies, *tasks, *routines, *_declarations(),
+                      ATTRIBUTES, METADATA, *metadata, *[GUARD] * stops])
     return Translation(text, tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
                        tuple(sorted(module.routines)))
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import single, width
 from fbvm.code.image import Image
-from fbvm.code.operations import Address, Block, Node
+from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, Address, Block, Node
 from fbvm.engine.native_calls import Range
 from fbvm.engine.native_context import FIELDS, SCRATCH, Point, Shown
 from fbvm.engine.native_regions import SYSTEM, Regions
@@ -341,7 +341,18 @@ class Writer:
         last = self.new(f"sub i64 {size}, {count}")
         if form == "i128":
             last = self.new(f"zext i64 {last} to i128")
-        ended = self.new(f"icmp ne i64 {self.new(f'lshr i64 {reference}, 40')}, 1")
+        number = self.new(f"lshr i64 {reference}, {OBJECT_SHIFT}")
+        other = self.new(f"icmp ne i64 {number}, {BUFFER_OBJECT}")
         outside = self.new(f"icmp ugt {form} {total}, {last}")
-        self.trap_if(self.new(f"or i1 {ended}, {outside}"), "R0110", site, ("ref", reference))
-        return self.new(f"trunc i128 {total} to i64") if form == "i128" else total
+        place = self.new(f"trunc i128 {total} to i64") if form == "i128" else total
+        apart, good, bad = self.label("x"), self.label(), self.label("x")
+        self.emit(f"br i1 {self.new(f'or i1 {other}, {outside}')}, label %{apart}, label %{good}, {RARE}")
+        with self.aside(apart):
+            inside = self.new(f"call fastcc i1 @inside(ptr %m, i64 {number}, i64 {place}, i64 {count})")
+            if form == "i128":
+                inside = self.new(f"and i1 {inside}, {self.new(f'icmp ult i128 {total}, {1 << 32}')}")
+            self.emit(f"br i1 {inside}, label %{good}, label %{bad}")
+        with self.aside(bad):
+            self.end("R0110", site, (("ref", reference),))
+        self.begin(good)
+        return place

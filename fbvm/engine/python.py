@@ -111,7 +111,7 @@ class PythonEngine:
 
     def _bind(self, program: Program) -> list[Callable[[int], Any]]:
         """The bodies of a program over this memory."""
-        names = environment(self.memory) | program.constants
+        names = environment(self.memory, self.image.objects) | program.constants
         exec(program.code, names)
         for number, function in self.substitutes.items():
             body = self.image.bodies[number]

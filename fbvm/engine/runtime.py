@@ -12,15 +12,21 @@ from typing import Any, NamedTuple, TypeVar
 from fbvm.base import arithmetic, strings
 from fbvm.base.arithmetic import Undefined
 from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
+from fbvm.code.image import Objects
+from fbvm.code.operations import (
+    BIT_MASK,
+    BUFFER_OBJECT,
+    FIRST_OBJECT,
+    LEASE_BYTES,
+    LEASED,
+    OBJECT_SHIFT,
+    OFFSET_MASK,
+    OFFSET_SHIFT,
+)
 from fbvm.engine import texts
 from fbvm.engine.trap import Stop
 
 T = TypeVar("T")
-OBJECT_SHIFT, OFFSET_SHIFT, OFFSET_MASK, BIT_MASK = 40, 8, (1 << 32) - 1, 255
-BUFFER_OBJECT = 1
-"""Number of the object that is the whole buffer; 0 is null, every other object has ended."""
-
-
 NO_SITE = -1
 """The site of what no statement asked for."""
 
@@ -124,7 +130,7 @@ _PURE: dict[str, Any] = {
 }
 
 
-def environment(memory: Memory) -> dict[str, Any]:
+def environment(memory: Memory, objects: Objects) -> dict[str, Any]:
     """The globals of generated code over a memory.
 
     Views are named by machine type, `u1` is that of BOOL; `get_x` and `put_x` work at any offset of `buffer`."""
@@ -133,11 +139,29 @@ def environment(memory: Memory) -> dict[str, Any]:
         names["u1" if machine == "b" else machine] = view
         names[f"get_{machine}"], names[f"put_{machine}"] = STRUCTS[machine].unpack_from, STRUCTS[machine].pack_into
     names["buffer"] = memory.map
-    return names | _references(memory) | _texts(memory)
+    return names | _references(memory, objects) | _texts(memory)
 
 
-def _references(memory: Memory) -> dict[str, Any]:
-    size, u8 = memory.size, memory.u8
+def _extents(memory: Memory, objects: Objects) -> Callable[[int], tuple[int, int]]:
+    """Where the object of that number lies: its first byte and the first behind; none at all if it has ended."""
+    u32, first, held_bits = memory.views["u32"], objects.leases_at // 4, objects.held_bits
+    extents, leases = objects.extents, objects.leases
+
+    def extent(number: int) -> tuple[int, int]:
+        if FIRST_OBJECT <= number < FIRST_OBJECT + len(extents):
+            return extents[number - FIRST_OBJECT]
+        row, held = divmod(number - LEASED, 1 << held_bits)
+        if 0 <= row < leases and held:
+            start, end, holder, _ = u32[first + row * LEASE_BYTES // 4:first + (row + 1) * LEASE_BYTES // 4]
+            if held == holder:
+                return start, end
+        return 0, 0
+
+    return extent
+
+
+def _references(memory: Memory, objects: Objects) -> dict[str, Any]:
+    size, u8, extent = memory.size, memory.u8, _extents(memory, objects)
 
     def at(reference: int, delta: int, count: int, site: int) -> int:
         """The offset of `count` bytes, `delta` bytes behind where the reference points."""
@@ -145,7 +169,17 @@ def _references(memory: Memory) -> dict[str, Any]:
             offset = (reference >> OFFSET_SHIFT & OFFSET_MASK) + delta
             if 0 <= offset <= size - count:
                 return offset
+        elif reference:
+            start, end = extent(reference >> OBJECT_SHIFT)
+            offset = (reference >> OFFSET_SHIFT & OFFSET_MASK) + delta
+            if start <= offset <= end - count:
+                return offset
         raise Stop("R0110", site, reference)
+
+    def moved(reference: int, delta: int, bit: int, site: int) -> int:
+        """A reference to what lies `delta` bytes further on in the same object."""
+        offset = at(reference, delta, 1, site)
+        return reference >> OBJECT_SHIFT << OBJECT_SHIFT | offset << OFFSET_SHIFT | bit
 
     def get_flag(reference: int, delta: int, site: int) -> bool:
         byte, bit = u8[at(reference, delta, 1, site)], reference & BIT_MASK
@@ -158,7 +192,7 @@ def _references(memory: Memory) -> dict[str, Any]:
         else:
             u8[offset] = u8[offset] & ~(1 << (bit & 7)) | bool(value) << (bit & 7)
 
-    return {"at": at, "get_flag": get_flag, "put_flag": put_flag}
+    return {"at": at, "moved": moved, "get_flag": get_flag, "put_flag": put_flag}
 
 
 def _texts(memory: Memory) -> dict[str, Any]:
