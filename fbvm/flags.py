@@ -11,6 +11,8 @@ from fbvm.base.memory import Memory
 
 FIRST_CYCLE = (200, 11)
 """A200.11: ON in the first cycle after a change to RUN."""
+FIRST_TASK_CYCLE = (200, 15)
+"""A200.15: ON while a task is executed for the first time after a change to RUN."""
 MAX_CYCLE_TIME = 262
 """A262 and A263, low word first: longest cycle time, 0.1 ms."""
 CYCLE_TIME = 264
@@ -47,7 +49,7 @@ class Flags:
         """Write all of them for the scan at `now_ns`; `cycle_time_ns` is the length of the cycle before, 0 at first."""
         a, on = self._a, self._bytes
         word, bit = FIRST_CYCLE
-        a[word] = a[word] & ~(1 << bit) | first << bit
+        a[word] = a[word] & ~(1 << bit | 1 << FIRST_TASK_CYCLE[1]) | first << bit
         tenths = min(cycle_time_ns // TENTH_MS_NS, 0xFFFFFFFF)
         longest = 0 if first else a[MAX_CYCLE_TIME] | a[MAX_CYCLE_TIME + 1] << 16
         a[CYCLE_TIME], a[CYCLE_TIME + 1] = tenths & 0xFFFF, tenths >> 16
@@ -71,6 +73,11 @@ class Flags:
                 if now_ns % period_ns >= half_ns:
                     pulses |= bit
             self._pulses.append((at, keep, pulses))
+
+    def begin_task(self, first: bool) -> None:
+        """Tell the program that a task begins, and whether for the first time."""
+        word, bit = FIRST_TASK_CYCLE
+        self._a[word] = self._a[word] & ~(1 << bit) | first << bit
 
     @property
     def io_memory_held(self) -> bool:

@@ -21,7 +21,7 @@ from fbvm.flags import Flags
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
 from fbvm.scan_times import Lateness, ScanTimes
-from fbvm.schedule import Schedule, hurried
+from fbvm.schedule import Schedule, ScheduleState, hurried
 from fbvm.units.unit import Unit
 from fbvm.watch import places
 from fbvm.watch.paths import Place, Span, find, find_place
@@ -71,7 +71,7 @@ class State:
     memory: Snapshot
     now_ns: int
     scans: int
-    schedule: tuple[dict[int, int], dict[int, bool]]
+    schedule: ScheduleState
     forces: dict[Place, Value]
     mode: Mode
     first: bool
@@ -211,12 +211,15 @@ class Plc:
 
     def _execute(self) -> Trap | None:
         """Program execution: the tasks that are due, by priority.  One that stands at a breakpoint stays due."""
-        due, breakpoints = self._due, self.breakpoints
+        due, breakpoints, fresh = self._due, self.breakpoints, self._schedule.fresh
+        some_are_new = bool(fresh)
         while due:
+            if some_are_new:
+                self._flags.begin_task(due[0] in fresh)
             trap = breakpoints.run(due[0], self.engine) if breakpoints.armed else self.engine.run(due[0])
             if breakpoints.halted:
                 return None
-            due.popleft()
+            fresh.discard(due.popleft())
             if trap:
                 due.clear()
                 return trap

@@ -14,6 +14,8 @@ from fbvm.base.areas import NEVER
 from fbvm.code.image import TaskRow
 from fbvm.watch.values import show_time
 
+ScheduleState = tuple[dict[int, int], dict[int, bool], frozenset[int]]
+
 
 @dataclass
 class Schedule:
@@ -23,8 +25,11 @@ class Schedule:
     single: Callable[[str], bool]
     _next_ns: dict[int, int] = field(default_factory=dict)
     _levels: dict[int, bool] = field(default_factory=dict)
+    fresh: set[int] = field(default_factory=set)
+    """Tasks that have not been executed since the start."""
 
     def __post_init__(self) -> None:
+        self.fresh.update(range(len(self.tasks)))
         self._order = sorted(range(len(self.tasks)), key=lambda number: self.tasks[number].priority)
 
     def due(self, now_ns: int) -> list[int]:
@@ -55,14 +60,15 @@ class Schedule:
         """As at power-on."""
         self._next_ns.clear()
         self._levels.clear()
+        self.fresh.update(range(len(self.tasks)))
 
-    def state(self) -> tuple[dict[int, int], dict[int, bool]]:
+    def state(self) -> ScheduleState:
         """What a snapshot keeps."""
-        return dict(self._next_ns), dict(self._levels)
+        return dict(self._next_ns), dict(self._levels), frozenset(self.fresh)
 
-    def restore(self, state: tuple[dict[int, int], dict[int, bool]]) -> None:
+    def restore(self, state: ScheduleState) -> None:
         """Back to a state that `state` gave."""
-        self._next_ns, self._levels = dict(state[0]), dict(state[1])
+        self._next_ns, self._levels, self.fresh = dict(state[0]), dict(state[1]), set(state[2])
 
 
 def hurried(tasks: tuple[TaskRow, ...], cycle_ns: int) -> Iterator[str]:

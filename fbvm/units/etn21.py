@@ -55,7 +55,10 @@ class Etn21:
         choices = Choices(time_wait_ns, odd_filler)
         self._made = {"unit_number": unit_number, "address": address, "timing": timing, "seed": seed,
                       "time_wait_ns": time_wait_ns, "odd_filler": odd_filler}  # fmt: skip
-        self._dispatch = Dispatch(self.layout, address, timing_of(timing, seed), choices, self.faults)
+        self._timing = timing_of(timing, seed)
+        self._dispatch = Dispatch(self.layout, address, self._timing, choices, self.faults)
+        self._starting: tuple[int, int] | None = None
+        """Cycle and time at which a restart ends; None if none is going on."""
         self._switches_at = slice(self.layout.n + at.SWITCHES, self.layout.n + at.FINS_TCP_STATUS)
         self._seen = [0, 0, 0, 0]
         self.wake_ns = self._next_ns = NEVER_NS
@@ -83,7 +86,14 @@ class Etn21:
                           for code, switch, socket in given["faults"]]  # fmt: skip
 
     def reset(self, memory: AreaMemory) -> list[Request]:
-        """Power on or restart: the unit's own words and all switches 0, connections broken by RST."""
+        """Power on: the unit's own words and all switches 0, connections broken by RST."""
+        a = memory.words("A")
+        for word in (at.INITIALIZING, at.RESTART):
+            a[word] &= ~(1 << self.layout.bit)
+        self._starting = None
+        return self._begin_anew(memory)
+
+    def _begin_anew(self, memory: AreaMemory) -> list[Request]:
         self._dispatch.forget()
         self._seen = [0, 0, 0, 0]
         self.wake_ns, self._next_ns = 0, NEVER_NS
@@ -101,6 +111,8 @@ class Etn21:
         """One I/O refresh: take the network's events and new switches, end what is ready, show what changed."""
         dispatch = self._dispatch
         dispatch.cycle += 1
+        if self._starting or memory.words("A")[at.RESTART] >> self.layout.bit & 1:
+            return self._restart(memory, events, now_ns)
         cio = memory.words("CIO")
         self._show_unit_status(cio)
         switches = cio[self._switches_at].tolist()
@@ -124,6 +136,24 @@ class Etn21:
         self._seen = cio[self._switches_at].tolist() if changed else switches
         self._next_ns = dispatch.wake_ns(now_ns)
         self.wake_ns = 0 if changed else self._next_ns
+        return requests
+
+    def _restart(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
+        """One I/O refresh of a restart, from the restart bit ON to the initializing flag OFF: requests are not seen."""
+        a, mask = memory.words("A"), 1 << self.layout.bit
+        requests: list[Request] = []
+        if self._starting is None:
+            requests = self._begin_anew(memory)
+            delay = self._timing.start_up()
+            self._starting = self._dispatch.cycle + delay.refreshes, now_ns + delay.time_ns
+            a[at.INITIALIZING] |= mask
+        elif self._dispatch.cycle >= self._starting[0] and now_ns >= self._starting[1]:
+            self._starting = None
+            a[at.INITIALIZING] &= ~mask
+            a[at.RESTART] &= ~mask
+        for event in events:
+            requests += self._dispatch.take(event)
+        self.wake_ns = self._starting[1] if self._starting and self._dispatch.cycle >= self._starting[0] else 0
         return requests
 
     def _show_unit_status(self, cio: memoryview) -> None:

@@ -27,6 +27,10 @@ FORCE_CLOSE_BIT = 2  # of word n, W421 6-7-5 p120
 FORCE_CLOSE = 1 << FORCE_CLOSE_BIT
 LINK_UP = 1 << 14  # of n+17; the bit's number is assumed
 
+# --- A words of the CPU unit, bit N for the CPU bus unit with number N, [K] ---------------------------------------------
+INITIALIZING = 302
+RESTART = 501
+
 # --- offsets from m (D), W420 4-2 p88 --------------------------------------------------------------------------------
 BYTES_RECEIVED = 0  # + socket number: m+1..m+8
 TCP_STATE = 8  # + socket number: m+9..m+16
@@ -91,17 +95,18 @@ class TcpState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """First words of one unit: `n` in CIO, `m` in D (W421 6-7-1 p113)."""
+    """First words of one unit: `n` in CIO, `m` in D (W421 6-7-1 p113), and its bit in words for all CPU bus units."""
 
     n: int
     m: int
+    bit: int
 
     @classmethod
     def of(cls, unit_number: int) -> Layout:
         """The layout of unit 0..15; ValueError for another number."""
         if unit_number not in UNIT_NUMBERS:
             raise ValueError(f"unit number {unit_number} is not in 0..15")
-        return cls(1500 + 25 * unit_number, 30000 + 100 * unit_number)
+        return cls(1500 + 25 * unit_number, 30000 + 100 * unit_number, unit_number)
 
     def parameters(self, area: int) -> int:
         """D address of parameter area 1..8."""

@@ -40,7 +40,11 @@ PARAMETER_NAMES = {
 
 def descriptions(layout: Layout) -> dict[str, str]:
     """The name of each bit and word by its address, such as `CIO 1519.02`; area and socket 1 go unnumbered."""
-    names = {f"CIO {layout.n}.02": "Socket Force-close Switch"}
+    names = {
+        f"CIO {layout.n}.02": "Socket Force-close Switch",
+        f"A{at.INITIALIZING}.{layout.bit:02}": "CPU Bus Unit Initializing Flag",
+        f"A{at.RESTART}.{layout.bit:02}": "CPU Bus Unit Restart Bit",
+    }
     for area in at.AREAS:
         word, first = layout.switches(area)
         for switch, name in SWITCH_NAMES.items():

@@ -44,6 +44,9 @@ class Timing(Protocol):
     def skew(self) -> Skew:
         """For a service that ends now."""
 
+    def start_up(self) -> Delay:
+        """From a restart until the unit sees requests."""
+
 
 class Exact:
     """A switch is accepted by the refresh that finds it ON, and finished by the next one at the earliest."""
@@ -56,9 +59,14 @@ class Exact:
     def skew(self) -> Skew:
         return TOGETHER
 
+    def start_up(self) -> Delay:
+        return Delay(1, 0)
+
 
 class Real:
-    """Seeded delays like those of the device (assumed): 3..7 refreshes and 5..21 ms, words out of step by -1..+3."""
+    """Seeded delays like those of the device (assumed): 3..7 refreshes and 5..21 ms, words out of step by -1..+3.
+
+    A restart takes 1 to 3 s."""
 
     accept_refreshes = 1
 
@@ -70,6 +78,9 @@ class Real:
 
     def skew(self) -> Skew:
         return Skew(1, *(self._random.randint(0, 4) for _ in range(3)))
+
+    def start_up(self) -> Delay:
+        return Delay(self._random.randint(3, 7), self._random.randint(1_000_000_000, 3_000_000_000))
 
 
 def timing_of(name: str, seed: int) -> Timing:

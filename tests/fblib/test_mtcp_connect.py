@@ -175,10 +175,13 @@ def test_a_socket_left_open_by_a_mode_change() -> None:
     )
 
 
-def test_a_restart_of_the_unit() -> None:
-    rig = Rig().connect()
-    rig.plc.units[0].link.submit(rig.unit.reset(rig.plc.memory), rig.plc.now_ns)
+@pytest.mark.parametrize("timing", ["exact", "real"])
+def test_a_restart_of_the_unit(timing: str) -> None:
+    rig = Rig(timing=timing, seed=2).connect()
+    rig.plc.write("A501.00", True)
     rig.run_until("Main.conn.Error", 1)
+    assert rig.get("conn.ENO") is False
+    rig.run_until("NOT A501.00 AND NOT A302.00", 4)
     rig.run_until("Main.conn.ENO", 2)
     assert rig.code("conn") == ""
 

@@ -178,7 +178,7 @@ def test_a_restart_of_anything_at_any_scan(timing: str, seed: int, after: int, w
     elif what == "power":
         rig.plc.warm_start()
     elif what == "unit":
-        rig.plc.units[0].link.submit(rig.unit.reset(rig.plc.memory), rig.plc.now_ns)
+        rig.plc.write("A501.00", True)
     else:
         rig.plc.write("CIO 1500.02", True)
     rig.scan(10)

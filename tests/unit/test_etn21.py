@@ -13,9 +13,9 @@ from fbvm.wire.link import Close, Closed, Connect, Opened
 
 
 def writable(unit_number: int) -> set[tuple[str, int]]:
-    """n, n+1..n+23, m+1..m+17 and the words +1..+5, +9 of the eight areas."""
+    """n, n+1..n+23, m+1..m+17, the words +1..+5, +9 of the eight areas, and the two words for all CPU bus units."""
     n, m = 1500 + 25 * unit_number, 30000 + 100 * unit_number
-    own = {("CIO", word) for word in range(n, n + 24)} | {("D", word) for word in range(m + 1, m + 18)}
+    own = {("A", 302), ("A", 501)} | {("CIO", word) for word in range(n, n + 24)} | {("D", word) for word in range(m + 1, m + 18)}
     return own | {("D", m + 18 + 10 * area + offset) for area in range(8) for offset in (1, 2, 3, 4, 5, 9)}
 
 
@@ -158,3 +158,43 @@ def test_an_open_waits_until_the_network_has_closed_the_socket_of_before_a_resta
     assert rig.scan(Closed(1)) == [Connect(1, SERVER)]
     rig.scan(Opened(1, 49153, SERVER))
     assert rig.code() == "0000"
+
+
+@pytest.mark.parametrize("number", [0, 1, 15])
+def test_a_program_restarts_the_unit(number: int) -> None:
+    """A501 bit N: connections break, A302 bit N is ON while the unit starts, then both bits are OFF; others stay."""
+    rig = Rig(Etn21(number))
+    rig.open()
+    a = rig.memory.words("A")
+    mine, others = 1 << number, 0x5554 & ~(1 << number)
+    a[501] = mine | others
+    a[302] = others
+    assert rig.scan() == [Close(1, reset=True)]
+    assert (a[302], a[501], rig.status(), rig.state()) == (others | mine, others | mine, 0, 0)
+    rig.parameters()
+    assert rig.scan(Switch.ACTIVE_OPEN, Closed(1)) == []
+    assert (a[302], a[501]) == (others, others)
+    assert rig.scan() == [Connect(1, SERVER)], "what was requested meanwhile is seen now"
+    rig.scan(Opened(1, 49153, SERVER))
+    assert (rig.code(), rig.is_open()) == ("0000", True)
+
+
+def test_a_restart_takes_1_to_3_s_assumed() -> None:
+    rig = Rig(Etn21(timing="real", seed=5))
+    a = rig.memory.words("A")
+    a[501] = 1
+    rig.scan()
+    began_ns = rig.now_ns
+    while a[302]:
+        assert rig.scan() == []
+    assert 1_000_000_000 <= rig.now_ns - began_ns <= 3_010_000_000
+    assert a[501] == 0
+
+
+def test_the_restart_bit_of_another_unit_is_none_of_its_business() -> None:
+    rig = Rig()
+    rig.open()
+    rig.memory.words("A")[501] = 0xFFFE
+    assert rig.scan() == []
+    assert rig.is_open()
+    assert rig.memory.words("A")[501] == 0xFFFE
