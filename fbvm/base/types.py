@@ -112,9 +112,12 @@ class StructType(Type):
 
     fields: dict[str, Field] = field(hash=False, compare=False)
     block: bool = False
+    other_names: dict[str, str] = field(default_factory=dict, hash=False, compare=False)
+    """Names under which a member is known besides its own, folded."""
 
     def member(self, name: str) -> Field | None:
-        return self.fields.get(fold(name))
+        folded = fold(name)
+        return self.fields.get(self.other_names.get(folded, folded))
 
 
 @dataclass(frozen=True)

@@ -138,6 +138,7 @@ class Calls:
     def _named(self, argument: tree.Argument, pou: Pou, bound: PouCall, given: dict[str, tree.Node]) -> None:
         assert argument.name is not None
         name = fold(argument.name.text)
+        name = pou.other_names.get(name, name)
         if name in given:
             self.error("S0403", argument.name, f"{argument.name.text} is given twice")
             return

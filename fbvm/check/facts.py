@@ -64,6 +64,8 @@ class Pou:
     source: Source
     tree: tree.Pou
     variables: dict[str, Variable] = field(default_factory=dict)
+    other_names: dict[str, str] = field(default_factory=dict)
+    """Names under which callers may know a pin, folded, and its own."""
     order: list[Variable] = field(default_factory=list)
     result: Variable | None = None
     type: StructType | None = None
@@ -174,6 +176,10 @@ class Facts:
     """Expressions that mean the same as another one (ADD(a, b) is a + b)."""
     guards: dict[tree.Call, Guard] = field(default_factory=dict)
     labels: dict[tree.CaseBranch, tuple[tuple[int, int], ...]] = field(default_factory=dict)
+    assigned: set[tree.Call] = field(default_factory=set)
+    """Calls whose result is the whole value of an assignment."""
+    turned: set[tree.Call] = field(default_factory=set)
+    """Calls whose result is what lies in memory, its bytes in another order."""
     text_cases: set[tree.Case] = field(default_factory=set)
     """CASE statements that choose by a STRING."""
     sources: dict[tree.Node, Source] = field(default_factory=dict)

@@ -52,8 +52,8 @@ TRUNC                                  IN:T                         -> DINT   AN
 TIME                                                                -> TIME
 IS_VALID                               IN:T                         -> BOOL   ANY_REAL
 IS_VALID_BCD                           IN:T                         -> BOOL   ANY_BIT
-TO_BIG_ENDIAN TO_LITTLE_ENDIAN         IN:T                         -> T      ANY_INT ANY_BIT
-FROM_BIG_ENDIAN FROM_LITTLE_ENDIAN     IN:T                         -> T      ANY_INT ANY_BIT
+TO_BIG_ENDIAN TO_LITTLE_ENDIAN         IN:T                         -> T      ANY
+FROM_BIG_ENDIAN FROM_LITTLE_ENDIAN     IN:T                         -> T      ANY
 __DUE                                  AT:TIME                      ->
 """
 
@@ -61,15 +61,28 @@ OPERATORS = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/", "MOD": "MOD", "EXPT
              "XOR": "XOR", "NOT": "NOT"}
 """Functions that mean an operator; ADD, MUL, AND, OR and XOR take more than two inputs."""
 EXTENSIBLE_OPERATORS = frozenset(("ADD", "MUL", "AND", "OR", "XOR"))
-TIME_OPERATORS = {
-    f"{word}_{left}_{right}" if right else f"{word}_{left}": word
-    for word, left, right in (
-        ("ADD", "TIME", ""), ("SUB", "TIME", ""), ("ADD", "LTIME", ""), ("SUB", "LTIME", ""),
-        ("MUL", "TIME", ""), ("DIV", "TIME", ""), ("MUL", "LTIME", ""), ("DIV", "LTIME", ""),
-        ("ADD", "TOD", "TIME"), ("ADD", "DT", "TIME"), ("SUB", "TOD", "TIME"), ("SUB", "DT", "TIME"),
-        ("SUB", "DATE", "DATE"), ("SUB", "TOD", "TOD"), ("SUB", "DT", "DT"),
-    )
-} | {"MULTIME": "MUL", "DIVTIME": "DIV"}
+_TIME_ROWS = """
+ADD_TIME TIME TIME      ADD_TOD_TIME TOD TIME    ADD_DT_TIME DT TIME
+SUB_TIME TIME TIME      SUB_TOD_TIME TOD TIME    SUB_DT_TIME DT TIME
+SUB_DATE_DATE DATE DATE SUB_TOD_TOD TOD TOD      SUB_DT_DT DT DT
+MUL_TIME TIME ANY_NUM   DIV_TIME TIME ANY_NUM    MULTIME TIME ANY_NUM    DIVTIME TIME ANY_NUM
+ADD_LTIME LTIME LTIME   ADD_LTOD_LTIME LTOD LTIME ADD_LDT_LTIME LDT LTIME
+SUB_LTIME LTIME LTIME   SUB_LTOD_LTIME LTOD LTIME SUB_LDT_LTIME LDT LTIME
+SUB_LDATE_LDATE LDATE LDATE SUB_LTOD_LTOD LTOD LTOD SUB_LDT_LDT LDT LDT
+MUL_LTIME LTIME ANY_NUM DIV_LTIME LTIME ANY_NUM
+"""
+
+
+def _time_operators(rows: str) -> dict[str, tuple[str, tuple[str, str]]]:
+    words = iter(rows.split())
+    return {name: (name[:3], (left, right)) for name, left, right in zip(words, words, words, strict=True)}
+
+
+TIME_OPERATORS = _time_operators(_TIME_ROWS)
+"""The typed functions of times: name to the overloaded function and the types of both inputs (table 35)."""
+
+TURNED = frozenset(("TO_BIG_ENDIAN", "TO_LITTLE_ENDIAN", "FROM_BIG_ENDIAN", "FROM_LITTLE_ENDIAN"))
+"""Functions that change the order of bytes."""
 
 
 def _parse(rows: str) -> dict[str, Signature]:
@@ -87,7 +100,6 @@ def _parse(rows: str) -> dict[str, Signature]:
 SIGNATURES = _parse(_ROWS)
 
 _CONVERSION = re.compile(r"(?:(?P<source>[A-Z_]+?)_)?(?P<form>TO_BCD|BCD_TO|TRUNC|TO)_(?P<target>[A-Z_]+)")
-_TYPED = re.compile(r"(?P<name>[A-Z0-9]+)_(?P<type>[A-Z_]+)")
 _CONVERTIBLE = set(ELEMENTARY) | {"STRING", "WSTRING", "TOD", "DT", "LTOD", "LDT"}
 
 
@@ -129,13 +141,13 @@ def conversion(name: str) -> Conversion | None:
 
 def typed_name(name: str) -> tuple[str, Elementary | StringType] | None:
     """`ADD_INT` as ("ADD", INT) if such a function exists in a typed form, else None."""
-    match = _TYPED.fullmatch(name)
-    kind = named_type(match["type"]) if match is not None else None
-    if match is None or kind is None:
-        return None
-    row = SIGNATURES.get(match["name"])
-    if match["name"] in OPERATORS or row is not None and row.limits:
-        return match["name"], kind
+    at = name.find("_")
+    while at > 0:
+        function, kind = name[:at], named_type(name[at + 1:])
+        row = SIGNATURES.get(function)
+        if kind is not None and (function in OPERATORS or row is not None and row.limits):
+            return function, kind
+        at = name.find("_", at + 1)
     return None
 
 

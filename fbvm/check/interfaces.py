@@ -309,7 +309,7 @@ class Interfaces:
         content += bytes(-len(content) % 8)
         self._limit(pou, len(content))
         fields = {fold(v.name): _field(v) for v in pou.order if v.place != "frame"}
-        pou.type = StructType(pou.name, len(content), 8, fields, block=True)
+        pou.type = StructType(pou.name, len(content), 8, fields, True, pou.other_names)
         pou.initial = bytes(content)
 
     def _limit(self, pou: Pou, size: int) -> None:

@@ -7,6 +7,11 @@ A library for a unit that has no words of its own in the PLC's areas declares th
     head = 512          # words for the unit as a whole
     slots = 32
     slot = 400          # words of a slot
+
+Pins that other tools call otherwise have their other names there too:
+
+    [pins]
+    SR = { SET1 = "S1", RESET = "R" }
 """
 
 from __future__ import annotations
@@ -36,6 +41,8 @@ class Library:
     files: dict[str, Path]
     globals: tuple[str, ...] = ()
     mailbox: Mailbox | None = None
+    pins: dict[str, dict[str, str]] = field(default_factory=dict)
+    """By folded name of a POU the other names of its pins, folded, and their own."""
     loaded: set[str] = field(default_factory=set)
 
 
@@ -58,7 +65,18 @@ def _libraries_below(root: Path) -> Iterator[Library]:
             raise LibraryError(f"{described}: globals must be a list of file names")
         name = folder.relative_to(root).as_posix() if folder != root else root.name
         files = {fold(p.stem): p for p in sorted(folder.glob("*.st"))}
-        yield Library(name, folder, files, tuple(listed), _mailbox(table, described))
+        yield Library(name, folder, files, tuple(listed), _mailbox(table, described), _pins(table, described))
+
+
+def _pins(table: dict[str, object], described: Path) -> dict[str, dict[str, str]]:
+    """The other names of pins."""
+    written = table.get("pins", {})
+    pins: dict[str, dict[str, str]] = {}
+    for pou, row in written.items() if isinstance(written, dict) else [("", None)]:
+        if not isinstance(row, dict) or not all(isinstance(own, str) for own in row.values()):
+            raise LibraryError(f"{described}: pins has for each POU a table of names and what the POU calls them")
+        pins[fold(pou)] = {fold(other): fold(own) for other, own in row.items()}
+    return pins
 
 
 def _mailbox(table: dict[str, object], described: Path) -> Mailbox | None:
@@ -94,6 +112,11 @@ class Libraries:
     @property
     def names(self) -> tuple[str, ...]:
         return tuple(self._libraries)
+
+    def other_pins(self, owner: str, pou: str) -> dict[str, str]:
+        """Other names of the pins of a library's POU, folded, and their own."""
+        library = self._libraries.get(owner)
+        return library.pins.get(fold(pou), {}) if library is not None else {}
 
     def block_names(self) -> list[str]:
         """The names under which files are found, as their files are named."""

@@ -81,6 +81,7 @@ class Project:
             self.report.add(refused.code, source, refused, _refusal(refused))
         if not self._twice(key, declaration.name, source, "POU"):
             self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
+            pou.other_names = self.libraries.other_pins(source.library, pou.name)
             pou.damaged |= {name for refused in declaration.refused if (name := _refused_name(refused, source))}
             self.new_pous.append(pou)
 

@@ -8,9 +8,12 @@ from fbvm.base.types import (
     ELEMENTARY,
     GENERIC,
     LREAL,
+    ArrayType,
     Elementary,
     EnumType,
+    RefType,
     StringType,
+    StructType,
     Type,
     base,
     common,
@@ -55,7 +58,7 @@ class StandardCalls:
             values = Arguments(self.expressions, call, ["ARR", "DIM"]).in_order()
             return references.bound(self.expressions, call, name, *values) if values is not None else None
         if name in functions.TIME_OPERATORS:
-            return self._operator(call, functions.TIME_OPERATORS[name], None, want)
+            return self._time_operator(call, *functions.TIME_OPERATORS[name], want)
         if name in functions.OPERATORS:
             return self._operator(call, name, None, want)
         if name in functions.SIGNATURES:
@@ -85,11 +88,34 @@ class StandardCalls:
     def _operator(self, call: tree.Call, name: str, kind: Elementary | StringType | None,
                   want: Type | None) -> Type | None:
         """ADD(a, b, c) means a + b + c; NOT(a) means NOT a."""
-        op = functions.OPERATORS[name]
         names = ["IN"] if name == "NOT" else ["IN1", "IN2"]
         values = Arguments(self.expressions, call, names, name in functions.EXTENSIBLE_OPERATORS).in_order()
+        return self._meaning(call, name, values, kind, want) if values is not None else None
+
+    def _time_operator(self, call: tree.Call, name: str, wanted: tuple[str, str], want: Type | None) -> Type | None:
+        """ADD_TOD_TIME(a, b) means a + b, and takes these types only."""
+        values = Arguments(self.expressions, call, ["IN1", "IN2"]).in_order()
         if values is None:
             return None
+        for value, type_name in zip(values, wanted, strict=True):
+            kind = functions.named_type(type_name)
+            if kind is None and not self._is_number(value) or \
+                    kind is not None and not self.expressions.fit(value, kind, "S0405"):
+                return None
+        return self._meaning(call, name, values, None, want)
+
+    def _is_number(self, value: tree.Expr) -> bool:
+        """True for a number, whose type stays open if it is a literal; else a diagnostic."""
+        kind = self.expressions.infer(value)
+        if kind is not None and kind not in UNTYPED and not is_any(kind, "ANY_NUM"):
+            self.error("S0405", value, f"a number is needed here, this is {kind}")
+            return False
+        return kind is not None
+
+    def _meaning(self, call: tree.Call, name: str, values: list[tree.Expr], kind: Elementary | StringType | None,
+                 want: Type | None) -> Type | None:
+        """The type of a call that means an operator between its arguments."""
+        op = functions.OPERATORS[name]
         if name == "NOT":
             meaning: tree.Expr = tree.Unary(call.start, call.end, "NOT", values[0])
         else:
@@ -130,10 +156,15 @@ class StandardCalls:
             if kind is None or not self.expressions.fit(value, kind, "S0405"):
                 return None
             arguments.append((value, kind))
+        if row.key in functions.TURNED and variable is not None and not self._turned(call, variable):
+            return None
         whole = [value for value, kind in arguments if kind == variable and not machine(kind)]
         if whole and not self._as_a_whole(call, whole):
             return None
         self.facts.calls[call] = StandardCall(row.key, arguments, (variable,) if variable else ())
+        if row.key == "TRUNC" and want is not None and is_any(want, "ANY_INT"):
+            self.facts.calls[call] = StandardCall(row.key, arguments, (arguments[0][1], base(want)))
+            return base(want)
         if row.result == "T":
             assert variable is not None
             return variable
@@ -147,10 +178,24 @@ class StandardCalls:
             self.error("S0405", call, f"{callee(call)} of an array or structure takes no EN and ENO", "write IF instead")
             return False
         made = [value for value in values if self._is_result(value)]
-        if made and callee(call).upper() != "MOVE":
+        if made and callee(call).upper() not in ("MOVE", *functions.TURNED):
             self.error("S0405", made[0], f"{callee(call)} chooses among variables, not among results of that size",
                        "assign the result to a variable first")
             return False
+        return True
+
+    def _turned(self, call: tree.Call, kind: Type) -> bool:
+        """True if the order of the bytes of a value may be changed here; else a diagnostic."""
+        if _holds_references(kind):
+            self.error("S0405", call, f"{callee(call)}: {kind} holds references, which have no order of bytes")
+            return False
+        if machine(kind) and machine(kind)[0] not in ("f", "s"):
+            return True
+        if call not in self.facts.assigned or call in self.facts.guards:
+            self.error("S0405", call, f"the bytes of {kind} change places in a variable only",
+                       f"write  variable := {callee(call)}(...);  and nothing else in that statement")
+            return False
+        self.facts.turned.add(call)
         return True
 
     def _is_result(self, value: tree.Expr) -> bool:
@@ -252,3 +297,12 @@ class StandardCalls:
 
     def _named(self, name: str) -> Type | None:
         return functions.named_type(name) or self.expressions.checker.specs.named_type(name, self.expressions.source)
+
+
+def _holds_references(kind: Type) -> bool:
+    """True if a reference lies in a value of this type."""
+    if isinstance(kind, ArrayType):
+        return _holds_references(kind.element)
+    if isinstance(kind, StructType):
+        return any(_holds_references(field.type) for field in kind.fields.values())
+    return isinstance(kind, RefType)

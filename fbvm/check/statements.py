@@ -62,6 +62,8 @@ class Statements:
         if last is None:
             self.expressions.infer(node.value)
             return
+        if isinstance(node.value, tree.Call):
+            self.facts.assigned.add(node.value)
         self.expressions.fit(node.value, last)
         for kind, value, value_kind in zip(kinds, node.targets[1:], kinds[1:], strict=False):
             if kind is not None and value_kind is not None and not assignable(value_kind, kind):

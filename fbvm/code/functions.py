@@ -233,8 +233,8 @@ def _to_time(node: Node, source: Type, target: Type, site: int) -> Node:
 
 def _date_part(body: BodyLowering, node: Node, source: Type, target: Type) -> Node:
     """Among times; a date or a time of day out of a date and time."""
-    if source.name.removeprefix("L") == target.name.removeprefix("L"):
-        return node
+    if source.name.removeprefix("L") == target.name.removeprefix("L") or source.name.endswith("DATE"):
+        return node  # a date as a moment is its midnight
     kept = body.keep(node)
     midnight = ("mul", "i64", ("floor_div", "i64", kept, ("const", "i64", DAY_NS)), ("const", "i64", DAY_NS))
     return midnight if target.name.endswith("DATE") else ("sub", "i64", kept, midnight)

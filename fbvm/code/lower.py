@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import BOOL, NULL, Type, base, machine
 from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, PouCall, StandardCall
+from fbvm.code import byte_order
 from fbvm.code.functions import FUNCTIONS
 from fbvm.code.image import Body
 from fbvm.code.loops import LoopLowering
@@ -187,6 +188,11 @@ class BodyLowering:
     def assign(self, target: tree.Expr, value: tree.Expr, site: int) -> None:
         """`target := value`: the subscripts of the target first, then the value."""
         kind = self.facts.types[target]
+        if isinstance(value, tree.Call) and value in self.facts.turned:
+            called = self.facts.calls[value]
+            assert isinstance(called, StandardCall)
+            byte_order.assign(self, target, called, site)
+            return
         if is_aggregate(kind):
             to = self.places.fixed(self.places.of(target))
             self.copy(to, self.aggregate(value), site)

@@ -147,6 +147,7 @@ exit       |                        |        |             | leaves the innermos
 next       |                        |        |             | to the tail of the innermost loop
 return     |                        |        |             | leaves the body
 call       | pou address            |        |             | executes the body of that number; address of its instance, or None
+reverse    | address size runs      |        |             | each item's bytes backwards; runs (offset, count, stride, item)
 charge     | count site             |        | R0104       | takes count from the step budget and stores it; below 0 traps
 due        | a                      |        |             | notes time a (ns) if it is earlier than what is noted
 stop       | code site              |        | code        | traps

@@ -50,6 +50,22 @@ def text_find(a: int, m: int, b: int, n: int) -> int:
     return 0
 
 
+def reverse_items(at: int, count: int, stride: int, size: int) -> int:
+    """The bytes of each of `count` items backwards."""
+    while count > 0:
+        low = at
+        high = at + size - 1
+        while low < high:
+            byte = peek(low)
+            poke(low, peek(high))
+            poke(high, byte)
+            low += 1
+            high -= 1
+        at += stride
+        count -= 1
+    return 0
+
+
 # --- characters of two bytes ----------------------------------------------------------------------------------------
 
 

@@ -108,6 +108,13 @@ def _fill(w: Writer, address: Address, pattern: bytes) -> None:
     w.reload(w.scope(address, len(pattern)))
 
 
+def _reverse(w: Writer, address: Address, size: int, runs: tuple[tuple[int, ...], ...]) -> None:
+    start = w.integer(w.pointer(address, size))
+    for offset, count, stride, item in runs:
+        w.call("reverse_items", w.new(f"add i64 {start}, {offset}"), str(count), str(stride), str(item))
+    w.reload(w.scope(address, size))
+
+
 def _let(w: Writer, number: int, machine: str, a: Node) -> None:
     if machine in TEXT_UNITS:
         keep(w, number, a)
@@ -233,8 +240,9 @@ def _observe(w: Writer, kind: str, site: int, detail: Any) -> None:
 
 EMITTERS: dict[str, Callable[..., None]] = {
     "store": _store, "store_raw": _store_raw, "store_bit": _store_bit, "store_flag": _store_flag,
-    "store_text": _store_text, "copy": _copy, "fill": _fill, "let": _let, "if": _if, "case": _case, "loop": _loop,
-    "exit": _exit, "next": _next, "return": _return, "call": _call, "charge": _charge, "due": _due, "stop": _stop,
+    "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
+    "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
+    "charge": _charge, "due": _due, "stop": _stop,
     "observe": _observe,
 }
 """How each statement is written: called with the operands of its row."""

@@ -215,7 +215,13 @@ def _texts(memory: Memory) -> dict[str, Any]:
     def copy(to: int, source: int, count: int) -> None:
         u8[to:to + count] = u8[source:source + count]
 
+    def reverse(at: int, runs: tuple[tuple[int, int, int, int], ...]) -> None:
+        for offset, count, stride, size in runs:
+            for start in range(at + offset, at + offset + count * stride, stride):
+                u8[start:start + size] = bytes(u8[start:start + size])[::-1]
+
     def fill(to: int, pattern: bytes) -> None:
         u8[to:to + len(pattern)] = pattern
 
-    return {"get_s8": get_s8, "put_s8": put_s8, "get_s16": get_s16, "put_s16": put_s16, "copy": copy, "fill": fill}
+    return {"get_s8": get_s8, "put_s8": put_s8, "get_s16": get_s16, "put_s16": put_s16, "copy": copy, "fill": fill,
+            "reverse": reverse}

@@ -206,6 +206,10 @@ def _copy(w: BodyWriter, to: Address, source: Address, size: int) -> None:
         w.line(f"copy({target}, {origin}, {size})")
 
 
+def _reverse(w: BodyWriter, address: Address, size: int, runs: tuple[tuple[int, ...], ...]) -> None:
+    w.line(f"reverse({bare(w.place(address, size))}, {w.constant(runs)})")
+
+
 def _fill(w: BodyWriter, address: Address, pattern: bytes) -> None:
     w.line(f"fill({bare(w.place(address, len(pattern)))}, {pattern!r})")
 
@@ -367,8 +371,9 @@ _DETAILS: dict[str, Callable[[BodyWriter, Any], str]] = {"contact": _contact, "r
 
 EMITTERS: dict[str, Callable[..., None]] = {
     "store": _store, "store_raw": _store_raw, "store_bit": _store_bit, "store_flag": _store_flag,
-    "store_text": _store_text, "copy": _copy, "fill": _fill, "let": _let, "if": _if, "case": _case, "loop": _loop,
-    "exit": _exit, "next": _next, "return": _return, "call": _call, "charge": _charge, "due": _due, "stop": _stop,
+    "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
+    "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
+    "charge": _charge, "due": _due, "stop": _stop,
     "observe": _observe,
 }
 """How each statement is written: called with the operands of its row."""

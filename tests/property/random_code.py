@@ -321,6 +321,7 @@ class Maker:
         return self.pick((
             ("copy", at(place), at(64 * self.random.randrange(10) + self.random.randrange(9)), self.random.randrange(1, 60)),
             ("fill", at(place), self.pick((bytes(9), b"\1\2\3", b"\xff" * 20))), ("charge", 1, self.site()),
+            ("reverse", at(place), 60, self.pick((((0, 5, 2, 2),), ((1, 3, 20, 8), (9, 2, 10, 4)), ((3, 7, 8, 3),)))),
             ("due", self.value("i64", 1)), ("copy", (("ref", self.reference(), self.site()), 0, ()), at(place), 16)))
 
     def case(self, depth: int) -> Node:
