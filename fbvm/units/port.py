@@ -1,0 +1,67 @@
+"""The TCP side of a unit that is met through a mailbox: one connection for each slot that names the unit.
+
+Knows neither Modbus nor what is in the head of the mailbox.  Several units may share one mailbox; each serves the
+slots that carry its number."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+
+from fbvm.units import port_map as at
+from fbvm.units.port_line import Line
+from fbvm.units.port_map import State, Wish
+from fbvm.wire.link import Event, Request
+
+
+class Port:
+    """The connections of unit `number` in a mailbox with `slots` slots behind `head_words` words.
+
+    `number_of` gives the number that the unit has for a POSIX errno name."""
+
+    def __init__(self, number: int, head_words: int, slots: int, number_of: Callable[[str], int]) -> None:
+        self.number = number
+        self._head_words = head_words
+        self._lines = [Line(channel, number_of) for channel in range(slots)]
+        self._modules_at = slice(head_words + at.MODULE, head_words + slots * at.SLOT_WORDS, at.SLOT_WORDS)
+
+    def take(self, words: memoryview, events: Iterable[Event]) -> None:
+        """What the network tells; `words` is the whole mailbox."""
+        for event in events:
+            if 0 <= event.channel < len(self._lines):
+                self._lines[event.channel].take(event, self._slot(words, event.channel))
+
+    def exchange(self, words: memoryview) -> list[Request]:
+        """What the network has to do for the wishes of the program."""
+        requests: list[Request] = []
+        for channel, module in enumerate(words[self._modules_at].tolist()):
+            line = self._lines[channel]
+            if module == self.number or not line.is_idle:
+                slot = self._slot(words, channel)
+                requests += line.exchange(slot, module == self.number, lambda port: self._may_listen(words, port))
+        return requests
+
+    def reset(self, words: memoryview | None) -> list[Request]:
+        """Break all connections; the slots of this unit are as new, but for their owners."""
+        requests = [request for line in self._lines for request in line.close(reset=True)]
+        if words is None:
+            return requests
+        for channel in range(len(self._lines)):
+            slot = self._slot(words, channel)
+            if slot[at.MODULE] == self.number:
+                for word in (at.WISH, at.STATE, at.ERROR, at.SENDING, at.RECEIVED):
+                    slot[word] = 0
+        return requests
+
+    def _slot(self, words: memoryview, channel: int) -> memoryview:
+        start = self._head_words + channel * at.SLOT_WORDS
+        return words[start : start + at.SLOT_WORDS]
+
+    def _may_listen(self, words: memoryview, port: int) -> bool:
+        """True if no other slot of this unit listens there: one after the other opens the door for its caller."""
+        slots = (self._slot(words, channel) for channel, line in enumerate(self._lines) if not line.is_idle)
+        return not any(_listens(slot, self.number, port) for slot in slots)
+
+
+def _listens(slot: Sequence[int], number: int, port: int) -> bool:
+    found = (slot[at.MODULE], slot[at.WISH], slot[at.STATE], slot[at.LOCAL_PORT])
+    return found == (number, Wish.LISTEN, State.OPENING, port)

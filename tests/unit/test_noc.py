@@ -1,0 +1,397 @@
+"""The Ethernet module as a unit: what every unit owes, its head, its connections, restart, wrong arguments."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Sequence
+
+import pytest
+from common_unit_tests import CYCLE_NS, CommonUnitTests, FakeMemory
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fbvm.base.data import data_folder
+from fbvm.net.loop import LoopLink, LoopNetwork
+from fbvm.net.peers import Fin, Reset, Say, ScriptedPeer
+from fbvm.units import noc_map, port_map
+from fbvm.units.noc import RESTART_NS, Noc
+from fbvm.units.port_map import State, Wish
+from fbvm.units.unit import Unit
+from fbvm.wire.link import (
+    Broken,
+    Close,
+    Connect,
+    Event,
+    Failed,
+    Grant,
+    Listen,
+    Opened,
+    Peer,
+    PeerClosed,
+    Received,
+    Request,
+    Send,
+)
+
+OWN = Peer("192.168.250.22", 502)
+SERVER = Peer("192.168.250.2", 502)
+SLOTS_AT = noc_map.PLACES * noc_map.HEAD_WORDS
+
+
+def slot(memory: FakeMemory, number: int = 0) -> memoryview:
+    start = SLOTS_AT + number * port_map.SLOT_WORDS
+    return memory.words("NOC")[start : start + port_map.SLOT_WORDS]
+
+
+def wish(words: memoryview, what: Wish, remote: Peer = SERVER, local_port: int = 0, place: int = 7) -> None:
+    octets = [int(part) for part in remote.host.split(".")]
+    words[port_map.MODULE] = place + 1
+    words[port_map.REMOTE_IP], words[port_map.REMOTE_IP + 1] = octets[0] << 8 | octets[1], octets[2] << 8 | octets[3]
+    words[port_map.REMOTE_PORT], words[port_map.LOCAL_PORT] = remote.port, local_port
+    words[port_map.WISH] = what
+
+
+def say(words: memoryview, data: bytes) -> None:
+    padded = data + b"\0"
+    for number in range((len(data) + 1) // 2):
+        words[port_map.OUTGOING + number] = int.from_bytes(padded[2 * number : 2 * number + 2], "big")
+    words[port_map.SENDING] = len(data)
+
+
+def heard(words: memoryview) -> bytes:
+    size = words[port_map.RECEIVED]
+    data = b"".join(word.to_bytes(2, "big") for word in words[port_map.INCOMING : port_map.INCOMING + (size + 1) // 2])
+    return data[:size]
+
+
+class TestNocIsAUnit(CommonUnitTests):
+    def new_unit(self) -> Unit:
+        return Noc()
+
+    def may_write(self) -> set[tuple[str, int]]:
+        head = range(7 * noc_map.HEAD_WORDS, 8 * noc_map.HEAD_WORDS)
+        unit_words = (port_map.WISH, port_map.STATE, port_map.ERROR, port_map.PEER_IP, port_map.PEER_IP + 1,
+                      port_map.PEER_PORT, port_map.SENDING, port_map.RECEIVED)  # fmt: skip
+        return {("NOC", word) for word in head} | {("NOC", SLOTS_AT + word) for word in unit_words}
+
+    def data_words(self) -> set[tuple[str, int]]:
+        return {("NOC", SLOTS_AT + word) for word in range(port_map.INCOMING, port_map.SLOT_WORDS)}
+
+    def ask(self, memory: FakeMemory) -> None:
+        wish(slot(memory), Wish.CONNECT)
+
+    def is_answered(self, memory: FakeMemory) -> bool:
+        return slot(memory)[port_map.STATE] == State.OPEN
+
+
+class Rig:
+    """A module, its memory, a network in memory; `step` is one refresh."""
+
+    def __init__(self, noc: Noc | None = None, network: LoopNetwork | None = None) -> None:
+        self.noc = noc or Noc(restart_ns=5 * CYCLE_NS)
+        self.memory = FakeMemory()
+        self.network = network or LoopNetwork()
+        self.link: LoopLink = self.network.attach(self.noc.address)
+        self.now_ns = 0
+        self.link.submit(self.noc.reset(self.memory), 0)
+        self.requests: list[Request] = []
+
+    def step(self, count: int = 1) -> None:
+        for _ in range(count):
+            self.now_ns += CYCLE_NS
+            self.requests = self.noc.refresh(self.memory, self.link.events(self.now_ns), self.now_ns)
+            self.link.submit(self.requests, self.now_ns)
+
+    def head(self, place: int = 7) -> memoryview:
+        return self.memory.words("NOC")[place * noc_map.HEAD_WORDS : (place + 1) * noc_map.HEAD_WORDS]
+
+    def table(self) -> list[int]:
+        return self.head()[noc_map.STATISTICS : noc_map.STATISTICS + noc_map.TABLE_WORDS].tolist()
+
+    def counter(self, place: int) -> int:
+        low, high = self.table()[place : place + 2]
+        return low | high << 16
+
+
+# --- the head -----------------------------------------------------------------------------------------------------------
+
+
+def test_the_library_declares_what_the_unit_brings() -> None:
+    written = tomllib.loads((data_folder("fblib") / "schneider" / "mbp_mstr" / "library.toml").read_text())["mailbox"]
+    assert written == {"area": noc_map.AREA, "head": SLOTS_AT, "slots": noc_map.SLOTS, "slot": port_map.SLOT_WORDS}
+    assert len(FakeMemory().words("NOC")) == SLOTS_AT + noc_map.SLOTS * port_map.SLOT_WORDS
+
+
+def test_the_table_of_the_sheet() -> None:
+    """MAC 00 00 54 00 12 34 and IP 198.202.137.113 as the help writes them; link, 100 Mbit/s, full duplex, NOC, running."""
+    rig = Rig(Noc(address="198.202.137.113"))
+    table = rig.table()
+    assert table[0:3] == [0x0000, 0x5400, 0x1234]
+    assert table[36:38] == [0x8971, 0xC6CA]
+    assert table[3] == 0x8000 | 0x1000 | 14 << 4 | 4 | 2 | 1
+    assert not any(table[4:36])
+
+
+def test_the_board_status_follows_the_settings() -> None:
+    rig = Rig(Noc(module_type=21))
+    rig.noc.settings = {"link_up": False, "configured": False}
+    rig.step()
+    assert rig.table()[3] == 0x1000 | 21 << 4 | 4
+    assert rig.head()[noc_map.STATUS] == noc_map.UNCONFIGURED
+
+
+@pytest.mark.parametrize(("rack_slot", "place"), [(0, 0), (7, 7), (16, 16), (254, 17)])
+def test_the_head_of_each_slot(rack_slot: int, place: int) -> None:
+    rig = Rig(Noc(rack_slot, http=False))
+    head = rig.head(place)
+    assert (head[noc_map.STATUS], head[noc_map.RACK_SLOT]) == (noc_map.READY, rack_slot)
+    assert head[noc_map.CONFIGURED] == head[noc_map.SERVICES] == noc_map.FTP
+    assert head[noc_map.OWN_IP : noc_map.OWN_IP + 2].tolist() == [0xC0A8, 0xFA16]
+    assert rig.noc.name == f"NOC {rack_slot}"
+
+
+@pytest.mark.parametrize("wrong", [
+    {"rack_slot": -1}, {"rack_slot": 17}, {"rack_slot": 255}, {"module_type": 6}, {"module_type": 22}, {"mac": "00:11"},
+    {"mac": "00:00:54:00:12:3g"},
+])  # fmt: skip
+def test_wrong_arguments(wrong: dict[str, int | str]) -> None:
+    with pytest.raises(ValueError):
+        Noc(**wrong)  # type: ignore[arg-type]
+
+
+def test_a_mode_change_clears_the_words_but_not_what_the_module_knows() -> None:
+    rig = Rig()
+    rig.head()[noc_map.SERVICES] = 0
+    rig.head()[noc_map.STATISTICS + 4] = 9
+    rig.step()
+    rig.memory.words("NOC")[:] = memoryview(bytes(2 * 13664)).cast("H")
+    rig.step()
+    assert (rig.head()[noc_map.SERVICES], rig.counter(4)) == (0, 9)
+    rig.noc.reset(rig.memory)
+    assert (rig.head()[noc_map.SERVICES], rig.counter(4)) == (noc_map.FTP | noc_map.HTTP, 0)
+
+
+def test_a_plc_without_a_mailbox_leaves_it_idle() -> None:
+    class Bare:
+        def words(self, area: str) -> memoryview:
+            raise KeyError(area)
+
+    noc = Noc()
+    assert noc.reset(Bare()) == []
+    assert noc.refresh(Bare(), [Opened(0, 1, SERVER)], 0) == []
+
+
+# --- connections --------------------------------------------------------------------------------------------------------
+
+
+def test_connect_send_receive_close() -> None:
+    rig = Rig()
+    peer = ScriptedPeer([Say(b"worlds")])
+    rig.network.place(SERVER, peer)
+    words = slot(rig.memory, 31)
+    wish(words, Wish.CONNECT)
+    say(words, b"hello")
+    states = []
+    for _ in range(4):
+        rig.step()
+        states.append(words[port_map.STATE])
+    assert states == [State.OPENING, State.OPEN, State.OPEN, State.OPEN]
+    assert peer.heard == [b"hello"]
+    assert (words[port_map.SENDING], heard(words)) == (0, b"worlds")
+    assert words[port_map.PEER_IP : port_map.PEER_PORT + 1].tolist() == [0xC0A8, 0xFA02, 502]
+    words[port_map.WISH] = Wish.CLOSED
+    rig.step()
+    assert (rig.requests, words[port_map.STATE]) == ([Close(31)], State.CLOSING)
+    rig.step()
+    assert words[port_map.STATE] == State.CLOSED
+    assert peer.log == ["fin"]
+
+
+def test_what_the_program_leaves_stays_in_the_network() -> None:
+    """Room is granted as the program takes bytes away; the word's other half is kept at an odd count."""
+    rig = Rig()
+    data = bytes(range(256)) * 4
+    rig.network.place(SERVER, ScriptedPeer(greeting=[Say(data)]))
+    words = slot(rig.memory)
+    wish(words, Wish.CONNECT)
+    rig.step(5)
+    assert heard(words) == data[:504]
+    words[port_map.RECEIVED] = 0
+    rig.step(3)
+    assert heard(words) == data[504:1008]
+    words[port_map.RECEIVED] = 3
+    rig.step(3)
+    assert heard(words) == data[504:507] + data[1008:]
+
+
+def test_the_end_and_the_break_of_a_connection() -> None:
+    rig = Rig()
+    rig.network.place(SERVER, ScriptedPeer([Say(b"x"), Fin()], [Reset()]))
+    words = slot(rig.memory)
+    wish(words, Wish.CONNECT)
+    say(words, b"1")
+    rig.step(5)
+    assert (words[port_map.STATE], heard(words)) == (State.ENDED, b"x")
+    say(words, b"2")
+    rig.step(3)
+    assert (words[port_map.STATE], words[port_map.ERROR]) == (State.FAILED, 0x36)
+    rig.step(3)
+    assert words[port_map.STATE] == State.FAILED
+    words[port_map.WISH] = Wish.CLOSED
+    rig.step(2)
+    assert words[port_map.STATE] == State.CLOSED
+
+
+def test_an_open_that_fails_waits_for_the_program() -> None:
+    rig = Rig()
+    words = slot(rig.memory)
+    wish(words, Wish.CONNECT)
+    rig.step(3)
+    assert (words[port_map.STATE], words[port_map.ERROR], rig.requests) == (State.FAILED, 0x3D, [])
+    words[port_map.WISH] = Wish.CLOSED
+    rig.step()
+    assert (words[port_map.STATE], rig.requests) == (State.CLOSED, [])
+    words[port_map.WISH] = Wish.CONNECT
+    rig.step()
+    assert rig.requests == [Connect(0, SERVER)]
+
+
+def test_slots_listen_one_after_the_other() -> None:
+    rig = Rig()
+    first, second = slot(rig.memory, 3), slot(rig.memory, 5)
+    for words in (first, second):
+        wish(words, Wish.LISTEN, Peer("0.0.0.0", 0), 502)
+    rig.step()
+    assert rig.requests == [Listen(3, 502)]
+    clients = [rig.network.attach(f"192.168.250.{number}") for number in (50, 51)]
+    for client in clients:
+        client.submit([Connect(1, OWN), Send(1, b"hi"), Grant(1, 100)], rig.now_ns)
+        rig.step(3)
+    assert [words[port_map.STATE] for words in (first, second)] == [State.OPEN, State.OPEN]
+    assert [words[port_map.PEER_IP + 1] for words in (first, second)] == [0xFA32, 0xFA33]
+    first[port_map.WISH] = Wish.RESET
+    rig.step(2)
+    assert Broken(1, "ECONNRESET") in clients[0].events(rig.now_ns)
+
+
+def test_a_slot_of_another_module_is_left_alone_and_closed_when_it_changes_hands() -> None:
+    rig = Rig()
+    rig.network.place(SERVER, ScriptedPeer())
+    words = slot(rig.memory)
+    wish(words, Wish.CONNECT, place=8)
+    rig.step(3)
+    assert words[port_map.STATE] == State.CLOSED
+    words[port_map.MODULE] = 8
+    rig.step(3)
+    assert words[port_map.STATE] == State.OPEN
+    words[port_map.MODULE] = 0
+    rig.step()
+    assert rig.requests == [Close(0)]
+
+
+def test_keep_alive_is_an_option() -> None:
+    rig = Rig()
+    words = slot(rig.memory)
+    wish(words, Wish.CONNECT)
+    words[port_map.OPTIONS] = port_map.KEEP_ALIVE
+    rig.step()
+    assert rig.requests == [Connect(0, SERVER, 0, True)]
+
+
+@pytest.mark.parametrize("errno", [*noc_map.ERRNO, "EUNHEARDOF"])
+def test_errors_by_their_numbers(errno: str) -> None:
+    noc, memory = Noc(), FakeMemory()
+    noc.reset(memory)
+    wish(slot(memory), Wish.CONNECT)
+    noc.refresh(memory, [], 1)
+    noc.refresh(memory, [Failed(0, "open", errno)], 2)
+    assert slot(memory)[port_map.ERROR] == noc_map.ERRNO.get(errno, 5)
+    assert slot(memory)[port_map.STATE] == State.FAILED
+
+
+# --- counters and restart -----------------------------------------------------------------------------------------------
+
+
+def counted(*events: Event, link_up: bool = True) -> list[int]:
+    """The table's counters after a connection has been asked for and these events have come."""
+    noc, memory = Noc(), FakeMemory()
+    noc.reset(memory)
+    noc.settings = {"link_up": link_up, "configured": True}
+    wish(slot(memory), Wish.CONNECT)
+    noc.refresh(memory, [], 1)
+    noc.refresh(memory, events, 2)
+    first = 7 * noc_map.HEAD_WORDS + noc_map.STATISTICS
+    return memory.words("NOC")[first + 4 : first + 36].tolist()
+
+
+@pytest.mark.parametrize(("events", "expected"), [
+    ([], {}),
+    ([Opened(0, 1, SERVER)], {4: 1}),
+    ([Opened(0, 1, SERVER), Received(0, b"1"), Received(0, b"2"), PeerClosed(0)], {4: 4}),
+    ([Failed(0, "open", "ECONNREFUSED")], {4: 1}),
+    ([Failed(0, "open", "ETIMEDOUT")], {8: 1}),
+    ([Opened(0, 1, SERVER), Broken(0, "ETIMEDOUT")], {4: 1, 8: 1}),
+    ([Opened(0, 1, SERVER), Failed(0, "send", "ENOBUFS")], {4: 1, 26: 1}),
+])  # fmt: skip
+def test_what_is_counted(events: Sequence[Event], expected: dict[int, int]) -> None:
+    found = counted(*events)
+    assert {place: found[place - 4] for place in range(4, 36) if found[place - 4]} == {6: 1, **expected}
+
+
+def test_what_goes_out_without_a_cable_is_lost_carrier() -> None:
+    found = counted(link_up=False)
+    assert (found[6 - 4], found[32 - 4]) == (1, 1)
+
+
+def test_a_counter_goes_on_in_its_high_word_and_from_the_end_to_0() -> None:
+    for before, after in (((0xFFFF, 0), [0, 1]), ((0xFFFF, 0xFFFF), [0, 0])):
+        rig = Rig()
+        rig.head()[noc_map.STATISTICS + 6], rig.head()[noc_map.STATISTICS + 7] = before
+        wish(slot(rig.memory), Wish.CONNECT)
+        rig.step()
+        assert rig.table()[6:8] == after
+
+
+def test_a_restart_breaks_connections_and_restores_the_configuration() -> None:
+    rig = Rig()
+    peer = ScriptedPeer()
+    rig.network.place(SERVER, peer)
+    words = slot(rig.memory)
+    wish(words, Wish.CONNECT)
+    rig.step(3)
+    rig.head()[noc_map.SERVICES] = 0
+    rig.head()[noc_map.REQUEST] = noc_map.RESTART
+    rig.step()
+    assert rig.requests == [Close(0, reset=True)]
+    assert (rig.head()[noc_map.STATUS], rig.head()[noc_map.REQUEST]) == (noc_map.RESTARTING, 0)
+    assert (words[port_map.WISH], words[port_map.STATE]) == (Wish.CLOSED, State.CLOSED)
+    assert rig.head()[noc_map.SERVICES] == noc_map.FTP | noc_map.HTTP
+    assert (rig.counter(noc_map.DRIVER_RESTARTS), rig.counter(noc_map.RECEIVER_INTERRUPTS)) == (1, 0)
+    words[port_map.WISH] = Wish.CONNECT
+    rig.step(4)
+    assert (rig.head()[noc_map.STATUS], words[port_map.STATE]) == (noc_map.RESTARTING, State.CLOSED)
+    words[port_map.WISH] = Wish.CONNECT
+    rig.step()
+    assert rig.head()[noc_map.STATUS] == noc_map.READY
+    rig.step()
+    assert words[port_map.STATE] == State.OPEN
+    assert peer.log == ["ECONNRESET"]
+    assert Noc().configuration["restart_ns"] == RESTART_NS
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.integers(0, 0xFFFF), min_size=16, max_size=16), st.lists(st.sampled_from(list(Wish)), max_size=8))
+def test_any_words_in_a_slot_are_survived(content: list[int], wishes: list[Wish]) -> None:
+    rig = Rig()
+    rig.network.place(SERVER, ScriptedPeer(greeting=[Say(bytes(2000))]))
+    words = slot(rig.memory)
+    for number, value in enumerate(content):
+        words[number] = value
+    words[port_map.MODULE] = 8
+    rig.step(2)
+    for wanted in wishes:
+        wish(words, wanted, Peer(SERVER.host, content[7]), content[8] % 65536)
+        words[port_map.RECEIVED] = content[9]
+        words[port_map.SENDING] = content[10]
+        rig.step(2)
+        assert words[port_map.STATE] in list(State)
