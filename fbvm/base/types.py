@@ -94,7 +94,7 @@ class Field:
 
     `kind` is "" for structure members, else the section's word (VAR_INPUT ...); `bit` is set for a BOOL located on a
     bit; `absolute` for a located variable, whose offset is one of the buffer; `reference` for an in-out, whose slot
-    holds a reference to a value of `type`."""
+    holds a reference to a value of `type`; `hexadecimal` for one that people want to read so."""
 
     name: str
     type: Type
@@ -104,6 +104,7 @@ class Field:
     absolute: bool = False
     reference: bool = False
     constant: bool = False
+    hexadecimal: bool = False
 
 
 @dataclass(frozen=True)

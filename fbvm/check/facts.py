@@ -9,6 +9,7 @@ from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.types import ArrayType, Elementary, EnumType, Field, RefType, StructType, Type, fold
 from fbvm.syntax import tree
+from fbvm.syntax.pragmas import shown_in_hexadecimal
 from fbvm.syntax.tree import Node
 
 Value = int | float | bool | bytes | str
@@ -53,6 +54,11 @@ class Variable:
     object: int | None = None
     """Of a variable that something refers to: the number of its object (see code.operations), or of one that every
     instance has, its position among those.  Known after layout, or when it is referred to."""
+
+    @property
+    def hexadecimal(self) -> bool:
+        """True if its declaration says that people read it in hexadecimal."""
+        return shown_in_hexadecimal(self.source.text, self.node.start)
 
 
 @dataclass(eq=False)

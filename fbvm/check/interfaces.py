@@ -332,4 +332,4 @@ def _append(content: bytearray, variable: Variable) -> None:
 def _field(variable: Variable) -> Field:
     """The variable as a member of its block's type; a location is filled in when the layout is known."""
     return Field(variable.name, variable.type, variable.offset, variable.kind, absolute=variable.place == "area",
-                 reference=variable.reference, constant=variable.constant)
+                 reference=variable.reference, constant=variable.constant, hexadecimal=variable.hexadecimal)

@@ -109,7 +109,7 @@ def _fill_in(pou: Pou) -> None:
 
 def _symbol(variable: Variable) -> Field:
     return Field(variable.name, variable.type, variable.offset, variable.kind, variable_bit(variable), absolute=True,
-                 constant=variable.constant)
+                 constant=variable.constant, hexadecimal=variable.hexadecimal)
 
 
 def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:

@@ -31,9 +31,10 @@ class Signal:
 
     def text(self, value: Value) -> str:
         """A value as a chart shows it: short, flag words in hexadecimal."""
-        if self.place.area in HEXADECIMAL_AREAS and isinstance(value, int) and not self.is_bit:
-            return f"{value:04X}h"
         kind = base(self.place.type)
+        wanted = self.place.hexadecimal or self.place.area in HEXADECIMAL_AREAS
+        if wanted and isinstance(value, int) and not self.is_bit:
+            return f"{value & (1 << 8 * kind.size) - 1:0{2 * kind.size}X}h"
         if isinstance(kind, EnumType) and isinstance(value, int):
             return kind.shown.get(value, str(value))
         return show(self.place.type, value).removeprefix("T#")

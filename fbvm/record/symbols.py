@@ -51,7 +51,7 @@ class _Writer:
         self._numbers: dict[int, int] = {}
 
     def field(self, field: Field) -> list[Any]:
-        flags = field.absolute | field.reference << 1 | field.constant << 2
+        flags = field.absolute | field.reference << 1 | field.constant << 2 | field.hexadecimal << 3
         return [field.name, self.type(field.type), field.offset, field.kind, field.bit, flags]
 
     def type(self, kind: Type) -> Any:
@@ -90,7 +90,7 @@ class _Reader:
     def field(self, row: list[Any]) -> Field:
         name, kind, offset, section, bit, flags = row
         return Field(str(name), self.type(kind), int(offset), str(section), bit, bool(flags & 1), bool(flags & 2),
-                     bool(flags & 4))  # fmt: skip
+                     bool(flags & 4), bool(flags & 8))  # fmt: skip
 
     def type(self, data: Any) -> Type:
         if isinstance(data, str):

@@ -14,6 +14,10 @@ ATTRIBUTES = {
     "opc.ua.da", "tcencoding", "tcdisplayscale", "tcnocopy"}
 """Names of attributes that make no valid program do anything else: they restrict, show, hide or export."""
 
+_HEXADECIMAL = re.compile(r"""\{\s*attribute\s*'displaymode'\s*:=\s*'hex(?:adecimal)?'\s*\}\s*\Z""", re.IGNORECASE)
+_REACH = 100
+"""How far before a name its pragma is looked for."""
+
 _SHAPE = re.compile(r"""\s*(?:attribute\s*'([^']*)'|(\w+))""", re.IGNORECASE)
 
 
@@ -24,3 +28,9 @@ def harmless(text: str) -> bool:
         return not text.strip()
     name, word = found[1], found[2]
     return name.lower() in ATTRIBUTES if name is not None else word.lower() in WORDS
+
+
+def shown_in_hexadecimal(text: str, start: int) -> bool:
+    """Whether `{attribute 'displaymode' := 'hex'}` stands before the name that begins at `start`, as CODESYS has it."""
+    before = text[max(0, start - _REACH):start]
+    return before.rstrip().endswith("}") and _HEXADECIMAL.search(before) is not None

@@ -44,6 +44,8 @@ class Place:
     hops: tuple[int, ...] = ()
     area: str = ""
     constant: bool = False
+    hexadecimal: bool = False
+    """Declared to be read so."""
 
     def inner(self, name: str, type_: Type, distance: int, bit: int | None = None) -> Place:
         """The part of this place that begins `distance` bytes behind its start."""
@@ -202,7 +204,7 @@ def _of(parent: Place, field: Field, name: str, distance: int) -> Place:
         place = parent.inner(name, field.type, distance, field.bit)
     if field.reference:
         place = replace(place, hops=(*place.hops, 0))
-    return replace(place, constant=field.constant or parent.constant)
+    return replace(place, constant=field.constant or parent.constant, hexadecimal=field.hexadecimal)
 
 
 def member(place: Place, name: str) -> Place:

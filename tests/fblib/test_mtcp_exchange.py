@@ -93,12 +93,12 @@ def test_fn03_when_the_reply_is_an_exception() -> None:
         Main.rd_Cmd          ########
         Main.rd.Rcv_Counter  0     |1
         Main.rd.Error        ......##
-        Main.rd.Error_Code   0     |2
-        CIO1519.03           #.......   Send Request Switch
-        CIO1519.04           ..#.#...   Receive Request Switch
-        CIO1509.13           .#.#....   TCP Data Received Flag
-        D30001               0||||0     = 0, 9, 0, 3, 0   Number of Bytes Received
-        D30023               12|6|3     Number of Bytes to Send or Receive
+        Main.rd.Error_Code   0000h |0002h
+        CIO1519.03           #.......       Send Request Switch
+        CIO1519.04           ..#.#...       Receive Request Switch
+        CIO1509.13           .#.#....       TCP Data Received Flag
+        D30001               0||||0         = 0, 9, 0, 3, 0   Number of Bytes Received
+        D30023               12|6|3         Number of Bytes to Send or Receive
     """
     )
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import pytest
 from images import counter_image
 
+from fbvm.code.compiler import compile_text
 from fbvm.plc import Plc
 from fbvm.record.chart import Chart, chart, draw
-from fbvm.record.recorder import Recorder
-from fbvm.watch.paths import UnknownPlace
+from fbvm.record.recorder import Recorder, Signal
+from fbvm.record.symbols import from_data, to_data
+from fbvm.watch.paths import UnknownPlace, find_place
 
 
 @pytest.fixture
@@ -46,6 +48,34 @@ def test_numbers_without_room_are_listed(plc: Plc) -> None:
 def test_flag_words_are_hexadecimal(plc: Plc) -> None:
     plc.write("CIO 1509", 0x8004)
     assert chart(plc, scans=6, signals=["CIO 1509"]) == "CIO1509  8004h"
+
+
+def test_what_is_declared_to_be_read_in_hexadecimal_is() -> None:
+    """Variables and pins, of any size, also in arrays, behind instances and in a trace; the names beside them are not."""
+    made = compile_text("""
+        FUNCTION_BLOCK Coded
+        VAR_OUTPUT
+            {attribute 'displaymode' := 'hex'}
+            Error_Code : UINT := 16#81; Plain : UINT := 129;
+            {ATTRIBUTE 'DisplayMode':='hexadecimal'}
+            Codes : ARRAY[0..1] OF INT := [-2, 2];
+            {attribute 'displaymode' := 'dec'}
+            Decimal : UINT := 10;
+        END_VAR
+        END_FUNCTION_BLOCK
+        PROGRAM Main
+        VAR
+            a : Coded;
+            {attribute 'displaymode' := 'hex'} Byte_Code : USINT := 16#5;
+        END_VAR
+        END_PROGRAM""")
+    assert made.image is not None and not made.diagnostics
+    names = ("a.Error_Code", "a.Plain", "a.Codes[0]", "a.Codes[1]", "a.Decimal", "Byte_Code")
+    symbols = from_data(to_data(made.image.symbols))
+    for found in (made.image.symbols, symbols):
+        places = [find_place(found, made.image.layout.areas, f"Main.{name}") for name in names]
+        texts = [Signal(place, "").text(value) for place, value in zip(places, (129, 129, -2, 2, 10, 5), strict=True)]
+        assert texts == ["0081h", "129", "FFFEh", "0002h", "10", "05h"]
 
 
 def test_times_are_short(plc: Plc) -> None:
