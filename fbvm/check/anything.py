@@ -1,11 +1,12 @@
 """ANY parameters: what a block may ask of what was passed to it, whatever its type.
 
+    x.pValue        a pointer to its first byte (POINTER TO BYTE)
     x.diSize        how many bytes it fills (DINT)              x.BITS[i]    BOOL number i: an element of an array of BOOL,
     x.TypeClass     its type, TYPE_CLASS.TYPE_INT ...                        else bit i, the lowest of the first byte first
     x.BYTES[i]      byte i, likewise WORDS, DWORDS, LWORDS      SIZEOF(x)    as diSize (UDINT)
 
-All begin at 0; UPPER_BOUND(x.BITS, 1) is the last.  A BOOL on a bit of a word fills no byte: it has BITS only.  diSize and
-TypeClass are named as CODESYS names them; the rest is ours.
+All begin at 0; UPPER_BOUND(x.BITS, 1) is the last.  A BOOL on a bit of a word fills no byte: it has BITS only.  pValue,
+diSize and TypeClass are as in CODESYS; the rest is ours.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ from fbvm.base.types import (
     fold,
     open_array,
 )
+from fbvm.check import references
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -42,8 +44,11 @@ if TYPE_CHECKING:
 VIEWS = {name: open_array(1, kind) for name, kind in (
     ("BITS", BOOL), ("BYTES", BYTE), ("WORDS", WORD), ("DWORDS", DWORD), ("LWORDS", LWORD))}
 """The members that are arrays over what was passed."""
+POINTER = "PVALUE"
 NUMBERS = {"DISIZE": ANY_SIZE, "TYPECLASS": ANY_CLASS}
 """The members that are numbers, by their place in the slot."""
+MEMBERS = frozenset((*VIEWS, *NUMBERS, POINTER))
+"""All members of an ANY, folded."""
 _CLASSES = {"DATE_AND_TIME": "DATEANDTIME", "TIME_OF_DAY": "TIMEOFDAY", "LDATE_AND_TIME": "LDATEANDTIME",
             "LTIME_OF_DAY": "LTIMEOFDAY"}
 _DERIVED: dict[type[Type], str] = {ArrayType: "ARRAY", OpenArrayType: "ARRAY", EnumType: "ENUM", SubrangeType: "SUBRANGE",
@@ -57,9 +62,11 @@ def member(expressions: Expressions, expr: tree.Member, whole: AnyType) -> Type 
         return expressions.checker.specs.type_classes()
     if name in NUMBERS:
         return DINT
+    if name == POINTER:
+        return references.to_parameter(expressions, expr)
     if name not in VIEWS:
         expressions.error("S0210", expr.name, f"{whole} has no {expr.name.text}",
-                          expressions.project.choices(expr.name.text, ("diSize", "TypeClass", *VIEWS)))
+                          expressions.project.choices(expr.name.text, ("pValue", "diSize", "TypeClass", *VIEWS)))
     return VIEWS.get(name)
 
 

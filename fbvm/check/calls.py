@@ -6,9 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, StringType, StructType, Type, base, fold
+from fbvm.check import qualified
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
 from fbvm.check.fitting import assignable, holds, same
+from fbvm.check.generics import Generics, is_generic
 from fbvm.check.standard import StandardCalls
 from fbvm.check.writes import note_count, writable
 from fbvm.syntax import tree
@@ -49,12 +51,12 @@ class Calls:
         """The result's type, "" for a call without result, None after a diagnostic."""
         callee = call.callee
         variable = self.expressions.variable(callee.text) if isinstance(callee, tree.NameRef) else None
-        if not isinstance(callee, tree.NameRef) or variable is not None and variable.kind != "RESULT":
+        name = callee.text if isinstance(callee, tree.NameRef) else qualified.bare(self.expressions, callee)
+        if name is None or variable is not None and variable.kind != "RESULT":
             return self._instance(call, as_value)
-        name = callee.text
         pou = self.project.pou(name, self.expressions.source)
         if pou is not None and pou.is_function:
-            return self._function(call, pou)
+            return self._function(call, pou, want)
         if pou is not None:
             self.error("S0401", callee, f"{pou.name} is a {pou.kind}: what is called is an instance of it",
                        f"declare one, such as  my_{pou.name.lower()} : {pou.name};" if pou.kind != "PROGRAM" else
@@ -85,7 +87,10 @@ class Calls:
         self.facts.calls[call] = bound
         return ""
 
-    def _function(self, call: tree.Call, pou: Pou) -> Type | str | None:
+    def _function(self, call: tree.Call, generic: Pou, want: Type | None) -> Type | str | None:
+        pou = Generics(self).function(call, generic, want) if is_generic(generic) else generic
+        if pou is None:
+            return None
         if not self.checker.interface(pou, self.expressions.source, call):
             self._arguments_alone(call)
             return None

@@ -12,6 +12,7 @@ from fbvm.check.calls import Calls
 from fbvm.check.configurations import Configurations
 from fbvm.check.expressions import Expressions
 from fbvm.check.facts import Pou, TaskFact, Variable
+from fbvm.check.generics import is_generic
 from fbvm.check.globals import Globals
 from fbvm.check.interfaces import Interfaces
 from fbvm.check.project import Project
@@ -54,7 +55,7 @@ class Checker:
         self.globals.declare()
         while self.project.new_pous:
             pou = self.project.new_pous.pop(0)
-            if not pou.source.library:
+            if not pou.source.library and not is_generic(pou):
                 self._body(pou)
         Configurations(self).resolve(program)
         self._complain_of_recursion()
@@ -110,8 +111,10 @@ class Checker:
     def scope(self, pou: Pou | None) -> Iterator[None]:
         """Constants of `pou` are visible while its declarations are worked out."""
         before, self._scope = self._scope, pou
+        self.specs.types = pou.types if pou is not None else {}
         yield
         self._scope = before
+        self.specs.types = before.types if before is not None else {}
 
     def _fit(self, expr: tree.Expr, source: Source, kind: Type) -> bool:
         return self._constants(source).fit(expr, kind, "S0705", "the initial value")

@@ -31,7 +31,7 @@ from fbvm.base.types import (
     fold,
     string,
 )
-from fbvm.check import anything
+from fbvm.check import anything, qualified
 from fbvm.check.constants import convert, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
 from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, is_untyped, literal_hint
@@ -230,13 +230,8 @@ class Expressions:
                        "declare it in front, in a VAR CONSTANT section")
             return None
         variable = self.variable(expr.text)
-        if variable is not None and variable.wrong:
-            return None
         if variable is not None:
-            self.facts.variables[expr] = variable
-            if variable.constant and variable.value is not None:
-                self.facts.constants[expr] = variable.value
-            return variable.type
+            return self._variable(expr, variable)
         members = self.project.enum_members.get(fold(expr.text), [])
         wanted = [m for m in members if m[0] == want] or members
         if len({kind.name for kind, _ in wanted}) == 1:
@@ -248,6 +243,14 @@ class Expressions:
             return None
         self._unknown(expr)
         return None
+
+    def _variable(self, expr: tree.Expr, variable: Variable) -> Type | None:
+        if variable.wrong:
+            return None
+        self.facts.variables[expr] = variable
+        if variable.constant and variable.value is not None:
+            self.facts.constants[expr] = variable.value
+        return variable.type
 
     def _unknown(self, expr: tree.NameRef) -> None:
         name = expr.text
@@ -281,10 +284,15 @@ class Expressions:
     # --- parts of variables -----------------------------------------------------------------------------------------
 
     def _member(self, expr: tree.Member, want: Type | None) -> Type | None:
-        if isinstance(expr.of, tree.NameRef) and self.variable(expr.of.text) is None:
-            named = self.checker.specs.named_type(expr.of.text, self.source)
-            if isinstance(named, EnumType):
-                return self._enum_value(expr, named, expr.name)
+        meant = qualified.member(self, expr)
+        if isinstance(meant, EnumType):
+            return self._enum_value(expr, meant, expr.name)
+        if isinstance(meant, Variable):
+            return self._variable(expr, meant)
+        if isinstance(expr.of, tree.NameRef) and qualified.is_space(self, expr.of):
+            self.error("S0210", expr.name, f"{expr.of.text} has no {expr.name.text}",
+                       self.project.choices(expr.name.text, self.project.names_in(expr.of.text)))
+            return None
         whole = self.infer(expr.of)
         if whole is None:
             return None

@@ -100,6 +100,8 @@ class Pou:
     edges: list[Edge] = field(default_factory=list)
     referred: list[Variable] = field(default_factory=list)
     """Variables of an instance that something refers to; each is an object of its own."""
+    types: dict[str, Type] = field(default_factory=dict)
+    """What generic types stand for in a function that was made for one call."""
     leases: list[int] = field(default_factory=list)
     """Leases that its body holds until it ends."""
 
@@ -197,7 +199,8 @@ class Facts:
 
     def is_part(self, expr: tree.Expr) -> TypeGuard[tree.Member | tree.Index | tree.Part]:
         """True for a member, element or bit, which lies in what it is of; not for an element behind a pointer."""
-        return isinstance(expr, tree.Member | tree.Index | tree.Part) and not isinstance(self.types.get(expr.of), RefType)
+        return isinstance(expr, tree.Member | tree.Index | tree.Part) and expr not in self.variables and \
+            not isinstance(self.types.get(expr.of), RefType)
 
     def root(self, expr: tree.Expr) -> tree.Expr:
         """The variable, address, dereference or element behind a pointer that a place begins with."""

@@ -96,6 +96,7 @@ class Interfaces:
                 self._external(declared, section, pou)
                 continue
             resolved = self.typed(declared, pou.source, pou)
+            borrowed = resolved is not None and isinstance(resolved[0], AnyType) and section.kind == "VAR_INPUT"
             for name in declared.names:
                 pou.later.discard(fold(name.text))
                 if resolved is None:
@@ -103,6 +104,8 @@ class Interfaces:
                     continue
                 variable = self.variable(declared, name, section, pou.source, resolved)
                 variable.owner = pou
+                if borrowed:
+                    variable.kind = "VAR_IN_OUT"  # CODESYS passes an input of type ANY by its place
                 if is_block(variable.type) and variable.kind in ("VAR_INPUT", "VAR_OUTPUT"):
                     self.report.add("S0901", pou.source, name, f"an instance as {section.kind} is understood but not "
                                     "executed by this version", "pass it as VAR_IN_OUT")

@@ -8,6 +8,8 @@ A library for a unit that has no words of its own in the PLC's areas declares th
     slots = 32
     slot = 400          # words of a slot
 
+Names that programs put in front of its own, with a point, are its `spaces = ["Standard"]`.
+
 Pins that other tools call otherwise have their other names there too:
 
     [pins]
@@ -43,6 +45,8 @@ class Library:
     mailbox: Mailbox | None = None
     pins: dict[str, dict[str, str]] = field(default_factory=dict)
     """By folded name of a POU the other names of its pins, folded, and their own."""
+    spaces: frozenset[str] = frozenset()
+    """Folded names under which programs know the library: `Standard` in Standard.TON."""
     loaded: set[str] = field(default_factory=set)
 
 
@@ -63,9 +67,11 @@ def _libraries_below(root: Path) -> Iterator[Library]:
         listed = table.get("globals", [])
         if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
             raise LibraryError(f"{described}: globals must be a list of file names")
+        spaces = table.get("spaces", [])
         name = folder.relative_to(root).as_posix() if folder != root else root.name
         files = {fold(p.stem): p for p in sorted(folder.glob("*.st"))}
-        yield Library(name, folder, files, tuple(listed), _mailbox(table, described), _pins(table, described))
+        yield Library(name, folder, files, tuple(listed), _mailbox(table, described), _pins(table, described),
+                      frozenset(fold(str(space)) for space in spaces) if isinstance(spaces, list) else frozenset())
 
 
 def _pins(table: dict[str, object], described: Path) -> dict[str, dict[str, str]]:
@@ -117,6 +123,10 @@ class Libraries:
         """Other names of the pins of a library's POU, folded, and their own."""
         library = self._libraries.get(owner)
         return library.pins.get(fold(pou), {}) if library is not None else {}
+
+    def has_space(self, name: str) -> bool:
+        """True if programs know a library under that name."""
+        return any(fold(name) in library.spaces for library in self._libraries.values())
 
     def block_names(self) -> list[str]:
         """The names under which files are found, as their files are named."""

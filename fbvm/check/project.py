@@ -8,6 +8,7 @@ import difflib
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TypeVar
 
 from fbvm.base.diagnostics import Source
@@ -49,11 +50,15 @@ class Project:
         self.globals: dict[tuple[str, str], Variable] = {}
         self.sections: list[tuple[tree.VarSection, Source]] = []
         """VAR_GLOBAL sections that still have to be declared."""
+        self.lists: set[str] = set()
+        """Folded names of the files that declare global variables outside of a CONFIGURATION."""
         self.configurations: list[tuple[tree.Configuration, Source]] = []
         self.enum_members: dict[str, list[tuple[EnumType, int]]] = {}
         self.late_global: Callable[[tuple[str, str]], None] = lambda key: None
         """Declares a global variable whose turn has not come yet (set by the checker)."""
         self._loaded: set[str] = set()
+        self.made: dict[tuple[Pou, tuple[tuple[str, str], ...]], Pou] = {}
+        """Functions made of generic ones, by the types that these stand for."""
         self.new_pous: list[Pou] = []
         """POUs that have been named but not checked yet."""
 
@@ -70,6 +75,7 @@ class Project:
                     self.types[key] = TypeEntry(declaration, source)
             elif isinstance(declaration, tree.GlobalVars):
                 self.sections.append((declaration.section, source))
+                self.lists.add(fold(Path(source.name).stem))
             elif isinstance(declaration, tree.Configuration):
                 self.configurations.append((declaration, source))
                 self.sections += [(s, source) for s in declaration.sections]
@@ -132,6 +138,21 @@ class Project:
             if (owner, folded) in self.globals:
                 return self.globals[owner, folded]
         return None
+
+    def is_space(self, name: str) -> bool:
+        """True for what may stand in front of a name and a point without being a variable."""
+        return fold(name) in self.lists or self.libraries.has_space(name)
+
+    def listed(self, space: str, name: str, source: Source) -> Variable | None:
+        """The global variable of that folded name in a list, or in any if a library is named."""
+        variable = self.global_variable(f"{space}.{name}", source) or self.global_variable(name, source)
+        if variable is not None and space in self.lists and fold(Path(variable.source.name).stem) != space:
+            return None
+        return variable
+
+    def names_in(self, space: str) -> list[str]:
+        """The global variables of a list."""
+        return [v.name for v in self.globals.values() if fold(Path(v.source.name).stem) == fold(space)]
 
     def choices(self, name: str, candidates: Iterable[str]) -> str:
         """A hint that names the candidates most like a misspelt name, or the first ones if none is like it."""

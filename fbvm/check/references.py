@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import (
+    BYTE,
     DINT,
     UDINT,
     AnyType,
@@ -89,6 +90,13 @@ def _held(expressions: Expressions, expr: tree.Expr, variable: Variable) -> Hold
         variable.object = len(row)
         row.append(variable)
     return Holder(expr, variable)
+
+
+def to_parameter(expressions: Expressions, expr: tree.Member) -> Type:
+    """`x.pValue` of an ANY: a pointer to what was passed."""
+    facts = expressions.facts
+    facts.holders[expr] = _held(expressions, expr.of, facts.variables[expr.of])
+    return pointer(BYTE)
 
 
 def _short_lived(variable: Variable) -> str:

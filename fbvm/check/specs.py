@@ -69,11 +69,15 @@ class Specs:
         self.report = project.report
         self.values: Values
         self.scope: Callable[[Pou | None], AbstractContextManager[None]]
+        self.types: dict[str, Type] = {}
+        """What generic types stand for in the function that is being resolved."""
         self._anonymous = 0
 
     def parameter(self, spec: tree.TypeSpec, source: Source) -> Resolved | None:
         """As `resolve`, for a variable of a POU, where generic types may stand."""
         generic = ANYTHING.get(fold(spec.text)) if isinstance(spec, tree.NamedType) else None
+        if generic is not None and generic.name in self.types:
+            return self.resolve(spec, source)
         return (generic, bytes(generic.size)) if generic is not None else self.resolve(spec, source)
 
     def resolve(self, spec: tree.TypeSpec, source: Source, name: str = "") -> Resolved | None:
@@ -128,7 +132,9 @@ class Specs:
         return ELEMENTARY.get(SHORT_NAMES.get(folded, folded) if folded not in ("T", "D", "LT", "LD") else folded)
 
     def _named(self, spec: tree.NamedType, source: Source) -> Resolved | None:
-        folded = fold(spec.text)
+        folded = self._without_space(fold(spec.text))
+        if folded in self.types:
+            return self.types[folded], default(self.types[folded])
         entry = self.project.type_entry(folded, source)
         if entry is not None:
             return self.declared(folded, source)
@@ -143,6 +149,11 @@ class Specs:
             return None
         self.report.add("S0204", source, spec, f"there is no type or block {spec.text}", self._meant(spec.text))
         return None
+
+    def _without_space(self, name: str) -> str:
+        """A folded name of a type without the name of a library in front."""
+        space, dot, rest = name.rpartition(".")
+        return rest if dot and self.project.is_space(space) else name
 
     def _meant(self, name: str) -> str:
         """A hint for a type that there is not."""

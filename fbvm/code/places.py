@@ -67,14 +67,14 @@ class Places:
     def of(self, expr: tree.Expr) -> Place:
         """The place that an expression names."""
         kind = self.facts.types[expr]
-        if isinstance(expr, tree.NameRef):
+        if expr in self.facts.variables:
             return self.variable(self.facts.variables[expr], expr)
         if isinstance(expr, tree.Direct):
             address = self.facts.directs[expr]
             offset = self.body.program.areas[address.area].offset + address.byte_offset()
             is_bit = address.bit is not None or address.area in FLAG_AREAS
             return Place(("abs", offset, ()), kind, address.bit_in_byte() if is_bit else None)
-        if isinstance(expr, tree.Member) and isinstance(self.facts.types[expr.of], AnyType):
+        if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
             return self._of_any(expr, kind)
         if isinstance(expr, tree.Member):
             member = self.facts.fields[expr]

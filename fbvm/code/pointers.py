@@ -66,6 +66,10 @@ class PointerLowering:
         moved = ("mul", "u64", ("sub", "u64", number, _word(BUFFER_OBJECT)), _word(1 << OBJECT_SHIFT))
         return _reference(("add", "u64", _number(reference), moved))
 
+    def to_parameter(self, expr: tree.Member) -> Node:
+        """`x.pValue` of an ANY."""
+        return self._leased(self.facts.holders[expr], self.body.places.reference(self.body.places.of(expr.of)))
+
     def _object(self, holder: Holder) -> Node:
         """The number of the object that holds a place, as u64."""
         variable, expr = holder.variable, holder.expr
@@ -86,7 +90,7 @@ class PointerLowering:
         body, variable = self.body, holder.variable
         assert variable is not None and holder.lease is not None and holder.expr is not None
         kept = body.keep(_number(reference))
-        passed = variable.reference
+        passed = variable.reference and not isinstance(variable.type, AnyType)
         whole = body.places.of(holder.expr)
         number = body.keep(("shr", "u64", kept, ("const", "i64", OBJECT_SHIFT), body.entry_site)) if passed else None
         with body.block() as taken:

@@ -11,6 +11,7 @@ from fbvm.base.types import (
     DAY_NS,
     LREAL,
     NULL,
+    AnyType,
     EnumType,
     StringType,
     Type,
@@ -123,6 +124,9 @@ class ValueLowering:
             return self._unary(expr)
         if isinstance(expr, tree.Call):
             return self._call(expr)
+        if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType) and \
+                expr in self.facts.holders:
+            return self.body.pointers.to_parameter(expr)
         if isinstance(expr, tree.NullLiteral):
             return ("const", "ref", 0)
         place = self.body.places.of(expr)

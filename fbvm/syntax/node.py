@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
-from typing import TypeVar, dataclass_transform
+from typing import Any, TypeVar, dataclass_transform
 
 _T = TypeVar("_T")
 
@@ -24,3 +25,22 @@ class Node:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{f.name}={getattr(self, f.name)!r}' for f in fields(self))})"
+
+
+def walk(part: Any) -> Iterator[Node]:
+    """A node and all nodes in it; of a tuple, all that it holds."""
+    left = [part]
+    while left:
+        item = left.pop()
+        if isinstance(item, tuple):
+            left += item
+        elif isinstance(item, Node):
+            yield item
+            left += [getattr(item, f.name) for f in fields(item)]
+
+
+def copied(part: Any) -> Any:
+    """The same tree anew: nodes that are not the old ones, so that other facts can be known of them."""
+    if isinstance(part, tuple):
+        return tuple(copied(item) for item in part)
+    return type(part)(*(copied(getattr(part, f.name)) for f in fields(part))) if isinstance(part, Node) else part

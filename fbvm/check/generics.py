@@ -1,0 +1,147 @@
+"""Functions with parameters of generic type: one text, made anew for each set of types that it is called with.
+
+All places of one generic type in the head of a function have the same type in a call, ANY_NUM and ANY_INT are two.  What
+looks into a parameter instead (x.pValue, x.diSize, x.BYTES ...) takes it as it is passed, whatever its type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import ANYTHING, AnyType, StringType, Type, base, common, families, fold, string
+from fbvm.check.anything import MEMBERS
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Pou, holds_block
+from fbvm.check.fitting import same
+from fbvm.check.values import is_any
+from fbvm.syntax import tree
+from fbvm.syntax.node import copied, walk
+
+if TYPE_CHECKING:
+    from fbvm.check.calls import Calls
+
+RESULT_STRING = 255
+"""Characters of a generic STRING, which takes texts of any length."""
+
+
+def variables(declared: tree.Pou) -> dict[str, str]:
+    """The parameters and variables of generic type, folded, and the names of their types."""
+    return {fold(name.text): fold(spec.text) for section in declared.sections for variable in section.variables
+            if isinstance(spec := variable.spec, tree.NamedType) and fold(spec.text) in ANYTHING
+            for name in variable.names}
+
+
+def looks_into(declared: tree.Pou) -> set[str]:
+    """Names of which the body asks what only a parameter of type ANY tells."""
+    return {fold(node.of.text) for node in walk(declared.body)
+            if isinstance(node, tree.Member) and isinstance(node.of, tree.NameRef) and fold(node.name.text) in MEMBERS}
+
+
+def is_generic(pou: Pou) -> bool:
+    """True for a function that is made anew for the types of each call."""
+    if not pou.is_function or pou.types:
+        return False
+    result = pou.tree.result
+    names = variables(pou.tree)
+    if isinstance(result, tree.NamedType) and fold(result.text) in ANYTHING:
+        return True
+    return bool(names.keys() - looks_into(pou.tree)) if names else False
+
+
+class Generics:
+    """Finds or makes the function that a call of a generic one means, for the calls of one POU."""
+
+    def __init__(self, calls: Calls) -> None:
+        self.calls = calls
+        self.expressions = calls.expressions
+        self.error = calls.error
+        self.made = calls.project.made
+
+    def function(self, call: tree.Call, pou: Pou, want: Type | None) -> Pou | None:
+        """The function for the types of this call, or None after a diagnostic."""
+        types = self._types(call, pou, want)
+        if types is None:
+            return None
+        key = pou, tuple(sorted((name, kind.name) for name, kind in types.items()))
+        if key not in self.made:
+            made = Pou(pou.name, pou.kind, pou.source, copied(pou.tree), types=types)
+            self.made[key] = made
+            if not self.calls.checker.interface(made, pou.source, call):
+                return None
+            self.calls.checker.check_body(made)
+        return self.made[key]
+
+    def _types(self, call: tree.Call, pou: Pou, want: Type | None) -> dict[str, Type] | None:
+        """The type that each generic type stands for in a call."""
+        bound: dict[str, Type | None] = {}
+        for name, kind, expr, exact in self._arguments(call, pou):
+            if kind is None:
+                return None
+            met = bound.get(name)
+            joined = _joined(met, kind, exact)
+            if joined is None and met is not None:
+                self.error("S0405", expr, f"{name} is {met} and {kind} in one call of {pou.name}",
+                           "all its places have the same type")
+                return None
+            bound[name] = joined
+        if isinstance(pou.tree.result, tree.NamedType) and fold(pou.tree.result.text) in ANYTHING:
+            bound.setdefault(fold(pou.tree.result.text), want)
+        types: dict[str, Type] = {}
+        for name, kind in bound.items():
+            settled = self._settled(call, pou, name, kind, want)
+            if settled is None:
+                return None
+            types[name] = settled
+        return types
+
+    def _arguments(self, call: tree.Call, pou: Pou) -> Iterator[tuple[str, Type | None, tree.Expr, bool]]:
+        """Generic type, type, argument, and whether it has to be of exactly that type, for each generic parameter."""
+        names = variables(pou.tree)
+        parameters = [(fold(name.text), section.kind) for section in pou.tree.sections
+                      if section.kind in ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
+                      for variable in section.variables for name in variable.names]
+        kinds = dict(parameters)
+        looked = looks_into(pou.tree)
+        for position, argument in enumerate(call.arguments):
+            if argument.name is not None:
+                name = fold(argument.name.text)
+            elif position < len(parameters):
+                name = parameters[position][0]
+            else:
+                continue
+            if name in names and name not in looked and argument.value is not None:
+                kind = self.expressions.infer(argument.value)
+                yield names[name], kind, argument.value, kinds.get(name) != "VAR_INPUT"
+
+    def _settled(self, call: tree.Call, pou: Pou, name: str, kind: Type | None, want: Type | None) -> Type | None:
+        """The type that a generic type stands for, if it belongs to it."""
+        if kind in (UNTYPED_INT, UNTYPED_REAL) or kind is None:
+            wanted = base(want) if want is not None and name in families(want) else None
+            literal = {UNTYPED_INT: "DINT", UNTYPED_REAL: "LREAL"}.get(kind) if kind is not None else None
+            if wanted is None and literal is None:
+                self.error("S0405", call, f"nothing tells which type {name} stands for in this call of {pou.name}",
+                           f"pass an argument to a parameter of type {name}")
+                return None
+            kind = wanted or self.calls.checker.specs.elementary(literal or "")
+            assert kind is not None
+        if name not in families(kind) or holds_block(kind) or isinstance(kind, AnyType):
+            self.error("S0405", call, f"{pou.name} takes {name}, this is {kind}")
+            return None
+        return kind
+
+
+def _joined(met: Type | None, kind: Type, exact: bool) -> Type | None:
+    """The type in which another argument meets those before it; None if there is none."""
+    if met is None or met == kind:
+        return kind if exact or not isinstance(kind, StringType) else string(max(kind.capacity, RESULT_STRING), kind.wide)
+    if kind is UNTYPED_REAL:
+        return met if is_any(met, "ANY_REAL") else kind
+    if kind is UNTYPED_INT:
+        return met
+    if met is UNTYPED_REAL:
+        return kind if is_any(kind, "ANY_REAL") else met
+    if met is UNTYPED_INT:
+        return kind
+    if exact:
+        return None
+    return met if same(kind, met) else common(met, kind)

@@ -1,0 +1,46 @@
+"""Names with something in front: a list of global variables (its file), a library, a program.
+
+    GVL.pressure        the VAR_GLOBAL that the file GVL.st declares
+    Standard.TON        a name of a library, which says by itself what is meant
+    PLC_PRG.step        a variable of a program, of which there is one instance then
+
+What stands in front never decides between two declarations of a library: it only has to be known.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import EnumType, Type, fold
+from fbvm.check.facts import Variable
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.expressions import Expressions
+
+
+def bare(expressions: Expressions, expr: tree.Expr) -> str | None:
+    """The name that an expression is, without a name space in front; None for anything else."""
+    if isinstance(expr, tree.NameRef):
+        return expr.text if expressions.variable(expr.text) is None else None
+    if isinstance(expr, tree.Member) and isinstance(expr.of, tree.NameRef) and is_space(expressions, expr.of):
+        return expr.name.text
+    return None
+
+
+def is_space(expressions: Expressions, name: tree.NameRef) -> bool:
+    """True for the name of a library or of a list of global variables, where no variable is called so."""
+    return expressions.variable(name.text) is None and expressions.project.is_space(name.text)
+
+
+def member(expressions: Expressions, expr: tree.Member) -> Type | Variable | None:
+    """What `X.name` means where X is no variable: a member of an enumeration (its type), a global variable, or nothing."""
+    outer = bare(expressions, expr.of)
+    if outer is None:
+        return None
+    named = expressions.checker.specs.named_type(outer, expressions.source)
+    if isinstance(named, EnumType):
+        return named
+    if isinstance(expr.of, tree.NameRef) and is_space(expressions, expr.of):
+        return expressions.project.listed(fold(expr.of.text), fold(expr.name.text), expressions.source)
+    return None
