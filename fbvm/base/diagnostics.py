@@ -50,11 +50,13 @@ class Diagnostic:
     message: str
     hint: str = ""
     related: tuple[Source, int, str] | None = field(default=None, compare=False)
+    raised: bool = False
+    """True for a warning that counts as an error, because somebody wants it so."""
 
     @property
     def severity(self) -> str:
         """"error" or "warning", as the table of codes has it."""
-        return CODES[self.code].severity
+        return "error" if self.raised else CODES[self.code].severity
 
     @property
     def line(self) -> int:

@@ -94,8 +94,10 @@ class Checker:
             self.report.add("S0207", source, node, f"{pou.name} holds an instance of itself",
                             "an instance can hold instances of other blocks only")
             return False
-        pou.busy = True
         self.globals.declare()
+        if pou.resolved:  # a global variable asked for it
+            return True
+        pou.busy = True
         with self.scope(pou):
             self.interfaces.resolve(pou)
         pou.busy = False

@@ -24,6 +24,7 @@ from fbvm.base.types import (
     Elementary,
     EnumType,
     RefType,
+    StringType,
     StructType,
     SubrangeType,
     Type,
@@ -104,17 +105,25 @@ class Expressions:
             return self.adopt(expr, target, code) is not None
         if assignable(kind, target):
             value = self.facts.constants.get(expr)
-            return value is None or self._in_range(expr, value, target)
+            return value is None or self._in_range(expr, value, target, code)
         known = code in _KNOWN and not is_block(kind)
         self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
                    literal_hint(self.facts.constants.get(expr), base(target)) if known else fitting_hint(expr, kind, target))
         return False
 
-    def _in_range(self, expr: tree.Expr, value: Value, target: Type) -> bool:
+    def _in_range(self, expr: tree.Expr, value: Value, target: Type, code: str) -> bool:
+        if isinstance(target, StringType) and isinstance(value, bytes) and code != "S0503":
+            length = len(value) // (2 if target.wide else 1)
+            if length > target.capacity:
+                self._loses(expr, "S0790", f"the text has {length} characters, and {target} keeps {target.capacity} of them")
         if isinstance(target, SubrangeType) and isinstance(value, int) and not target.low <= value <= target.high:
             self.error("S0702", expr, f"{value} is outside {target.low}..{target.high} of {target}")
             return False
         return True
+
+    def _loses(self, expr: tree.Expr, code: str, message: str) -> None:
+        """Remember a constant that its place does not keep as it is written."""
+        self.facts.losses.append((self.source, expr, code, message))
 
     def condition(self, expr: tree.Expr, what: str) -> None:
         """An expression that must be BOOL."""
@@ -143,7 +152,9 @@ class Expressions:
             self.error("S0702", expr, f"{value} does not fit {target}, which holds {span[0]} to {span[1]}",
                        literal_hint(value, kind) if kind == BOOL else "")
             return None
-        self.facts.constants[expr] = convert(value, kind)
+        self.facts.constants[expr] = held = convert(value, kind)
+        if untyped is UNTYPED_INT and isinstance(held, float) and held != value:
+            self._loses(expr, "S0791", f"{kind} cannot hold {value}: it becomes {held:.0f}")
         self.facts.types[expr] = target
         return target
 

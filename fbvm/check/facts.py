@@ -207,6 +207,8 @@ class Facts:
         while self.is_part(expr):
             expr = expr.of
         return expr
+    losses: list[tuple[Source, tree.Expr, str, str]] = field(default_factory=list)
+    """Constants that their places do not keep as they are written: where, code and message of the warning."""
 
 
 @dataclass

@@ -20,3 +20,7 @@ def command(code: str | None) -> None:
         click.echo(page(code))
     except UnknownCode as error:
         raise click.UsageError(f"{error}\n`fbvm explain` alone lists all.") from None
+    code = code.strip().upper()
+    if CODES[code].severity == "warning":
+        click.echo(f"\nSwitch it off in a text with {{warning disable {code}}} .. {{warning restore {code}}}, or for a whole "
+                   f"check with\n`fbvm check --no-warn {code}`.")

@@ -78,7 +78,7 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
     for folder in folders:
         if not folder.is_dir():
             raise JournalError(f"the program needs the library folder {folder}; say where it is now with --library")
-    compilation = compile_sources(sources, program, folders, runnable=True)
+    compilation = compile_sources(sources, program, folders, runnable=True, lint=False)
     if compilation.image is None:
         report(compilation, as_json)
         sys.exit(status.PROGRAM_ERRORS)

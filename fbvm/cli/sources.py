@@ -38,7 +38,7 @@ def compiled(
     """The Image of the files.  Reports warnings; reports errors and ends with status 3 if there are any.
 
     With `runnable` it is an error, too, if nothing says which program to run."""
-    compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable)
+    compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable, lint=False)
     if compilation.image is None:
         report(compilation, as_json)
         sys.exit(status.PROGRAM_ERRORS)
@@ -56,8 +56,10 @@ def report(compilation: Compilation, as_json: bool) -> None:
     for diagnostic in diagnostics:
         show(diagnostic)
     wrong = len(errors(diagnostics))
-    if wrong:
-        click.secho(f"{wrong} error{'s' * (wrong > 1)}; `fbvm explain CODE` says more about each", bold=True, err=True)
+    counts = [f"{count} {what}{'s' * (count > 1)}" for count, what in ((wrong, "error"), (len(diagnostics) - wrong, "warning"))
+              if count]
+    if counts:
+        click.secho(f"{' and '.join(counts)}; `fbvm explain CODE` says more about each", bold=True, err=True)
 
 
 def show(diagnostic: Diagnostic) -> None:

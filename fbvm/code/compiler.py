@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,7 +14,9 @@ from fbvm.base.types import Field, StructType, Type, fold
 from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, Report, TaskFact
 from fbvm.check.library import Libraries
+from fbvm.check.lint import lint as look_for_slips
 from fbvm.check.project import Project
+from fbvm.check.silence import Silence, Wanted
 from fbvm.code.damage import Damage
 from fbvm.code.image import Image, Objects, ProgramRun, Site, TaskRow
 from fbvm.code.layout import Placed, place
@@ -79,11 +81,13 @@ class Program:
 
 
 def compile_files(paths: Sequence[Path | str], program: str | None = None, libraries: Sequence[Path | str] = (),
-                  runnable: bool = False) -> Compilation:
+                  runnable: bool = False, *, lint: bool = True, no_warn: Iterable[str] = (),
+                  warnings_as_errors: bool = False) -> Compilation:
     """Compile source files.  `program` names the PROGRAM to run; `libraries` are folders asked before the shipped ones.
 
-    With `runnable` it is an error if there is not exactly one thing to run.  Never raises for what files contain;
-    a file that cannot be read gives a diagnostic."""
+    With `runnable` it is an error if there is not exactly one thing to run.  `lint` looks for what is allowed and hardly
+    meant; `no_warn` are codes of warnings that are not wanted, or "all".  Never raises for what files contain; a file that
+    cannot be read gives a diagnostic.  Raises ValueError for a code that is none of a warning."""
     sources: list[Source] = []
     unreadable: list[Diagnostic] = []
     for path in paths:
@@ -92,26 +96,29 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
             sources.append(source)
         else:
             unreadable.append(source)
-    made = compile_sources(sources, program, libraries, runnable)
+    made = compile_sources(sources, program, libraries, runnable, lint=lint, no_warn=no_warn,
+                           warnings_as_errors=warnings_as_errors)
     return Compilation(None, unreadable + made.diagnostics) if unreadable else made
 
 
-def compile_text(text: str, name: str = "text.st", program: str | None = None,
-                 libraries: Sequence[Path | str] = ()) -> Compilation:
-    """Compile one text."""
-    return compile_sources([Source(name, text)], program, libraries)
+def compile_text(text: str, name: str = "text.st", program: str | None = None, libraries: Sequence[Path | str] = (), *,
+                 lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False) -> Compilation:
+    """Compile one text; see `compile_files`."""
+    return compile_sources([Source(name, text)], program, libraries, lint=lint, no_warn=no_warn,
+                           warnings_as_errors=warnings_as_errors)
 
 
 def compile_sources(sources: Sequence[Source], program: str | None = None, libraries: Sequence[Path | str] = (),
-                    runnable: bool = False) -> Compilation:
+                    runnable: bool = False, *, lint: bool = True, no_warn: Iterable[str] = (),
+                    warnings_as_errors: bool = False) -> Compilation:
     """Compile texts; see `compile_files`."""
-    report = Report()
+    wanted, silence, report = Wanted.of(no_warn, warnings_as_errors), Silence(), Report()
     with _deep():
         project = Project(Libraries([Path(folder) for folder in libraries]), report)
         damage = Damage()
         for source in sources:
             text, diagnostics = parse(source)
-            report.diagnostics += diagnostics
+            report.diagnostics += diagnostics + silence.note(source, text)
             damage.note(source, text, errors(diagnostics))
             project.collect(text, source)
         unread = len(report.diagnostics)
@@ -119,8 +126,10 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         checker.check(program)
         if runnable and not errors(report.diagnostics):
             _demand_program(checker, program, sources, report)
+        if lint and not errors(report.diagnostics):
+            look_for_slips(checker, program)
         found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not damage.explains(d)]
-        diagnostics = sorted(found, key=Diagnostic.order)
+        diagnostics = sorted(silence.heard(found, wanted), key=Diagnostic.order)
         image = None if errors(diagnostics) else _image(checker)
     return Compilation(image, diagnostics)
 

@@ -18,6 +18,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
 
+from fbvm.testing.warned import NAME as WARNED
+from fbvm.testing.warned import Warned, add_options, warned_of
+
 if TYPE_CHECKING:
     from fbvm.net.loop import LoopNetwork
     from fbvm.plc import Plc
@@ -54,10 +57,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     group.addoption("--fbvm-cov", action="store_true", help="report which statements and branches of PLC code tests executed")
     group.addoption("--fbvm-cov-html", metavar="DIR", help="write the coverage of PLC code as pages")
     group.addoption("--fbvm-cov-xml", metavar="FILE", help="write the coverage of PLC code as Cobertura XML")
+    add_options(parser, group)
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Coverage is counted if an option asks for it."""
+    """Warnings are collected; coverage is counted if an option asks for it."""
+    config.pluginmanager.register(Warned(config), WARNED)
     if any(config.getoption(name) for name in ("fbvm_cov", "fbvm_cov_html", "fbvm_cov_xml")):
         from fbvm.testing.coverage_plugin import NAME, CoveragePlugin
 
@@ -140,7 +145,9 @@ def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
         __tracebackhide__ = True
         own = [folder / path for path in libraries for folder in folders if (folder / path).is_dir()]
         shelves = [*own, *library_folders(request.config, request.path)]
-        rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, **given)
+        warned = warned_of(request.config)
+        rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, wanted=warned.wanted, **given)
+        warned.note(rig.subject)
         rigs.append(rig)
         counting = ExitStack()
         counting.enter_context(counted(request.config, rig.plc, rig.subject))

@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Any
 
 from fbvm.base.types import fold
+from fbvm.check.silence import ANY, Wanted
 from fbvm.engine.trap import Trap
 from fbvm.net.loop import LoopNetwork
 from fbvm.plc import Mode, Plc
@@ -110,10 +111,11 @@ class Rig:
     @classmethod
     def of(cls, what: str, cycle: str | int = "10ms", *, block: bool = True, folders: Sequence[Path] = (),
            libraries: Sequence[Path] = (), sources: Sequence[str] = (), text: str = "",
-           stubs: Mapping[str, Stub] | None = None, **given: Any) -> Rig:  # fmt: skip
+           stubs: Mapping[str, Stub] | None = None, wanted: Wanted = ANY, **given: Any) -> Rig:  # fmt: skip
         """A rig by text: `"src/pump.st::Pump"`, `"src/pump.st"`, or `"TON"` from a library.
 
-        Files are looked for in `folders`, or where Python runs; without `block` it is the whole program of the file."""
+        Files are looked for in `folders`, or where Python runs; without `block` it is the whole program of the file.
+        `wanted` says which warnings are."""
         __tracebackhide__ = True
         file, mark, name = what.partition("::")
         if not mark and block and not file.lower().endswith(".st"):
@@ -122,7 +124,7 @@ class Rig:
         for path in (*([file] if file else []), *sources):
             files.append(_file(path, folders or [Path.cwd()]))
         near = [path.parent for path in files if path.parent not in (*libraries, Path.cwd(), *folders[1:])]
-        made = subject(files, name if name or block else None, [*libraries, *dict.fromkeys(near)], stubs, text)
+        made = subject(files, name if name or block else None, [*libraries, *dict.fromkeys(near)], stubs, text, wanted)
         return cls(made, cycle, stubs=stubs, **given)
 
     def _stub(self, name: str, stub: Callable[[Any], None]) -> None:

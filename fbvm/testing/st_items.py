@@ -25,6 +25,7 @@ from fbvm.syntax.text import read
 from fbvm.testing.plugin import counted, library_folders
 from fbvm.testing.rig import Trapped
 from fbvm.testing.subject import Subject, SubjectError, pous, subject
+from fbvm.testing.warned import warned_of
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value, show_time
 
@@ -69,7 +70,9 @@ class StItem(pytest.Item):
     def runtest(self) -> None:
         near = [self.path.parent] if self.path.parent != self.config.rootpath else []
         shelves = [LIBRARY, *library_folders(self.config, self.path), *near]
-        made = self.subject = subject([self.path], self.name, shelves)
+        warned = warned_of(self.config)
+        made = self.subject = subject([self.path], self.name, shelves, wanted=warned.wanted)
+        warned.note(made)
         plc = Plc(made.image, CYCLE_NS)
         watch = Assertions(plc, made.prefix)
         history = History(plc)

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from fbvm.base.diagnostics import Source, errors
+from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.types import fold
 from fbvm.check.facts import Report
 from fbvm.check.library import Libraries
+from fbvm.check.silence import ANY, Wanted
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
 from fbvm.syntax import tree
@@ -44,6 +45,8 @@ class Subject:
     prefix: str
     sources: Mapping[str, Source]
     libraries: tuple[Path, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
+    """What the user's own sources are warned of."""
     in_outs: frozenset[str] = frozenset()
     """In-outs of a block by folded name: the test sees the variables of the program that are passed."""
 
@@ -61,35 +64,36 @@ class Subject:
 
 
 def subject(files: Sequence[Path], name: str | None, libraries: Sequence[Path] = (), stubs: Mapping[str, Stub] | None = None,
-            text: str = "") -> Subject:  # fmt: skip
+            text: str = "", wanted: Wanted = ANY) -> Subject:  # fmt: skip
     """The POU `name` of some files (or of a library, without files); the only one if it is "", the program if None.
 
-    `text` is ST that is compiled with them.  Raises SubjectError."""
+    `text` is ST that is compiled with them; `wanted` says which warnings are.  Raises SubjectError."""
     __tracebackhide__ = True
     sources = [_read(path) for path in files] + ([Source("test.st", text)] if text else [])
     stubs = stubs or {}
     written = {fold(stubbed): stub for stubbed, stub in stubs.items() if isinstance(stub, str)}
-    key = (tuple((source.name, source.text) for source in sources), name, tuple(libraries), tuple(written.items()))
+    key = (tuple((source.name, source.text) for source in sources), name, tuple(libraries), tuple(written.items()), wanted)
     if key not in _images:
-        _images[key] = _build(sources, name, libraries, written)
+        _images[key] = _build(sources, name, libraries, written, wanted)
     return _images[key]
 
 
-def _build(sources: list[Source], name: str | None, libraries: Sequence[Path], stubs: Mapping[str, str]) -> Subject:
+def _build(sources: list[Source], name: str | None, libraries: Sequence[Path], stubs: Mapping[str, str],
+           wanted: Wanted) -> Subject:  # fmt: skip
     __tracebackhide__ = True
     if name == "":
         name = _only(sources)
     for stubbed, stub in stubs.items():
         sources = _stubbed(sources, stubbed, stub, libraries)
     if name is None:
-        return _compiled(sources, None, libraries, "")
+        return _compiled(sources, None, libraries, wanted, "")
     node, source = _declared(sources, name, libraries)
     if node.kind == "PROGRAM":
-        return _compiled(sources, node.name.text, libraries, f"{node.name.text}.")
+        return _compiled(sources, node.name.text, libraries, wanted, f"{node.name.text}.")
     wrapper = Source(f"<test of {node.name.text}>", _wrapper(node, source))
     if node.kind == "FUNCTION":
-        return _compiled([*sources, wrapper], WRAPPER, libraries, f"{WRAPPER}.", node.name.text)
-    made = _compiled([*sources, wrapper], WRAPPER, libraries, f"{WRAPPER}.{INSTANCE}.", node.name.text)
+        return _compiled([*sources, wrapper], WRAPPER, libraries, wanted, f"{WRAPPER}.", node.name.text)
+    made = _compiled([*sources, wrapper], WRAPPER, libraries, wanted, f"{WRAPPER}.{INSTANCE}.", node.name.text)
     return replace(made, in_outs=frozenset(fold(each) for each, _ in _variables(node, "VAR_IN_OUT", source)))
 
 
@@ -103,16 +107,18 @@ def _only(sources: Sequence[Source]) -> str:
     return chosen[0]
 
 
-def _compiled(sources: list[Source], program: str | None, libraries: Sequence[Path], prefix: str,
+def _compiled(sources: list[Source], program: str | None, libraries: Sequence[Path], wanted: Wanted, prefix: str,
               name: str = "") -> Subject:  # fmt: skip
     __tracebackhide__ = True
-    made = compile_sources(sources, program, libraries, runnable=True)
+    made = compile_sources(sources, program, libraries, runnable=True, no_warn=wanted.no_warn,
+                           warnings_as_errors=wanted.as_errors)  # fmt: skip
     if made.image is None:
         raise SubjectError("\n".join(message.render() for message in made.errors))
     if not prefix and len(made.image.tasks) == 1 and len(made.image.tasks[0].programs) == 1:
         prefix = f"{made.image.tasks[0].programs[0].name}."
     return Subject(name or prefix.rstrip(".") or "PLC", made.image, prefix,
-                   {source.name: source for source in sources}, tuple(libraries))
+                   {source.name: source for source in sources}, tuple(libraries),
+                   tuple(each for each in made.diagnostics if not each.source.name.startswith("<")))  # fmt: skip
 
 
 def _read(path: Path) -> Source:

@@ -18,6 +18,10 @@ from fbvm.watch.paths import Place, Span, UnknownPlace
 BUDGET = 100_000
 """Statements that a program of the corpus may execute in one scan: endless ones end soon."""
 
+LINTED = "warnings"
+"""The folder of the programs that are looked at for what is hardly meant.  The others show one thing each, which is often
+that: a variable that only its initial value is asked of, a loop without end."""
+
 BUILDS: dict[str, Callable[[Image, int], Plc]] = {
     "python plain": lambda image, cycle_ns: Plc(image, cycle_ns, budget=BUDGET),
     "python observed": lambda image, cycle_ns: Plc(image, cycle_ns, budget=BUDGET, observed=True),
@@ -27,7 +31,7 @@ BUILDS: dict[str, Callable[[Image, int], Plc]] = {
 
 def check(program: Program) -> None:
     """Compiles and runs a program of the corpus and compares with its expectations."""
-    compilation = compile_sources([Source(program.name, program.text)], runnable=True)
+    compilation = compile_sources([Source(program.name, program.text)], runnable=True, lint=program.path.parent.name == LINTED)
     _check_diagnostics(program, compilation.diagnostics)
     if program.runs:
         assert compilation.image is not None, "no errors, and no image"

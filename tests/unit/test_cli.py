@@ -211,10 +211,33 @@ def test_without_a_server_the_example_goes_on_trying() -> None:
 # --- check, list, explain ---------------------------------------------------------------------------------------------
 
 
-def test_check_is_silent_when_nothing_is_wrong(counter: str) -> None:
-    result = fbvm("check", counter)
+def test_check_is_silent_when_nothing_is_wrong() -> None:
+    result = fbvm("check", DEMO)
     assert (result.exit_code, result.output) == (0, "")
-    assert json.loads(fbvm("check", counter, "--json").stdout) == {"diagnostics": []}
+    assert json.loads(fbvm("check", DEMO, "--json").stdout) == {"diagnostics": []}
+
+
+def test_check_warns_and_run_does_not(counter: str) -> None:
+    result = fbvm("check", counter)
+    assert result.exit_code == 0 and "warning S0290: wait is never used" in result.stderr
+    assert result.stderr.endswith("5 warnings; `fbvm explain CODE` says more about each\n")
+    assert run("--scans", "1").stderr == fbvm("list", counter).stderr == ""
+
+
+def test_warnings_that_are_not_wanted(counter: str) -> None:
+    assert fbvm("check", counter, "--no-warn", "s0290").output == ""
+    assert fbvm("check", counter, "--no-warn", "S0390,S0290").output == ""
+    assert fbvm("check", counter, "--no-warn", "S0390", "--no-warn", "all").output == ""
+    wrong = fbvm("check", counter, "--no-warn", "S0201")
+    assert wrong.exit_code == 2 and "S0201 is no code of a warning; there are S0190, S0191" in wrong.stderr
+
+
+def test_warnings_as_errors(counter: str) -> None:
+    result = fbvm("check", counter, "--warnings-as-errors")
+    assert result.exit_code == 3 and "error S0290: wait is never used" in result.stderr and "5 errors;" in result.stderr
+    data = json.loads(fbvm("check", counter, "--warnings-as-errors", "--json").stdout)
+    assert {row["severity"] for row in data["diagnostics"]} == {"error"}
+    assert fbvm("check", counter, "--warnings-as-errors", "--no-warn", "S0290").exit_code == 0
 
 
 def test_check_says_what_is_wrong(counter: str) -> None:

@@ -358,3 +358,49 @@ def test_a_project_within_another_folder_finds_its_files(project: pytest.Pyteste
         "def test_there(fb):\n    assert not fb('src/pump.st').scan().Running\n"
         "def test_by_name(fb):\n    assert not fb('x.st::X', text='').Running\n".replace("x.st::X", "Pump"), encoding="utf-8")
     run(project).assert_outcomes(passed=2)
+
+
+# --- warnings ---------------------------------------------------------------------------------------------------------
+
+SLACK = PUMP.replace("    Edge : R_TRIG;\n", "    Edge : R_TRIG;\n    Idle : INT;\n")
+
+
+@pytest.fixture
+def slack(project: pytest.Pytester) -> pytest.Pytester:
+    (project.path / "src" / "pump.st").write_text(SLACK, encoding="utf-8")
+    project.makepyfile("""
+        def test_one(fb):
+            fb("src/pump.st::Pump").scan(Start=True)
+
+        def test_other(fb):
+            fb("src/pump.st::Pump").scan()
+    """)
+    return project
+
+
+def test_warnings_are_shown_once_at_the_end(slack: pytest.Pytester) -> None:
+    result = run(slack)
+    result.assert_outcomes(passed=2)
+    assert result.stdout.str().count("warning S0290: Idle is never used") == 1
+    result.stdout.fnmatch_lines(["*= warnings of PLC code =*", "*pump.st:12:5: warning S0290: Idle is never used"])
+
+
+@pytest.mark.parametrize("argument", ["--fbvm-no-warn=S0290", "--fbvm-no-warn=S0390,s0290", "--fbvm-no-warn=all"])
+def test_warnings_that_are_not_wanted_are_not_shown(slack: pytest.Pytester, argument: str) -> None:
+    assert "S0290" not in run(slack, argument).stdout.str()
+
+
+def test_warnings_can_fail_a_test(slack: pytest.Pytester) -> None:
+    result = run(slack, "--fbvm-warnings-as-errors")
+    result.assert_outcomes(failed=2)
+    result.stdout.fnmatch_lines(["*error S0290: Idle is never used"])
+    slack.makeini("[pytest]\nfbvm_warnings_as_errors = true\n")
+    run(slack).assert_outcomes(failed=2)
+    slack.makeini("[pytest]\nfbvm_warnings_as_errors = true\nfbvm_no_warn = S0290\n")
+    run(slack).assert_outcomes(passed=2)
+
+
+def test_what_is_no_code_of_a_warning_is_wrong_usage(slack: pytest.Pytester) -> None:
+    result = run(slack, "--fbvm-no-warn=S0201")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*--fbvm-no-warn: S0201 is no code of a warning*"])

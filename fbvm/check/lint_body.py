@@ -1,0 +1,99 @@
+"""A checked body as the rules of warnings see it: its facts, its nodes, and where a warning goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from fbvm.base.diagnostics import Source
+from fbvm.check.facts import Facts, Pou, Report
+from fbvm.syntax import tree
+
+
+class Body:
+    """The body of one POU of the user's own, without errors."""
+
+    def __init__(self, pou: Pou, facts: Facts, report: Report) -> None:
+        self.pou, self.facts, self.report = pou, facts, report
+
+    def warn(self, code: str, node: tree.Node, message: str, hint: str = "",
+             related: tuple[Source, int, str] | None = None) -> None:
+        self.report.add(code, self.pou.source, node, message, hint, related)
+
+    def there(self, node: tree.Node, what: str) -> tuple[Source, int, str]:
+        """A second place in the same source."""
+        return self.pou.source, node.start, what
+
+    def text(self, node: tree.Node) -> str:
+        """A piece of the program as it is written, on one line."""
+        return " ".join(self.pou.source.text[node.start:node.end].split())
+
+    def below(self, node: tree.Node) -> Iterable[tree.Node | None]:
+        """The nodes directly below one; of a call that means an operator, those of the operator."""
+        if isinstance(node, tree.Call) and (meaning := self.facts.rewritten.get(node)) is not None:
+            return (meaning,)
+        return _BELOW[type(node)](node)
+
+    def nodes(self) -> Iterator[tree.Node]:
+        """All statements and expressions, each once, in the order of the text."""
+        todo: list[tree.Node | None] = list(reversed(self.pou.tree.body))
+        while todo:
+            node = todo.pop()
+            if node is not None:
+                yield node
+                todo.extend(reversed([*self.below(node)]))
+
+    def constant(self, expr: tree.Expr) -> Any:
+        """The value of an expression in which no name stands, so that nobody meant to change it; else None."""
+        value = self.facts.constants.get(expr)
+        if value is None:
+            return None
+        todo: list[tree.Node | None] = [expr]
+        while todo:
+            node = todo.pop()
+            if isinstance(node, tree.NameRef):
+                return None
+            if node is not None:
+                todo.extend(self.below(node))
+        return value
+
+
+def _branches(node: tree.If) -> Iterator[tree.Node]:
+    for condition, block in node.branches:
+        yield condition
+        yield from block
+    yield from node.otherwise or ()
+
+
+def _labels(node: tree.Case) -> Iterator[tree.Node]:
+    yield node.selector
+    for branch in node.branches:
+        yield from branch.body
+    yield from node.otherwise or ()
+
+
+def _nothing(node: tree.Node) -> Iterable[tree.Node]:
+    return ()
+
+
+_BELOW: dict[type, Callable[[Any], Iterable[tree.Node | None]]] = {
+    tree.Assign: lambda n: (*n.targets, n.value),
+    tree.CallStatement: lambda n: (n.call,),
+    tree.If: _branches,
+    tree.Case: _labels,
+    tree.For: lambda n: (n.variable, n.first, n.last, n.step, *n.body),
+    tree.While: lambda n: (n.condition, *n.body),
+    tree.Repeat: lambda n: (*n.body, n.until),
+    tree.Return: lambda n: (n.value,),
+    tree.Exit: _nothing, tree.Continue: _nothing, tree.Empty: _nothing, tree.RefusedStatement: _nothing,
+    tree.Binary: lambda n: (n.left, n.right),
+    tree.Unary: lambda n: (n.operand,),
+    tree.Call: lambda n: (n.callee, *(argument.value for argument in n.arguments)),
+    tree.Member: lambda n: (n.of,),
+    tree.Part: lambda n: (n.of,),
+    tree.Index: lambda n: (n.of, *n.subscripts),
+    tree.Deref: lambda n: (n.of,),
+    tree.Literal: _nothing, tree.EnumLiteral: _nothing, tree.NullLiteral: _nothing, tree.NameRef: _nothing,
+    tree.Direct: _nothing,
+}
+"""For each kind of node of a body the nodes directly below it, in the order of the text."""

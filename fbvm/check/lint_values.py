@@ -1,0 +1,157 @@
+"""Warnings about values: reals compared for equality, fractions that are lost, results and assignments without effect."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from fbvm.base.types import BOOL, LREAL, Type, base
+from fbvm.check.constants import wrap
+from fbvm.check.facts import Pou, PouCall, StandardCall, Variable
+from fbvm.check.lint_body import Body
+from fbvm.check.values import is_any
+from fbvm.check.writes import place
+from fbvm.syntax import tree
+
+
+def look_at(body: Body, node: tree.Node) -> None:
+    """Warn of what is wrong with one node of a body."""
+    rule = _RULES.get(type(node))
+    if rule is not None:
+        rule(body, node)
+
+
+def _binary(body: Body, node: tree.Binary) -> None:
+    kind = body.facts.operands.get(node)
+    if kind is None or not is_any(kind, "ANY_REAL"):
+        if kind is not None and node in body.facts.constants:
+            _overflow(body, node, kind)
+        return
+    if node.op in ("=", "<>"):
+        _equality(body, node, node.op, (node.left, node.right), kind)
+    _fraction(body, node.left, kind)
+    _fraction(body, node.right, kind)
+
+
+def _overflow(body: Body, node: tree.Binary, kind: Type) -> None:
+    """Warn of a constant that is cut to the width of its type."""
+    left, right = (body.facts.constants.get(each) for each in (node.left, node.right))
+    work_out = _EXACT.get(node.op)
+    if not work_out or not is_any(kind, "ANY_INT") or not isinstance(left, int) or not isinstance(right, int):
+        return
+    exact = work_out(left, right)
+    if exact != wrap(kind, exact):
+        body.warn("S0791", node, f"{kind} cannot hold {exact}: it becomes {wrap(kind, exact)}",
+                  "work it out in a wider type, such as DINT#...")
+
+
+def _converted(body: Body, node: tree.Call, called: StandardCall) -> None:
+    """Warn of a conversion that cuts bits off a number which is known.  The same bits as another number are meant."""
+    value, target = body.facts.constants.get(called.arguments[0][0]), called.detail[1]
+    if is_any(target, "ANY_INT", "ANY_BIT") and target != BOOL and type(value) is int:
+        bits = target.size * 8
+        if not -(1 << bits - 1) <= value < 1 << bits:
+            body.warn("S0791", node, f"{target} cannot hold {value}: it becomes {wrap(target, value)}")
+
+
+def _equality(body: Body, node: tree.Expr, op: str, sides: Sequence[tree.Expr], kind: Type) -> None:
+    """A comparison with 0 guards a division, one with itself finds what is no number: both are meant."""
+    constants = body.facts.constants
+    left, right = (body.text(side) for side in sides[:2])
+    if left.casefold() != right.casefold() and not any(constants.get(side) == 0 for side in sides) and node not in constants:
+        body.warn("S0390", node, f"two {kind} are compared by {op}, and rounding decides",
+                  f"compare how far apart they are: ABS({left} - {right}) {'<' if op in ('=', 'EQ') else '>'} 0.001")
+
+
+def _fraction(body: Body, expr: tree.Expr, kind: Type) -> None:
+    """Warn of a division of integers within a value that becomes a real only afterwards."""
+    if not is_any(kind, "ANY_REAL"):
+        return
+    todo = [expr]
+    while todo:
+        node = todo.pop()
+        node = body.facts.rewritten.get(node, node)
+        if isinstance(node, tree.Unary):
+            todo.append(node.operand)
+        elif isinstance(node, tree.Binary) and not is_any(body.facts.operands.get(node, LREAL), "ANY_REAL") and \
+                not isinstance(body.facts.constants.get(node.left), float):
+            if node.op == "/":
+                _divided(body, node, kind)
+            elif node.op in ("+", "-", "*"):
+                todo += (node.left, node.right)
+
+
+def _divided(body: Body, node: tree.Binary, kind: Type) -> None:
+    left, right = (body.facts.constants.get(side) for side in (node.left, node.right))
+    if isinstance(left, int) and isinstance(right, int) and right and left % right == 0:
+        return
+    literal = isinstance(node.right, tree.Literal) and isinstance(right, int | float)
+    hint = f"write {body.text(node.right)}.0" if literal else f"convert first: TO_{base(kind)}({body.text(node.left)}) / ..."
+    body.warn("S0391", node, f"this divides integers and drops the fraction before the value becomes {kind}", hint)
+
+
+def _assign(body: Body, node: tree.Assign) -> None:
+    facts = body.facts
+    kind = facts.types.get(node.targets[-1])
+    if kind is not None:
+        _fraction(body, node.value, kind)
+    if node.op != ":=" or len(node.targets) > 1:
+        return
+    there = place(facts, node.targets[0])
+    if there is not None and there == place(facts, node.value):
+        body.warn("S0594", node, f"{body.text(node.targets[0])} is assigned to itself")
+
+
+def _call(body: Body, node: tree.Call) -> None:
+    called = body.facts.calls.get(node)
+    if isinstance(called, PouCall):
+        for parameter, value in called.inputs:
+            _fraction(body, value, parameter.type)
+    elif isinstance(called, StandardCall):
+        for value, kind in called.arguments:
+            _fraction(body, value, kind)
+        if called.key in ("EQ", "NE") and is_any(called.detail[0], "ANY_REAL"):
+            _equality(body, node, called.key, [value for value, _ in called.arguments], called.detail[0])
+        if called.key == "TO":
+            _converted(body, node, called)
+
+
+def _statement(body: Body, node: tree.CallStatement) -> None:
+    """A call for nothing but its result, which nobody takes."""
+    call, facts = node.call, body.facts
+    if not isinstance(call, tree.Call) or call not in facts.types or call in facts.guards:
+        return
+    called = facts.calls.get(call)
+    if isinstance(called, PouCall) and (called.outputs or called.in_outs or called.enabled or not _silent(body, called.pou, [])):
+        return
+    name = body.text(call.callee)
+    body.warn("S0491", call, f"the result of {name} is not used, and the call does nothing else",
+              f"assign it: x := {name}(...)")
+
+
+def _silent(body: Body, pou: Pou, path: list[Pou]) -> bool:
+    """True for a function that changes nothing but variables of its own."""
+    if not pou.is_function or pou in path:
+        return False
+    function = Body(pou, body.facts, body.report)
+    for node in function.nodes():
+        called = body.facts.calls.get(node) if isinstance(node, tree.Call) else None
+        if isinstance(called, PouCall) and not _silent(body, called.pou, [*path, pou]):
+            return False
+        targets = node.targets if isinstance(node, tree.Assign) else (node.variable,) if isinstance(node, tree.For) else ()
+        if isinstance(called, PouCall):
+            targets = tuple(value for _, value, _ in called.outputs)
+        if not all(_own(body.facts.variables.get(body.facts.root(target)), pou) for target in targets):
+            return False
+    return True
+
+
+def _own(variable: Variable | None, pou: Pou) -> bool:
+    return variable is not None and variable.owner is pou and not variable.reference and variable.location is None
+
+
+_EXACT: dict[str, Callable[[int, int], int]] = {"+": operator.add, "-": operator.sub, "*": operator.mul}
+_RULES: dict[type, Callable[[Body, Any], None]] = {
+    tree.Binary: _binary, tree.Assign: _assign, tree.Call: _call, tree.CallStatement: _statement,
+}

@@ -1,0 +1,90 @@
+"""Which warnings are wanted: the pragmas of a text, and what the caller asks for.
+
+    {warning disable S0390}          from here on S0390 is not warned of; several codes with commas
+    {warning restore S0390}          from here on again
+
+A pragma speaks of its own text, from its own place on.  A code of another tool in such a pragma is passed over.
+"""
+
+from __future__ import annotations
+
+import bisect
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
+
+from fbvm.base.codes import CODES
+from fbvm.base.diagnostics import Diagnostic, Source
+
+if TYPE_CHECKING:
+    from fbvm.syntax.tree import SourceText
+
+_PRAGMA = re.compile(r"\s*warning\s+(disable|restore)\b(.*)", re.IGNORECASE | re.DOTALL)
+_OURS = re.compile(r"S\d{4}")
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What the caller asks for: codes that are not wanted ("all" for every warning), and whether warnings forbid running.
+
+    Raises ValueError for what is no code of a warning."""
+
+    no_warn: frozenset[str] = field(default_factory=frozenset)
+    as_errors: bool = False
+
+    @classmethod
+    def of(cls, no_warn: Iterable[str], as_errors: bool) -> Wanted:
+        """Of codes in any case."""
+        codes = frozenset(code.strip().upper() for code in no_warn)
+        wrong = sorted(code for code in codes if code != "ALL" and (code not in CODES or CODES[code].severity != "warning"))
+        if wrong:
+            known = ", ".join(code for code, row in CODES.items() if row.severity == "warning")
+            raise ValueError(f"{wrong[0]} is no code of a warning; there are {known}, or all")
+        return cls(codes, as_errors)
+
+
+ANY = Wanted()
+"""Every warning, and none forbids running."""
+
+
+class Silence:
+    """Where in the texts of a project warnings are switched off."""
+
+    def __init__(self) -> None:
+        self._switches: dict[tuple[str, str], list[tuple[int, bool]]] = {}
+        """Source and code -> places from which on it is off (True) or on."""
+
+    def note(self, source: Source, text: SourceText) -> list[Diagnostic]:
+        """Take the pragmas of one text; warnings for codes that there are not."""
+        unknown = []
+        for pragma in text.pragmas:
+            found = _PRAGMA.fullmatch(pragma.text)
+            if not found:
+                continue
+            for code in re.split(r"[\s,]+", found[2].strip().upper()):
+                self._switches.setdefault((source.name, code), []).append((pragma.end, found[1].lower() == "disable"))
+                if _OURS.fullmatch(code) and (code not in CODES or CODES[code].severity != "warning"):
+                    unknown.append(Diagnostic("S0190", source, pragma.start, pragma.end,
+                                              f"{code} is no code of a warning: the pragma has no effect",
+                                              "`fbvm explain` lists all codes"))
+        return unknown
+
+    def covers(self, warning: Diagnostic) -> bool:
+        """Whether a pragma has switched a warning off where it stands."""
+        switches = self._switches.get((warning.source.name, warning.code))
+        if not switches:
+            return False
+        at = bisect.bisect_right(switches, warning.start, key=lambda switch: switch[0])
+        return at > 0 and switches[at - 1][1]
+
+    def heard(self, diagnostics: Iterable[Diagnostic], wanted: Wanted) -> list[Diagnostic]:
+        """The diagnostics without warnings that are not wanted; the others are errors if that is asked for."""
+        kept = []
+        for each in diagnostics:
+            if each.severity == "warning":
+                if "ALL" in wanted.no_warn or each.code in wanted.no_warn or self.covers(each):
+                    continue
+                each = replace(each, raised=wanted.as_errors)
+            kept.append(each)
+        return kept

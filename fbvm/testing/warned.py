@@ -1,0 +1,71 @@
+"""Warnings in pytest: those of all programs that the tests ran, once each, at the end.
+
+    pytest --fbvm-no-warn S0390 --fbvm-warnings-as-errors
+
+The ini options `fbvm_no_warn` and `fbvm_warnings_as_errors` say the same for every run.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from fbvm.check.silence import Wanted
+
+if TYPE_CHECKING:
+    from fbvm.testing.subject import Subject
+
+NAME = "fbvm_warned"
+"""Under which the plugin is registered."""
+
+
+def add_options(parser: pytest.Parser, group: pytest.OptionGroup) -> None:
+    """The options of the command line and of pytest's ini."""
+    parser.addini("fbvm_no_warn", "codes of warnings of PLC code that are not wanted", type="args", default=[])
+    parser.addini("fbvm_warnings_as_errors", "warnings of PLC code are errors", type="bool", default=False)
+    group.addoption("--fbvm-no-warn", action="append", default=[], metavar="CODE",
+                    help="do not warn of that in PLC code, such as S0390, or of `all`")  # fmt: skip
+    group.addoption("--fbvm-warnings-as-errors", action="store_true", help="warnings of PLC code are errors")
+
+
+class Warned:
+    """Which warnings are wanted in a session, and those that there were."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        codes = [*config.getini("fbvm_no_warn"), *config.getoption("fbvm_no_warn")]
+        as_errors = config.getoption("fbvm_warnings_as_errors") or config.getini("fbvm_warnings_as_errors")
+        try:
+            self.wanted = Wanted.of((code for listed in codes for code in listed.split(",")), bool(as_errors))
+        except ValueError as error:
+            raise pytest.UsageError(f"--fbvm-no-warn: {error}") from None
+        self._shown: dict[str, None] = {}
+
+    def note(self, subject: Subject) -> None:
+        """Remember what a subject is warned of."""
+        self._shown.update(dict.fromkeys(each.render() for each in subject.warnings))
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        """A worker of xdist hands its warnings to the controller."""
+        output: dict[str, Any] | None = getattr(session.config, "workeroutput", None)
+        if output is not None:
+            output[NAME] = list(self._shown)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any, error: Any) -> None:
+        """The controller takes the warnings of a worker."""
+        self._shown.update(dict.fromkeys(getattr(node, "workeroutput", {}).get(NAME, ())))
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """Every warning once."""
+        if self._shown:
+            terminalreporter.section("warnings of PLC code")
+            for text in sorted(self._shown):
+                terminalreporter.line(text)
+
+
+def warned_of(config: pytest.Config) -> Warned:
+    """The warnings of a session."""
+    warned: Warned | None = config.pluginmanager.get_plugin(NAME)
+    assert warned is not None, "it is registered when pytest starts"
+    return warned

@@ -1,0 +1,74 @@
+"""Which warnings are wanted: pragmas, codes, and warnings that count as errors, through the API."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fbvm import Source, compile_files, compile_sources, compile_text
+from fbvm.base.diagnostics import errors
+from fbvm.check.silence import Wanted
+
+TEXT = """PROGRAM Main
+VAR r : REAL; q : BOOL; idle : INT; END_VAR
+    q := r = 1.0;
+END_PROGRAM
+"""
+
+
+def codes(text: str, **wanted: object) -> list[str]:
+    return [d.code for d in compile_text(text, **wanted).diagnostics]  # type: ignore[arg-type]
+
+
+def test_codes_are_left_out() -> None:
+    assert codes(TEXT) == ["S0290", "S0390"]
+    assert codes(TEXT, no_warn=["S0290"]) == codes(TEXT, no_warn=[" s0290 "]) == ["S0390"]
+    assert codes(TEXT, no_warn=["all"]) == codes(TEXT, lint=False) == []
+
+
+@pytest.mark.parametrize("code", ["S0201", "S0999", "R0101", "", "C0195"])
+def test_what_is_no_code_of_a_warning_is_misuse(code: str) -> None:
+    with pytest.raises(ValueError, match="is no code of a warning; there are S0190"):
+        Wanted.of([code], False)
+
+
+def test_warnings_can_forbid_running() -> None:
+    made = compile_text(TEXT, warnings_as_errors=True)
+    assert made.image is None and made.errors == made.diagnostics and len(made.errors) == 2
+    assert made.errors[0].render().startswith("text.st:2:25: error S0290: ")
+    assert compile_text(TEXT, warnings_as_errors=True, no_warn=["all"]).image is not None
+    assert compile_text(TEXT).image is not None
+
+
+def test_a_text_with_errors_is_not_looked_at_further() -> None:
+    assert codes(TEXT.replace("1.0", "TRUE")) == ["S0302"]
+
+
+def test_a_pragma_speaks_of_its_own_text_only() -> None:
+    other = TEXT.replace("Main", "Other")
+    made = compile_sources([Source("a.st", "{warning disable S0390, S0290}\n" + TEXT), Source("b.st", other)])
+    assert [(d.source.name, d.code) for d in made.diagnostics] == [("b.st", "S0290"), ("b.st", "S0390")]
+
+
+def test_libraries_are_not_looked_at(tmp_path: Path) -> None:
+    (tmp_path / "Slack.st").write_text("FUNCTION_BLOCK Slack\nVAR idle : INT; END_VAR\nEND_FUNCTION_BLOCK\n", encoding="utf-8")
+    main = tmp_path / "main" / "main.st"
+    main.parent.mkdir()
+    main.write_text("PROGRAM Main\nVAR s : Slack; END_VAR\n    s();\nEND_PROGRAM\n", encoding="utf-8")
+    assert compile_files([main], libraries=[tmp_path]).diagnostics == []
+    own = compile_files([main, tmp_path / "Slack.st"])
+    assert [d.code for d in own.diagnostics] == ["S0290"] and errors(own.diagnostics) == []
+
+
+HOUSE = Path(__file__).resolve().parents[2]
+
+
+OWN = [*(sorted(path.parent.rglob("*.st")) for path in sorted((HOUSE / "fblib").rglob("library.toml"))),
+       *([path] for path in sorted((HOUSE / "examples").glob("*.st"))), sorted((HOUSE / "examples/project/src").glob("*.st"))]
+
+
+@pytest.mark.parametrize("files", OWN, ids=lambda files: files[0].parent.name + "/" + files[0].stem)
+def test_what_fbvm_brings_is_clean(files: list[Path]) -> None:
+    compilation = compile_files(files, libraries=[files[0].parent])
+    assert compilation.diagnostics == [], "\n".join(d.render() for d in compilation.diagnostics)
