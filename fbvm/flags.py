@@ -43,7 +43,6 @@ class Flags:
         self._slot = -1
         self._counters: list[tuple[int, int]] = []
         self._pulses: list[tuple[int, int, int]] = []
-        self._rows = [(AREAS["CF"].offset + byte, *_masks(byte)) for byte in sorted({number // 8 for number in PERIODS_NS})]
 
     def update(self, now_ns: int, cycle_time_ns: int, first: bool) -> None:
         """Write all of them for the scan at `now_ns`; `cycle_time_ns` is the length of the cycle before, 0 at first."""
@@ -67,7 +66,7 @@ class Flags:
         self._slot = now_ns // SLOT_NS
         self._counters = [(at, now_ns // step_ns & 0xFFFF) for at, step_ns in FREE_COUNTERS]
         self._pulses = []
-        for at, keep, periods in self._rows:
+        for at, keep, periods in _ROWS:
             pulses = 0
             for bit, period_ns, half_ns in periods:
                 if now_ns % period_ns >= half_ns:
@@ -90,3 +89,6 @@ def _masks(byte: int) -> tuple[int, Periods]:
     """Which bits of a byte of CF are not clock pulses, and when the others are ON."""
     here = {1 << number % 8: period_ns for number, period_ns in PERIODS_NS.items() if number // 8 == byte}
     return 0xFF & ~sum(here), [(bit, period_ns, period_ns // 2) for bit, period_ns in here.items()]
+
+
+_ROWS = [(AREAS["CF"].offset + byte, *_masks(byte)) for byte in sorted({number // 8 for number in PERIODS_NS})]

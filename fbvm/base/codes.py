@@ -1,7 +1,8 @@
-"""Every diagnostic code: S = source, R = running (trap).  Each has a page in `pages/` and a test.
+"""Every diagnostic code: S = source, P = project file, R = running (trap).  Each has a page in `pages/` and a test.
 
 Ranges: S01 text and syntax, S02 names and declarations, S03 types, S04 calls, S05 statements, S06 addresses and memory,
-S07 constants and initial values, S08 configuration and tasks, S09 understood but refused, R01 traps.
+S07 constants and initial values, S08 configuration and tasks, S09 understood but refused, P01 the project file,
+R01 traps.
 """
 
 from __future__ import annotations
@@ -72,6 +73,10 @@ CODES: dict[str, Code] = {
         "S0801": "task or resource declared wrongly",
         "S0901": "understood, but not executed by this version",
         "S0902": "object-oriented text is refused",
+        "P0101": "project file is not TOML",
+        "P0102": "unknown key in a project file",
+        "P0103": "value in a project file does not fit",
+        "P0104": "key missing from a project file",
     }),
     **_table("warning", {
         "S0190": "pragma is not known and has no effect",

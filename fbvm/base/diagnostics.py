@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -115,6 +116,6 @@ def caret_lines(source: Source, start: int, end: int) -> list[str]:
     return [f"    {shown}", f"    {lead}{'^' * width}"]
 
 
-def errors(diagnostics: list[Diagnostic]) -> list[Diagnostic]:
+def errors(diagnostics: Sequence[Diagnostic]) -> list[Diagnostic]:
     """Those that forbid running."""
     return [d for d in diagnostics if d.severity == "error"]

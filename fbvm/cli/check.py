@@ -36,6 +36,6 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         compilation = compile_files(files, program=program, libraries=libraries, no_warn=codes,
                                     warnings_as_errors=warnings_as_errors)
     if compilation.diagnostics or as_json:
-        report(compilation, as_json)
+        report(compilation.diagnostics, as_json)
     if errors(compilation.diagnostics):
         sys.exit(status.PROGRAM_ERRORS)

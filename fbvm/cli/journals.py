@@ -80,6 +80,6 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
             raise JournalError(f"the program needs the library folder {folder}; say where it is now with --library")
     compilation = compile_sources(sources, program, folders, runnable=True, lint=False)
     if compilation.image is None:
-        report(compilation, as_json)
+        report(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)
     return with_banks(compilation.image, banks)

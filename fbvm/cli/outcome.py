@@ -24,7 +24,7 @@ from fbvm.watch.values import Value, plain_value, show, show_time
 MS_NS = 1_000_000
 PIPE_WIDTH = 100
 """Width of charts that do not go to a terminal."""
-_STATUS = {"max": status.FAILED, "differs": status.FAILED, "trap": status.STOPPED, "interrupted": status.INTERRUPTED}
+EXIT_STATUS = {"max": status.FAILED, "differs": status.FAILED, "trap": status.STOPPED, "interrupted": status.INTERRUPTED}
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Outcome:
     @property
     def status(self) -> int:
         """The exit status of the command."""
-        return _STATUS.get(self.reason, status.GOOD)
+        return EXIT_STATUS.get(self.reason, status.GOOD)
 
     def print(self) -> None:
         """Values and charts on stdout, what stopped the run on stderr."""

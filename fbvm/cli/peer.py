@@ -10,7 +10,8 @@ from typing import Any
 
 import click
 
-from fbvm.cli import registers, status
+from fbvm.cli import status
+from fbvm.wire import registers
 
 LISTENING = "listening on "
 """What the line begins with that names host and port."""

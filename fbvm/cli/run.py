@@ -9,13 +9,14 @@ from typing import Any
 
 import click
 
-from fbvm.cli import registers, status
+from fbvm.cli import status
 from fbvm.cli.banks import banks_in, with_banks
 from fbvm.cli.breakpoints import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.journals import start_journal
 from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, time_ns
 from fbvm.cli.outcome import Outcome, Progress
-from fbvm.cli.sources import compiled, source_arguments
+from fbvm.cli.project import project_named, run_project
+from fbvm.cli.sources import compiled, source_options
 from fbvm.cli.traces import tracing
 from fbvm.code.image import Image
 from fbvm.engine.tiers import CHOICES
@@ -32,6 +33,7 @@ from fbvm.run.running import EVENT, PACES, TimedWrite
 from fbvm.units.etn21 import Etn21
 from fbvm.watch.paths import Place
 from fbvm.watch.values import parse_value, split_list
+from fbvm.wire import registers
 
 CYCLE_NS = 10_000_000
 """Cycle of programs without a TASK, unless somebody says another."""
@@ -40,7 +42,8 @@ UNIT_ADDRESS = "192.168.250.21"
 
 
 @click.command("run")
-@source_arguments
+@source_options
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=click.Path(exists=True, path_type=Path))
 @click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
               help="Cycle of programs without a TASK, and how often the PLC scans.")
 @click.option("--scans", type=click.IntRange(min=0), metavar="N", help="End after N scans.")
@@ -81,10 +84,13 @@ def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int, as_json: bool,
     **options: Any,
 ) -> None:  # fmt: skip
-    """Compile the files and run them, with an ETN21 (unit number 0) on the backplane.
+    """Compile the files and run them, with an ETN21 (unit number 0) on the backplane; or run a PROJECT: a folder with an
+    fbvm.toml, or that file.  Without either it is the folder where you are.
 
     End by one of --scans, --for and --until; before that, --break, --watch and --break-if end it inside a scan.  Status 1
     if --max ended --until, 3 if the program has errors, 4 if a trap stopped it, 5 if the network could not be used."""
+    if project := project_named(files):
+        sys.exit(run_project(project, click.get_current_context()))
     _check_usage(**options)
     image = compiled(files, program, libraries, runnable=True, as_json=as_json)
     named = [given.name for given in options["settings"]]

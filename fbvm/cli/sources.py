@@ -13,20 +13,25 @@ import click
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.cli import status
-from fbvm.code.compiler import Compilation, compile_files
+from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.syntax.text import read
 
 
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
     """FILE..., --program and --library, which all verbs on programs share."""
+    files = click.argument("files", nargs=-1, required=True, metavar="FILE...",
+                           type=click.Path(exists=True, dir_okay=False, path_type=Path))  # fmt: skip
+    return source_options(files(function))
+
+
+def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """--program and --library."""
     for decorate in (
         click.option("--library", "libraries", multiple=True, metavar="DIR",
                      type=click.Path(exists=True, file_okay=False, path_type=Path),
                      help="A folder of libraries of your own, besides those that fbvm brings; may be repeated."),
         click.option("--program", metavar="NAME", help="The PROGRAM to run where no CONFIGURATION says it."),
-        click.argument("files", nargs=-1, required=True, metavar="FILE...",
-                       type=click.Path(exists=True, dir_okay=False, path_type=Path)),
     ):  # fmt: skip
         function = decorate(function)
     return function
@@ -40,16 +45,15 @@ def compiled(
     With `runnable` it is an error, too, if nothing says which program to run."""
     compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable, lint=False)
     if compilation.image is None:
-        report(compilation, as_json)
+        report(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)
     for diagnostic in compilation.diagnostics:
         show(diagnostic)
     return compilation.image
 
 
-def report(compilation: Compilation, as_json: bool) -> None:
+def report(diagnostics: Sequence[Diagnostic], as_json: bool) -> None:
     """All diagnostics: to stderr as text with a last line that counts, or to stdout as one object."""
-    diagnostics = compilation.diagnostics
     if as_json:
         click.echo(json.dumps({"diagnostics": [diagnostic.as_dict() for diagnostic in diagnostics]}, indent=2))
         return

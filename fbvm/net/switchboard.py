@@ -15,7 +15,7 @@ from typing import Protocol
 
 from fbvm.net.addresses import AddressMap
 from fbvm.net.channels import ChannelLink
-from fbvm.wire.link import Peer
+from fbvm.wire.link import Link, Peer
 from fbvm.wire.tap import Happening, Tap, What
 
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
@@ -91,31 +91,33 @@ class Switchboard(ABC):
         self._own: dict[tuple[str, Peer], Peer] = {}
         self._orphans: deque[tuple[int, Orphan]] = deque()
         self.closed = False
+        self.driven = False
+        """True while somebody else calls `serve` whenever time goes on, for all links at once."""
 
     @abstractmethod
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
         """Where on the host a unit's own endpoint is."""
 
-    def wait(self, timeout_s: float) -> list[ChannelLink]:
-        """Sleep until a connection wants attention or the time is over; the links that have something to fetch."""
-        told = [link for link in self.links.values() if link.told]
-        if self.closed or told:
-            return told
+    def wait(self, timeout_s: float) -> bool:
+        """Sleep until a connection wants attention or the time is over; True if there is something to fetch."""
+        if self.closed or any(link.told for link in self.links.values()):
+            return True
         timeout_s = max(timeout_s, 0.0)
-        if self._number is None:
-            return [key.data.link for key, _ in self._selector.select(timeout_s)]
-        if select.select([self._number], [], [], timeout_s)[0]:
-            return [key.data.link for key, _ in self._selector.select(0)]
-        return []
+        if self._number is not None:
+            return bool(select.select([self._number], [], [], timeout_s)[0])
+        return bool(self._selector.select(timeout_s))
 
-    def serve(self, now_ns: int) -> None:
-        """Do everything that the host is ready for."""
+    def serve(self, now_ns: int) -> list[Link]:
+        """Do everything that the host is ready for; whose connections that was."""
         if self.closed:
-            return
+            return []
+        woken: list[Link] = []
         for key, ready in self._selector.select(0) if self._selector.get_map() else ():
             key.data.ready(ready, now_ns)
+            woken.append(key.data.link)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):
             self._orphans.popleft()[1].give_up(now_ns)
+        return woken
 
     def close(self) -> None:
         """End all connections and free what the host lent."""
@@ -131,7 +133,12 @@ class Switchboard(ABC):
         self._selector.close()
         self.closed = True
 
-    # For channels.
+    # For links and their channels.
+
+    def attend(self, now_ns: int) -> None:
+        """Serve, unless somebody else does."""
+        if not self.driven:
+            self.serve(now_ns)
 
     def watch(self, sock: HasFileno, wanted: int, channel: Watcher) -> None:
         """Be told when the host is ready for what is wanted: READ, WRITE, both or nothing."""

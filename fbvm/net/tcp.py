@@ -96,7 +96,7 @@ class TcpLink(ChannelLink):
         self.network = network
 
     def serve(self, now_ns: int) -> None:
-        self.network.serve(now_ns)
+        self.network.attend(now_ns)
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
         channel: _OnHost

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import heapq
 import time
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from typing import Protocol
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Protocol, cast
 
 from fbvm.plc import Plc
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
-from fbvm.wire.link import Link
+from fbvm.wire.link import RealNetwork
 
 PROGRESS_NS = 100_000_000
 """How often progress is told, at most."""
@@ -44,10 +44,12 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
 
     They share one time: real if a network of any of them is, so that a network may have units of several PLCs."""
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
-    if not networks:  # nothing happens between two periods of virtual time
-        for run in runs:
+    start_ns = max((run.plc.elapsed_ns for run in runs), default=0)
+    for run in runs:
+        run.begin(start_ns)
+        if not networks:  # nothing happens between two periods of virtual time
             run.pace = CYCLIC
-    clock = _Real(list(networks.values()), runs) if networks else _Virtual()
+    clock = _Real(cast(list[RealNetwork], list(networks.values())), runs, start_ns) if networks else _Virtual()
     queue = _Queue(runs)
     told_ns = time.monotonic_ns()
     try:
@@ -62,6 +64,8 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     except KeyboardInterrupt:
         for run in runs:
             run.reason = run.reason or "interrupted"
+    finally:
+        clock.stop()
 
 
 def _scan_all(queue: _Queue, now_ns: int, real: bool) -> None:
@@ -118,7 +122,7 @@ class _Queue:
 
 
 class _Clock(Protocol):
-    """The time of the loop, which begins with 0."""
+    """The time of the loop."""
 
     real: bool
     woken: Sequence[int]
@@ -126,6 +130,9 @@ class _Clock(Protocol):
 
     def reach(self, due_ns: int) -> int:
         """Waits until then, or until somebody is woken; the time."""
+
+    def stop(self) -> None:
+        """The loop has ended."""
 
 
 class _Virtual:
@@ -137,30 +144,42 @@ class _Virtual:
     def reach(self, due_ns: int) -> int:
         return due_ns
 
+    def stop(self) -> None:
+        """Nothing to give back."""
+
 
 class _Real:
-    """The host's time."""
+    """The host's time, and the networks that live in it: each is asked once whenever somebody scans."""
 
     real = True
 
-    def __init__(self, networks: Sequence[object], runs: Sequence[Running]) -> None:
-        self.woken: Sequence[int] = ()
-        waits: list[Callable[[float], Collection[Link]]] = [
-            wait for network in networks if (wait := getattr(network, "wait", None))]  # fmt: skip
+    def __init__(self, networks: Sequence[RealNetwork], runs: Sequence[Running], start_ns: int) -> None:
+        self.woken: list[int] = []
+        self._networks = networks
+        for network in networks:
+            network.driven = True
         self._numbers = {id(unit.link): number for number, run in enumerate(runs) if run.pace == EVENT
                          for unit in run.plc.units}  # fmt: skip
-        self._wait = waits[0] if len(waits) == 1 and self._numbers else None
-        self._zero_ns = time.monotonic_ns()
+        self._waits = len(networks) == 1 and bool(self._numbers)
+        self._zero_ns = time.monotonic_ns() - start_ns
 
     def reach(self, due_ns: int) -> int:
-        self.woken = ()
-        while (left_ns := due_ns - (time.monotonic_ns() - self._zero_ns)) > 0:
-            if self._wait is None:
+        while (left_ns := due_ns + self._zero_ns - time.monotonic_ns()) > 0:
+            if not self._waits:
                 time.sleep(left_ns / 1e9)
-            elif woken := self._wait(left_ns / 1e9):
-                self.woken = [self._numbers[id(link)] for link in woken if id(link) in self._numbers]
+            elif self._networks[0].wait(left_ns / 1e9):
                 break
-        return time.monotonic_ns() - self._zero_ns
+        now_ns = time.monotonic_ns() - self._zero_ns
+        self.woken.clear()
+        for network in self._networks:
+            for link in network.serve(now_ns):
+                if (number := self._numbers.get(id(link))) is not None:
+                    self.woken.append(number)
+        return now_ns
+
+    def stop(self) -> None:
+        for network in self._networks:
+            network.driven = False
 
 
 def epoch_ns() -> int:

@@ -28,7 +28,7 @@ class TimedWrite:
 class Running:
     """A PLC and the bounds of its run, which are those of `Plc.run`.  Raises ValueError for ones that make no sense.
 
-    Times are of the loop, which begin with 0 when it does."""
+    Times are of the loop, which `begin` sets in relation to the PLC's own."""
 
     def __init__(
         self,
@@ -48,14 +48,19 @@ class Running:
         self._goal = Goal(plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
         self.reason = self._goal.reached()
         """What ended the run, by the names of `Plc.run`; "" while it goes on."""
-        self.due_ns = 0
+        self.due_ns = plc.elapsed_ns
         """When the next scan is to begin."""
-        self._ahead_ns = plc.elapsed_ns
+        self._behind_ns = 0
         self._writes = sorted(writes, key=lambda write: write.at_ns)
+
+    def begin(self, start_ns: int) -> None:
+        """The loop begins at this time of its own."""
+        self._behind_ns = start_ns - self.plc.elapsed_ns
+        self.due_ns = start_ns
 
     def scan(self, now_ns: int) -> None:
         """One scan at this time, and the plan for the next.  A period that was overrun is not made up for."""
-        plc, told_ns = self.plc, max(now_ns + self._ahead_ns, self.plc.now_ns)
+        plc, told_ns = self.plc, max(now_ns - self._behind_ns, self.plc.now_ns)
         while self._writes and self._writes[0].at_ns <= told_ns:
             write = self._writes.pop(0)
             plc.write(write.where, write.value)
@@ -64,7 +69,7 @@ class Running:
         if plc.halted:
             return
         if self.pace == EVENT:
-            self.due_ns = max(now_ns, min(now_ns + plc.cycle_ns, plc.due_ns - self._ahead_ns))
+            self.due_ns = max(now_ns, min(now_ns + plc.cycle_ns, plc.due_ns + self._behind_ns))
         elif now_ns < self.due_ns + plc.cycle_ns:
             self.due_ns += plc.cycle_ns
         else:

@@ -6,6 +6,8 @@ Only bits that changed are written, so what the CPU has cleared meanwhile (a cha
 
 from __future__ import annotations
 
+from functools import cache
+
 from fbvm.units import etn21_map as at
 from fbvm.units.etn21_socket import Socket
 from fbvm.units.etn21_timing import TOGETHER, Skew
@@ -15,18 +17,24 @@ Word = tuple[str, int]
 """Area and address."""
 
 
+@cache
+def _words_of(layout: at.Layout) -> dict[tuple[str, int], tuple[Word, Word, Word]]:
+    """By protocol and socket: status, bytes received, TCP state; the same for all units of a number."""
+    return {
+        (protocol, socket): (
+            ("CIO", layout.status(protocol, socket)),
+            ("D", layout.m + at.BYTES_RECEIVED + socket),
+            ("D", layout.m + at.TCP_STATE + socket),
+        )
+        for protocol in ("TCP", "UDP") for socket in at.SOCKETS
+    }  # fmt: skip
+
+
 class Display:
     """Writes for one unit's status words, R words and request switches."""
 
     def __init__(self, layout: at.Layout) -> None:
-        self._words_of = {
-            (protocol, socket): (
-                ("CIO", layout.status(protocol, socket)),
-                ("D", layout.m + at.BYTES_RECEIVED + socket),
-                ("D", layout.m + at.TCP_STATE + socket),
-            )
-            for protocol in ("TCP", "UDP") for socket in at.SOCKETS
-        }  # fmt: skip
+        self._words_of = _words_of(layout)
         self._shown: dict[Word, int] = {}
         self._queue: list[tuple[int, Word, int, int]] = []
         """Due refresh, word, mask of the bits that stay, bits that turn ON."""

@@ -5,7 +5,6 @@ Knows neither memory nor cycles.  States follow W421 6-6-2 p112, the reactions t
 
 from __future__ import annotations
 
-from collections import deque
 from enum import Enum
 
 from fbvm.units import etn21_codes as codes
@@ -77,7 +76,7 @@ class Socket:
         self.linger = False
         self._closed_here = False
         self._stream = bytearray()
-        self._datagrams: deque[Received] = deque()
+        self._datagrams: list[Received] = []
         self._peer_closed = False
         self._broken = False
         self._send_ended = False
@@ -323,7 +322,7 @@ class Socket:
             return []
         limit = service.parameters.size_bytes
         if self._datagrams and limit:
-            datagram = self._datagrams.popleft()
+            datagram = self._datagrams.pop(0)
             self._hand_over(service, datagram.data[:limit])
             service.results |= results_of(datagram.remote)
         elif self._stream and limit:

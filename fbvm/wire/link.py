@@ -10,7 +10,7 @@ has no room for stays in the network, so that the TCP window closes instead of d
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -189,3 +189,16 @@ class Network(Protocol):
 
     def close(self) -> None:
         """End all connections and free what the host lent."""
+
+
+class RealNetwork(Network, Protocol):
+    """One on which things happen while nobody looks."""
+
+    driven: bool
+    """Set by whoever calls `serve` whenever time goes on; else links do so when they are asked for events."""
+
+    def wait(self, timeout_s: float) -> bool:
+        """Sleep until something happens or the time is over; True if something did."""
+
+    def serve(self, now_ns: int) -> Sequence[Link]:
+        """Do everything that the host is ready for; whose connections that was."""

@@ -1,64 +1,152 @@
-"""`fbvm new` and `fbvm test`: from nothing to a green test, and to a failure that explains itself."""
+"""`fbvm run` of a project: which one is meant, what it prints, and the status with which it ends."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
+import json
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 
 from fbvm.cli.main import main
 
-HOUSE = Path(__file__).resolve().parents[2]
+PROGRAM = """
+PROGRAM Main
+VAR n : INT; step : INT := 1; divisor : INT := 1; END_VAR
+    n := n + step / divisor;
+END_PROGRAM
+"""
+PROJECT = """
+run = {for = "50ms"}
+
+[plc.pump]
+sources = ["counter.st"]
+count = 3
+watch = ["Main.n", "D0"]
+
+[plc.valve]
+sources = ["counter.st"]
+cycle = "5ms"
+watch = ["Main.n"]
+set = [{name = "Main.step", value = 10, at = "20ms"}]
+"""
 
 
-def called(*arguments: str, cwd: Path, monkeypatch: pytest.MonkeyPatch) -> subprocess.CompletedProcess[str]:
-    """`fbvm` in a process of its own, as in a terminal."""
-    monkeypatch.setenv("PYTHONPATH", str(HOUSE))
-    return subprocess.run([sys.executable, "-m", "fbvm", *arguments], cwd=cwd, capture_output=True, text=True, check=False)
-
-
-def new(name: str) -> str:
-    result = CliRunner().invoke(main, ["new", name])
-    assert result.exit_code == 0, result.output
-    return result.output
-
-
-def test_a_new_project_is_complete(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "counter.st").write_text(PROGRAM, encoding="utf-8")
+    (tmp_path / "fbvm.toml").write_text(PROJECT, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    said = new("conveyor")
-    for line in said.splitlines():
-        if line.startswith("  "):
-            assert (tmp_path / "conveyor" / line.split()[0]).is_file()
-    assert (tmp_path / "conveyor" / "README.md").read_text(encoding="utf-8").startswith("# conveyor\n")
-    check = CliRunner().invoke(main, ["check", *map(str, (tmp_path / "conveyor" / "src").glob("*.st"))])
-    assert (check.exit_code, check.output) == (0, "")
+    return tmp_path
 
 
-@pytest.mark.slow
-def test_from_a_new_project_to_a_failure_that_explains_itself(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    new("conveyor")
-    green = called("test", cwd=tmp_path / "conveyor", monkeypatch=monkeypatch)
-    assert green.returncode == 0
-    assert "2 passed" in green.stdout
-    pump = tmp_path / "conveyor" / "src" / "pump.st"
-    pump.write_text(pump.read_text(encoding="utf-8").replace("T#50ms", "T#80ms"), encoding="utf-8")
-    red = called("test", "-q", cwd=tmp_path / "conveyor", monkeypatch=monkeypatch)
-    assert red.returncode == 1
-    assert "by src/pump.st:15:  Running := Delay.Q;  with Delay.Q = FALSE" in red.stdout
-    assert "Delay: TON with IN = TRUE, PT = 80ms" in red.stdout
-    none = called("test", "-k", "absent", cwd=tmp_path / "conveyor", monkeypatch=monkeypatch)
-    assert none.returncode == 2
+def run(*arguments: str) -> Result:
+    result = CliRunner().invoke(main, ["run", *arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
 
 
-@pytest.mark.parametrize("name", ["taken", "a*b", ""])
-def test_what_cannot_be_made_is_said(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("taken").mkdir()
-    Path("taken", "file").touch()
-    result = CliRunner().invoke(main, ["new", name])
+SAID = """\
+pump: 3 PLCs, 5 scans each in 50ms, ended by time
+  Main.n = 5
+  D0 = 0 (16#0000)
+valve: 10 scans in 50ms, ended by time
+  Main.n = 64
+"""
+
+
+def test_in_the_folder_of_a_project_nothing_needs_to_be_said(folder: Path) -> None:
+    result = run()
+    assert (result.exit_code, result.stdout, result.stderr) == (0, SAID, "")
+
+
+def test_a_project_is_named_by_its_folder_or_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir("/")
+    assert run(str(folder)).stdout == SAID
+    assert run(str(folder / "fbvm.toml")).stdout == SAID
+
+
+def test_values_that_differ_are_a_range(folder: Path) -> None:
+    (folder / "counter.st").write_text(PROGRAM.replace("step : INT", "step AT D1 : INT"), encoding="utf-8")
+    (folder / "client.st").write_text("""
+PROGRAM Main
+VAR sent : BOOL; conn : MTCP_ETN_Connect; END_VAR
+    conn(IP_Address1 := 10, IP_Address2 := 0, IP_Address3 := 0, IP_Address4 := 9, Connect := TRUE);
+END_PROGRAM
+""", encoding="utf-8")
+    (folder / "fbvm.toml").write_text("""
+run = {for = "1s"}
+[[plc.door.unit]]
+address = "10.0.0.1"
+[plc.door]
+sources = ["client.st"]
+count = 2
+watch = ["Main.conn.ENO", "D30009..D30010"]
+[[fault]]
+silent = true
+peer = "10.0.0.2:0"
+[[server]]
+address = "10.0.0.9:502"
+""", encoding="utf-8")
+    assert run().stdout == """\
+door: 2 PLCs, 100 scans each in 1s, ended by time
+  Main.conn.ENO = FALSE .. TRUE
+  D30009..D30010 has 2 different values
+"""
+
+
+def test_for_scripts(folder: Path) -> None:
+    result = run("--json", "--scans", "2", "--scan-time")
+    data = json.loads(result.stdout)
+    assert list(data["plcs"]) == ["pump[1]", "pump[2]", "pump[3]", "valve"]
+    assert data["plcs"]["pump[2]"] == {
+        "scans": 2, "time_ns": 20_000_000, "stopped": "scans", "values": {"Main.n": 2, "D0": 0}, "trap": None}  # fmt: skip
+    assert (data["scan_time"]["pump"]["overruns"], data["lateness"]["valve"]["missed_periods"]) == (0, 0)
+
+
+def test_scan_times_are_of_all_plcs_of_a_kind(folder: Path) -> None:
+    lines = run("--scan-time").stderr.splitlines()
+    assert [line.split(" on average")[0].rsplit(" ", 2)[0] for line in lines] == ["pump: scan time:", "valve: scan time:"]
+
+
+def test_a_trap_stops_one_plc_and_is_told(folder: Path) -> None:
+    text = PROJECT + '\n[[plc.bad.set]]\nname = "Main.divisor"\nvalue = 0\n[plc.bad]\nsources = ["counter.st"]\n'
+    (folder / "fbvm.toml").write_text(text, encoding="utf-8")
+    result = run()
+    assert result.exit_code == 4
+    assert result.stdout.startswith(SAID + "bad: 1 scan in 10ms, ended by trap")
+    assert result.stderr == "bad: R0101 counter.st:4:14 in Main: 1 divided by 0\n"
+
+
+def test_a_bad_file_is_refused_as_a_bad_program_is(folder: Path) -> None:
+    (folder / "fbvm.toml").write_text("[plc.a]\nsource = 1\n", encoding="utf-8")
+    result = run()
+    assert (result.exit_code, result.stdout) == (3, "")
+    assert result.stderr.startswith("fbvm.toml:1:1: error P0104: plc.a.sources is missing")
+    assert result.stderr.endswith("2 errors; `fbvm explain CODE` says more about each\n")
+    codes = [message["code"] for message in json.loads(run("--json").stdout)["diagnostics"]]
+    assert codes == ["P0104", "P0102"]
+
+
+@pytest.mark.parametrize(("arguments", "message"), [
+    (["--set", "a=1", "--chart", "x"], "--set, --chart: what a project does stands in its file; beside it there are --net, "),
+    (["--cycle", "1ms"], "--cycle: what a project does"),
+])  # fmt: skip
+def test_what_has_no_place_beside_a_project(folder: Path, arguments: list[str], message: str) -> None:
+    result = run(*arguments)
     assert result.exit_code == 2
-    assert "Error:" in result.output
+    assert message in result.stderr
+
+
+def test_without_an_end_nothing_begins(folder: Path) -> None:
+    (folder / "fbvm.toml").write_text(PROJECT.replace('run = {for = "50ms"}', ""), encoding="utf-8")
+    result = run()
+    assert result.exit_code == 2
+    assert 'say when to end: by --for or --scans, by for = "10s" in [run], or by until of a PLC' in result.stderr
+
+
+def test_where_there_is_no_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run("--scans", "1")
+    assert result.exit_code == 2
+    assert f"there is no fbvm.toml in {tmp_path}; give a FILE, or a folder with a project" in result.stderr

@@ -14,6 +14,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.pages import UnknownCode, near, page
 from fbvm.code.compiler import Compilation, compile_sources
 from fbvm.plc import Plc
+from fbvm.run.project import Project, read_project
 from fbvm.syntax.text import decode
 
 SCANS = 3
@@ -24,15 +25,16 @@ ROWS = 12
 
 PAGE = re.compile(
     r"# (?P<title>[^\n]+)\n\n(?P<reason>.+?)\n\n"
-    r"## Wrong\n\n```(?P<language>st|sh)\n(?P<wrong>.+?)```\n\n"
+    r"## Wrong\n\n```(?P<language>st|sh|toml)\n(?P<wrong>.+?)```\n\n"
     r"## Right\n\n```(?P=language)\n(?P<right>.+?)```"
     r"(?:\n\n## See also\n(?P<neighbours>(?:\n- [^\n]+)+))?",
     re.DOTALL,
 )
 
 every_code = pytest.mark.parametrize("code", CODES)
-program_codes = [code for code in CODES if code != "S0107"]
-"""All but that of a file which is no text, and which a page cannot show."""
+project_codes = [code for code in CODES if code.startswith("P")]
+program_codes = [code for code in CODES if code != "S0107" and code not in project_codes]
+"""All of programs but that of a file which is no text, and which a page cannot show."""
 source_codes = [code for code in program_codes if code.startswith("S")]
 trap_codes = [code for code in program_codes if code.startswith("R")]
 
@@ -127,6 +129,17 @@ def test_both_programs_are_nearly_the_same(code: str) -> None:
     wrong, right = (set(parts(code)[half].splitlines()) for half in ("wrong", "right"))
     assert wrong & right, "nothing of the wrong program is left"
     assert wrong != right
+
+
+@pytest.mark.parametrize("code", project_codes)
+def test_the_wrong_project_gives_this_diagnostic_and_the_right_one_none(code: str, tmp_path: Path) -> None:
+    file = tmp_path / "fbvm.toml"
+    file.write_text(parts(code)["wrong"], encoding="utf-8")
+    found = read_project(file)
+    assert isinstance(found, list)
+    assert [diagnostic.code for diagnostic in found] == [code]
+    file.write_text(parts(code)["right"], encoding="utf-8")
+    assert isinstance(read_project(file), Project)
 
 
 def test_a_file_that_is_no_text_has_a_page_for_the_shell() -> None:

@@ -37,13 +37,13 @@ class Clock:
 class RealNetwork:
     """A network of real time on which something happens at the given times."""
 
-    virtual_time = False
+    virtual_time = driven = False
     address = ""
 
     def __init__(self, clock: Clock, *happenings_ms: int) -> None:
         self.clock = clock
         self.waits_ms: list[float] = []
-        self._attached = False
+        self._attached = self._happened = False
         self._happenings_ns = [clock.now_ns + at_ms * MS for at_ms in happenings_ms]
 
     def attach(self, address: str) -> Link:
@@ -53,12 +53,17 @@ class RealNetwork:
             return self
         return RealNetwork(self.clock)
 
-    def wait(self, timeout_s: float) -> list[Link]:
+    def wait(self, timeout_s: float) -> bool:
         self.waits_ms.append(round(timeout_s * 1e3))
         until_ns = self.clock.now_ns + max(0, round(timeout_s * 1e9))
         early = self._happenings_ns.pop(0) if self._happenings_ns and self._happenings_ns[0] < until_ns else None
         self.clock.now_ns = max(self.clock.now_ns, until_ns if early is None else early)
-        return [] if early is None else [self]
+        self._happened = early is not None
+        return self._happened
+
+    def serve(self, now_ns: int) -> list[Link]:
+        happened, self._happened = self._happened, False
+        return [self] if happened else []
 
     def events(self, now_ns: int) -> list[Event]:
         return []

@@ -1,0 +1,155 @@
+"""`fbvm run` of a project: all its PLCs at once, and what came of each."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+from click.core import ParameterSource
+
+from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.cli import status
+from fbvm.cli.outcome import EXIT_STATUS, Progress, for_scripts, shown
+from fbvm.cli.sources import report, show
+from fbvm.run import run_all
+from fbvm.run.plant import Kind, Plant
+from fbvm.run.project import FILE, Project, project_file, read_project
+from fbvm.run.running import Running
+from fbvm.scan_times import Lateness, ScanTimes
+from fbvm.watch.paths import Place
+from fbvm.watch.values import Value, show_time
+
+OPTIONS = {"net": "--net", "for_ns": "--for", "scans": "--scans", "scan_time": "--scan-time", "as_json": "--json"}
+"""What may be said beside a project; everything else is in its file."""
+
+
+def project_named(files: tuple[Path, ...]) -> Path | None:
+    """The project file that the arguments of `fbvm run` mean: a .toml file, a folder that has one, or nothing at all,
+    which is the folder where one is.  None if they are sources."""
+    if len(files) > 1 or (files and not files[0].is_dir() and files[0].suffix != ".toml"):
+        return None
+    where = files[0] if files else Path()
+    if (found := project_file(where)) is None:
+        raise click.UsageError(f"there is no {FILE} in {where.resolve()}; give a FILE, or a folder with a project")
+    return found
+
+
+def run_project(file: Path, context: click.Context) -> int:
+    """Runs it to its end, with the options of the command line; the exit status."""
+    given = {name for name in context.params if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
+    _check_options(given - {"files"}, context)
+    net = context.params["net"] if "net" in given else None
+    for_ns, scans = context.params["for_ns"], context.params["scans"]
+    as_json = context.params["as_json"]
+    project = read_project(file)
+    if not isinstance(project, Project):
+        return _refuse(project, as_json)
+    _check_end(project, net, for_ns, scans)
+    try:
+        plant = Plant(project, net=net, for_ns=for_ns, scans=scans)
+    except OSError as error:
+        click.echo(f"the network cannot be used: {error.strerror or error}", err=True)
+        return status.NETWORK
+    if errors(plant.diagnostics):
+        return _refuse(plant.diagnostics, as_json)
+    for diagnostic in plant.diagnostics:
+        show(diagnostic)
+    first = plant.runs[0].plc
+    try:
+        with Progress(None if as_json else first, plant.scans, plant.for_ns) as progress:
+            run_all(plant.runs, lambda: progress.update(first))
+    finally:
+        plant.close()
+    _print(plant, as_json, context.params["scan_time"])
+    return max(EXIT_STATUS.get(run.reason, status.GOOD) for run in plant.runs)
+
+
+def _check_options(given: set[str], context: click.Context) -> None:
+    wrong = [parameter.opts[0] for parameter in context.command.params if parameter.name in given - set(OPTIONS)]
+    if wrong:
+        raise click.UsageError(f"{', '.join(wrong)}: what a project does stands in its file; beside it there are "
+                               f"{', '.join(OPTIONS.values())}")  # fmt: skip
+
+
+def _refuse(diagnostics: list[Diagnostic], as_json: bool) -> int:
+    report(diagnostics, as_json)
+    return status.PROGRAM_ERRORS
+
+
+def _check_end(project: Project, net: str | None, for_ns: int | None, scans: int | None) -> None:
+    """In virtual time nobody would wait for Ctrl-C."""
+    ends = for_ns is not None or scans is not None or project.for_ns is not None or project.scans is not None
+    if not ends and (net or project.net) == "loop" and not any(row.until for row in project.plcs):
+        raise click.UsageError('say when to end: by --for or --scans, by for = "10s" in [run], or by until of a PLC')
+
+
+def _print(plant: Plant, as_json: bool, scan_time: bool) -> None:
+    if as_json:
+        click.echo(json.dumps({"plcs": dict(_for_scripts(plant)), **(_measures(plant) if scan_time else {})}, allow_nan=True))
+        return
+    for kind in plant.kinds:
+        for line in _lines(kind):
+            click.echo(line)
+        for name, run in zip(kind.names, kind.runs, strict=True):
+            if run.plc.trap:
+                click.secho(f"{name}: {run.plc.trap}", fg="red", err=True)
+    if scan_time:
+        for kind in plant.kinds:
+            times, late = _measured(kind.runs, kind.row.cycle_ns)
+            click.echo(f"{kind.row.name}: {times}", err=True)
+            if late.count:
+                click.echo(f"{kind.row.name}: {late}", err=True)
+
+
+def _lines(kind: Kind) -> Iterator[str]:
+    """A kind's scans, how they ended, and what is watched: a line for each value, or for how far the PLCs' values go."""
+    scans = [run.plc.scans for run in kind.runs]
+    many = f"{len(kind.runs):,} PLCs, " if kind.row.count is not None else ""
+    each = " each" if many else ""
+    ends = sorted({run.reason for run in kind.runs})
+    lasted = show_time(max(run.plc.elapsed_ns for run in kind.runs) // 1_000_000 * 1_000_000)[2:]
+    yield f"{kind.row.name}: {many}{_scans(min(scans), max(scans))}{each} in {lasted}, ended by {', '.join(ends)}"
+    for name, place in kind.watched.items():
+        values = [run.plc.read(place) for run in kind.runs]
+        if all(value == values[0] for value in values):
+            yield f"  {name} = {shown(place, values[0])}"
+        elif isinstance(place, Place) and all(isinstance(value, int | float) for value in values):
+            yield f"  {name} = {shown(place, min(values, key=_number))} .. {shown(place, max(values, key=_number))}"
+        else:
+            yield f"  {name} has {len({repr(value) for value in values})} different values"
+
+
+def _number(value: Value) -> float:
+    return value if isinstance(value, int | float) else 0.0
+
+
+def _scans(least: int, most: int) -> str:
+    return (f"{least:,}" if least == most else f"{least:,} to {most:,}") + " scan" + "s" * (most != 1)
+
+
+def _for_scripts(plant: Plant) -> Iterator[tuple[str, object]]:
+    for kind in plant.kinds:
+        for name, run in zip(kind.names, kind.runs, strict=True):
+            trap = run.plc.trap
+            yield name, {
+                "scans": run.plc.scans, "time_ns": run.plc.elapsed_ns, "stopped": run.reason,
+                "values": {text: for_scripts(kind.watched[text], value) for text, value in kind.values(run).items()},
+                "trap": trap and {"code": trap.code, "message": trap.message},
+            }  # fmt: skip
+
+
+def _measures(plant: Plant) -> dict[str, object]:
+    found = {kind.row.name: _measured(kind.runs, kind.row.cycle_ns) for kind in plant.kinds}
+    return {"scan_time": {name: times.as_dict() for name, (times, _) in found.items()},
+            "lateness": {name: late.as_dict() for name, (_, late) in found.items()}}  # fmt: skip
+
+
+def _measured(runs: list[Running], cycle_ns: int) -> tuple[ScanTimes, Lateness]:
+    """The scans of all of them as one measure."""
+    times, late = ScanTimes(cycle_ns), Lateness()
+    for run in runs:
+        times.add(run.plc.scan_times)
+        late.add(run.plc.lateness)
+    return times, late

@@ -1,0 +1,174 @@
+"""The PLCs of a project, built and wired: equal ones share an image and its code, all share one network and one loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from ipaddress import IPv4Address
+
+from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.code.compiler import compile_files
+from fbvm.code.image import Image
+from fbvm.engine import native
+from fbvm.net.loop import LoopNetwork
+from fbvm.net.peers import ModbusPeer
+from fbvm.net.tcp import TcpNetwork
+from fbvm.plc import Plc
+from fbvm.run.project import PlcRow, Project, SetRow
+from fbvm.run.running import Running, TimedWrite
+from fbvm.run.toml_keys import Path, span
+from fbvm.units.etn21 import Etn21
+from fbvm.watch.paths import Place, Span
+from fbvm.watch.values import Value, conform, parse_value
+from fbvm.wire.registers import server
+
+MANY = 10
+"""So many equal PLCs execute enough together for machine code from the first scan on."""
+ENDLESS = 1 << 62
+
+
+@dataclass
+class Kind:
+    """Equal PLCs, and what is watched of each."""
+
+    row: PlcRow
+    runs: list[Running] = field(default_factory=list)
+    watched: dict[str, Place | Span] = field(default_factory=dict)
+
+    @property
+    def names(self) -> list[str]:
+        """A name for each PLC."""
+        if self.row.count is None:
+            return [self.row.name]
+        return [f"{self.row.name}[{number}]" for number in range(1, self.row.count + 1)]
+
+    def values(self, run: Running) -> dict[str, Value]:
+        """What is watched of one of them, now."""
+        return {name: run.plc.read(place) for name, place in self.watched.items()}
+
+
+class Plant:
+    """A project that can run.  `net` stands in for the file's.  Its mistakes are in `diagnostics`; then there is no PLC.
+
+    `for_ns` and `scans` end PLCs that have no end of their own, in place of what the file says.  Raises OSError if the
+    host's network cannot be used."""
+
+    def __init__(
+        self, project: Project, *, net: str | None = None, for_ns: int | None = None, scans: int | None = None
+    ) -> None:
+        self.project = project
+        self.diagnostics: list[Diagnostic] = []
+        self.kinds = [Kind(row) for row in project.plcs]
+        self.network = _network(project, net or project.net)
+        given = for_ns is not None or scans is not None
+        self.for_ns = for_ns if given else project.for_ns
+        self.scans = scans if given else project.scans
+        for kind in self.kinds:
+            image = self._image(kind.row)
+            if image:
+                self._build(kind, image)
+        if errors(self.diagnostics):
+            self.close()
+
+    @property
+    def runs(self) -> list[Running]:
+        """All PLCs for `run_all`."""
+        return [run for kind in self.kinds for run in kind.runs]
+
+    def close(self) -> None:
+        """End all connections."""
+        self.network.close()
+
+    def _report(self, path: Path, message: str) -> None:
+        source = self.project.source
+        self.diagnostics.append(Diagnostic("P0103", source, *span(source, path), message))
+
+    def _image(self, row: PlcRow) -> Image | None:
+        for folder in row.libraries:
+            if not folder.is_dir():
+                self._report(("plc", row.name, "libraries"), f"there is no folder {folder}")
+                return None
+        compilation = compile_files(row.sources, program=row.program, libraries=row.libraries, runnable=True)
+        self.diagnostics += compilation.diagnostics
+        return compilation.image
+
+    def _build(self, kind: Kind, image: Image) -> None:
+        row, where = kind.row, ("plc", kind.row.name)
+        engine = "native" if row.engine == "auto" and (row.count or 1) >= MANY and native.available() else row.engine
+        writes: list[TimedWrite] = []
+        for number in range(row.count or 1):
+            try:
+                plc = Plc(image, row.cycle_ns, engine=engine)
+            except ValueError as error:
+                self._report((*where, "engine"), str(error))
+                return
+            if number == 0:
+                kind.watched = dict(self._watched(plc, row))
+                writes = list(self._writes(plc, row.sets, where))
+            if not self._attach(plc, row, number):
+                return
+            running = self._running(plc, row, writes)
+            if running is None:
+                return
+            kind.runs.append(running)
+
+    def _attach(self, plc: Plc, row: PlcRow, number: int) -> bool:
+        for place, unit in enumerate(row.units):
+            try:
+                address = str(IPv4Address(unit.address) + number)
+                plc.attach(Etn21(unit.number, address, timing=unit.timing, seed=unit.seed + number), self.network)
+            except ValueError as error:
+                self._report(("plc", row.name, "unit", place), str(error))
+                return False
+        return True
+
+    def _running(self, plc: Plc, row: PlcRow, writes: Iterable[TimedWrite]) -> Running | None:
+        try:
+            if row.until is not None:
+                return Running(plc, until=row.until, max_ns=self.for_ns, writes=writes, pace=row.pace)
+        except (LookupError, TypeError, ValueError) as error:
+            self._report(("plc", row.name, "until"), str(error))
+            return None
+        if self.for_ns is None and self.scans is None:
+            return Running(plc, until=self._others_ended, writes=writes, pace=row.pace)
+        return Running(plc, for_ns=self.for_ns, scans=self.scans, writes=writes, pace=row.pace)
+
+    def _others_ended(self, plc: Plc) -> bool:
+        """The end of a PLC that has none: that of all which have one."""
+        ends = [run for kind in self.kinds if kind.row.until is not None for run in kind.runs]
+        return bool(ends) and all(run.reason for run in ends)
+
+    def _watched(self, plc: Plc, row: PlcRow) -> Iterator[tuple[str, Place | Span]]:
+        for name in row.watch:
+            try:
+                yield name, plc.find(name)
+            except LookupError as error:
+                self._report(("plc", row.name, "watch"), str(error))
+
+    def _writes(self, plc: Plc, sets: Iterable[SetRow], where: Path) -> Iterator[TimedWrite]:
+        for number, row in enumerate(sets):
+            try:
+                yield TimedWrite(found := plc.find(row.name), _value(found, row.value), row.at_ns)
+            except (LookupError, TypeError, ValueError) as error:
+                self._report((*where, "set", number), str(error))
+
+
+def _value(where: Place | Span, written: object) -> object:
+    """What TOML can say as a value of that type; texts are read as in a program."""
+    if isinstance(where, Span):
+        if not isinstance(written, list) or len(written) != len(where.places):
+            raise ValueError(f"{where.name} takes a list of {len(where.places)} values")
+        return [_value(place, item) for place, item in zip(where.places, written, strict=True)]
+    if isinstance(written, str):
+        return parse_value(where.type, written, where.name)
+    return conform(where.type, written, where.name)
+
+
+def _network(project: Project, net: str) -> LoopNetwork | TcpNetwork:
+    if net == "tcp":
+        rows = {said: real for said, real in project.servers if real is not None} | dict(project.doors)
+        return TcpNetwork(rows)
+    network = LoopNetwork(project.seed, faults=project.faults)
+    for said, _ in project.servers:
+        network.place(said, ModbusPeer(server()))
+    return network

@@ -1,0 +1,184 @@
+"""The project file, `fbvm.toml`: PLCs with their units, what they talk to, what goes wrong and what is watched.
+
+    [run]
+    net = "loop"                        # in memory and virtual time; "tcp": real connections, real time
+    for = "10s"
+
+    [[server]]                          # a Modbus server in memory; with tcp it is at `host`
+    address = "192.168.250.1:502"
+    host = "127.0.0.1:15020"
+
+    [plc.pump]
+    sources = ["pump.st"]               # relative to the project file
+    cycle = "100ms"
+    count = 1000                        # pump[1] to pump[1000], with addresses from that of the unit on
+    watch = ["Main.Done", "D200"]
+
+    [[plc.pump.unit]]
+    address = "192.168.250.21"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.engine.tiers import CHOICES
+from fbvm.net.faults import FOREVER, KINDS, NO_FAULT, Fault
+from fbvm.run.project_reader import (
+    Key,
+    Keys,
+    Reading,
+    anything,
+    endpoint,
+    flag,
+    host,
+    ip,
+    moment_ns,
+    one_of,
+    text,
+    texts,
+    time_ns,
+    whole,
+)
+from fbvm.run.running import PACES
+from fbvm.syntax.text import read
+from fbvm.wire.link import Peer
+
+FILE = "fbvm.toml"
+NETS = ("loop", "tcp")
+MOST = 100_000
+"""PLCs of one kind."""
+
+RUN: Keys = {
+    "net": Key(one_of(NETS), "loop"), "seed": Key(whole(0, 1 << 62), 0), "for": Key(time_ns, None),
+    "scans": Key(whole(0, 1 << 62), None),
+}  # fmt: skip
+SERVER: Keys = {"address": Key(endpoint), "host": Key(host, None)}
+DOOR: Keys = {"address": Key(endpoint), "host": Key(host)}
+FAULT: Keys = {
+    "kind": Key(one_of(tuple(KINDS)), None), "peer": Key(endpoint, None), "from": Key(moment_ns, 0),
+    "until": Key(time_ns, FOREVER), "latency": Key(time_ns, None), "jitter": Key(time_ns, None),
+    "segment_bytes": Key(whole(1, 65535), None), "gap": Key(moment_ns, None), "join": Key(time_ns, None),
+    "random_cut": Key(flag, None), "silent": Key(flag, None), "reset": Key(flag, None), "error": Key(text, None),
+}  # fmt: skip
+UNIT: Keys = {
+    "type": Key(one_of(("ETN21",)), "ETN21"), "number": Key(whole(0, 15), 0), "address": Key(ip),
+    "timing": Key(one_of(("exact", "real")), "exact"), "seed": Key(whole(0, 1 << 62), 0),
+}  # fmt: skip
+SET: Keys = {"name": Key(text), "value": Key(anything), "at": Key(moment_ns, 0)}
+PLC: Keys = {
+    "sources": Key(texts), "program": Key(text, None), "libraries": Key(texts, ()), "cycle": Key(time_ns, 10_000_000),
+    "pace": Key(one_of(PACES), PACES[0]), "engine": Key(one_of(CHOICES), "auto"), "count": Key(whole(1, MOST), None),
+    "until": Key(text, None), "watch": Key(texts, ()), "unit": Key(UNIT, (), many=True), "set": Key(SET, (), many=True),
+}  # fmt: skip
+PROJECT: Keys = {
+    "run": Key(RUN, None), "server": Key(SERVER, (), many=True), "door": Key(DOOR, (), many=True),
+    "fault": Key(FAULT, (), many=True), "plc": Key(PLC, named=True),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class UnitRow:
+    """A unit of the first PLC of its kind; the others have addresses that follow."""
+
+    number: int
+    address: str
+    timing: str
+    seed: int
+
+
+@dataclass(frozen=True)
+class SetRow:
+    """A value that is written once."""
+
+    name: str
+    value: object
+    at_ns: int
+
+
+@dataclass(frozen=True)
+class PlcRow:
+    """PLCs of one kind: `count` None is a single one, whose name has no number."""
+
+    name: str
+    sources: tuple[Path, ...]
+    program: str | None
+    libraries: tuple[Path, ...]
+    cycle_ns: int
+    pace: str
+    engine: str
+    count: int | None
+    until: str | None
+    watch: tuple[str, ...]
+    units: tuple[UnitRow, ...]
+    sets: tuple[SetRow, ...]
+
+
+@dataclass(frozen=True)
+class Project:
+    """What a project file says."""
+
+    source: Source
+    net: str
+    seed: int
+    for_ns: int | None
+    scans: int | None
+    servers: tuple[tuple[Peer, tuple[str, int] | None], ...]
+    """Endpoint of a Modbus server and where it is on the host; None: where its endpoint says."""
+    doors: tuple[tuple[Peer, tuple[str, int]], ...]
+    """A unit's endpoint and where others reach it on the host."""
+    faults: tuple[Fault, ...]
+    plcs: tuple[PlcRow, ...]
+
+
+def project_file(path: Path) -> Path | None:
+    """The project file that is meant by a file or a folder; None if it is none."""
+    if path.is_dir():
+        path = path / FILE
+    return path if path.suffix == ".toml" and path.is_file() else None
+
+
+def read_project(path: Path) -> Project | list[Diagnostic]:
+    """The project of a file, or all that is wrong with the file.  Sources are not looked at yet."""
+    found = read(path, str(path))
+    if isinstance(found, Diagnostic):
+        return [found]
+    reading = Reading(found)
+    written = reading.load()
+    if reading.diagnostics:
+        return reading.diagnostics
+    table = reading.table(written, PROJECT)
+    if table["plc"] == {}:
+        reading.report("P0104", ("plc",), "there is no PLC", "begin one with [plc.NAME] and its sources")
+    if errors(reading.diagnostics):
+        return sorted(reading.diagnostics, key=Diagnostic.order)
+    run = table["run"] or {name: key.default for name, key in RUN.items()}
+    return Project(
+        found, run["net"], run["seed"], run["for"], run["scans"],
+        tuple((row["address"], row["host"]) for row in table["server"]),
+        tuple((row["address"], row["host"]) for row in table["door"]),
+        tuple(_fault(row) for row in table["fault"]),
+        tuple(_plc(name, row, path.parent) for name, row in table["plc"].items()),
+    )  # fmt: skip
+
+
+def _fault(row: Mapping[str, Any]) -> Fault:
+    """The fault of that kind, with what is written besides."""
+    named = {"peer": "peer", "from": "from_ns", "until": "until_ns", "latency": "latency_ns", "jitter": "jitter_ns",
+             "gap": "gap_ns", "join": "join_ns"}  # fmt: skip
+    written = {named.get(key, key): value for key, value in row.items() if key != "kind" and value is not None}
+    return replace(KINDS[row["kind"]] if row["kind"] else NO_FAULT, **written)
+
+
+def _plc(name: str, row: Mapping[str, Any], folder: Path) -> PlcRow:
+    return PlcRow(
+        name, tuple(folder / source for source in row["sources"]), row["program"],
+        tuple(folder / library for library in row["libraries"]), row["cycle"], row["pace"], row["engine"], row["count"],
+        row["until"], row["watch"],
+        tuple(UnitRow(unit["number"], unit["address"], unit["timing"], unit["seed"]) for unit in row["unit"]),
+        tuple(SetRow(one["name"], one["value"], one["at"]) for one in row["set"]),
+    )  # fmt: skip

@@ -1,0 +1,62 @@
+"""Where the keys of a TOML text stand, since the host's TOML reader does not tell: for messages that point at them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from fbvm.base.diagnostics import Source
+
+Path = tuple[str | int, ...]
+"""How one gets to a value: names of keys, and numbers in arrays of tables."""
+
+_NAME = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
+_DOTTED = rf"{_NAME}(?:\s*\.\s*{_NAME})*"
+_HEAD = re.compile(rf"[ \t]*(\[\[?)\s*({_DOTTED})\s*\]")
+_KEY = re.compile(rf"[ \t]*({_DOTTED})\s*=[ \t]*([^\n]*)")
+
+
+def span(source: Source, path: Path) -> tuple[int, int]:
+    """Start and end of what stands for a path, or for as much of it as stands in a line of its own.
+
+    A key is given with its value."""
+    best, found = 0, (0, 0)
+    for there, start, end in _places(source):
+        same = min(len(there), len(path))
+        if there[:same] != path[:same]:
+            continue
+        if same > best:
+            best, found = same, (start, end)
+    return found
+
+
+def _places(source: Source) -> list[tuple[Path, int, int]]:
+    """Every header and key that begins a line, with its path."""
+    places: list[tuple[Path, int, int]] = []
+    counts: dict[Path, int] = {}
+    table: Path = ()
+    for start, text in zip(source.line_starts, source.text.split("\n"), strict=True):
+        if head := _HEAD.match(text):
+            table = _numbered(_names(head[2]), counts, head[1] == "[[")
+            places.append((table, start + head.start(1), start + head.end()))
+        elif key := _KEY.match(text):
+            places.append(((*table, *_names(key[1])), start + key.start(1), start + len(text.rstrip())))
+    return places
+
+
+def _names(dotted: str) -> list[str]:
+    return [name.strip("\"'") for name in re.findall(_NAME, dotted)]
+
+
+def _numbered(names: Sequence[str], counts: dict[Path, int], opens: bool) -> Path:
+    """A header's path: arrays of tables that were opened before stand for their last table."""
+    path: Path = ()
+    for name in names[:-1]:
+        path = (*path, name)
+        if path in counts:
+            path = (*path, counts[path])
+    path = (*path, names[-1])
+    if opens:
+        counts[path] = counts.get(path, -1) + 1
+        return (*path, counts[path])
+    return path

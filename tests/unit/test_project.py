@@ -1,0 +1,288 @@
+"""The project file: what it may say, what is said of a bad one, and the PLCs that come of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.engine import native
+from fbvm.net.faults import KINDS
+from fbvm.net.loop import LoopNetwork
+from fbvm.run import run_all
+from fbvm.run.plant import MANY, Plant
+from fbvm.run.project import Project, project_file, read_project
+from fbvm.run.toml_keys import span
+from fbvm.wire.link import Peer
+
+MS = 1_000_000
+COUNTER = """
+PROGRAM Main
+VAR n : INT; step : INT := 1; wait : TIME; words AT D200 : ARRAY[0..1] OF WORD; END_VAR
+    n := n + step;
+END_PROGRAM
+"""
+CLIENT = """
+PROGRAM Main
+VAR conn : MTCP_ETN_Connect; read : MTCP_ETN_Fn03; END_VAR
+    conn(IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 1, Connect := TRUE);
+    read(EN := conn.ENO, Register_Address := 0, Register_Qty := 2, RespData_DM := 200, Cmd_Read := TRUE, SlaveID := 1);
+END_PROGRAM
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "counter.st").write_text(COUNTER, encoding="utf-8")
+    (tmp_path / "client.st").write_text(CLIENT, encoding="utf-8")
+    return tmp_path
+
+
+def read(folder: Path, text: str) -> Project | list[Diagnostic]:
+    (folder / "fbvm.toml").write_text(text, encoding="utf-8")
+    return read_project(folder / "fbvm.toml")
+
+
+def project(folder: Path, text: str) -> Project:
+    found = read(folder, text)
+    assert isinstance(found, Project), [diagnostic.render() for diagnostic in found]
+    return found
+
+
+def said(diagnostics: list[Diagnostic]) -> list[tuple[str, int, str]]:
+    return [(diagnostic.code, diagnostic.line, diagnostic.message) for diagnostic in diagnostics]
+
+
+# --- reading ----------------------------------------------------------------------------------------------------------
+
+WHOLE = """
+run = {net = "tcp", for = "1m", seed = 7}
+
+[[server]]
+address = "192.168.250.1:502"
+host = "127.0.0.1:15020"
+
+[[door]]
+address = "192.168.250.21:502"
+host = "127.0.0.1:0"
+
+[[fault]]
+kind = "cut"
+peer = "192.168.250.1:502"
+from = "2s"
+until = "3s"
+gap = "0s"
+
+[plc.pump]
+sources = ["counter.st"]
+cycle = "5ms"
+pace = "event"
+engine = "python"
+count = 3
+until = "Main.n > 2"
+watch = ["Main.n"]
+set = [{name = "Main.step", value = 2, at = "10ms"}]
+
+[[plc.pump.unit]]
+address = "192.168.250.21"
+
+[[plc.pump.unit]]
+number = 1
+address = "192.168.251.21"
+timing = "real"
+"""
+
+
+def test_everything_that_can_be_said(folder: Path) -> None:
+    found = project(folder, WHOLE)
+    assert (found.net, found.for_ns, found.seed, found.scans) == ("tcp", 60_000 * MS, 7, None)
+    assert found.servers == ((Peer("192.168.250.1", 502), ("127.0.0.1", 15020)),)
+    assert found.doors == ((Peer("192.168.250.21", 502), ("127.0.0.1", 0)),)
+    (fault,) = found.faults
+    assert (fault.segment_bytes, fault.random_cut) == (KINDS["cut"].segment_bytes, True)
+    assert (fault.peer, fault.from_ns, fault.until_ns, fault.gap_ns) == (Peer("192.168.250.1", 502), 2000 * MS, 3000 * MS, 0)
+    (plc,) = found.plcs
+    assert (plc.name, plc.sources, plc.cycle_ns, plc.pace) == ("pump", (folder / "counter.st",), 5 * MS, "event")
+    assert (plc.engine, plc.count, plc.until, plc.watch) == ("python", 3, "Main.n > 2", ("Main.n",))
+    assert [(unit.number, unit.address, unit.timing) for unit in plc.units] == [
+        (0, "192.168.250.21", "exact"), (1, "192.168.251.21", "real")]  # fmt: skip
+    assert [(row.name, row.value, row.at_ns) for row in plc.sets] == [("Main.step", 2, 10 * MS)]
+
+
+def test_the_least_that_must_be_said(folder: Path) -> None:
+    found = project(folder, '[plc.a]\nsources = ["counter.st"]\n')
+    assert (found.net, found.for_ns, found.servers, found.faults) == ("loop", None, (), ())
+    assert (found.plcs[0].cycle_ns, found.plcs[0].pace, found.plcs[0].count) == (10 * MS, "cyclic", None)
+
+
+@pytest.mark.parametrize(("text", "messages"), [
+    ("", [("P0104", 1, "plc is missing")]),
+    ("[plc]", [("P0104", 1, "there is no PLC")]),
+    ("a = [1", [("P0101", 1, "unclosed array")]),
+    ("[plc.a]\nsources = ['counter.st']\nsource = 1", [("P0102", 3, "plc.a.source is no key of a project")]),
+    ("plc = 3", [("P0103", 1, "plc is no table")]),
+    ("[plc.a]\nsources = []", [("P0103", 2, 'plc.a.sources: [] is no list of texts; write ["one", "other"]')]),
+    ("[plc.a]\nsources = ['c.st']\ncount = true", [
+        ("P0103", 3, "plc.a.count: True is no whole number from 1 to 100000")]),
+    ("[plc.a]\nsources = ['c.st']\ncycle = '0s'", [("P0103", 3, "plc.a.cycle: '0s' is no time that can pass")]),
+    ("[plc.a]\nsources = ['c.st']\n[[plc.a.unit]]\naddress = '1.2.3.4'\n[[plc.a.unit]]\nnumber = 1", [
+        ("P0104", 5, "plc.a.unit 2.address is missing")]),
+    ("[plc.a]\nsources = ['c.st']\nunit = 1", [("P0103", 3, "plc.a.unit is no list of tables")]),
+    ("[plc.a]\nsources = ['c.st']\n[[server]]\naddress = 'here:502'", [
+        ("P0103", 4, "server 1.address: 'here' is no IPv4 address; write \"192.168.250.21\"")]),
+    ("[plc.a]\nsources = ['c.st']\n[[server]]\naddress = '1.2.3.4'", [
+        ("P0103", 4, "server 1.address: '1.2.3.4' is no address and port; write \"192.168.250.1:502\"")]),
+    ("[plc.a]\nsources = ['c.st']\n[[fault]]\nkind = 'odd'\nsilent = 1\nfrom = '-1s'", [
+        ("P0103", 4, "fault 1.kind: 'odd' is none of " + ", ".join(KINDS)),
+        ("P0103", 5, "fault 1.silent: 1 is neither true nor false"),
+        ("P0103", 6, "fault 1.from: '-1s' is before power-on")]),
+])  # fmt: skip
+def test_what_is_wrong_is_said_where_it_stands(folder: Path, text: str, messages: list[tuple[str, int, str]]) -> None:
+    found = read(folder, text)
+    assert isinstance(found, list)
+    assert said(found) == messages
+
+
+def test_a_misspelt_key_is_offered_in_the_right_spelling(folder: Path) -> None:
+    found = read(folder, '[plc.a]\nsources = ["c.st"]\ncycel = "1ms"\n')
+    assert isinstance(found, list)
+    assert found[0].render().endswith('cycel = "1ms"\n    ^^^^^^^^^^^^^\n  help: did you mean cycle?')
+
+
+def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
+    found = read_project(tmp_path / "fbvm.toml")
+    assert isinstance(found, list)
+    assert [diagnostic.code for diagnostic in found] == ["S0107"]
+
+
+def test_a_project_is_a_folder_or_its_file(folder: Path) -> None:
+    assert project_file(folder) is None
+    file = folder / "fbvm.toml"
+    file.write_text("", encoding="utf-8")
+    assert project_file(folder) == project_file(file) == file
+    assert project_file(folder / "counter.st") is None
+
+
+@pytest.mark.parametrize(("path", "line"), [
+    (("a",), 1), (("t", "b"), 3), (("t", "b", "deeper"), 3), (("t", "inner", "c"), 5), (("rows", 0, "d"), 7),
+    (("rows", 1, "d"), 9), (("rows", 1, "sub", 0, "e"), 11), (("rows", 1, "absent"), 8), (("q r", "f"), 13),
+])  # fmt: skip
+def test_where_keys_stand(path: tuple[str | int, ...], line: int) -> None:
+    source = Source("x.toml", """a = 1
+[t]
+b.deeper = 2
+[t.inner]
+c = 3
+[[rows]]
+d = 4
+[[rows]]
+d = 5
+[[rows.sub]]
+e = 6
+["q r"]
+f = 7
+""")
+    assert source.place(span(source, path)[0])[0] == line
+
+
+# --- building and running ---------------------------------------------------------------------------------------------
+
+
+def plant(folder: Path, text: str, **options: int) -> Plant:
+    built = Plant(project(folder, text), **options)  # type: ignore[arg-type]
+    assert not errors(built.diagnostics), [diagnostic.render() for diagnostic in built.diagnostics]
+    return built
+
+
+def test_two_kinds_with_ends_of_their_own(folder: Path) -> None:
+    built = plant(folder, """
+[plc.short]
+sources = ["counter.st"]
+until = "Main.n = 6"
+watch = ["Main.n", "D200..D201"]
+set = [{name = "Main.step", value = 2}, {name = "Main.wait", value = "T#1s"}, {name = "D200..D201", value = [1, 2]}]
+[plc.other]
+sources = ["counter.st"]
+cycle = "5ms"
+""")
+    run_all(built.runs)
+    assert [run.reason for run in built.runs] == ["until", "until"]
+    assert [run.plc.scans for run in built.runs] == [3, 5]
+    assert built.kinds[0].values(built.runs[0]) == {"Main.n": 6, "D200..D201": [1, 2]}
+    assert built.runs[0].plc.read("Main.wait") == 1000 * MS
+
+
+def test_many_equal_plcs_share_everything_but_their_memory(folder: Path) -> None:
+    built = plant(folder, f"""
+run = {{for = "30ms"}}
+[plc.pump]
+sources = ["counter.st"]
+count = {MANY}
+[[plc.pump.unit]]
+address = "10.0.0.250"
+""")
+    run_all(built.runs)
+    plcs = [run.plc for run in built.runs]
+    assert built.kinds[0].names[::MANY - 1] == ["pump[1]", f"pump[{MANY}]"]
+    assert [plc.units[0].unit.address for plc in plcs][4:8] == ["10.0.0.254", "10.0.0.255", "10.0.1.0", "10.0.1.1"]
+    assert len({id(plc.image) for plc in plcs}) == 1
+    assert {type(plc.engine).__name__ for plc in plcs} == {"NativeEngine" if native.available() else "PythonEngine"}
+    plcs[3].write("Main.n", 77)
+    assert [plc.read("Main.n") for plc in plcs[2:5]] == [3, 77, 3]
+
+
+PAIR = """
+run = {{for = "2s"}}
+[[server]]
+address = "192.168.250.1:502"
+{fault}
+[plc.client]
+sources = ["client.st"]
+until = "Main.read.Rcv_Counter = 1"
+[[plc.client.unit]]
+address = "192.168.250.21"
+"""
+
+
+def test_a_server_in_memory_answers(folder: Path) -> None:
+    built = plant(folder, PAIR.format(fault=""))
+    assert isinstance(built.network, LoopNetwork)
+    run_all(built.runs)
+    assert (built.runs[0].reason, built.runs[0].plc.read("D200..D201")) == ("until", [1000, 1001])
+
+
+def test_faults_lie_on_the_way(folder: Path) -> None:
+    built = plant(folder, PAIR.format(fault='[[fault]]\nkind = "refused"'))
+    run_all(built.runs)
+    assert (built.runs[0].reason, built.runs[0].plc.read("Main.conn.Error_Code")) == ("max", 0x4A)
+
+
+def test_the_command_line_says_more_than_the_file(folder: Path) -> None:
+    text = 'run = {for = "1s"}\n[plc.a]\nsources = ["counter.st"]\n'
+    built = plant(folder, text, scans=2)
+    run_all(built.runs)
+    assert [(run.reason, run.plc.scans) for run in built.runs] == [("scans", 2)]
+
+
+@pytest.mark.parametrize(("text", "line", "message"), [
+    ('until = "Main.m > 1"', 3, "Main has no m"),
+    ('watch = ["Main.n", "D99999"]', 3, "99999 does not exist"),
+    ('set = [{name = "Main.n", value = "much"}]', 3, "Main.n"),
+    ('set = [{name = "Main.n", value = 40000}]', 3, "40000"),
+    ('set = [{name = "D200..D201", value = [1]}]', 3, "D200..D201 takes a list of 2 values"),
+    ('libraries = ["nowhere"]', 3, "there is no folder"),
+    ("[[plc.a.unit]]\naddress = '1.2.3.4'\n[[plc.a.unit]]\naddress = '1.2.3.5'", 5, "ETN21 0 is on the backplane already"),
+    ("[[plc.a.unit]]\naddress = '1.2.3.4'\n[[plc.a.unit]]\naddress = '1.2.3.4'\nnumber = 1", 5, "1.2.3.4 is attached"),
+])  # fmt: skip
+def test_what_does_not_fit_the_program(folder: Path, text: str, line: int, message: str) -> None:
+    built = Plant(project(folder, f'[plc.a]\nsources = ["counter.st"]\n{text}\n'))
+    (found,) = errors(built.diagnostics)
+    assert (found.code, found.line) == ("P0103", line)
+    assert message in found.message
+
+
+def test_errors_of_programs_are_told_as_always(folder: Path) -> None:
+    (folder / "bad.st").write_text("PROGRAM Main\n    x := 1;\nEND_PROGRAM\n", encoding="utf-8")
+    built = Plant(project(folder, '[plc.a]\nsources = ["bad.st"]\n[plc.b]\nsources = ["none.st"]\n'))
+    assert [found.code for found in errors(built.diagnostics)] == ["S0201", "S0107"]
