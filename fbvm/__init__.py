@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from fbvm.record.recorder import Recorder as Recorder
     from fbvm.run.replay import Replay as Replay
     from fbvm.units.etn21 import Etn21 as Etn21
+    from fbvm.units.noc import Noc as Noc
     from fbvm.watch.paths import UnknownPlace as UnknownPlace
     from fbvm.wire.link import Peer as Peer
     from fbvm.wire.modbus_server import ModbusServer as ModbusServer
@@ -58,6 +59,7 @@ _HOMES = {
     "record.recorder": ("Recorder",),
     "run.replay": ("Replay",),
     "units.etn21": ("Etn21",),
+    "units.noc": ("Noc",),
     "watch.paths": ("UnknownPlace",),
     "wire.link": ("Peer",),
     "wire.modbus_server": ("ModbusServer",),

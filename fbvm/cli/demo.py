@@ -26,13 +26,13 @@ from fbvm.base.data import data_folder
 from fbvm.cli import status
 from fbvm.cli.outcome import chart_width
 from fbvm.cli.peer import LISTENING
-from fbvm.cli.run import UNIT_ADDRESS
 from fbvm.code.compiler import compile_files
 from fbvm.net.tcp import TcpNetwork
 from fbvm.plc import Plc
 from fbvm.record.chart import draw
 from fbvm.record.recorder import Recorder
 from fbvm.run import loop
+from fbvm.units.backplane import ETN21_ADDRESS
 from fbvm.units.etn21 import Etn21
 from fbvm.wire.link import Peer
 
@@ -91,7 +91,7 @@ def _show(console: Console, program: Path, port: int) -> int:
     plc = Plc(image, CYCLE_NS)
     network = TcpNetwork({SERVER: ("127.0.0.1", port)})
     try:
-        plc.attach(Etn21(0, UNIT_ADDRESS), network)
+        plc.attach(Etn21(0, ETN21_ADDRESS), network)
         recorder = Recorder(plc, SIGNALS)
         with Steps(console, plc) as steps:
             plc.watchers.append(steps.watch)

@@ -30,15 +30,13 @@ from fbvm.record.recorder import Recorder
 from fbvm.record.trace_writer import Depth
 from fbvm.run import loop
 from fbvm.run.running import EVENT, PACES, TimedWrite
-from fbvm.units.etn21 import Etn21
+from fbvm.units.backplane import usual_units
 from fbvm.watch.paths import Place
 from fbvm.watch.values import parse_value, split_list
 from fbvm.wire import registers
 
 CYCLE_NS = 10_000_000
 """Cycle of programs without a TASK, unless somebody says another."""
-UNIT_ADDRESS = "192.168.250.21"
-"""IPv4 address of the ETN21 with unit number 0 that is on the backplane of every run."""
 
 
 @click.command("run")
@@ -87,6 +85,8 @@ def command(
     """Compile the files and run them, with an ETN21 (unit number 0) on the backplane; or run a PROJECT: a folder with an
     fbvm.toml, or that file.  Without either it is the folder where you are.
 
+    Beside it is the unit of each mailbox that the program uses, such as the Ethernet module of MBP_MSTR in slot 7.
+
     End by one of --scans, --for and --until; before that, --break, --watch and --break-if end it inside a scan.  Status 1
     if --max ended --until, 3 if the program has errors, 4 if a trap stopped it, 5 if the network could not be used."""
     if project := project_named(files):
@@ -106,8 +106,9 @@ def command(
         plc = _plc(image, cycle_ns, options["engine"], journal)
         if options["pcap"]:
             network.tap = _capture(stack, options["pcap"], network).tap
-        plc.attach(Etn21(0, UNIT_ADDRESS, timing=options["timing"], seed=options["seed"]), network)
-        _tell_doors(network, options["mappings"])
+        for unit in usual_units(mailboxes(image), options["timing"], options["seed"]):
+            plc.attach(unit, network)
+        _tell_doors(plc, network, options["mappings"])
         with tracing(plc, options["trace"], options["depth"], options["selected"], files, libraries):
             outcome = _run(plc, as_json, **options)
         outcome.print()
@@ -182,13 +183,19 @@ def build_network(net: str, mappings: tuple[Mapping, ...], seed: int = 0) -> Loo
     return TcpNetwork({row.said: (row.host or "", row.port) for row in mappings})
 
 
-def _tell_doors(network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...]) -> None:
-    """Says where others reach the unit on the host, once per row that is about the unit itself."""
+def mailboxes(image: Image) -> list[str]:
+    """The names of those that a program uses."""
+    return [box.name for box in image.layout.mailboxes]
+
+
+def _tell_doors(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...]) -> None:
+    """Says where others reach the units on the host, once per row that is about a unit itself."""
     if isinstance(network, LoopNetwork):
         return
+    own = {attached.unit.address for attached in plc.units}
     try:
         for row in mappings:
-            if row.said.host == UNIT_ADDRESS and row.said.port:
+            if row.said.host in own and row.said.port:
                 click.echo(f"{row.said} is {network.host_endpoint(row.said)}", err=True)
     except OSError as error:
         click.echo(f"the network cannot be used: {error}", err=True)

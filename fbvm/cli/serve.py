@@ -17,7 +17,6 @@ from fbvm.base.data import data_folder
 from fbvm.cli import status
 from fbvm.cli.options import time_ns
 from fbvm.cli.peer import LISTENING
-from fbvm.cli.run import UNIT_ADDRESS
 from fbvm.code.compiler import compile_files
 from fbvm.net.tcp import TcpNetwork
 from fbvm.plc import Plc
@@ -25,6 +24,7 @@ from fbvm.record import images
 from fbvm.record.requests import RequestLog
 from fbvm.run import loop
 from fbvm.run.running import EVENT
+from fbvm.units.backplane import ETN21_ADDRESS
 from fbvm.units.etn21 import Etn21
 from fbvm.wire.link import Peer
 
@@ -32,7 +32,7 @@ CYCLE_NS = 10_000_000
 START_LIMIT_NS = 5_000_000_000
 SCANS_OF_AN_OPEN = 4
 """Within which a unit says that a port cannot be listened on."""
-ENDPOINT = Peer(UNIT_ADDRESS, 502)
+ENDPOINT = Peer(ETN21_ADDRESS, 502)
 SERVED = {"CIO": 5801, "D": 32768}
 """Words of each area that clients can reach, fblib/omron/etn_modbus/README.md."""
 
@@ -68,7 +68,7 @@ def command(
         stack.callback(network.close)
         if log:
             network.tap = RequestLog(_opened(stack, log), loop.epoch_ns(), lambda: plc.scans).tap
-        plc.attach(Etn21(0, UNIT_ADDRESS), network)
+        plc.attach(Etn21(0, ETN21_ADDRESS), network)
         reason = _start(plc, network)
         while reason != "trap" and not signals.end:
             reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=EVENT)

@@ -10,7 +10,7 @@ import click
 from fbvm.cli import status
 from fbvm.cli.options import Mapping, Setting, mapping, setting, time_ns
 from fbvm.cli.prompt import prompted
-from fbvm.cli.run import CYCLE_NS, UNIT_ADDRESS, build_network
+from fbvm.cli.run import CYCLE_NS, build_network, mailboxes
 from fbvm.cli.sources import compiled, source_arguments, source_texts
 from fbvm.code.image import Image
 from fbvm.plc import Plc
@@ -18,7 +18,7 @@ from fbvm.record.traffic import Passed, Reader
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.session import Session
 from fbvm.step.words import Words
-from fbvm.units.etn21 import Etn21
+from fbvm.units.backplane import usual_units
 from fbvm.watch.paths import Place
 from fbvm.watch.values import parse_value
 from fbvm.wire.tap import Happening
@@ -42,7 +42,8 @@ class Bench:
             self.passed.extend(reader.read(now_ns, happening))
 
         network.tap = tap
-        plc.attach(Etn21(0, UNIT_ADDRESS, timing=self._timing, seed=self._seed), network)
+        for unit in usual_units(mailboxes(self._image), self._timing, self._seed):
+            plc.attach(unit, network)
         return plc
 
 

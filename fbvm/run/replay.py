@@ -12,12 +12,9 @@ from fbvm.code.image import Image, fingerprint
 from fbvm.goal import Goal
 from fbvm.net.journal import Act, End, Entry, Fingerprint, Header, JournalError, Scan
 from fbvm.plc import Mode, Plc, Stopped
-from fbvm.units.etn21 import Etn21
+from fbvm.units.backplane import UNITS
 from fbvm.units.unit import Unit
 from fbvm.wire.link import Event, Request
-
-UNITS: Mapping[str, Callable[..., Unit]] = {"Etn21": Etn21}
-"""What builds the units that a journal names."""
 
 
 class _Recorded:
