@@ -74,6 +74,18 @@ def packed(text: str) -> bytes:
     return text.encode("utf-16-le", "surrogatepass")
 
 
+def character(code: int, wide: bool) -> bytes | str:
+    """The text of one character; the code 0 ends a text and gives none."""
+    if wide:
+        return chr(code) if code else ""
+    return bytes((code,)) if code else b""
+
+
+def first(text: bytes | str) -> int:
+    """The code of the first character; 0 if there is none."""
+    return ord(text[:1]) if text else 0
+
+
 def widened(a: bytes) -> str:
     """A STRING as WSTRING: Latin-1 is the beginning of Unicode."""
     return a.decode("latin-1")

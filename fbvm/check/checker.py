@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
@@ -11,7 +11,7 @@ from fbvm.base.types import StructType, Type, fold
 from fbvm.check.calls import Calls
 from fbvm.check.configurations import Configurations
 from fbvm.check.expressions import Expressions
-from fbvm.check.facts import Pou, TaskFact, Variable
+from fbvm.check.facts import Pou, StandardCall, TaskFact, Value, Variable
 from fbvm.check.generics import is_generic
 from fbvm.check.globals import Globals
 from fbvm.check.interfaces import Interfaces
@@ -21,15 +21,19 @@ from fbvm.check.statements import Statements, assigns_to
 from fbvm.check.values import Values
 from fbvm.syntax import tree
 
+Evaluate = Callable[[StandardCall, Sequence[Value]], Value | None]
+
 
 class Checker:
     """Checks a whole project.  After `check`, the project's facts and these lists are what lowering needs."""
 
-    def __init__(self, project: Project) -> None:
+    def __init__(self, project: Project, evaluate: Evaluate) -> None:
         self.project = project
+        self.evaluate = evaluate
+        """What a call of a standard function gives for constants, None if that is not known now; raises Undefined."""
         self.report = project.report
         self.specs = Specs(project)
-        self.values = Values(project, self._fit, self._infer, self.interface)
+        self.values = Values(project, self._fit, self._infer, self._variable, self.interface)
         self.specs.values = self.values
         self.specs.scope = self.scope
         self.interfaces = Interfaces(self)
@@ -120,6 +124,9 @@ class Checker:
 
     def _fit(self, expr: tree.Expr, source: Source, kind: Type) -> bool:
         return self._constants(source).fit(expr, kind, "S0705", "the initial value")
+
+    def _variable(self, name: str, source: Source) -> Variable | None:
+        return self.expressions(source, self._scope).variable(name)
 
     def _infer(self, expr: tree.Expr, source: Source) -> Type | None:
         return self._constants(source).settle(expr)

@@ -174,6 +174,8 @@ class Facts:
     wrong: set[tree.Expr] = field(default_factory=set)
     """Expressions that have no type, which was said."""
     constants: dict[tree.Expr, Value] = field(default_factory=dict)
+    undefined: dict[tree.Expr, tuple[Source, str]] = field(default_factory=dict)
+    """Calls of constants that have no value, where they stand, and the code of the trap that they become."""
     variables: dict[tree.Expr, Variable] = field(default_factory=dict)
     fields: dict[tree.Expr, Field] = field(default_factory=dict)
     directs: dict[tree.Expr, Address] = field(default_factory=dict)

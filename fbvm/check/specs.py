@@ -289,7 +289,7 @@ class Specs:
         following = 0
         for member, written in spec.members:
             refuse_reserved(self.report, source, member)
-            value = self.values.integer(written, source) if written is not None else following
+            value = self.values.integer(written, source, members) if written is not None else following
             if value is None:
                 return None
             if fold(member.text) in members:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from fbvm.base.arithmetic import Undefined
 from fbvm.base.types import (
     ELEMENTARY,
     GENERIC,
@@ -47,6 +48,27 @@ class StandardCalls:
 
     def call(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
         """The result's type, "" for a call without result, None after a diagnostic."""
+        result = self._typed(call, name, want, as_value)
+        called = self.facts.calls.get(call)
+        if result and isinstance(called, StandardCall) and call not in self.facts.guards and \
+                call not in self.facts.turned:
+            self._fold(call, called)
+        return result
+
+    def _fold(self, call: tree.Call, called: StandardCall) -> None:
+        """The value of a call of constants; what would trap is left to the program."""
+        values = [value for argument, _ in called.arguments if (value := self.facts.constants.get(argument)) is not None]
+        if len(values) < len(called.arguments):
+            return
+        try:
+            value = self.expressions.checker.evaluate(called, values)
+        except Undefined as undefined:
+            self.facts.undefined[call] = self.expressions.source, undefined.code
+            return
+        if value is not None:
+            self.facts.constants[call] = value
+
+    def _typed(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
         if name in references.MAKERS or name == "SIZEOF":
             values = Arguments(self.expressions, call, ["IN"]).in_order()
             if values is None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields
 
+from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import ArrayType, Field, RefType, StructType, Type, families, fold
 from fbvm.check.constants import encode
-from fbvm.check.facts import Facts, Pou, Value
+from fbvm.check.facts import UNTYPED_INT, Facts, Pou, Value, Variable
 from fbvm.check.project import Project
 from fbvm.syntax import tree
 
@@ -19,22 +21,31 @@ class Values:
 
     def __init__(self, project: Project, fit: Callable[[tree.Expr, Source, Type], bool],
                  infer: Callable[[tree.Expr, Source], Type | None],
+                 variable: Callable[[str, Source], Variable | None],
                  interface: Callable[[Pou, Source, tree.Node], bool]) -> None:
         self.project = project
         self.facts: Facts = project.facts
         self.report = project.report
         self._fit = fit
         self._infer = infer
+        self._variable = variable
         self.interface = interface
 
-    def integer(self, expr: tree.Expr, source: Source) -> int | None:
-        """The value of a constant integer expression, or None after a diagnostic."""
+    def integer(self, expr: tree.Expr, source: Source, known: Mapping[str, int] | None = None) -> int | None:
+        """The value of a constant integer expression, or None after a diagnostic.
+
+        `known` are names, folded, that stand for numbers in it."""
+        for name in names_in(expr) if known else ():
+            if known and fold(name.text) in known:
+                self.facts.types[name], self.facts.constants[name] = UNTYPED_INT, known[fold(name.text)]
         kind = self._infer(expr, source)
         if kind is None:
             return None
         value = self.facts.constants.get(expr)
         if isinstance(value, bool) or not isinstance(value, int):
             what = f"{kind}" if value is not None else "not known before the program runs"
+            if value is None and self._is_undefined(expr, source):
+                return None
             self.report.add("S0701", source, expr, f"a constant integer is needed here; this is {what}",
                             "write a number" if value is not None else
                             "write a literal, or declare the name in a VAR CONSTANT section")
@@ -49,9 +60,19 @@ class Values:
         value = self.facts.constants.get(expr)
         if value is None:
             self.facts.wrong.add(expr)
+            if self._is_undefined(expr, source):
+                return None
             self.report.add("S0701", source, expr, "an initial value must be known before the program runs",
                             "assign it in the body instead")
         return value
+
+    def _is_undefined(self, expr: tree.Expr, source: Source) -> bool:
+        """True, with a diagnostic, if a call in a constant expression would trap."""
+        for call, (where, code) in self.facts.undefined.items():
+            if where is source and expr.start <= call.start and call.end <= expr.end:
+                self.report.add("S0703", source, call, f"this has no value: {CODES[code].title}")
+                return True
+        return False
 
     def initial(self, kind: Type, init: tree.Initial, source: Source, default: bytes) -> bytes:
         """The bytes of a variable of `kind` with this initial value; what it leaves open keeps `default`."""
@@ -73,12 +94,12 @@ class Values:
             self.report.add("S0705", source, init, f"[...] is an initial value of an array, not of {kind}")
             return default
         size = kind.element.size
-        element_default = default[:size]
         content = bytearray(default)
         at = 0
         if len(kind.bounds) > 1:
             init = flattened(init)
         for repetition, value in init.items:
+            repetition, value = self._repeated(repetition, value, source)
             count = 1
             if repetition is not None:
                 times = self.integer(repetition, source)
@@ -88,14 +109,33 @@ class Values:
                     self.report.add("S0705", source, repetition, "a repetition cannot be negative")
                     return default
                 count = times
-            data = element_default if value is None else self.initial(kind.element, value, source, element_default)
             if at + count > kind.count:
                 self.report.add("S0705", source, value or init,
                                 f"too many initial values: {kind} has {kind.count} elements")
                 return bytes(content)
-            content[at * size:(at + count) * size] = data * count
+            if value is not None and count:
+                self._elements(kind.element, value, source, content, range(at * size, (at + count) * size, size))
             at += count
         return bytes(content)
+
+    def _elements(self, kind: Type, value: tree.Initial, source: Source, content: bytearray, places: range) -> None:
+        """The same initial value for some elements of an array; each keeps its own default where that says nothing."""
+        made: dict[bytes, bytes] = {}
+        for start in places:
+            before = bytes(content[start:start + kind.size])
+            if before not in made:
+                made[before] = self.initial(kind, value, source, before)
+            content[start:start + kind.size] = made[before]
+
+    def _repeated(self, repetition: tree.Expr | None, value: tree.Initial | None,
+                  source: Source) -> tuple[tree.Expr | None, tree.Initial | None]:
+        """`N(0)` reads as a call: where N is a constant it is a repetition."""
+        if repetition is None and isinstance(value, tree.Call) and isinstance(value.callee, tree.NameRef) and \
+                len(value.arguments) < 2 and all(not argument.kind for argument in value.arguments):
+            variable = self._variable(value.callee.text, source)
+            if variable is not None and isinstance(variable.value, int):
+                return value.callee, value.arguments[0].value if value.arguments else None
+        return repetition, value
 
     def _structure(self, kind: Type, init: tree.StructInit, source: Source, default: bytes) -> bytes:
         if not isinstance(kind, StructType):
@@ -117,6 +157,19 @@ class Values:
             span = slice(member.offset, member.offset + member.type.size)
             content[span] = self.initial(member.type, value, source, bytes(content[span]))
         return bytes(content)
+
+
+def names_in(expr: tree.Node) -> Iterator[tree.NameRef]:
+    """The names that stand in an expression by themselves."""
+    todo: list[object] = [expr]
+    while todo:
+        item = todo.pop()
+        if isinstance(item, tree.NameRef):
+            yield item
+        elif isinstance(item, tuple):
+            todo += item
+        elif isinstance(item, tree.Node):
+            todo += [getattr(item, field.name) for field in fields(item)]
 
 
 def flattened(init: tree.ArrayInit) -> tree.ArrayInit:

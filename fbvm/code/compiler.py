@@ -18,6 +18,7 @@ from fbvm.check.lint import lint as look_for_slips
 from fbvm.check.project import Project
 from fbvm.check.silence import Silence, Wanted
 from fbvm.code.damage import Damage
+from fbvm.code.evaluation import evaluate
 from fbvm.code.image import Image, Objects, ProgramRun, Site, TaskRow
 from fbvm.code.layout import Placed, place
 from fbvm.code.lower import BodyLowering
@@ -122,7 +123,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
             damage.note(source, text, errors(diagnostics))
             project.collect(text, source)
         unread = len(report.diagnostics)
-        checker = Checker(project)
+        checker = Checker(project, evaluate)
         checker.check(program)
         if runnable and not errors(report.diagnostics):
             _demand_program(checker, program, sources, report)

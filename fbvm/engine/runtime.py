@@ -6,7 +6,7 @@ A function that can trap takes the site last and raises Stop.  Numbers are worke
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
 from fbvm.base import arithmetic, strings
@@ -23,8 +23,8 @@ from fbvm.code.operations import (
     OFFSET_MASK,
     OFFSET_SHIFT,
 )
-from fbvm.engine import texts
 from fbvm.engine.trap import Stop
+from fbvm.syntax import texts
 
 T = TypeVar("T")
 NO_SITE = -1
@@ -96,32 +96,14 @@ def bit_behind(reference: int, n: int) -> int:
     return reference >> OBJECT_SHIFT << OBJECT_SHIFT | offset << OFFSET_SHIFT | n & 7
 
 
-def character_s8(code: int) -> bytes:
-    return bytes((code,)) if code else b""
-
-
-def character_s16(code: int) -> str:
-    return chr(code) if code else ""
-
-
-def first(text: bytes | str) -> int:
-    return ord(text[:1]) if text else 0
-
-
-def enum_text(names: Mapping[int, str], value: int) -> bytes:
-    name = names.get(value)
-    return str(int(value)).encode() if name is None else name.encode("latin-1", "replace")
-
-
 _PURE: dict[str, Any] = {
     "Observation": Observation, "NAN": arithmetic.NAN, "INF": arithmetic.INF, "stop": stop, "bisect": bisect_right,
     "quotient": quotient, "remainder": remainder, "divide": arithmetic.divide, "power": arithmetic.power,
     "lesser": arithmetic.lesser, "greater": arithmetic.greater, "choose": choose, "mux": mux, "within": within,
     "single": arithmetic.single, "single_of_integer": arithmetic.single_of_integer, "bits": arithmetic.bits,
-    "arctangent": arithmetic.arctangent, "find": strings.find, "to_text": texts.to_text, "enum_text": enum_text,
+    "arctangent": arithmetic.arctangent, "find": strings.find, "to_text": texts.to_text, "enum_text": texts.enum_text,
     "bit_behind": bit_behind,
-    "character_s8": character_s8, "character_s16": character_s16, "first": first, "widened": strings.widened,
-    "narrowed": strings.narrowed,
+    "character": strings.character, "first": strings.first, "widened": strings.widened, "narrowed": strings.narrowed,
     **{function.__name__: sited(function) for function in (
         arithmetic.nearest, arithmetic.truncate, arithmetic.from_bcd, arithmetic.to_bcd, arithmetic.shift_left,
         arithmetic.shift_right, arithmetic.rotate_left, arithmetic.rotate_right, strings.left, strings.right,

@@ -113,6 +113,14 @@ class Declarations(Statements):
         flat = tuple(item for group in items or () for item in group)
         return ArrayInit(opener.start, closer.end, flat)
 
+    def array_bare(self, first: list[Item], comma: Token, items: list[list[Item]]) -> ArrayInit:
+        flat = (*first, *(item for group in items for item in group))
+        parts = [part for item in flat for part in item if part is not None]
+        return ArrayInit(parts[0].start, parts[-1].end, flat) if parts else ArrayInit(comma.start, comma.end, flat)
+
+    def array_bare_repeated(self, count: Token, opener: Token, values: list[Initial] | None, closer: Token) -> ArrayInit:
+        return ArrayInit(count.start, closer.end, tuple(self.array_repeated(count, opener, values, closer)))
+
     def array_item(self, value: Initial) -> list[Item]:
         return [(None, value)]
 

@@ -1,4 +1,4 @@
-"""Texts of values and values of texts: machine code writes and reads what `fbvm.engine.texts` does, to the bit."""
+"""Texts of values and values of texts: machine code writes and reads what `fbvm.syntax.texts` does, to the bit."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import Undefined, single
 from fbvm.base.memory import STRUCTS
 from fbvm.base.types import ELEMENTARY
-from fbvm.engine import native, texts
+from fbvm.engine import native
+from fbvm.syntax import texts
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)

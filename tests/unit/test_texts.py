@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from fbvm.base.arithmetic import Undefined
 from fbvm.base.types import ELEMENTARY
-from fbvm.engine.texts import from_text, to_text
+from fbvm.syntax.texts import from_text, to_text
 
 WRITTEN = sorted(name for name, kind in ELEMENTARY.items() if "ANY_CHAR" not in kind.families)
 

@@ -6,7 +6,7 @@ reads back, times and dates with their short prefix (IEC 61131-3 ed. 3 tables 5,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import date, timedelta
 
 from fbvm.base.arithmetic import INF, NAN, Undefined, single
@@ -43,6 +43,12 @@ def from_text(data_type: str, text: bytes) -> float:
     if kind != wanted or isinstance(value, str):
         raise Undefined("R0111", text, data_type)
     return single(value) if wanted == "REAL" else value
+
+
+def enum_text(names: Mapping[int, str], value: int) -> bytes:
+    """The name of an enumeration's member, or the number that is none."""
+    name = names.get(value)
+    return str(int(value)).encode() if name is None else name.encode("latin-1", "replace")
 
 
 def _bool(value: float) -> str:

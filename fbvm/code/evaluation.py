@@ -1,0 +1,112 @@
+"""Standard functions of constants: what a call gives before anything runs, by the same lowering as when it runs."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any, cast
+
+from fbvm.base import arithmetic, strings
+from fbvm.base.types import base, machine
+from fbvm.check.constants import convert
+from fbvm.check.facts import StandardCall, Value
+from fbvm.code.functions import FUNCTIONS
+from fbvm.code.operations import FLOATS, INTEGERS, TEXT_UNITS, Node
+from fbvm.code.values import constant
+from fbvm.syntax import texts
+
+VARYING = frozenset(("TIME", "__DUE"))
+"""Functions whose value is another one each time."""
+
+
+class _Body:
+    """The place in a body for calls that need none: what is kept is what it was."""
+
+    def keep(self, node: Node) -> Node:
+        return node
+
+    measured = keep
+
+
+def evaluate(call: StandardCall, arguments: Sequence[Value]) -> Value | None:
+    """The value of a call of constants, or None if it has none before the program runs.  Raises Undefined for a trap."""
+    kinds = [base(kind) for _, kind in call.arguments]
+    if call.key not in FUNCTIONS or call.key in VARYING or not all(map(machine, kinds)):
+        return None
+    nodes = [constant(kind, convert(value, kind)) for kind, value in zip(kinds, arguments, strict=True)]
+    node = FUNCTIONS[call.key](cast("Any", _Body()), nodes, call, 0)
+    value = _value(node)
+    return bool(value) if node[1] == "b" else cast("Value", value)
+
+
+def _value(node: Node) -> Any:
+    """What an expression of constants yields."""
+    name, form, *operands = node
+    if name == "const":
+        return operands[0]
+    if name == "mux":
+        number = _value(operands[0])
+        if not 0 <= number < len(operands[1]):
+            raise arithmetic.Undefined("R0107", number, len(operands[1]) - 1)
+        return _value(operands[1][number])
+    values = [_value(operand) if isinstance(operand, tuple) and name != "enum_text" else operand for operand in operands]
+    if name == "enum_text":
+        return texts.enum_text(dict(operands[0]), _value(operands[1]))
+    return _ROWS[name](form, *values)
+
+
+def _brought(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Arithmetic of which the low bits count, or 32 bits of a float."""
+    def answer(form: str, *values: Any) -> Any:
+        value = function(*values)
+        return arithmetic.wrap(value, form) if form in INTEGERS else arithmetic.single(value) if form == "f32" else value
+    return answer
+
+
+def _extreme(function: Callable[..., Any], real: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda form, a, b: (real if form in FLOATS else function)(a, b)
+
+
+def _compare(function: Callable[..., bool]) -> Callable[..., Any]:
+    return lambda form, kind, a, b: function(a, b)
+
+
+def _divide(form: str, a: Any, b: Any, site: int) -> Any:
+    if form in FLOATS:
+        return _brought(arithmetic.divide)(form, a, b)
+    if b == 0:
+        raise arithmetic.Undefined("R0101", a, b)
+    return arithmetic.wrap(arithmetic.quotient(a, b), form)
+
+
+_ROWS: dict[str, Callable[..., Any]] = {
+    "add": _brought(operator.add), "sub": _brought(operator.sub), "mul": _brought(operator.mul), "div": _divide,
+    "abs": _brought(abs), "pow": _brought(arithmetic.power), "atan2": _brought(arithmetic.arctangent),
+    "math": lambda form, name, a: _brought(arithmetic.FUNCTIONS[name])(form, a),
+    "and": lambda form, a, b: a & b, "or": lambda form, a, b: a | b, "xor": lambda form, a, b: a ^ b,
+    "shl": lambda form, a, n, site: arithmetic.shift_left(a, n, form),
+    "shr": lambda form, a, n, site: arithmetic.shift_right(a, n, form),
+    "rol": lambda form, a, n, site: arithmetic.rotate_left(a, n, form),
+    "ror": lambda form, a, n, site: arithmetic.rotate_right(a, n, form),
+    **{name: _compare(getattr(operator, name)) for name in ("eq", "ne", "lt", "le", "gt", "ge")},
+    "convert": lambda form, source, a: arithmetic.convert(a, source, form),
+    "nearest": lambda form, source, a, site: arithmetic.nearest(a, form),
+    "truncate": lambda form, source, a, site: arithmetic.truncate(a, form),
+    "bits": lambda form, source, a: arithmetic.bits(a, source, form),
+    "is_set": lambda form, source, a: a != 0,
+    "select": lambda form, g, a, b: b if g else a,
+    "min": _extreme(lambda a, b: a if a <= b else b, arithmetic.lesser),
+    "max": _extreme(lambda a, b: a if a >= b else b, arithmetic.greater),
+    "floor_div": lambda form, a, b: a // b,
+    "from_bcd": lambda form, source, a, site: arithmetic.from_bcd(a, form),
+    "to_bcd": lambda form, source, a, site: arithmetic.to_bcd(a, form),
+    "length": lambda form, a: arithmetic.wrap(len(a), form), "find": lambda form, a, b: strings.find(a, b),
+    "concat": lambda form, a, b: a + b,
+    **{name: lambda form, *operands, _name=name: getattr(strings, _name)(*operands[:-1])
+       for name in ("left", "right", "mid", "insert", "delete", "replace")},
+    "character": lambda form, a: strings.character(a, TEXT_UNITS[form] == 2), "first": lambda form, a: strings.first(a),
+    "recode": lambda form, a: strings.widened(a) if form == "s16" else strings.narrowed(a),
+    "to_text": lambda form, kind, a: texts.to_text(kind, a),
+    "from_text": lambda form, kind, a, site: texts.from_text(kind, a),
+}
+"""What each operation yields for values, called with its type and the operands of its row."""
