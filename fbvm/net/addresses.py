@@ -4,7 +4,9 @@ Nothing here touches a connection; names of hosts have been resolved before."""
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Container, Mapping
+from ipaddress import IPv4Address
 
 from fbvm.wire.link import Peer
 
@@ -23,6 +25,14 @@ def impossible(local: Peer, remote: Peer) -> str:
     if not 0 < remote.port <= 0xFFFF or remote.host == "0.0.0.0" or remote == local:
         return "EADDRNOTAVAIL"
     return ""
+
+
+def dotted(real: Peer) -> tuple[str, int]:
+    """An endpoint for the host.  Raises OSError for a name, which would have to be looked up and so could block."""
+    try:
+        return str(IPv4Address(real.host)), real.port
+    except ValueError:
+        raise OSError(errno.EADDRNOTAVAIL, real.host) from None
 
 
 class AddressMap:

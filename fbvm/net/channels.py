@@ -15,6 +15,13 @@ MAX_DATAGRAMS = 64
 ANYBODY = Peer("0.0.0.0", 0)
 
 
+def undeliverable(remote: Peer, data: bytes) -> str:
+    """The errno name of why no datagram can be sent there; "" if one can."""
+    if remote.host == "0.0.0.0" or remote.port == 0:
+        return "EADDRNOTAVAIL"
+    return "EMSGSIZE" if len(data) > MAX_DATAGRAM_BYTES else ""
+
+
 class Channel:
     """A channel in use.  `send` and `send_to` give back the errno name of a failure, or ""."""
 

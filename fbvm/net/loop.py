@@ -202,8 +202,8 @@ class LoopLink(MemoryLink):
     # For the network and for the channels.
 
     def admit(self, caller: End, now_ns: int) -> End | None:
-        """A connection from elsewhere: its end here, or None if no door is open to it."""
-        for channel, there in self.channels.items():
+        """A connection from elsewhere: its end at the lowest-numbered door that is open to it (assumed), or None."""
+        for channel, there in sorted(self.channels.items()):
             if isinstance(there, Door) and there.port == caller.remote.port and fits(there.remote, caller.local):
                 line = self.channels[channel] = Line(self, channel, there.port)
                 line.granted = there.granted
@@ -231,11 +231,12 @@ class LoopLink(MemoryLink):
 
     def _conflict(self, request: Connect | Listen | Bind) -> str:
         """The errno name of what cannot be opened, "" if it can."""
-        kind = Bound if isinstance(request, Bind) else Door
-        port = request.local_port
+        if isinstance(request, Listen):
+            return ""
+        kind, port = Bound if isinstance(request, Bind) else Door, request.local_port
         if port and any(isinstance(there, kind) and there.port == port for there in self.channels.values()):
             return "EADDRINUSE"
-        if not isinstance(request, Connect):
+        if isinstance(request, Bind):
             return ""
         local, remote = Peer(self.address, port), request.remote
         if (port, remote) in self._ends:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections import deque
 
-from fbvm.net.channels import ANYBODY, MAX_DATAGRAM_BYTES, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink
+from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink, undeliverable
 from fbvm.net.stream import End
 from fbvm.wire.link import Broken, Failed, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import What
@@ -132,10 +132,8 @@ class Bound(_Here):
             self._arrived.append(Received(self.channel, data, sender))
 
     def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
-        if remote.host == "0.0.0.0" or remote.port == 0:
-            return "EADDRNOTAVAIL"
-        if len(data) > MAX_DATAGRAM_BYTES:
-            return "EMSGSIZE"
+        if error := undeliverable(remote, data):
+            return error
         self.link.post(self.port, remote, data)
         self.link.told.append(Sent(self.channel, len(data)))
         return ""

@@ -122,10 +122,10 @@ class Switchboard(ABC):
     def close(self) -> None:
         """End all connections and free what the host lent."""
         for link in self.links.values():
-            for there in link.channels.values():
+            while link.channels:
+                _, there = link.channels.popitem()
                 if isinstance(there, Watcher):
                     there.end()
-            link.channels.clear()
         for _, orphan in self._orphans:
             orphan.end()
         self.links.clear()

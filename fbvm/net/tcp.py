@@ -12,11 +12,11 @@ import struct
 import sys
 from abc import abstractmethod
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 
-from fbvm.net.addresses import AddressMap, fits, impossible
-from fbvm.net.channels import ANYBODY, MAX_DATAGRAM_BYTES, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink
+from fbvm.net.addresses import AddressMap, dotted, fits, impossible
+from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink, undeliverable
 from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, UDP, WRITE, Switchboard, Watcher, errno_name
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import What
@@ -30,15 +30,6 @@ def _share_port(sock: socket.socket) -> None:
     """Let a port be listened on again while old connections of it linger (elsewhere than on Windows)."""
     if os.name == "posix":
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-
-
-def _dotted(real: Peer) -> tuple[str, int]:
-    """An endpoint for the host.  Raises OSError for a name, which would have to be looked up and so could block."""
-    try:
-        socket.inet_pton(socket.AF_INET, real.host)
-    except OSError:
-        raise OSError(errno.EADDRNOTAVAIL, real.host) from None
-    return real.host, real.port
 
 
 class TcpNetwork(Switchboard):
@@ -99,14 +90,7 @@ class TcpLink(ChannelLink):
         self.network.attend(now_ns)
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
-        channel: _OnHost
-        match request:
-            case Connect():
-                channel = _Line(self, request)
-            case Listen():
-                channel = _Door(self, request)
-            case Bind():
-                channel = _Bound(self, request)
+        channel: _OnHost = _KINDS[type(request)](self, request)
         self.channels[request.channel] = channel
         try:
             if self.network.closed:
@@ -148,8 +132,8 @@ class _OnHost(Channel, Watcher):
             self.sock = None
 
     def failed(self, error: str) -> None:
-        self.end()
         super().failed(error)
+        self.end()
 
     def close(self, reset: bool, now_ns: int) -> None:
         self.end()
@@ -168,16 +152,27 @@ class _OnHost(Channel, Watcher):
 
 
 class _Door(_OnHost):
-    """Waits for one caller that fits; others are reset."""
+    """Waits for one caller that fits; others are reset.
+
+    Several may wait on one port: one has the host's socket, the lowest-numbered takes the caller (assumed)."""
 
     def __init__(self, link: TcpLink, request: Listen) -> None:
         super().__init__(link, request)
         self._request = request
 
     def open(self, now_ns: int) -> None:
-        sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
-        sock.listen()
-        self.network.watch(sock, READ, self)
+        if not any(door.sock for door in self._doors()):
+            sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
+            sock.listen()
+            self.network.watch(sock, READ, self)
+
+    def end(self) -> None:
+        heir = next(iter(self._doors()), None)
+        if self.sock and heir:
+            self.network.watch(self.sock, 0, self)
+            heir.sock, self.sock = self.sock, None
+            self.network.watch(heir.sock, READ, heir)
+        super().end()
 
     def ready(self, ready: int, now_ns: int) -> None:
         for _ in range(MAX_CALLERS):
@@ -185,21 +180,27 @@ class _Door(_OnHost):
                 return
             try:
                 conn, name = self.sock.accept()
-            except (BlockingIOError, ConnectionAbortedError):
-                return
             except OSError as error:
-                self.failed(errno_name(error))
+                if not isinstance(error, BlockingIOError | ConnectionAbortedError):
+                    self.failed(errno_name(error))
                 return
             remote = self.network.inward(TCP, Peer(*name))
-            if fits(self._request.remote, remote):
-                self.end()
-                wish = Connect(self.channel, remote, self.local.port, self._request.keep_alive)
-                line = self.link.channels[self.channel] = _Line(self.link, wish)
-                line.granted = self.granted
+            door = next((door for door in self._doors() if fits(door._request.remote, remote)), None)
+            if door:
+                del door.link.channels[door.channel]
+                door.end()
+                wish = Connect(door.channel, remote, door.local.port, door._request.keep_alive)
+                line = door.link.channels[door.channel] = _Line(door.link, wish)
+                line.granted = door.granted
                 line.admit(conn, now_ns)
             else:
                 with suppress(OSError), conn:
                     conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+
+    def _doors(self) -> list[_Door]:
+        """Those that wait on the same port, by number."""
+        there = (channel for _, channel in sorted(self.link.channels.items()))
+        return [door for door in there if isinstance(door, _Door) and door.local == self.local]
 
 
 class _Line(_OnHost):
@@ -222,7 +223,7 @@ class _Line(_OnHost):
         error = impossible(self.local, self.remote)
         if error:
             raise OSError(getattr(errno, error), error)
-        where = _dotted(self.network.outward(self.remote))
+        where = dotted(self.network.outward(self.remote))
         port = self.network.host_endpoint(self.local).port if self.local.port else 0
         sock = self.make(socket.SOCK_STREAM, Peer("0.0.0.0", port) if port else None)
         self._tune(sock)
@@ -299,10 +300,8 @@ class _Line(_OnHost):
                 self._broke(code, now_ns)
 
     def send(self, data: bytes, now_ns: int) -> str:
-        if not self._connected:
-            return "ENOTCONN"
-        if self.sock is None:
-            return "EPIPE"
+        if not self._connected or self.sock is None:
+            return "EPIPE" if self._connected else "ENOTCONN"
         if sum(map(len, self._outbox)) + len(data) > SEND_BUFFER_BYTES:
             return "ENOBUFS"
         self._outbox.append(data)
@@ -434,13 +433,11 @@ class _Bound(_OnHost):
             self.link.told.append(Received(self.channel, data, remote))
 
     def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
-        if remote.host == "0.0.0.0" or remote.port == 0:
-            return "EADDRNOTAVAIL"
-        if len(data) > MAX_DATAGRAM_BYTES:
-            return "EMSGSIZE"
+        if refusal := undeliverable(remote, data):
+            return refusal
         try:
             if self.sock:
-                self.sock.sendto(data, _dotted(self.network.outward(remote, UDP)))
+                self.sock.sendto(data, dotted(self.network.outward(remote, UDP)))
         except BlockingIOError:
             return "ENOBUFS"
         except OSError as error:
@@ -448,3 +445,6 @@ class _Bound(_OnHost):
         self.network.tell(now_ns, What.UDP, self.local, remote, True, data)
         self.link.told.append(Sent(self.channel, len(data)))
         return ""
+
+
+_KINDS: dict[type, Callable[..., _OnHost]] = {Connect: _Line, Listen: _Door, Bind: _Bound}

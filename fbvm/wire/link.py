@@ -43,7 +43,8 @@ class Connect:
 class Listen:
     """Wait for one TCP connection on `local_port` from a peer that fits `remote` (0 parts fit anything).
 
-    Takes exactly one peer; other peers are refused.  Answer: `Opened` or `Failed`; `Close` withdraws it."""
+    Takes exactly one peer; other peers are refused.  Several channels may wait on one port: a peer goes to the lowest
+    that it fits (assumed).  Answer: `Opened` or `Failed`; `Close` withdraws it."""
 
     channel: int
     local_port: int

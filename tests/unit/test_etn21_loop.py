@@ -92,6 +92,31 @@ def test_two_units_talk_to_each_other() -> None:
     assert server.serve(Switch.CLOSE) == "0000"
 
 
+def test_sockets_that_wait_on_one_port_are_served_from_the_lowest_number_on_assumed() -> None:
+    """Whatever their order and areas; the next caller is refused.  A socket that is closed may wait again."""
+    network = LoopNetwork()
+    server, client = Station(network, Etn21(0, SERVER.host)), Station(network, Etn21(1, "192.168.250.1"))
+    for area, socket in ((1, 3), (2, 1), (3, 2)):
+        server.rig.parameters(area, socket, local_port=502, remote=ANYBODY)
+        server.rig.turn_on(Switch.PASSIVE_OPEN, area)
+        server.scan()
+    seen = []
+    for socket in (1, 2, 3):
+        client.rig.parameters(socket, socket)
+        client.rig.turn_on(Switch.ACTIVE_OPEN, socket)
+        for _ in range(3):
+            client.scan()
+            server.scan()
+        seen.append([server.rig.is_open(number) for number in (1, 2, 3)])
+    assert seen == [[True, False, False], [True, True, False], [True, True, True]]
+    assert [server.rig.result(4, area) for area in (2, 3, 1)] == [client.rig.result(1, area) for area in (1, 2, 3)]
+    client.rig.parameters(4, 4)
+    client.rig.turn_on(Switch.ACTIVE_OPEN, 4)
+    for _ in range(3):
+        client.scan()
+    assert client.rig.code(4) == "004A"
+
+
 def test_004a_nobody_listens() -> None:
     assert Station(LoopNetwork()).serve(Switch.ACTIVE_OPEN) == "004A"
 
