@@ -32,6 +32,8 @@ def test_a_wheel_runs_in_a_fresh_environment(tmp_path: Path) -> None:
     [wheel] = (tmp_path / "dist").glob("fbvm-*.whl")
     names = zipfile.ZipFile(wheel).namelist()
     assert not [name for name in names if name.startswith("tests")]
+    assert {"fbvm/record/page/chart.js", "fbvm/_data/examples/project/.github/workflows/test.yml",
+            "fbvm/_data/examples/project/.gitignore"} <= set(names)  # fmt: skip
     call(sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv", cwd=tmp_path)
     [packages] = (tmp_path / "venv").rglob("site-packages")
     python = tmp_path / "venv" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
@@ -48,4 +50,5 @@ def test_a_wheel_runs_in_a_fresh_environment(tmp_path: Path) -> None:
     shown = call(python, "-m", "fbvm", "run", "main.st", "--until", "Main.t.Q", "--max", "1s", "--show", "Main.t.ET",
                  cwd=outside)  # fmt: skip
     assert shown == "Main.t.ET = T#20ms\n"
+    assert "fbvm test" in call(python, "-m", "fbvm", "new", "mine", cwd=outside)
     assert "division by zero" in call(python, "-m", "fbvm", "explain", "R0101", cwd=outside)

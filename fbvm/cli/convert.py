@@ -2,34 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import click
 
 from fbvm.cli.options import split_names
 from fbvm.cli.traces import SUFFIX, opened, recorded, scans_option
-from fbvm.record.recorder import Recording
+from fbvm.record.page import page
+from fbvm.record.page_data import page_data
 from fbvm.record.rows import RowsError, read_rows, write_rows
+from fbvm.record.svg import Drawing
+from fbvm.record.trace import Trace
+from fbvm.record.trace_signals import traffic
 from fbvm.record.vcd import write_vcd
 
 CSV = ".csv"
+Names = Sequence[str]
 
 
-def _csv(recording: Recording, path: Path) -> None:
+def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
-        write_rows(recording, file)
+        write_rows(recorded(trace, names, scans), file)
 
 
-def _vcd(recording: Recording, path: Path) -> None:
+def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     with path.open("w", encoding="ascii", errors="replace") as file:
         try:
-            write_vcd(recording, file)
+            write_vcd(recorded(trace, names, scans), file)
         except ModuleNotFoundError:
             raise click.UsageError("VCD needs the package pyvcd: pip install 'fbvm[vcd]'") from None
 
 
-FORMATS: dict[str, Callable[[Recording, Path], None]] = {CSV: _csv, ".vcd": _vcd}
+def _svg(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
+    made = recorded(trace, names, scans)
+    path.write_text(Drawing(made, traffic(trace, made.scans), path.stem).text(), encoding="utf-8")
+
+
+def _html(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
+    recorded(trace, names, range(trace.scans.stop - 1, trace.scans.stop) if scans is None else scans)
+    path.write_text(page(page_data(trace, names, scans, path.stem)), encoding="utf-8")
+
+
+FORMATS: dict[str, Callable[[Trace, Names, range | None, Path], None]] = {
+    ".html": _html, ".svg": _svg, CSV: _csv, ".vcd": _vcd,
+}  # fmt: skip
 
 
 @click.command("convert")
@@ -38,9 +55,15 @@ FORMATS: dict[str, Callable[[Recording, Path], None]] = {CSV: _csv, ".vcd": _vcd
 @click.argument("names", nargs=-1, metavar="[NAME|ADDRESS|FIRST..LAST]...")
 @scans_option
 def command(source: Path, target: Path, names: tuple[str, ...], scans: range | None) -> None:
-    """Write a trace as .csv or .vcd (for GTKWave and Surfer), or a .csv as a trace.
+    """Write a trace as a page that shows all of it, a picture, or a table; or a table as a trace.
 
-    FROM and TO are told apart by their endings.  Without names, all variables that changed are written."""
+    \b
+    .html  one file for a browser: chart, inside of each scan, memory, frames
+    .svg   a time chart for documents
+    .csv   a table; FROM may be one, too, and becomes a trace
+    .vcd   for GTKWave and Surfer
+
+    Without names, all variables that changed are written."""
     try:
         if source.suffix.lower() == CSV:
             _to_trace(source, target)
@@ -49,7 +72,7 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
         if write is None:
             raise click.UsageError(f"{target}: what it shall be is not clear; end it with {', '.join(FORMATS)}")
         with opened(source) as trace:
-            write(recorded(trace, [name for text in names for name in split_names(text)], scans), target)
+            write(trace, [name for text in names for name in split_names(text)], scans, target)
     except OSError as error:
         raise click.UsageError(f"{target} cannot be written: {error.strerror}") from None
 

@@ -24,7 +24,7 @@ VERBS = {
     "chart": "Draw variables of a trace, a column a scan.",
     "table": "Show which statement changed variables of a trace.",
     "why": "Say why a variable has its value, back through scans.",
-    "convert": "Write a trace as CSV or VCD, or a CSV as a trace.",
+    "convert": "Write a trace as a page, a picture, CSV or VCD, or a CSV as a trace.",
     "check": "Say what is wrong with a program; silent when nothing is.",
     "fmt": "Rewrite a program in canonical Structured Text.",
     "list": "Print the compiled program, readable.",

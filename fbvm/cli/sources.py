@@ -10,12 +10,10 @@ from typing import Any
 
 import click
 
-from fbvm.base.data import data_folder
-from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli import status
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
-from fbvm.syntax.text import read
 
 
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -72,16 +70,3 @@ def show(diagnostic: Diagnostic) -> None:
     click.secho(first, fg="red" if diagnostic.severity == "error" else "yellow", err=True)
     if rest:
         click.echo(rest, err=True)
-
-
-def source_texts(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, str]:
-    """The texts of an Image's sources by name, as far as the files are there."""
-    own = {str(path): path for path in files}
-    texts = {}
-    for name in {site.file for site in image.sites}:
-        for path in (own.get(name), *(folder / name for folder in (*libraries, data_folder("fblib")))):
-            source = read(path, name) if path and path.is_file() else None
-            if isinstance(source, Source):
-                texts[name] = source.text
-                break
-    return texts

@@ -11,9 +11,10 @@ from fbvm.cli import status
 from fbvm.cli.options import Mapping, Setting, mapping, setting, time_ns
 from fbvm.cli.prompt import prompted
 from fbvm.cli.run import CYCLE_NS, build_network, mailboxes
-from fbvm.cli.sources import compiled, source_arguments, source_texts
+from fbvm.cli.sources import compiled, source_arguments
 from fbvm.code.image import Image
 from fbvm.plc import Plc
+from fbvm.record.source_texts import source_texts
 from fbvm.record.traffic import Passed, Reader
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.session import Session
@@ -73,7 +74,8 @@ def command(
             raise click.UsageError(f"stepping stays in memory: --map {row.said}=peer")
     bench = Bench(image, cycle_ns, mappings, timing, seed)
     session = Session(bench.make)
-    commands = Commands(session, Words(session, source_texts(image, files, libraries)), lambda: bench.passed)
+    texts = source_texts(image, {str(path): path for path in files}, libraries)
+    commands = Commands(session, Words(session, texts), lambda: bench.passed)
     try:
         for given in settings:
             _write(session, given)

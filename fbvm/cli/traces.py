@@ -9,10 +9,10 @@ from typing import Any
 
 import click
 
-from fbvm.cli.sources import source_texts
 from fbvm.code.image import Image
 from fbvm.plc import Plc
 from fbvm.record.recorder import Recording
+from fbvm.record.source_texts import source_texts
 from fbvm.record.trace import Trace
 from fbvm.record.trace_format import TraceError
 from fbvm.record.trace_signals import recording
@@ -108,4 +108,4 @@ def tracing(
 
 
 def _lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:
-    return source_lines(image, source_texts(image, files, libraries))
+    return source_lines(image, source_texts(image, {str(path): path for path in files}, libraries))

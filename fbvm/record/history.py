@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from typing import Protocol
 
@@ -94,13 +94,17 @@ class History:
 
     def again(self, scans: range, listener: Listener) -> None:
         """Does scans again; the listener looks inside.  Beyond the last one it goes on as if nobody did anything."""
+        self.redo(scans, lambda twin: looking(twin, listener))
+
+    def redo(self, scans: range, attached: Callable[[Plc], AbstractContextManager[object]]) -> None:
+        """Does scans again on a PLC to which something is attached meanwhile."""
         scans = range(max(scans.start, self._states[0].scans if self._states else scans.stop), scans.stop)
         if not scans:
             return
         twin = self._twin()
         self._bring(twin, scans.start)
         states = {state.scans: state for state in self._states}
-        with looking(twin, listener):
+        with attached(twin):
             for scan in scans:
                 if scan in states and scan != scans.start:
                     twin.restore(states[scan])

@@ -18,6 +18,7 @@ from fbvm.engine.python import PythonEngine
 from fbvm.engine.runtime import NO_SITE, Observation
 from fbvm.engine.tiers import substitutes_of
 from fbvm.engine.trap import Trap
+from fbvm.wire.tap import Happening
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,7 +86,14 @@ class Contact(NamedTuple):
     value: bool
 
 
-Event: TypeAlias = Began | Ended | Statement | Read | Write | Contact
+class Passing(NamedTuple):
+    """Something passed the network at a unit of the PLC, in the I/O refresh."""
+
+    now_ns: int
+    happening: Happening
+
+
+Event: TypeAlias = Began | Ended | Statement | Read | Write | Contact | Passing
 
 
 class Inside:

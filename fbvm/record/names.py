@@ -60,6 +60,14 @@ class Names:
             self._instances[offset] = found or Place("", REFERENCE, offset)
         return self._instances[offset].name
 
+    def address(self, place: Place) -> str:
+        """The address at which a variable is located, "" for one in the program's own memory."""
+        for area in self._areas.values():
+            if area.offset <= place.offset < _end(area):
+                found = _address(self._areas, area, place.offset, place.bit)
+                return found.name if found else ""
+        return ""
+
     # --- the slots of the program
 
     def _top(self, offset: int) -> Place | None:

@@ -20,7 +20,7 @@ from fbvm.base.memory import Memory
 from fbvm.code.image import Layout, Site
 from fbvm.plc import Phase
 from fbvm.record import symbols
-from fbvm.record.inside import Began, Contact, Ended, Event, Frame, Read, Statement, Write
+from fbvm.record.inside import Began, Contact, Ended, Event, Frame, Passing, Read, Statement, Write
 from fbvm.record.names import Names
 from fbvm.record.trace_format import (
     BLOCK,
@@ -30,6 +30,7 @@ from fbvm.record.trace_format import (
     HEADER,
     LINE,
     MAGIC,
+    NETWORK,
     PHASE,
     PHASES,
     READ,
@@ -47,6 +48,8 @@ from fbvm.record.trace_writer import FORMAT, Depth
 from fbvm.watch import places
 from fbvm.watch.paths import Place, Span, find
 from fbvm.watch.values import Value
+from fbvm.wire.link import Peer
+from fbvm.wire.tap import Happening, What
 
 
 class Follower(Protocol):
@@ -110,6 +113,9 @@ class Trace:
             self.outer = [int(number) for number in head["outer"]]
             self.bodies = [(str(name), str(kind)) for name, kind in head["bodies"]]
             self.described = dict(head["described"])
+            self.meanings: dict[str, dict[int, str]] = {
+                address: {int(value): str(text) for value, text in known.items()}
+                for address, known in head["meanings"].items()}  # fmt: skip
             self._lines: dict[str, dict[int, str]] = {
                 file: {int(n): str(text) for n, text in rows.items()} for file, rows in head["lines"].items()}
         except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
@@ -247,6 +253,8 @@ class _Player:
 
     def _event(self, tag: int) -> Event:
         cursor = self._cursor
+        if tag == NETWORK:
+            return _passing(cursor.bytes(cursor.number()))
         if tag == FRAME:
             body, start, site, caller = (cursor.number() for _ in range(4))
             frame = Frame(body, start, site - 1, self._frames[caller - 1] if caller else self._outside)
@@ -276,6 +284,15 @@ class _Player:
         else:
             memory.u8[event.offset : end] = event.value
         self._touched.append((event.offset, end))
+
+
+def _passing(text: bytes) -> Passing:
+    try:
+        now_ns, what, host, port, other, other_port, out, mirrored, data = json.loads(text)
+        local, remote = Peer(str(host), int(port)), Peer(str(other), int(other_port))
+        return Passing(int(now_ns), Happening(What(what), local, remote, bool(out), bytes.fromhex(data), bool(mirrored)))
+    except (ValueError, TypeError) as error:
+        raise IndexError(f"what passed the network is not readable: {error}") from None
 
 
 def _header(payload: bytes) -> dict[str, Any]:

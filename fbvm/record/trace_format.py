@@ -15,6 +15,8 @@ Then stand records: a tag, then unsigned numbers of 7 bits a byte, the lowest fi
     READ       frame, site + 1, offset, bit, size, bytes
     WRITE      frame, site + 1, offset, bit, size, old bytes, new bytes
     CONTACT    frame, site, value, JSON of the element (its size, bytes)
+    NETWORK    JSON of what passed at a unit (its size, bytes), before the PHASE of the I/O refresh: time ns, what, local
+               host and port, remote host and port, 1 if the unit did it, 1 if it is told twice, hexadecimal data
 
 LINES are a count, then for each line of LINE bytes of memory that changed: the difference of its number from the one
 before, and the exclusive or of its old and new bytes.
@@ -34,7 +36,7 @@ MAGIC = b"FBVMTRC1"
 HEADER, BLOCK = 1, 2
 LINE = 32
 """Bytes of memory whose change is written as one."""
-PHASE, SCAN, FRAME, END, STATEMENT, READ, WRITE, CONTACT = range(8)
+PHASE, SCAN, FRAME, END, STATEMENT, READ, WRITE, CONTACT, NETWORK = range(9)
 PHASES = (Phase.INPUTS, Phase.PROGRAM, Phase.REFRESH)
 _CHUNK = struct.Struct("<BIIQI")
 LARGEST_BYTES = 1 << 30

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fbvm.plc import Phase
+from fbvm.record.inside import Event, Passing
 from fbvm.record.recorder import Recording, Signal, Track, signals_at
 from fbvm.record.selection import select, singles
-from fbvm.record.trace import Trace
+from fbvm.record.trace import Moment, Trace
+from fbvm.record.traffic import Passed, Reader
 from fbvm.watch.paths import Place
 
 
@@ -15,8 +18,7 @@ def recording(trace: Trace, names: Sequence[str] = (), scans: range | None = Non
 
     Raises UnknownPlace; TypeError for an array or a structure."""
     wanted = range(max(trace.scans.start, scans.start), min(trace.scans.stop, scans.stop)) if scans else trace.scans
-    signals = [signal for name in names for signal in signals_at(trace.find(name), trace.described)]
-    made = Recording([Track(signal) for signal in signals or _every(trace)], wanted.start)
+    made = Recording([Track(signal) for signal in chosen_signals(trace, names)], wanted.start)
     for moment in trace.moments(wanted):
         for track in made.tracks:
             track.add(moment.scans, moment.read(track.signal.place))
@@ -24,6 +26,33 @@ def recording(trace: Trace, names: Sequence[str] = (), scans: range | None = Non
     if not names:
         made.tracks = [track for track in made.tracks if len(track.changes) > 1] or made.tracks
     return made
+
+
+def traffic(trace: Trace, scans: range | None = None) -> list[tuple[int, Passed]]:
+    """What passed the network in some scans, with their numbers."""
+    heard = _Heard()
+    trace.follow(heard, scans)
+    return heard.passed
+
+
+class _Heard:
+    """Follows a trace and keeps what passed the network."""
+
+    def __init__(self) -> None:
+        self.passed: list[tuple[int, Passed]] = []
+        self._reader = Reader()
+
+    def phase(self, moment: Moment, phase: Phase) -> None:
+        """Nothing passes between phases."""
+
+    def event(self, moment: Moment, event: Event) -> None:
+        if isinstance(event, Passing):
+            self.passed += [(moment.scans, passed) for passed in self._reader.read(event.now_ns, event.happening)]
+
+
+def chosen_signals(trace: Trace, names: Sequence[str]) -> list[Signal]:
+    """The signals of some names; without names, those that were selected or all single ones.  Raises as `recording`."""
+    return [signal for name in names for signal in signals_at(trace.find(name), trace.described)] or _every(trace)
 
 
 def _every(trace: Trace) -> list[Signal]:

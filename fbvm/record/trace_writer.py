@@ -26,6 +26,7 @@ from fbvm.record.trace_format import (
     HEADER,
     LINE,
     MAGIC,
+    NETWORK,
     PHASE,
     PHASES,
     READ,
@@ -36,6 +37,8 @@ from fbvm.record.trace_format import (
     write_chunk,
     xor,
 )
+from fbvm.record.traffic import listen
+from fbvm.wire.tap import Happening
 
 FORMAT = 1
 BLOCK_SCANS = 100
@@ -92,6 +95,9 @@ class TraceWriter:
             self._attached.enter_context(looking(plc, self))
         plc.watchers.append(self._scan_ended)
         self._attached.callback(plc.watchers.remove, self._scan_ended)
+        self._passed: list[tuple[int, Happening]] = []
+        for network in {id(attached.network): attached.network for attached in plc.units}.values():
+            self._attached.callback(setattr, network, "tap", listen(network, self._pass))
 
     def close(self) -> None:
         """Ends the recording and writes what is left; the file stays open."""
@@ -113,8 +119,18 @@ class TraceWriter:
             self._begin(plc.scans)
             self._changes(phase)
 
+    def _pass(self, now_ns: int, unit: str, happening: Happening) -> None:
+        """What a network tells of the units of this PLC."""
+        if any(attached.unit.address == unit for attached in self._plc.units):
+            self._passed.append((now_ns, happening))
+
     def _scan_ended(self, plc: Plc) -> None:
         self._begin(plc.scans - 1)
+        for passed in self._passed:
+            text = json.dumps(_row(*passed), separators=(",", ":")).encode()
+            put(self._out, NETWORK, len(text))
+            self._out += text
+        self._passed.clear()
         self._changes(Phase.REFRESH)
         self._open = False
         if self._scans >= BLOCK_SCANS or len(self._out) > BLOCK_BYTES:
@@ -217,6 +233,12 @@ class TraceWriter:
         return number
 
 
+def _row(now_ns: int, told: Happening) -> list[object]:
+    local, remote = told.local, told.remote
+    return [now_ns, told.what.value, local.host, local.port, remote.host, remote.port, int(told.out), int(told.mirrored),
+            told.data.hex()]  # fmt: skip
+
+
 def _different(start: int, now: bytes, old: bytes) -> Iterator[tuple[int, bytes]]:
     """The lines of a piece that differ."""
     for part in range(0, len(now), PART):
@@ -232,6 +254,8 @@ def _header(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[str,
     files = sorted({site.file for site in image.sites})
     described = {address: text for attached in plc.units
                  for address, text in getattr(attached.unit, "descriptions", {}).items()}  # fmt: skip
+    meanings = {address: {str(value): text for value, text in known.items()} for attached in plc.units
+                for address, known in getattr(attached.unit, "meanings", {}).items()}  # fmt: skip
     return {
         "format": FORMAT, "image": fingerprint(image), "cycle_ns": plc.cycle_ns, "depth": depth.value,
         "selected": list(selected), "slots": image.layout.slots_size, "e_banks": image.layout.e_banks,
@@ -239,7 +263,8 @@ def _header(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[str,
         **symbols.to_data(image.symbols),
         "files": files, "sites": [[files.index(s.file), s.pou, s.line, s.column] for s in image.sites],
         "outer": outer_statements(image), "bodies": [[body.name, body.kind] for body in image.bodies],
-        "described": described, "lines": {file: {str(n): text for n, text in rows.items()} for file, rows in lines.items()},
+        "described": described, "meanings": meanings,
+        "lines": {file: {str(n): text for n, text in rows.items()} for file, rows in lines.items()},
     }  # fmt: skip
 
 

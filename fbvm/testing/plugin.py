@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 RIGS: pytest.StashKey[list[Rig]] = pytest.StashKey()
 """The rigs that a test has made."""
+PAGES: pytest.StashKey[list[Path]] = pytest.StashKey()
+"""The pages that were written for failed tests."""
 SOURCE_FOLDER = "src"
 """Where a project keeps its blocks, below the folder of its pytest.ini or pyproject.toml."""
 
@@ -189,9 +191,25 @@ def pytest_runtest_makereport(
     report = yield
     if report.failed and call.when == "call" and call.excinfo is not None:
         for rig, lines in _asking(call.excinfo, _rigs(item)):
-            if text := rig.explain(lines):
+            text = "\n\n".join(part for part in (rig.explain(lines), _page(item, rig, lines)) if part)
+            if text:
                 report.sections.append((f"fbvm {rig!r}", text))
     return report
+
+
+def _page(item: pytest.Item, rig: Rig, lines: tuple[str, range] | None) -> str:
+    """Writes the page of a failed test, and says where it is; "" without one."""
+    from fbvm.testing.pages import MOST_PAGES, page_path
+
+    written = item.config.stash.setdefault(PAGES, [])
+    path = page_path(item.config.rootpath, item.nodeid if len(_rigs(item)) == 1 else f"{item.nodeid}.{_rigs(item).index(rig)}")
+    try:
+        if len(written) >= MOST_PAGES or not rig.write_page(path, item.nodeid, lines):
+            return ""
+    except OSError as error:
+        return f"the page could not be written: {error}"
+    written.append(path)
+    return f"every scan, in a browser: {path.relative_to(item.config.rootpath)}"
 
 
 def _asking(excinfo: pytest.ExceptionInfo[BaseException], rigs: Sequence[Rig]) -> list[tuple[Rig, tuple[str, range] | None]]:

@@ -26,9 +26,8 @@ class Recorded:
         self._folder, self._write_golden = folder, write_golden
         self._rig = rig
         self._file = path.open("wb")
-        texts = {name: source.text for name, source in rig.subject.sources.items()}
         chosen = [pattern if "*" in pattern else rig.find(pattern).name for pattern in patterns]
-        self._writer = TraceWriter(rig.plc, self._file, Depth(depth), chosen, source_lines(rig.plc.image, texts))
+        self._writer = TraceWriter(rig.plc, self._file, Depth(depth), chosen, source_lines(rig.plc.image, rig.subject.texts))
 
     def close(self) -> None:
         """Ends the recording."""

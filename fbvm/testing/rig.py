@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -21,6 +22,8 @@ from fbvm.plc import Mode, Plc
 from fbvm.record.chart import Chart, draw
 from fbvm.record.history import History
 from fbvm.record.recorder import Recorder
+from fbvm.record.traffic import Passed, Reader, listen
+from fbvm.testing.pages import write_page
 from fbvm.testing.reads import Reads
 from fbvm.testing.report import Report
 from fbvm.testing.subject import Stub, Subject, subject
@@ -31,6 +34,8 @@ from fbvm.watch.conditions import parse_condition
 from fbvm.watch.paths import Place, Span, UnknownPlace, find, find_place
 from fbvm.watch.values import Value, parse_time_ns, show_time
 
+MOST_PASSED = 10_000
+"""Frames that are kept for the page of a failure."""
 PATIENCE = "1m"
 """How long `until` waits if nobody says, in virtual time."""
 
@@ -87,6 +92,7 @@ class Rig:
     _reads: Reads
     _timed: list[tuple[int, str, object]]
     _report: Report
+    _passed: deque[tuple[int, Passed]]
 
     def __init__(self, what: Subject, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
                  units: Sequence[Unit] = (), etn21: str = "", network: LoopNetwork | None = None) -> None:  # fmt: skip
@@ -102,6 +108,11 @@ class Rig:
         for name, stub in (stubs or {}).items():
             if callable(stub):
                 self._stub(name, stub)
+        set_(self, "_passed", deque(maxlen=MOST_PASSED))
+        if units or etn21:
+            reader = Reader()
+            listen(self.network, lambda now_ns, unit, told: self._passed.extend(
+                (plc.scans, passed) for passed in reader.read(now_ns, told)))  # fmt: skip
         for unit in (*units, *([Etn21(0, etn21)] if etn21 else ())):
             plc.attach(unit, self.network)
         for name in self._report.names_in(what.prefix):
@@ -326,6 +337,10 @@ class Rig:
 
         `lines` are a file and the lines in it that asked; without, all that was asked for since the last scan."""
         return self._report.text(lines)
+
+    def write_page(self, path: Path, title: str, lines: tuple[str, range] | None = None) -> bool:
+        """Writes the last scans as one HTML file, which shows what `lines` asked for; False if there was no scan."""
+        return write_page(path, title, self._history, self.subject, self._reads.places(*(lines or ())), self._passed)
 
 
 def _file(path: str, folders: Sequence[Path]) -> Path:

@@ -9,6 +9,7 @@ import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -19,6 +20,7 @@ from fbvm.check.library import Libraries
 from fbvm.check.silence import ANY, Wanted
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
+from fbvm.record.source_texts import source_texts
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
@@ -59,8 +61,13 @@ class Subject:
 
     def line(self, file: str, number: int) -> str:
         """A line of the source without its margin, "" if it is not known."""
-        source = self.sources.get(file)
-        return source.line(number).strip() if source and 0 < number <= len(source.line_starts) else ""
+        rows = self.texts.get(file, "").split("\n")
+        return rows[number - 1].strip() if 0 < number <= len(rows) else ""
+
+    @cached_property
+    def texts(self) -> dict[str, str]:
+        """The texts of all sources, libraries too, by name."""
+        return source_texts(self.image, {name: source.text for name, source in self.sources.items()}, self.libraries)
 
 
 def subject(files: Sequence[Path], name: str | None, libraries: Sequence[Path] = (), stubs: Mapping[str, Stub] | None = None,

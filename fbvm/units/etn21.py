@@ -14,7 +14,7 @@ from typing import Any
 from fbvm.units import etn21_map as at
 from fbvm.units.etn21_dispatch import NEVER_NS, Choices, Dispatch, Fault
 from fbvm.units.etn21_map import Layout
-from fbvm.units.etn21_names import descriptions
+from fbvm.units.etn21_names import descriptions, meanings
 from fbvm.units.etn21_timing import timing_of
 from fbvm.units.unit import AreaMemory
 from fbvm.wire.link import Event, Request
@@ -67,6 +67,11 @@ class Etn21:
     def descriptions(self) -> dict[str, str]:
         """What the unit's bits and words are called, by address as charts write it (`CIO 1519.02`, `D30001`)."""
         return descriptions(self.layout)
+
+    @cached_property
+    def meanings(self) -> dict[str, dict[int, str]]:
+        """What the values of its words mean, by address."""
+        return meanings(self.layout)
 
     @property
     def configuration(self) -> dict[str, Any]:

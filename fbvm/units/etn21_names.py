@@ -6,6 +6,7 @@ From W420 4-1 p80-85, 4-2 p88 and W421 6-6, 6-7.
 from __future__ import annotations
 
 from fbvm.units import etn21_map as at
+from fbvm.units.etn21_codes import ERRNO, MEANING
 from fbvm.units.etn21_map import Layout, Switch
 
 SWITCH_NAMES = {
@@ -60,6 +61,14 @@ def descriptions(layout: Layout) -> dict[str, str]:
         for offset, name in PARAMETER_NAMES.items():
             names[f"D{layout.parameters(area) + offset}"] = _numbered(name, area)
     return names
+
+
+def meanings(layout: Layout) -> dict[str, dict[int, str]]:
+    """What the values of words mean, by address: connection states and response codes."""
+    states = {state.value: state.name for state in at.TcpState}
+    codes = dict(MEANING) | {value: name for name, value in ERRNO.items() if value not in MEANING}
+    return ({f"D{layout.m + at.TCP_STATE + socket}": states for socket in at.SOCKETS}
+            | {f"D{layout.parameters(area) + at.RESPONSE}": codes for area in at.AREAS})  # fmt: skip
 
 
 def _numbered(name: str, number: int) -> str:

@@ -93,6 +93,17 @@ def test_a_failure_explains_itself(project: pytest.Pytester) -> None:
     result.stdout.no_fnmatch_line("Delay.IN is*")
 
 
+def test_a_failure_says_where_its_page_is(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        def test_wrong(fb):
+            pump = fb("src/pump.st::Pump").run("60ms", Start=True)
+            assert not pump.Running
+    """)
+    name = ".fbvm/test_a_failure_says_where_its_page_is.test_wrong.html"
+    run(project).stdout.fnmatch_lines([f"every scan, in a browser: {name}"])
+    assert "test_wrong</title>" in (project.path / name).read_text(encoding="utf-8")
+
+
 def test_what_a_function_of_the_test_asked_for_counts(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def check(pump):
@@ -306,11 +317,10 @@ def test_the_tests_of_the_readme_pass(project: pytest.Pytester) -> None:
 
 
 def test_the_failure_of_the_readme_looks_like_that(project: pytest.Pytester) -> None:
-    project.makepyfile("""
-        def test_starts(fb):
-            pump = fb("src/pump.st").at("30ms", Start=True).run("200ms")
-            assert pump.Starts == 2
-    """)
+    project.mkdir("tests").joinpath("test_pump.py").write_text(
+        "def test_starts(fb):\n"
+        "    pump = fb('src/pump.st').at('30ms', Start=True).run('200ms')\n"
+        "    assert pump.Starts == 2\n", encoding="utf-8")  # fmt: skip
     lines = run(project).outlines
     shown = in_readme("text", "assert pump.Starts == 2").splitlines()
     assert [line for line in shown if line not in lines] == []

@@ -45,6 +45,17 @@ def test_a_long_chart_is_wrapped_and_cut(fbvm: Fbvm) -> None:
     assert fbvm("chart", "run.fbtrace", "Main.Pump", "--whole", "--width", "40").output.count("Main.Pump") == 3
 
 
+def test_a_page_and_a_picture_of_a_trace(fbvm: Fbvm) -> None:
+    record(fbvm, "--depth", "statements")
+    assert fbvm("convert", "run.fbtrace", "run.html").exit_code == 0
+    assert "<title>run</title>" in Path("run.html").read_text(encoding="utf-8")
+    assert fbvm("convert", "run.fbtrace", "run.svg", "Main.Pump,D200").exit_code == 0
+    assert ">Main.Pump<" in Path("run.svg").read_text(encoding="utf-8")
+    for target in ("run.html", "run.svg"):
+        assert fbvm("convert", "run.fbtrace", target, "Main.Nobody").exit_code == 2
+        assert fbvm("convert", "run.fbtrace", target, "--scans", "900..").exit_code == 2
+
+
 def test_a_table_of_a_trace(fbvm: Fbvm) -> None:
     record(fbvm, "--depth", "writes")
     result = fbvm("table", "run.fbtrace", "CIO 0.00,Main.Pump")

@@ -1,0 +1,233 @@
+"""All that the page of a run shows, as plain data: signals, words, what happened inside scans, what passed the network.
+
+    {"scans": [first, count], "times": [ns, then differences], "signals": [...], "words": {"D": {"200": [scan, value, ...]}},
+     "rows": {scan: [[where, instance, signal, text, ...], ...]}, "frames": [...], ...}
+
+A value is written when it changes.  Numbers of signals, statements and instances are places in their lists; of a row,
+`where` is a statement, or -1, -2, -3 for the phases of a scan.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+from fbvm.base.areas import FLAG_AREAS
+from fbvm.base.memory import WHOLE_BYTES, Snapshot, compare
+from fbvm.base.types import StructType
+from fbvm.plc import Phase
+from fbvm.record.inside import Event, Frame, Passing, Statement, Write
+from fbvm.record.recorder import Signal
+from fbvm.record.trace import Moment, Trace
+from fbvm.record.trace_format import PHASES
+from fbvm.record.trace_signals import chosen_signals
+from fbvm.record.trace_writer import Depth
+from fbvm.record.traffic import Passed, Reader
+from fbvm.watch.paths import UnknownPlace
+
+MOST_ROWS = 200_000
+"""Statements and phases that are kept, the latest ones; of earlier scans there are values only."""
+FEW_SIGNALS = 60
+"""If there are more, those that stood still are left out unless somebody asks for them."""
+VERSION = 1
+
+
+class Collector:
+    """Follows a trace, or scans that are done again, and collects."""
+
+    def __init__(self, trace: Trace, signals: Sequence[Signal]) -> None:
+        self._trace, self.signals = trace, list(signals)
+        self.times_ns: list[int] = []
+        self.first = 0
+        self.changes: list[list[Any]] = [[] for _ in signals]
+        self.words: dict[str, dict[int, list[int]]] = {}
+        self.rows: OrderedDict[int, list[list[Any]]] = OrderedDict()
+        self.passed: list[tuple[int, Passed]] = []
+        self.instances: dict[str, int] = {}
+        self._reader = Reader()
+        self._known: list[str] = []
+        self._ended: list[str] = []
+        self._memory: Snapshot | None = None
+        self._whole: Snapshot | None = None
+        self._statement: tuple[int, Frame] | None = None
+        self._row: list[Any] | None = None
+        self._count = 0
+        self._at: dict[int, list[int]] = {}
+        for number, signal in enumerate(signals):
+            for offset in range(signal.place.offset, signal.place.offset + max(1, signal.place.type.size)):
+                self._at.setdefault(offset, []).append(number)
+
+    # --- what is told
+
+    def phase(self, moment: Moment, phase: Phase) -> None:
+        """Notes what a phase changed that no statement did, and at the end of a scan all values."""
+        now = moment.memory.snapshot()
+        if self._memory is None:
+            self.first = moment.scans
+            self._known = [self._text(number, moment) for number in range(len(self.signals))]
+        self._statement = self._row = None
+        moved = self._moved(self._touched(now), moment)
+        self._memory = now
+        if moved or phase is Phase.INPUTS:
+            self._add(moment.scans, [-1 - PHASES.index(phase), -1, *moved])
+        if phase is Phase.REFRESH:
+            self._end(moment, now)
+
+    def event(self, moment: Moment, event: Event) -> None:
+        """Notes a statement, and what it writes."""
+        if isinstance(event, Passing):
+            self.passed += [(moment.scans, passed) for passed in self._reader.read(event.now_ns, event.happening)]
+        elif isinstance(event, Statement):
+            self._statement, self._row = (event.site, event.frame), None
+            self._open(moment, event.site, event.frame)
+        elif isinstance(event, Write) and event.old != event.value:
+            if self._statement != (event.site, event.frame) or self._row is None:
+                self._statement = event.site, event.frame
+                self._open(moment, event.site, event.frame)
+            assert self._row is not None
+            self._row += self._moved(self._written(event), moment)
+
+    def _open(self, moment: Moment, site: int, frame: Frame) -> None:
+        path = self._trace.names.instance(frame.base)
+        self._row = [site, self.instances.setdefault(path, len(self.instances))]
+        self._add(moment.scans, self._row)
+
+    def _add(self, scan: int, row: list[Any]) -> None:
+        self.rows.setdefault(scan, []).append(row)
+        self._count += 1
+        while self._count > MOST_ROWS and len(self.rows) > 1:
+            self._count -= len(self.rows.popitem(last=False)[1])
+
+    # --- values
+
+    def _text(self, number: int, moment: Moment) -> str:
+        signal = self.signals[number]
+        value = moment.read(signal.place)
+        return str(int(value is True)) if signal.is_bit else signal.text(value)
+
+    def _touched(self, now: Snapshot) -> set[int]:
+        """The signals in bytes that differ from the phase before."""
+        if self._memory is None:
+            return set()
+        runs = compare(self._memory, now)
+        return {number for offset, size in runs for at in range(offset, offset + size) for number in self._at.get(at, ())}
+
+    def _written(self, event: Write) -> list[int]:
+        numbers = {number for at in range(event.offset, event.offset + len(event.value)) for number in self._at.get(at, ())}
+        return [number for number in sorted(numbers) if event.bit == WHOLE_BYTES
+                or self.signals[number].place.bit in (None, event.bit)]  # fmt: skip
+
+    def _moved(self, numbers: Iterable[int], moment: Moment) -> list[Any]:
+        """Signal, text, signal, text ... of those that have another value than they had."""
+        made: list[Any] = []
+        for number in sorted(numbers):
+            text = self._text(number, moment)
+            if text != self._known[number]:
+                self._known[number] = text
+                made += [number, text]
+        return made
+
+    def _end(self, moment: Moment, now: Snapshot) -> None:
+        scan = moment.scans
+        self.times_ns.append(moment.now_ns)
+        for number, text in enumerate(self._known):
+            if not self._ended or text != self._ended[number]:
+                self.changes[number] += [scan, text]
+        self._ended = list(self._known)
+        before = self._whole or Snapshot((None,) * len(now.pages))
+        for area, address in _words(self._trace, compare(before, now)):
+            changes = self.words.setdefault(area, {}).setdefault(address, [] if self._whole is None else [self.first, 0])
+            changes += [scan, moment.memory.words(area)[address]]
+        self._whole = now
+
+
+def _words(trace: Trace, runs: list[tuple[int, int]]) -> Iterator[tuple[str, int]]:
+    """The words of areas in some bytes, each once."""
+    areas = [area for area in trace.areas.values() if area.unit_bits == 16 and area.name not in FLAG_AREAS]
+    seen: set[tuple[str, int]] = set()
+    for offset, size in runs:
+        for area in areas:
+            low, high = max(offset, area.offset), min(offset + size, area.offset + area.size_bytes)
+            for address in range((low - area.offset) // 2, (high - area.offset + 1) // 2) if low < high else ():
+                if (area.name, address) not in seen:
+                    seen.add((area.name, address))
+                    yield area.name, address
+
+
+def page_data(trace: Trace, names: Sequence[str] = (), scans: range | None = None, title: str = "", *, prefix: str = "",
+              pinned: Sequence[str] = ()) -> dict[str, Any]:  # fmt: skip
+    """The data of a trace, or of some of its scans and variables.  Raises UnknownPlace, TypeError, TraceError.
+
+    `prefix` is not shown in names; variables that are `pinned` have columns in the scan table, and the last scan is
+    shown first."""
+    made = Collector(trace, chosen_signals(trace, names) if names else _in_order(trace))
+    trace.follow(made, scans)
+    every = bool(names) or len(made.signals) <= FEW_SIGNALS
+    made.changes = [changes if every or len(changes) > 2 or signal.place.name in pinned else []
+                    for signal, changes in zip(made.signals, made.changes, strict=True)]  # fmt: skip
+    return {"title": title, "pinned": [name.removeprefix(prefix) for name in pinned], **_as_data(trace, made, prefix)}
+
+
+def _in_order(trace: Trace) -> list[Signal]:
+    """All signals; what is of most interest comes first: programs' own variables, what units say, then what lies deeper."""
+    programs = {field.name for field in trace.symbols.values() if isinstance(field.type, StructType) and field.type.block}
+
+    def rank(signal: Signal) -> int:
+        owner, *rest = signal.place.name.split(".")
+        return 1 if signal.place.area else len(rest) - 1 if owner in programs else 2
+
+    return sorted(chosen_signals(trace, ()), key=rank)
+
+
+def _as_data(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
+    """What was collected, as JSON can write it; signals without values are left out."""
+    kept = [number for number, changes in enumerate(made.changes) if changes]
+    new = {number: at for at, number in enumerate(kept)}
+    used = sorted({row[0] for rows in made.rows.values() for row in rows if row[0] >= 0})
+    sites = {number: at for at, number in enumerate(used)}
+    times = made.times_ns
+    return {
+        "version": VERSION, "cycle": trace.cycle_ns, "depth": trace.depth.value,
+        "scans": [made.first, len(times)],
+        "times": [now - before for before, now in zip([0, *times], times, strict=False)],
+        "signals": [_signal(made, number, prefix) for number in kept],
+        "words": {area: {str(at): changes for at, changes in sorted(rows.items())} for area, rows in made.words.items()},
+        "names": dict(reversed(list(_located(trace, made.signals)))), "described": trace.described,
+        "meanings": {address: {str(value): text for value, text in known.items()}
+                     for address, known in trace.meanings.items()},
+        "sites": [[site.file, site.line, trace.line(site)] for site in (trace.sites[number] for number in used)],
+        "instances": [path.removeprefix(prefix.rstrip(".")).lstrip(".") for path in made.instances],
+        "rows": {str(scan): [_renumbered(row, new, sites) for row in rows] for scan, rows in made.rows.items()
+                 if trace.depth is not Depth.SCANS},
+        "frames": frame_rows(made.passed),
+    }  # fmt: skip
+
+
+def frame_rows(rows: Sequence[tuple[int, Passed]]) -> list[list[Any]]:
+    """What passed the network, as the page has it."""
+    return [[scan, passed.now_ns, str(passed.sender), str(passed.receiver), passed.said, passed.data.hex()]
+            for scan, passed in rows]  # fmt: skip
+
+
+def _signal(made: Collector, number: int, prefix: str) -> dict[str, Any]:
+    signal = made.signals[number]
+    return {"name": signal.label.removeprefix(prefix), "bit": int(signal.is_bit), "said": signal.description,
+            "changes": made.changes[number]}  # fmt: skip
+
+
+def _renumbered(row: list[Any], new: dict[int, int], sites: dict[int, int]) -> list[Any]:
+    changed = [item for number, text in zip(row[2::2], row[3::2], strict=True) if number in new
+               for item in (new[number], text)]  # fmt: skip
+    return [sites.get(row[0], row[0]), row[1], *changed]
+
+
+def _located(trace: Trace, signals: Sequence[Signal]) -> Iterator[tuple[str, str]]:
+    """Addresses at which variables lie, and the variables."""
+    for signal in signals:
+        if not signal.place.area:
+            try:
+                if address := trace.names.address(signal.place):
+                    yield address, signal.place.name
+            except UnknownPlace:
+                continue

@@ -1,0 +1,55 @@
+"""The page of a failed test: its last scans are done again, recorded with every statement, and written as one HTML file."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from fbvm.plc import Plc
+from fbvm.record.history import History
+from fbvm.record.page import page
+from fbvm.record.page_data import frame_rows, page_data
+from fbvm.record.trace import Trace
+from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
+from fbvm.record.traffic import Passed
+from fbvm.testing.subject import Subject
+from fbvm.watch.paths import Place
+
+FOLDER = ".fbvm"
+MOST_SCANS = 1000
+MOST_PAGES = 20
+"""Pages that one session writes."""
+
+
+def page_path(root: Path, test: str) -> Path:
+    """Where the page of a test lies: `.fbvm/tests.test_pump.test_it_waits.html`."""
+    name = re.sub(r"[^\w\-\[\].]+", ".", re.sub(r"\.(py|st)::", ".", test))
+    return root / FOLDER / f"{name[:150]}.html"
+
+
+def write_page(path: Path, title: str, history: History, subject: Subject, asked: Sequence[Place],
+               passed: Sequence[tuple[int, Passed]]) -> bool:  # fmt: skip
+    """Writes the page of a run; False if there was no scan.  Raises OSError."""
+    scans = history.scans
+    if not scans:
+        return False
+    file = io.BytesIO()
+
+    @contextmanager
+    def recorded(plc: Plc) -> Iterator[None]:
+        writer = TraceWriter(plc, file, Depth.STATEMENTS, (), source_lines(plc.image, subject.texts))
+        try:
+            yield
+        finally:
+            writer.close()
+
+    history.redo(range(max(scans.start, scans.stop - MOST_SCANS), scans.stop), recorded)
+    trace = Trace(io.BytesIO(file.getvalue()))
+    data = page_data(trace, title=title, prefix=subject.prefix, pinned=[place.name for place in asked])
+    data["frames"] = frame_rows([row for row in passed if row[0] in trace.scans])
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(page(data), encoding="utf-8")
+    return True

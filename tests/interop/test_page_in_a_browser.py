@@ -1,0 +1,242 @@
+"""The page of a run in a real browser, without network: Chromium through playwright, where both are there."""
+
+from __future__ import annotations
+
+import io
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from fbvm.code.compiler import compile_files
+from fbvm.net.loop import LoopNetwork
+from fbvm.net.peers import ModbusPeer
+from fbvm.plc import Plc
+from fbvm.record.page import page
+from fbvm.record.page_data import page_data
+from fbvm.record.recorder import Signal
+from fbvm.record.trace import Trace
+from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
+from fbvm.units.etn21 import Etn21
+from fbvm.watch.paths import Place
+from fbvm.wire.link import Peer
+
+pytestmark = pytest.mark.slow
+HOUSE = Path(__file__).resolve().parents[2]
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+SCANS = 40
+SENDING = 4
+"""The scan in which the demo sends its first request."""
+
+
+@pytest.fixture(scope="module")
+def trace() -> Trace:
+    path = HOUSE / "examples" / "demo.st"
+    image = compile_files([path], runnable=True).image
+    assert image is not None
+    plc, network, peer, file = Plc(image), LoopNetwork(), ModbusPeer(), io.BytesIO()
+    peer.server.holding_registers[0] = 1000
+    network.place(Peer("192.168.250.1", 502), peer)
+    plc.attach(Etn21(0, "192.168.250.21"), network)
+    writer = TraceWriter(plc, file, Depth.STATEMENTS, (), source_lines(image, {str(path): path.read_text(encoding="utf-8")}))
+    plc.run(scans=SCANS)
+    writer.close()
+    return Trace(io.BytesIO(file.getvalue()))
+
+
+@pytest.fixture(scope="module")
+def url(trace: Trace, tmp_path_factory: pytest.TempPathFactory) -> str:
+    path = tmp_path_factory.mktemp("page") / "run.html"
+    path.write_text(page(page_data(trace, title="<demo> & more")), encoding="utf-8")
+    return path.as_uri()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright: pip install 'fbvm[browser]'")
+    program = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+    if program is None:
+        pytest.skip(f"needs a browser: {' or '.join(BROWSERS)}")
+    with playwright.sync_playwright() as running:
+        root = hasattr(os, "geteuid") and os.geteuid() == 0
+        started = running.chromium.launch(executable_path=program, args=["--no-sandbox"] if root else [])
+        yield started
+        started.close()
+
+
+def opened(browser: Any, url: str, **settings: Any) -> Any:
+    """The page in a window of its own, offline; whatever it complains about fails the test."""
+    context = browser.new_context(offline=True, **{"viewport": {"width": 1300, "height": 850}, **settings})
+    made = context.new_page()
+    made.complaints = []
+    made.on("pageerror", lambda error: made.complaints.append(str(error)))
+    made.on("console", lambda message: made.complaints.append(message.text) if message.type == "error" else None)
+    made.on("request", lambda request: made.complaints.append(request.url) if not request.url.startswith("file:") else None)
+    made.goto(url)
+    made.wait_for_function("document.getElementById('where').textContent.startsWith('scan')")
+    return made
+
+
+@pytest.fixture
+def shown(browser: Any, url: str) -> Iterator[Any]:
+    made = opened(browser, url)
+    yield made
+    assert made.complaints == []
+    made.context.close()
+
+
+def where(shown: Any) -> str:
+    """What stands in the heading after the next picture."""
+    shown.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    text: str = shown.inner_text("#where")
+    return text
+
+
+def press(shown: Any, *keys: str) -> str:
+    for key in keys:
+        shown.keyboard.press(key)
+    return where(shown)
+
+
+def test_it_says_what_it_shows(shown: Any) -> None:
+    assert shown.title() == "<demo> & more"
+    assert where(shown) == "scan 0, 0 ms"
+
+
+def test_keys_move_the_cursor(shown: Any) -> None:
+    assert press(shown, "ArrowRight", "ArrowRight") == "scan 2, 20 ms"
+    assert press(shown, "ArrowLeft") == "scan 1, 10 ms"
+    assert press(shown, "Shift+ArrowRight") == "scan 11, 110 ms"
+    assert press(shown, "End") == f"scan {SCANS - 1}, {SCANS - 1}0 ms"
+    assert press(shown, "ArrowRight", "ArrowRight") == f"scan {SCANS - 1}, {SCANS - 1}0 ms"
+    assert press(shown, "Home", "ArrowLeft") == "scan 0, 0 ms"
+
+
+def test_values_are_those_of_the_trace(shown: Any, trace: Trace) -> None:
+    for scan in (0, SENDING, 9, SCANS - 1):
+        shown.evaluate(f"location.hash = '#{scan}'")
+        shown.reload()
+        assert where(shown).startswith(f"scan {scan},")
+        moment = trace.at(scan)
+        labels = shown.eval_on_selector_all(".label", "rows => rows.map(row => [row.title, row.children[1].textContent])")
+        assert len(labels) > 100
+        for title, text in labels:
+            place = trace.find(title.partition(": ")[0])
+            assert isinstance(place, Place)
+            value = moment.read(place)
+            assert text == (str(value).upper() if isinstance(value, bool) else Signal(place, "").text(value)), title
+
+
+def test_steps_inside_a_scan(shown: Any) -> None:
+    press(shown, "ArrowRight")
+    assert press(shown, "ArrowDown").startswith("scan 1, 10 ms, step 1 of ")
+    assert shown.inner_text("#rows tr.now").strip() == "inputs"
+    press(shown, "ArrowDown")
+    assert "→" in shown.inner_text("#rows tr.now td.changes")
+    assert press(shown, "ArrowUp", "ArrowUp").startswith("scan 0, 0 ms, step ")
+    shown.check("#every")
+    where(shown)
+    assert shown.locator("#rows tbody tr").count() > 50
+
+
+def test_a_pinned_variable_has_a_column(shown: Any) -> None:
+    shown.click(".label[title='Main.Step'] .pin")
+    for _ in range(SENDING):
+        shown.keyboard.press("ArrowRight")
+    where(shown)
+    assert shown.inner_text("#rows th:nth-child(2)") == "Main.Step"
+    cells = shown.locator("#rows td:nth-child(2)").all_inner_texts()
+    assert (cells[0], cells[-1]) == ("Connecting", "Reading")
+
+
+def test_the_next_change_of_a_variable(shown: Any) -> None:
+    shown.click(".label[title='Main.Step'] button")
+    assert press(shown, "n").startswith(f"scan {SENDING},")
+    assert press(shown, "n", "p").startswith(f"scan {SENDING},")
+    assert press(shown, "p").startswith(f"scan {SENDING},")
+
+
+def test_the_units_words_bit_by_bit(shown: Any) -> None:
+    for _ in range(SENDING):
+        shown.keyboard.press("ArrowRight")
+    where(shown)
+    word = shown.locator("[data-word='CIO 1519']")
+    assert word.locator(".bits .on").all_inner_texts() == ["3"]
+    assert "Send Request Switch" in word.inner_text()
+    assert "ESTABLISHED" in shown.inner_text("[data-word='D30009']")
+    shown.click("#areas [data-area=D]")
+    press(shown, "End")
+    assert "03E8" in shown.inner_text("#words")
+    shown.uncheck("#hex")
+    where(shown)
+    assert "1000" in shown.inner_text("#words")
+
+
+def test_frames_are_taken_apart_and_lead_to_their_scan(shown: Any) -> None:
+    rows = shown.locator("#passed li")
+    assert "03 read holding registers, address 0, quantity 10" in rows.nth(2).inner_text()
+    assert "00 01 00 00 00 06 01 03 00 00 00 0A" in rows.nth(2).inner_text()
+    rows.nth(2).locator("button").click()
+    assert where(shown).startswith(f"scan {SENDING},")
+
+
+def test_the_filter_and_only_what_changes(shown: Any) -> None:
+    press(shown, "/")
+    shown.keyboard.type("main done")
+    where(shown)
+    assert shown.eval_on_selector_all(".label", "rows => rows.map(row => row.title)") == ["Main.Done"]
+    shown.fill("#filter", "")
+    everything = shown.locator(".label").count()
+    shown.check("#moving")
+    where(shown)
+    assert 0 < shown.locator(".label").count() <= everything
+
+
+def test_pointer_wheel_and_zoom(shown: Any) -> None:
+    box = shown.locator("#canvas").bounding_box()
+    left = shown.evaluate("document.getElementById('labels').offsetWidth")
+    shown.mouse.click(box["x"] + left + (box["width"] - left) * 0.5, box["y"] + 60)
+    middle = int(where(shown).split()[1].rstrip(","))
+    assert SCANS * 0.4 < middle < SCANS * 0.6
+    press(shown, "+", "+")
+    shown.mouse.click(box["x"] + left + 5, box["y"] + 60)
+    assert int(where(shown).split()[1].rstrip(",")) > 5
+    press(shown, "0")
+    shown.mouse.click(box["x"] + left + 2, box["y"] + 60)
+    assert where(shown).startswith("scan 0,")
+
+
+def test_the_keys_are_listed(shown: Any) -> None:
+    press(shown, "?")
+    assert shown.locator("#help").is_visible()
+    shown.keyboard.press("Escape")
+    assert not shown.locator("#help").is_visible()
+
+
+def test_light_and_dark(browser: Any, url: str) -> None:
+    colours = []
+    for scheme in ("light", "dark"):
+        made = opened(browser, url, color_scheme=scheme)
+        where(made)
+        painted = "[...document.getElementById('canvas').getContext('2d').getImageData(5, 5, 1, 1).data].join()"
+        colours.append((made.evaluate("getComputedStyle(document.body).backgroundColor"), made.evaluate(painted)))
+        made.context.close()
+    assert colours[0][0] != colours[1][0]
+    assert colours[0][1] != colours[1][1]
+
+
+def test_on_a_phone(browser: Any, url: str) -> None:
+    made = opened(browser, url, viewport={"width": 390, "height": 800}, is_mobile=True, has_touch=True)
+    where(made)
+    assert made.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert made.locator("#scan").is_visible() and not made.locator("#memory").is_visible()
+    made.tap("[data-panel=memory]")
+    where(made)
+    assert made.locator("#memory").is_visible() and not made.locator("#scan").is_visible()
+    made.tap("[data-move=on]")
+    assert where(made) == "scan 1, 10 ms"
+    assert made.complaints == []
+    made.context.close()

@@ -1,0 +1,105 @@
+"""What passed the network, in words, and in a trace."""
+
+from __future__ import annotations
+
+import io
+
+from fbvm.code.compiler import compile_text
+from fbvm.net.loop import LoopNetwork
+from fbvm.net.peers import ModbusPeer
+from fbvm.plc import Phase, Plc
+from fbvm.record.inside import Event, Passing
+from fbvm.record.trace import Moment, Trace
+from fbvm.record.trace_writer import TraceWriter
+from fbvm.record.traffic import Reader, listen
+from fbvm.units.etn21 import Etn21
+from fbvm.wire import modbus
+from fbvm.wire.link import Peer
+from fbvm.wire.tap import Happening, What
+
+UNIT, SERVER = Peer("192.168.250.21", 49152), Peer("192.168.250.1", 502)
+PROGRAM = """
+PROGRAM Main
+VAR c : MTCP_ETN_Connect; r : MTCP_ETN_Fn03; END_VAR
+    c(IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 1, Connect := TRUE);
+    r(EN := c.ENO, Register_Address := 7, Register_Qty := 1, RespData_DM := 200, Cmd_Read := TRUE, SlaveID := 1);
+END_PROGRAM
+"""
+
+
+def said(*happenings: Happening) -> list[str]:
+    reader = Reader()
+    return [passed.said for happening in happenings for passed in reader.read(0, happening)]
+
+
+def data(out: bool, content: bytes) -> Happening:
+    return Happening(What.DATA, UNIT, SERVER, out, content)
+
+
+def test_frames_are_put_together_however_they_were_cut() -> None:
+    asked = modbus.Adu(1, 1, modbus.read(3, 7, 1)).to_bytes()
+    reply = modbus.Adu(1, 1, modbus.data_reply(3, b"\0\5")).to_bytes()
+    opening = Happening(What.SYN, UNIT, SERVER, True)
+    assert said(opening, data(True, asked[:5]), data(True, asked[5:] + asked), data(False, reply)) == [
+        "asks for a connection", "5 bytes, a frame in part",
+        "Modbus 1, unit 1: 03 read holding registers, address 7, quantity 1",
+        "Modbus 1, unit 1: 03 read holding registers, address 7, quantity 1",
+        "Modbus 1, unit 1: 03 read holding registers, data 00 05",
+    ]  # fmt: skip
+
+
+def test_without_its_beginning_a_conversation_is_known_by_the_port() -> None:
+    asked = modbus.Adu(1, 1, modbus.read(3, 7, 1)).to_bytes()
+    assert said(data(True, asked))[0].endswith("address 7, quantity 1")
+    assert said(data(False, modbus.Adu(1, 1, modbus.exception_reply(3, 2)).to_bytes())) == [
+        "Modbus 1, unit 1: 03 read holding registers, exception 02 illegal data address"]
+
+
+def test_what_is_no_modbus_is_counted() -> None:
+    assert said(data(True, b"\0\0\0\0\xff\xff!"), data(True, b"more")) == [
+        "7 bytes, no Modbus: length 65535 outside 2..254", "4 bytes"]
+    assert said(Happening(What.UDP, UNIT, SERVER, True, b"x")) == ["datagram of 1 byte"]
+    assert said(Happening(What.DATA, UNIT, SERVER, False, b"told twice", True)) == []
+
+
+class Noted:
+    """Follows a trace and notes what passed, with its scan and the phases that were over."""
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[int, int, str]] = []
+        self._phases = 0
+
+    def phase(self, moment: Moment, phase: Phase) -> None:
+        self._phases = 0 if phase is Phase.REFRESH else self._phases + 1
+
+    def event(self, moment: Moment, event: Event) -> None:
+        if isinstance(event, Passing):
+            self.rows.append((moment.scans, event.now_ns, str(event.happening)))
+
+
+def test_a_trace_keeps_what_passed() -> None:
+    image = compile_text(PROGRAM).image
+    assert image is not None
+    plc, network, heard = Plc(image), LoopNetwork(), list[tuple[int, int, str]]()
+    network.place(SERVER, ModbusPeer())
+    plc.attach(Etn21(0, UNIT.host), network)
+    network.tap = lambda now_ns, unit, happening: heard.append((plc.scans, now_ns, str(happening)))
+    before, file = network.tap, io.BytesIO()
+    writer = TraceWriter(plc, file)
+    plc.run(scans=250)
+    writer.close()
+    assert network.tap is before
+    noted = Noted()
+    Trace(io.BytesIO(file.getvalue())).follow(noted)
+    assert len(heard) == 4
+    assert noted.rows == heard
+
+
+def test_several_may_listen() -> None:
+    network, first, second = LoopNetwork(), list[Happening](), list[Happening]()
+    assert listen(network, lambda now_ns, unit, happening: first.append(happening)) is None
+    before = listen(network, lambda now_ns, unit, happening: second.append(happening))
+    network.tell_unit(UNIT.host, What.SYN, UNIT, SERVER, True)
+    network.tap = before
+    network.tell_unit(UNIT.host, What.SYN, UNIT, SERVER, True)
+    assert (len(first), len(second)) == (2, 1)
