@@ -17,6 +17,7 @@ WORDS = {
     "src/pump.st": "a function block",
     "src/main.st": "the program that uses it",
     "tests/test_pump.py": "its test",
+    "fbvm.toml": "what `fbvm run` runs",
     "requirements.txt": "what to install",
     ".github/workflows/test.yml": "tests on each push",
 }

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from fbvm.net.loop import LoopNetwork
     from fbvm.plc import Plc
     from fbvm.testing.coverage_plugin import CoveragePlugin
+    from fbvm.testing.plant_rig import PlantRig
     from fbvm.testing.recorded import Recorded
     from fbvm.testing.rig import Rig
     from fbvm.testing.st_items import StFile
@@ -50,6 +51,12 @@ class Tracer(Protocol):
     """What the fixture `trace` is."""
 
     def __call__(self, rig: Rig, *patterns: str, depth: str = "statements") -> Recorded: ...
+
+
+class PlantMaker(Protocol):
+    """What the fixture `plant` is."""
+
+    def __call__(self, project: str = "fbvm.toml") -> PlantRig: ...
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -98,6 +105,31 @@ def fb(request: pytest.FixtureRequest) -> RigMaker:
 def plc(request: pytest.FixtureRequest) -> RigMaker:
     """A whole program on a test rig: `plc("src/main.st")`, with its tasks; the rest is as for `fb`."""
     return _maker(request, block=False)
+
+
+@pytest.fixture
+def plant(request: pytest.FixtureRequest) -> Iterator[PlantMaker]:
+    """The PLCs of a project file, on one network in memory: `plant()` is that of fbvm.toml near the test.
+
+    Each is a rig: `plant().pump.Running`, `made["pump[3]"]`; `run("1s")`, `scan()` and `until("pump.Main.Done", max="5s")` move
+    all of them, `made.network` is what they share."""
+    from fbvm.testing.plant_rig import PlantRig, project_near
+
+    made: list[PlantRig] = []
+
+    def make(project: str = "fbvm.toml") -> PlantRig:
+        __tracebackhide__ = True
+        made.append(PlantRig(project_near(folders_of(request.path, request.config.rootpath), project)))
+        _rigs(request.node).extend(made[-1].rigs.values())
+        for rig in made[-1].rigs.values():
+            counting = ExitStack()
+            counting.enter_context(counted(request.config, rig.plc, rig.subject))
+            request.addfinalizer(counting.close)
+        return made[-1]
+
+    yield make
+    for plants in made:
+        plants.network.close()
 
 
 @pytest.fixture

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -33,6 +34,7 @@ from fbvm.units.unit import Unit
 from fbvm.watch.conditions import parse_condition
 from fbvm.watch.paths import Place, Span, UnknownPlace, find, find_place
 from fbvm.watch.values import Value, parse_time_ns, show_time
+from fbvm.wire.tap import Happening
 
 MOST_PASSED = 10_000
 """Frames that are kept for the page of a failure."""
@@ -95,9 +97,10 @@ class Rig:
     _passed: deque[tuple[int, Passed]]
 
     def __init__(self, what: Subject, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
-                 units: Sequence[Unit] = (), etn21: str = "", network: LoopNetwork | None = None) -> None:  # fmt: skip
+                 units: Sequence[Unit] = (), etn21: str = "", network: LoopNetwork | None = None,
+                 plc: Plc | None = None) -> None:  # fmt: skip
         set_ = object.__setattr__
-        plc = Plc(what.image, to_ns(cycle))
+        plc = plc or Plc(what.image, to_ns(cycle))
         set_(self, "plc", plc)
         set_(self, "subject", what)
         set_(self, "_history", History(plc))
@@ -109,10 +112,8 @@ class Rig:
             if callable(stub):
                 self._stub(name, stub)
         set_(self, "_passed", deque(maxlen=MOST_PASSED))
-        if units or etn21:
-            reader = Reader()
-            listen(self.network, lambda now_ns, unit, told: self._passed.extend(
-                (plc.scans, passed) for passed in reader.read(now_ns, told)))  # fmt: skip
+        if units or etn21 or plc.units:
+            listen(self.network, partial(self._hear, Reader()))
         for unit in (*units, *([Etn21(0, etn21)] if etn21 else ())):
             plc.attach(unit, self.network)
         for name in self._report.names_in(what.prefix):
@@ -137,6 +138,11 @@ class Rig:
         near = [path.parent for path in files if path.parent not in (*libraries, Path.cwd(), *folders[1:])]
         made = subject(files, name if name or block else None, [*libraries, *dict.fromkeys(near)], stubs, text, wanted)
         return cls(made, cycle, stubs=stubs, **given)
+
+    def _hear(self, reader: Reader, now_ns: int, unit: str, told: Happening) -> None:
+        """Keeps what passes the network at a unit of this PLC."""
+        if any(attached.unit.address == unit for attached in self.plc.units):
+            self._passed.extend((self.plc.scans, passed) for passed in reader.read(now_ns, told))
 
     def _stub(self, name: str, stub: Callable[[Any], None]) -> None:
         numbers = [number for number, body in enumerate(self.plc.image.bodies) if fold(body.name) == fold(name)]

@@ -414,3 +414,63 @@ def test_what_is_no_code_of_a_warning_is_wrong_usage(slack: pytest.Pytester) -> 
     result = run(slack, "--fbvm-no-warn=S0201")
     assert result.ret == pytest.ExitCode.USAGE_ERROR
     result.stderr.fnmatch_lines(["*--fbvm-no-warn: S0201 is no code of a warning*"])
+
+
+PROJECT = """
+[run]
+for = "1s"
+[[server]]
+address = "192.168.250.1:502"
+[plc.pump]
+sources = ["src/main.st", "src/pump.st"]
+cycle = "10ms"
+set = [{name = "CIO 0.00", value = true, at = "30ms"}]
+[[plc.pump.unit]]
+address = "192.168.250.21"
+[plc.slow]
+sources = ["src/main.st", "src/pump.st"]
+cycle = "25ms"
+count = 2
+"""
+MAIN = """
+PROGRAM Main
+VAR Button AT CIO 0.00 : BOOL; P : Pump; END_VAR
+    P(Start := Button);
+END_PROGRAM
+"""
+
+
+def test_a_network_of_plcs_from_a_project_file(project: pytest.Pytester) -> None:
+    (project.path / "fbvm.toml").write_text(PROJECT, encoding="utf-8")
+    (project.path / "src" / "main.st").write_text(MAIN, encoding="utf-8")
+    project.makepyfile("""
+        import pytest
+        from fbvm.watch.conditions import ConditionError
+
+        def test_all(plant):
+            made = plant()
+            assert list(made.rigs) == ["pump", "slow[1]", "slow[2]"]
+            made.run("100ms")
+            assert [rig.scans for rig in made.rigs.values()] == [10, 4, 4]
+            assert made.pump.P.Running and not made["slow[1]"].P.Running
+            made["slow[2]"].Button = True
+            made.until("slow[2].P.Running AND pump.P.Starts = 1", max="1s")
+            with pytest.raises(AssertionError, match="does not hold within 50ms"):
+                made.until("slow[1].P.Running", max="50ms")
+            with pytest.raises(ConditionError, match="name of no PLC"):
+                made.until("P.Running")
+            with pytest.raises(AttributeError, match="no PLC valve"):
+                made.valve
+
+        def test_wrong(plant):
+            assert plant().run("100ms").pump.P.Starts == 2
+    """)
+    result = run(project)
+    result.assert_outcomes(passed=1, failed=1)
+    result.stdout.fnmatch_lines(["P.Starts is 1 since scan 8 (80ms), by src/pump.st:17 in P:*"])
+
+
+def test_a_project_file_that_is_wrong(project: pytest.Pytester) -> None:
+    (project.path / "fbvm.toml").write_text("[plc.a]\nsource = 1\n", encoding="utf-8")
+    project.makepyfile("def test_wrong(plant):\n    plant()\ndef test_none(plant):\n    plant('other.toml')\n")
+    run(project).stdout.fnmatch_lines(["E*fbvm.toml:2:*", "E*FileNotFoundError: other.toml is neither in*"])

@@ -1,0 +1,144 @@
+"""A network of PLCs from a project file, moved together in virtual time and asked by name.
+
+    plant = plant()                                    # fbvm.toml near the test
+    plant.until("client.Main.Done", max="5s")
+    assert plant.server["D200"] == 7
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.net.loop import LoopNetwork
+from fbvm.run.plant import Kind, Plant
+from fbvm.run.project import FILE, Project, read_project
+from fbvm.syntax.text import read
+from fbvm.testing.rig import PATIENCE, Rig, to_ns
+from fbvm.testing.subject import Subject, SubjectError
+from fbvm.watch.conditions import parse_condition
+from fbvm.watch.paths import Place, UnknownPlace
+from fbvm.watch.values import Value, show_time
+
+
+class PlantRig:
+    """The PLCs of a project, each a `Rig`: `plant.pump`, `plant["pump[3]"]`; `network` is what they share.
+
+    Times are text ("50ms") or integers of nanoseconds."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises SubjectError with all that is wrong with the project or its programs."""
+        __tracebackhide__ = True
+        project = read_project(path)
+        if not isinstance(project, Project):
+            raise _wrong(project)
+        self._plant = Plant(project, net="loop")
+        if errors(self._plant.diagnostics):
+            raise _wrong(self._plant.diagnostics)
+        assert isinstance(self._plant.network, LoopNetwork)
+        self.network = self._plant.network
+        self.rigs: dict[str, Rig] = {}
+        for kind in self._plant.kinds:
+            self._add(kind)
+
+    def _add(self, kind: Kind) -> None:
+        read_again = [read(path, str(path)) for path in kind.row.sources]
+        sources = {source.name: source for source in read_again if isinstance(source, Source)}
+        for name, run in zip(kind.names, kind.runs, strict=True):
+            image = run.plc.image
+            programs = [program for task in image.tasks for program in task.programs]
+            prefix = f"{programs[0].name}." if len(programs) == 1 else ""
+            rig = Rig(Subject(name, image, prefix, sources, kind.row.libraries), plc=run.plc, network=self.network)
+            for row in kind.row.sets:
+                rig.at(row.at_ns, {row.name: row.value})
+            self.rigs[name] = rig
+
+    def __getitem__(self, name: str) -> Rig:
+        if name not in self.rigs:
+            raise KeyError(f"there is no PLC {name}; there is {', '.join(self.rigs)}")
+        return self.rigs[name]
+
+    def __getattr__(self, name: str) -> Rig:
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(str(error.args[0])) from None
+
+    @property
+    def elapsed_ns(self) -> int:
+        """The time of the next scan of the first PLC that is due."""
+        return min(rig.elapsed_ns for rig in self.rigs.values())
+
+    def scan(self) -> PlantRig:
+        """One scan of each PLC that is due next.  Raises Trapped."""
+        __tracebackhide__ = True
+        now_ns = self.elapsed_ns
+        for rig in self.rigs.values():
+            if rig.elapsed_ns == now_ns:
+                rig.scan()
+        return self
+
+    def run(self, time: str | int) -> PlantRig:
+        """Everybody scans for a time.  Raises Trapped."""
+        __tracebackhide__ = True
+        end_ns = self.elapsed_ns + to_ns(time)
+        while self.elapsed_ns < end_ns:
+            self.scan()
+        return self
+
+    def until(self, condition: str | Callable[[PlantRig], object], /, *, max: str | int = PATIENCE) -> PlantRig:
+        """Everybody scans until a condition holds: a function, or names behind those of their PLCs, `pump.Main.Done`.
+
+        Raises AssertionError if it does not hold within `max`, Trapped after a trap."""
+        __tracebackhide__ = True
+        holds = self._holds(condition)
+        end_ns = self.elapsed_ns + to_ns(max)
+        while True:
+            self.scan()
+            if holds():
+                return self
+            if self.elapsed_ns >= end_ns:
+                said = condition if isinstance(condition, str) else getattr(condition, "__name__", "the condition")
+                raise AssertionError(f"{said} does not hold within {show_time(to_ns(max))[2:]}")
+
+    def _holds(self, condition: str | Callable[[PlantRig], object]) -> Callable[[], bool]:
+        if callable(condition):
+            function = condition
+            return lambda: bool(function(self))
+        owners: dict[Place, tuple[Rig, Place]] = {}
+
+        def find(text: str) -> Place:
+            name, _, path = text.partition(".")
+            if name not in self.rigs:
+                raise UnknownPlace(f"{text} begins with the name of no PLC; there is {', '.join(self.rigs)}")
+            place = self.rigs[name].find(path)
+            if not isinstance(place, Place):
+                raise UnknownPlace(f"{text} is a range; name one place")
+            made = replace(place, name=text)
+            owners[made] = self.rigs[name], place
+            return made
+
+        def value(place: Place) -> Value:
+            rig, own = owners[place]
+            return rig.plc.read(own)
+
+        parsed = parse_condition(condition, find)
+        return lambda: parsed.holds(value)
+
+
+def project_near(folders: Sequence[Path], named: str) -> Path:
+    """The project file of that name in the nearest folder.  Raises FileNotFoundError."""
+    __tracebackhide__ = True
+    for folder in folders:
+        path = folder / named
+        if path.is_dir():
+            path /= FILE
+        if path.is_file():
+            return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
+    raise FileNotFoundError(f"{named} is neither in {' nor in '.join(map(str, folders))}")
+
+
+def _wrong(diagnostics: Sequence[Diagnostic]) -> SubjectError:
+    return SubjectError("\n".join(message.render() for message in errors(diagnostics)))
