@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from fbvm.base.areas import AREAS
 from fbvm.base.memory import Memory
+from fbvm.engine.native_scans import Clockwork
 
 FIRST_CYCLE = (200, 11)
 """A200.11: ON in the first cycle after a change to RUN."""
@@ -85,6 +86,19 @@ class Flags:
         return bool(self._a[word] >> bit & 1)
 
 
+def _clockwork() -> Clockwork:
+    """What `Flags.update` writes in a scan that is not the first, as data for machine code."""
+    a = AREAS["A"].offset
+    word, bit = FIRST_CYCLE
+    assert FIRST_TASK_CYCLE[0] == word
+    return Clockwork(
+        cleared=((a + 2 * word, 0xFFFF & ~(1 << bit | 1 << FIRST_TASK_CYCLE[1])),),
+        cycle_time=(a + 2 * CYCLE_TIME, a + 2 * MAX_CYCLE_TIME),
+        counters=tuple((a + 2 * at, unit_ns) for at, unit_ns in FREE_COUNTERS),
+        pulses=tuple((at, keep, tuple(periods)) for at, keep, periods in _ROWS),
+    )  # fmt: skip
+
+
 def _masks(byte: int) -> tuple[int, Periods]:
     """Which bits of a byte of CF are not clock pulses, and when the others are ON."""
     here = {1 << number % 8: period_ns for number, period_ns in PERIODS_NS.items() if number // 8 == byte}
@@ -92,3 +106,4 @@ def _masks(byte: int) -> tuple[int, Periods]:
 
 
 _ROWS = [(AREAS["CF"].offset + byte, *_masks(byte)) for byte in sorted({number // 8 for number in PERIODS_NS})]
+CLOCKWORK = _clockwork()

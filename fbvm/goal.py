@@ -45,6 +45,16 @@ class Goal:
         condition: Condition = parse_condition(until, self._plc.find)
         return lambda: condition.holds(self._plc.read)
 
+    @property
+    def scans_left(self) -> int:
+        """How many scans of a cycle each come before anybody looks at the goal again; 1 for a condition."""
+        plc = self._plc
+        if self._until:
+            return 1
+        ends = [self.scans - plc.scans] if self.scans is not None else []
+        ends += [-((plc.elapsed_ns - at_ns) // plc.cycle_ns) for at_ns in (self.for_ns, self.max_ns) if at_ns is not None]
+        return min(ends)
+
     def reached(self) -> str:
         """"trap", "until", "scans", "time", "max" or "break" if that ended the run, else ""."""
         plc = self._plc

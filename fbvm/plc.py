@@ -9,19 +9,21 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from enum import Enum
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
 from fbvm.base.memory import Memory, Snapshot
 from fbvm.breakpoints import Breakpoints, Halt
 from fbvm.code.image import Image, fingerprint
-from fbvm.engine.tiers import Engine, engine_for
+from fbvm.engine.tiers import Engine, engine_for, native_of
 from fbvm.engine.trap import Trap
-from fbvm.flags import Flags
+from fbvm.flags import CLOCKWORK, TENTH_MS_NS, Flags
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
 from fbvm.scan_times import Lateness, ScanTimes
-from fbvm.schedule import Schedule, ScheduleState, hurried
+from fbvm.schedule import Schedule, hurried
+from fbvm.state import Mode as Mode
+from fbvm.state import Phase as Phase
+from fbvm.state import State as State
 from fbvm.units.unit import Unit
 from fbvm.watch import places
 from fbvm.watch.paths import Place, Span, find, find_place
@@ -30,21 +32,6 @@ from fbvm.wire.link import Link, Network
 
 STEP_BUDGET = 2_000_000
 """Statements that one scan may execute before the watchdog ends it."""
-
-
-class Mode(Enum):
-    """PROGRAM: units are refreshed, the program stands.  RUN: the program is executed."""
-
-    PROGRAM = "PROGRAM"
-    RUN = "RUN"
-
-
-class Phase(Enum):
-    """What a scan consists of, for those who look inside: each is told when it is over."""
-
-    INPUTS = "inputs"
-    PROGRAM = "program"
-    REFRESH = "I/O refresh"
 
 
 class Stopped(RuntimeError):
@@ -62,20 +49,6 @@ class Attached:
     unit: Unit
     link: Link
     network: Network
-
-
-@dataclass(frozen=True)
-class State:
-    """All that `Plc.snapshot` keeps: memory, time, schedule, forces, mode and trap.  Not units and connections."""
-
-    memory: Snapshot
-    now_ns: int
-    scans: int
-    schedule: ScheduleState
-    forces: dict[Place, Value]
-    mode: Mode
-    first: bool
-    trap: Trap | None
 
 
 class Plc:
@@ -265,8 +238,26 @@ class Plc:
         that stands at a breakpoint; the next run goes on there."""
         goal = Goal(self, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
         while not (reason := goal.reached()):
-            self.scan()
+            if (left := goal.scans_left) < 2 or not self._scan_many(left):
+                self.scan()
         return reason
+
+    def _scan_many(self, most: int) -> bool:
+        """Several scans inside machine code, if nobody has to be told between them; False if there was none."""
+        native = native_of(self.engine)
+        outside = self.units or self.watchers or self.phases or self._forces or self._journal or self._past.maxlen
+        if native is None or outside or self._first or self._mode is not Mode.RUN or self.breakpoints.armed:
+            return False
+        turns = self._schedule.turns()
+        if turns is None:
+            return False
+        self._system[BUDGET // 8] = self.budget
+        cycle_time = min(self.cycle_ns // TENTH_MS_NS, 0xFFFFFFFF)
+        done, self.trap = native.run_many(turns, most, self.cycle_ns, CLOCKWORK, cycle_time=cycle_time, spend=STEP_BUDGET)
+        self._schedule.took(turns)
+        self.scans += done
+        self.now_ns += done * self.cycle_ns
+        return done > 0
 
     # --- values -------------------------------------------------------------------------------------------------------
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 from fbvm.base.areas import NEVER
 from fbvm.code.image import TaskRow
+from fbvm.engine.native_scans import Turn
 from fbvm.watch.values import show_time
 
 ScheduleState = tuple[dict[int, int], dict[int, bool], frozenset[int]]
@@ -55,6 +56,16 @@ class Schedule:
         missed = (now_ns - planned_ns) // task.interval_ns
         self._next_ns[number] = planned_ns + (missed + 1) * task.interval_ns
         return edge or not level
+
+    def turns(self) -> list[Turn] | None:
+        """The tasks in their order, as far as only time says when they run; None if a variable does, too."""
+        if self.fresh or any(task.single for task in self.tasks):
+            return None
+        return [Turn(number, self.tasks[number].interval_ns, self._next_ns.get(number, 0)) for number in self._order]
+
+    def took(self, turns: list[Turn]) -> None:
+        """The tasks have had turns up to these."""
+        self._next_ns.update((turn.task, turn.next_ns) for turn in turns if turn.interval_ns)
 
     def reset(self) -> None:
         """As at power-on."""

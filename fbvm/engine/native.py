@@ -6,14 +6,17 @@ meaning is in the table of operations."""
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 from weakref import finalize
 
+from fbvm.base.areas import BUDGET
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
 from fbvm.engine import native_compiler
 from fbvm.engine.native_code import Code, code_of
 from fbvm.engine.native_context import Context
-from fbvm.engine.native_entries import Entry, entry, scans
+from fbvm.engine.native_entries import Entry, entry
+from fbvm.engine.native_scans import NOTHING, PARAMETERS, Clockwork, Turn, scans
 from fbvm.engine.native_writer import Unsupported
 from fbvm.engine.stops import PAUSE, STOPPED, Stops
 from fbvm.engine.trap import Trap, trap
@@ -66,15 +69,24 @@ class NativeEngine:
         point = self._calls[task_index]()
         return self._trap(point) if point else None
 
-    def run_n(self, task_index: int, n: int, step_ns: int) -> tuple[int, Trap | None]:
-        """Execute a task up to n times while nobody needs to be told; returns how often, and the trap that ended it.
+    def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork = NOTHING, *,
+                 cycle_time: int = 0, spend: int = 1 << 62) -> tuple[int, Trap | None]:  # fmt: skip
+        """Up to n scans while nobody needs to be told; returns how many there were, and the trap of the last.
 
-        Before each time the scan's time advances by `step_ns`, nothing is due, and the budget is what it is now; after
-        each time the number of scans is one more."""
-        done = ctypes.c_int64()
-        point = scans()(self._code.address(task_index, self.level), self._memory_at, self._context.at, n, step_ns,
-                        ctypes.addressof(done))
-        return done.value, self._trap(point) if point else None
+        In each of them the scan's time advances by `step_ns`, nothing is due, the budget is what it is now, `clockwork`
+        is written, with `cycle_time` in its unit; then the tasks that are due take their turns, whose `next_ns` move on,
+        and the number of scans grows.  No other begins when all together have executed `spend` statements."""
+        if not turns or n <= 0:
+            return 0, None
+        budget: int = self.memory.views["i64"][BUDGET // 8]
+        rows = [(self._code.address(turn.task, self.level), turn.interval_ns, turn.next_ns, 0) for turn in turns]
+        numbers = (n, step_ns, budget, spend, 0, cycle_time, *(number for row in rows for number in row))
+        parameters = (ctypes.c_int64 * len(numbers))(*numbers)
+        function = scans(tuple(turn.interval_ns > 0 for turn in turns), clockwork)
+        point = function(self._memory_at, self._context.at, ctypes.addressof(parameters))
+        for number, turn in enumerate(turns):
+            turn.next_ns = parameters[len(PARAMETERS) + 4 * number + 2]
+        return parameters[PARAMETERS.index("done")], self._trap(point) if point else None
 
     def _trap(self, number: int) -> Trap:
         """What the point says, with the values that the context holds."""

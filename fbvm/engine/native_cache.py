@@ -22,8 +22,9 @@ from fbvm.engine.native_compiler import host
 
 FORMAT = b"fbvm object 1\n"
 """What a file begins with."""
-LIMIT_BYTES = 256 << 20
-"""Size of all files above which the oldest go, until a quarter of the room is free."""
+LIMIT_BYTES, LIMIT_FILES = 256 << 20, 2000
+"""Size and number of all files above which the oldest go, until a quarter of the room is free.  Each time that one is
+written all are looked at, which takes as long as there are many."""
 _DIGEST_BYTES = 32
 _on = True
 
@@ -124,22 +125,24 @@ def _unpacked(content: bytes) -> Stored | None:
 
 
 def _make_room(folder: Path) -> None:
-    files = sorted(_files(folder))
-    total = sum(size for _, size, _ in files)
-    if total <= LIMIT_BYTES:
+    files = list(_files(folder))
+    count, total = len(files), sum(size for _, size, _ in files)
+    if total <= LIMIT_BYTES and count <= LIMIT_FILES:
         return
-    for _, size, path in files:
-        if total <= LIMIT_BYTES * 3 // 4:
+    for _, size, path in sorted(files):
+        if total <= LIMIT_BYTES * 3 // 4 and count <= LIMIT_FILES * 3 // 4:
             return
-        path.unlink(missing_ok=True)
+        Path(path).unlink(missing_ok=True)
         total -= size
+        count -= 1
 
 
-def _files(folder: Path) -> Iterator[tuple[float, int, Path]]:
+def _files(folder: Path) -> Iterator[tuple[float, int, str]]:
     """When each file was used last, its size, and where it is."""
-    for path in folder.iterdir():
-        try:
-            found = path.stat()
-        except OSError:
-            continue
-        yield found.st_mtime, found.st_size, path
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            try:
+                found = entry.stat()
+            except OSError:  # somebody else made room
+                continue
+            yield found.st_mtime, found.st_size, entry.path

@@ -9,7 +9,6 @@ import ctypes
 from collections.abc import Callable
 from functools import cache
 
-from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
 from fbvm.engine import native_cache
 from fbvm.engine.native_cache import Stored, name_of
 from fbvm.engine.native_compiler import Linked, compile_text
@@ -25,39 +24,6 @@ define i32 @e{0}() {{
 %p = tail call i32 %f(ptr %m, ptr %c)
 ret i32 %p
 }}"""
-_SCANS = f"""
-define i32 @scans(ptr %f, ptr %m, ptr %c, i64 %n, i64 %step, ptr %done) {{
-entry:
-%now = getelementptr i8, ptr %m, i64 {NOW}
-%due = getelementptr i8, ptr %m, i64 {DUE}
-%left = getelementptr i8, ptr %m, i64 {BUDGET}
-%count = getelementptr i8, ptr %m, i64 {SCANS}
-%budget = load i64, ptr %left
-br label %test
-test:
-%i = phi i64 [ 0, %entry ], [ %i1, %scan ]
-%p = phi i32 [ 0, %entry ], [ %p1, %scan ]
-store i64 %i, ptr %done
-%fine = icmp eq i32 %p, 0
-%more = icmp slt i64 %i, %n
-%go = and i1 %fine, %more
-br i1 %go, label %scan, label %end
-scan:
-%t = load i64, ptr %now
-%t1 = add i64 %t, %step
-store i64 %t1, ptr %now
-store i64 {NEVER}, ptr %due
-store i64 %budget, ptr %left
-%p1 = call i32 %f(ptr %m, ptr %c)
-%s = load i64, ptr %count
-%s1 = add i64 %s, 1
-store i64 %s1, ptr %count
-%i1 = add i64 %i, 1
-br label %test
-end:
-ret i32 %p
-}}
-"""
 
 
 class Entry:
@@ -86,7 +52,7 @@ class _Block:
     """Entries that were loaded together, and the numbers of those that nobody has."""
 
     def __init__(self) -> None:
-        self.linked = Linked(_compiled(), ["slots", "scans", *(f"e{number}" for number in range(BLOCK))])
+        self.linked = Linked(_compiled(), ["slots", *(f"e{number}" for number in range(BLOCK))])
         self.slots = self.linked.address("slots")
         self.free = list(range(BLOCK - 1, -1, -1))
 
@@ -100,7 +66,7 @@ def _compiled() -> bytes:
     """The object of a block."""
     entries = [_ENTRY.format(number, *(SLOT_BYTES * number + part for part in (0, 8, 16))) for number in range(BLOCK)]
     head = f"@slots = global [{SLOT_BYTES * BLOCK} x i8] zeroinitializer, align 8"
-    text = "\n".join([head, *entries, _SCANS])
+    text = "\n".join([head, *entries])
     name = name_of("entries", text)
     stored = native_cache.read(name)
     if stored is None:
@@ -116,19 +82,3 @@ def entry() -> Entry:
     if not _open:
         _open.append(_Block())
     return Entry(_open[-1], _open[-1].free.pop())
-
-
-@cache
-def scans() -> Callable[..., int]:
-    """The function that executes a task many times: (function, memory, context, n, step in ns, where to count)."""
-    address = _first_block().linked.address("scans")
-    return ctypes.PYFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64,
-                             ctypes.c_int64, ctypes.c_void_p)(address)
-
-
-@cache
-def _first_block() -> _Block:
-    """A block that stays."""
-    block = _Block()
-    _open.append(block)
-    return block

@@ -55,6 +55,13 @@ def choice_of(engine: object) -> str:
     raise ValueError("somebody looks into every scan already: a run with breakpoints is another one")
 
 
+def native_of(engine: object) -> native.NativeEngine | None:
+    """The machine code that an engine runs now, if it does."""
+    if isinstance(engine, Tiers):
+        engine = engine._engine if engine.native and not engine.python.substitutes else None
+    return engine if isinstance(engine, native.NativeEngine) else None
+
+
 def substitutes_of(engine: object) -> Mapping[int, Callable[[int], None]]:
     """What stands in place of bodies, by their numbers."""
     return python_of(engine).substitutes if isinstance(engine, PythonEngine | Tiers) else {}

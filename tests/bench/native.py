@@ -28,6 +28,7 @@ from fbvm.code.compiler import compile_sources  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
 from fbvm.engine import native_cache, native_statements  # noqa: E402
 from fbvm.engine.native import NativeEngine  # noqa: E402
+from fbvm.engine.native_scans import Turn  # noqa: E402
 from fbvm.engine.native_writer import Writer  # noqa: E402
 from fbvm.engine.python import PythonEngine  # noqa: E402
 
@@ -93,7 +94,7 @@ def natively(image: Image, level: int, step_ns: int) -> Callable[[int], object]:
 
     def scans(n: int) -> None:
         engine.memory.write(BUDGET, "i64", 1 << 60)
-        assert engine.run_n(0, n, step_ns) == (n, None)
+        assert engine.run_many([Turn(0)], n, step_ns) == (n, None)
 
     return scans
 

@@ -23,6 +23,7 @@ if not native.available():
 
 from fbvm.engine import native_cache, native_compiler, native_entries
 from fbvm.engine.native_module import BodyWriter, translate
+from fbvm.engine.native_scans import Turn
 from fbvm.engine.native_worker import worker
 
 ONE = const("i16", 1)
@@ -94,27 +95,27 @@ def test_a_memory_stays_while_an_engine_runs_over_it() -> None:
 # --- many scans at once ---------------------------------------------------------------------------------------------
 
 
-def test_run_n_advances_time_and_counts_scans() -> None:
+def test_many_scans_advance_time_and_count() -> None:
     e = engine((*COUNT, ("due", ("add", "i64", ("now", "i64"), const("i64", 5))), ("charge", 7, 1)), budget=10)
-    assert e.run_n(0, 1000, 1_000_000) == (1000, None)
+    assert e.run_many([Turn(0)], 1000, 1_000_000) == (1000, None)
     assert slot(e) == 1000
     read = e.memory.read
     assert (read(NOW, "i64"), read(SCANS, "i64")) == (1_005_000_000, 1000)
     assert (read(DUE, "i64"), read(BUDGET, "i64")) == (1_005_000_005, 3)
 
 
-def test_run_n_ends_with_a_trap() -> None:
+def test_many_scans_end_with_a_trap() -> None:
     left = ("sub", "i16", const("i16", 5), load("i16", 0))
     e = engine((*COUNT, store("i16", 2, ("div", "i16", ONE, left, 4))))
-    done, trap = e.run_n(0, 1000, 1000)
+    done, trap = e.run_many([Turn(0)], 1000, 1000)
     assert done == 5 and trap is not None
     assert (trap.code, trap.values) == ("R0101", (1, 0))
     assert e.memory.read(SCANS, "i64") == 5
 
 
-def test_run_n_of_nothing() -> None:
+def test_many_scans_of_nothing() -> None:
     e = engine(COUNT)
-    assert e.run_n(0, 0, 1000) == (0, None)
+    assert e.run_many([Turn(0)], 0, 1000) == (0, None)
     assert slot(e) == 0 and e.memory.read(DUE, "i64") == NEVER
 
 

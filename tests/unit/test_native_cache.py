@@ -68,6 +68,15 @@ def test_the_oldest_go_when_there_are_too_many(folder: Path, monkeypatch: pytest
     assert sorted(path.name[0] for path in folder.iterdir()) == ["a", "f", "g"]
 
 
+def test_small_ones_go_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native_cache, "LIMIT_FILES", 8)
+    names = [letter * 64 for letter in "abcdefghi"]
+    for place, name in enumerate(names):
+        native_cache.write(name, STORED)
+        os.utime(folder / name, (place, place))
+    assert sorted(path.name[0] for path in folder.iterdir()) == ["d", "e", "f", "g", "h", "i"]
+
+
 def test_a_folder_that_cannot_be_made_does_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "file"))

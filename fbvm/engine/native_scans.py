@@ -1,0 +1,178 @@
+"""Many scans inside machine code: what a scan does besides its tasks, for as long as nobody outside has to be told.
+
+The function that does them is made for a shape: which of the tasks have an interval, and which words tell the program
+about time.  It has no calls but those of the tasks."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from string import Template
+
+from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
+from fbvm.engine import native_cache
+from fbvm.engine.native_cache import Stored, name_of
+from fbvm.engine.native_compiler import Linked, compile_text
+
+
+@dataclass
+class Turn:
+    """A task in its turn: its number, its interval or 0, and when it runs next if it has one."""
+
+    task: int
+    interval_ns: int = 0
+    next_ns: int = 0
+
+
+@dataclass(frozen=True)
+class Clockwork:
+    """What a scan writes at its start from its time alone; offsets in bytes of the buffer."""
+
+    cleared: tuple[tuple[int, int], ...] = ()
+    """Words of 16 bits and the bits of them that stay."""
+    cycle_time: tuple[int, int] | None = None
+    """Where 32 bits with the cycle time lie, and where those with the longest one."""
+    counters: tuple[tuple[int, int], ...] = ()
+    """Words of 16 bits that count, and what they count, in nanoseconds."""
+    pulses: tuple[tuple[int, int, tuple[tuple[int, int, int], ...]], ...] = ()
+    """Bytes, the bits of them that stay, and the others: mask, period, and from when in it they are ON."""
+
+
+NOTHING = Clockwork()
+PARAMETERS = ("left", "step", "budget", "spend", "done", "cycle")
+"""64 bits each, and then the rows of turns: how many scans, by how far time goes on, statements that a scan may execute
+and all of them together, how many scans there were; the cycle time."""
+ROW_BYTES = 32
+"""A turn: address of the function, interval, next time, whether it is due."""
+_SCANS = Template(f"""
+define i32 @scans(ptr %m, ptr %c, ptr %p) {{
+entry:
+%now_at = getelementptr inbounds i8, ptr %m, i64 {NOW}
+%due_at = getelementptr inbounds i8, ptr %m, i64 {DUE}
+%budget_at = getelementptr inbounds i8, ptr %m, i64 {BUDGET}
+%count_at = getelementptr inbounds i8, ptr %m, i64 {SCANS}
+%step_at = getelementptr inbounds i8, ptr %p, i64 8
+%amount_at = getelementptr inbounds i8, ptr %p, i64 16
+%spend_at = getelementptr inbounds i8, ptr %p, i64 24
+%done_at = getelementptr inbounds i8, ptr %p, i64 32
+%cycle_at = getelementptr inbounds i8, ptr %p, i64 40
+%n = load i64, ptr %p
+%step = load i64, ptr %step_at
+%amount = load i64, ptr %amount_at
+%spend = load i64, ptr %spend_at
+%cycle = load i64, ptr %cycle_at
+$rows
+br label %test
+test:
+%i = phi i64 [ 0, %entry ], [ %i1, %good ]
+%spent = phi i64 [ 0, %entry ], [ %spent1, %good ]
+%more = icmp slt i64 %i, %n
+%rest = icmp slt i64 %spent, %spend
+%go = and i1 %more, %rest
+br i1 %go, label %scan, label %end
+scan:
+%before = load i64, ptr %now_at
+%now = add i64 %before, %step
+store i64 %now, ptr %now_at
+store i64 {NEVER}, ptr %due_at
+store i64 %amount, ptr %budget_at
+$clockwork
+$turns
+br label %good
+good:
+%left = load i64, ptr %budget_at
+%used = sub i64 %amount, %left
+%spent1 = add i64 %spent, %used
+%s = load i64, ptr %count_at
+%s1 = add i64 %s, 1
+store i64 %s1, ptr %count_at
+%i1 = add i64 %i, 1
+br label %test
+trap:
+%point = phi i32 $points
+%s2 = load i64, ptr %count_at
+%s3 = add i64 %s2, 1
+store i64 %s3, ptr %count_at
+%i2 = add i64 %i, 1
+store i64 %i2, ptr %done_at
+ret i32 %point
+end:
+store i64 %i, ptr %done_at
+ret i32 0
+}}
+declare i32 @llvm.umax.i32(i32, i32)
+""")
+
+
+def _clockwork(row: Clockwork) -> Iterator[str]:
+    """What it writes, as instructions."""
+    for n, (offset, stay) in enumerate(row.cleared):
+        yield from (f"%ka{n} = getelementptr inbounds i8, ptr %m, i64 {offset}", f"%kb{n} = load i16, ptr %ka{n}",
+                    f"%kc{n} = and i16 %kb{n}, {stay}", f"store i16 %kc{n}, ptr %ka{n}")
+    if row.cycle_time:
+        now, longest = row.cycle_time
+        yield from ("%tc = trunc i64 %cycle to i32", f"%ta = getelementptr inbounds i8, ptr %m, i64 {now}",
+                    "store i32 %tc, ptr %ta, align 2", f"%tl = getelementptr inbounds i8, ptr %m, i64 {longest}",
+                    "%to = load i32, ptr %tl, align 2", "%tm = call i32 @llvm.umax.i32(i32 %tc, i32 %to)",
+                    "store i32 %tm, ptr %tl, align 2")
+    for n, (offset, unit_ns) in enumerate(row.counters):
+        yield from (f"%qa{n} = udiv i64 %now, {unit_ns}", f"%qb{n} = trunc i64 %qa{n} to i16",
+                    f"%qc{n} = getelementptr inbounds i8, ptr %m, i64 {offset}", f"store i16 %qb{n}, ptr %qc{n}")
+    for n, (offset, stay, bits) in enumerate(row.pulses):
+        yield from (f"%pa{n} = getelementptr inbounds i8, ptr %m, i64 {offset}", f"%pb{n} = load i8, ptr %pa{n}",
+                    f"%p{n}.0 = and i8 %pb{n}, {stay}")
+        for k, (mask, period_ns, from_ns) in enumerate(bits):
+            yield from (f"%ra{n}.{k} = urem i64 %now, {period_ns}", f"%rb{n}.{k} = icmp uge i64 %ra{n}.{k}, {from_ns}",
+                        f"%rc{n}.{k} = select i1 %rb{n}.{k}, i8 {mask}, i8 0",
+                        f"%p{n}.{k + 1} = or i8 %p{n}.{k}, %rc{n}.{k}")
+        yield f"store i8 %p{n}.{len(bits)}, ptr %pa{n}"
+
+
+def _rows(count: int) -> Iterator[str]:
+    """The functions of the turns, and where their times are."""
+    for n in range(count):
+        at = 8 * len(PARAMETERS) + ROW_BYTES * n
+        for letter, offset in zip("finw", range(at, at + ROW_BYTES, 8), strict=True):
+            yield f"%{letter}a{n} = getelementptr inbounds i8, ptr %p, i64 {offset}"
+        yield f"%f{n} = load ptr, ptr %fa{n}"
+
+
+def _turns(intervals: Sequence[bool]) -> Iterator[str]:
+    """Which are due is found before the first one runs."""
+    for n in (n for n, has in enumerate(intervals) if has):
+        yield from (f"%x{n} = load i64, ptr %na{n}", f"%y{n} = icmp sge i64 %now, %x{n}", f"%z{n} = zext i1 %y{n} to i64",
+                    f"store i64 %z{n}, ptr %wa{n}", f"br i1 %y{n}, label %due{n}, label %set{n}", f"due{n}:",
+                    f"%u{n} = load i64, ptr %ia{n}", f"%l{n} = sub i64 %now, %x{n}", f"%d{n} = udiv i64 %l{n}, %u{n}",
+                    f"%e{n} = add i64 %d{n}, 1", f"%g{n} = mul i64 %e{n}, %u{n}", f"%h{n} = add i64 %x{n}, %g{n}",
+                    f"store i64 %h{n}, ptr %na{n}", f"br label %set{n}", f"set{n}:")
+    for n, has in enumerate(intervals):
+        if has:
+            yield from (f"%w{n} = load i64, ptr %wa{n}", f"%v{n} = icmp ne i64 %w{n}, 0",
+                        f"br i1 %v{n}, label %run{n}, label %over{n}", f"run{n}:")
+        else:
+            yield from (f"br label %run{n}", f"run{n}:")
+        yield from (f"%r{n} = call i32 %f{n}(ptr %m, ptr %c)", f"%t{n} = icmp eq i32 %r{n}, 0",
+                    f"br i1 %t{n}, label %over{n}, label %trap", f"over{n}:")
+
+
+@cache
+def scans(intervals: tuple[bool, ...], clockwork: Clockwork) -> Callable[[int, int, int], int]:
+    """The function for a shape: (memory, context, parameters), which returns the point of a trap or 0."""
+    points = ", ".join(f"[ %r{n}, %run{n} ]" for n in range(len(intervals)))
+    text = _SCANS.substitute(rows="\n".join(_rows(len(intervals))), clockwork="\n".join(_clockwork(clockwork)),
+                             turns="\n".join(_turns(intervals)), points=points)  # fmt: skip
+    name = name_of("scans", text)
+    stored = native_cache.read(name)
+    if stored is None:
+        stored = Stored({}, compile_text(text, 2))
+        native_cache.write(name, stored)
+    linked = Linked(stored.compiled, ["scans"])
+    function = ctypes.PYFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(linked.address("scans"))
+    _LOADED.append(linked)
+    return function
+
+
+_LOADED: list[Linked] = []
+"""What functions that were given out lie in."""
