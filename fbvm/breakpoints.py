@@ -139,20 +139,25 @@ class Breakpoints:
 
     def run(self, task_index: int, engine: Engine) -> Trap | None:
         """Executes a task in place of an engine, or goes on with it, up to its end, a trap or a stop."""
-        guarded = self._guarded
-        if self.halted and guarded:
+        if self.halted and self._guarded:
             self.halted = None
+            guarded = self._guarded
             trap = guarded.go_on()
         else:
-            substitutes = substitutes_of(engine)
-            if guarded is None or self._stands_in != (engine, substitutes):
-                plc = self._plc
-                guarded = Guarded(plc.image, plc.memory, self._stops, choice_of(engine), substitutes)
-                self._guarded, self._stands_in = guarded, (engine, dict(substitutes))
+            guarded = self.guarding(engine)
             trap = guarded.run(task_index)
         if guarded.seen:
             self.halted = self._halt(guarded, guarded.seen.site)
         return trap
+
+    def guarding(self, engine: Engine) -> Guarded:
+        """What runs in place of an engine."""
+        substitutes = substitutes_of(engine)
+        if self._guarded is None or self._stands_in != (engine, substitutes):
+            plc = self._plc
+            self._guarded = Guarded(plc.image, plc.memory, self._stops, choice_of(engine), substitutes)
+            self._stands_in = engine, dict(substitutes)
+        return self._guarded
 
     def leave(self) -> None:
         """The scan that stands will not go on."""

@@ -244,9 +244,10 @@ class Plc:
 
     def _scan_many(self, most: int) -> bool:
         """Several scans inside machine code, if nobody has to be told between them; False if there was none."""
-        native = native_of(self.engine)
+        armed = self.breakpoints.armed
+        native = self.breakpoints.guarding(self.engine) if armed else native_of(self.engine)
         outside = self.units or self.watchers or self.phases or self._forces or self._journal or self._past.maxlen
-        if native is None or outside or self._first or self._mode is not Mode.RUN or self.breakpoints.armed:
+        if native is None or outside or self._first or self._mode is not Mode.RUN or self.halted:
             return False
         turns = self._schedule.turns()
         if turns is None:

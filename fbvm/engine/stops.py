@@ -16,6 +16,9 @@ from fbvm.code.image import Site
 from fbvm.engine.trap import Trap
 
 Test = Callable[[], bool]
+Seen = tuple[tuple[int, ...], bool, object]
+"""What was seen of watched bytes last: their bits, whether the test held, their value."""
+State = list[Seen]
 AT_STATEMENT, WATCHING = 1, 2
 """Bits of a byte of the table: a run stops at this statement; watched bytes are compared at this site."""
 ASK, COUNT, ROWS, TABLE = 0, 8, 16, 24
@@ -74,11 +77,11 @@ class Watched:
         return self._held and not (self._edge and held)
 
     @property
-    def state(self) -> tuple[tuple[int, ...], bool, object]:
+    def state(self) -> Seen:
         """What `back` brings back."""
         return self.last, self._held, self.value
 
-    def back(self, state: tuple[tuple[int, ...], bool, object]) -> None:
+    def back(self, state: Seen) -> None:
         self.last, self._held, self.value = state
 
 
@@ -140,11 +143,11 @@ class Stops:
         return bool(found)
 
     @property
-    def state(self) -> list[tuple[tuple[int, ...], bool, object]]:
+    def state(self) -> State:
         """What was seen last, for `back`."""
         return [row.state for row in self._watched]
 
-    def back(self, state: list[tuple[tuple[int, ...], bool, object]]) -> None:
+    def back(self, state: State) -> None:
         """Nothing has been seen since then."""
         for row, was in zip(self._watched, state, strict=True):
             row.back(was)
