@@ -21,7 +21,9 @@ def test_minutes_with_all_blocks_busy(timing: str, minutes: int) -> None:
     network.faults.append(Fault(segment_bytes=100, random_cut=True, gap_ns=1_000_000))
     network.place(SERVER, peer)
     plc.attach(Etn21(0, UNIT_ADDRESS, timing=timing, seed=5), network)
-    plc.run(for_ns=MINUTE_NS)
+    plc.run(for_ns=MINUTE_NS // 2)
+    early = usage()
+    plc.run(for_ns=MINUTE_NS // 2)
     before = usage()
     ended = check(plc)
     for _ in range(2 * minutes - 2):
@@ -33,7 +35,8 @@ def test_minutes_with_all_blocks_busy(timing: str, minutes: int) -> None:
     peer.heard.clear()
     after = usage()
     assert after.objects <= before.objects + 300
-    assert after.handles == before.handles
+    # The compiler's thread, which works beside, may have had a file of its cache open just then.
+    assert after.handles <= min(early.handles, before.handles)
     assert after.resident_bytes <= before.resident_bytes + (12 << 20)
     served = [plc.read(f"Main.{name}_Busy.Ended") for name in BLOCKS]
     assert max(served) - min(served) <= 1, "each has had its turn"  # type: ignore[operator, type-var]
