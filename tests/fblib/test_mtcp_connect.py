@@ -186,6 +186,75 @@ def test_a_restart_of_the_unit(timing: str) -> None:
     assert rig.code("conn") == ""
 
 
+RIVAL = """
+    IF Go THEN
+        Number := Rival_Socket; Port := 6000; IP[0] := 0; IP[1] := 0; Remote := 0; Time_Limit := 0;
+        Passive := TRUE; Go := FALSE;
+    ELSIF Leave THEN
+        Number := 2; Closing := TRUE; Leave := FALSE;
+    END_IF;"""
+RIVAL_VARIABLES = """
+    Number AT D30018 : WORD; Port AT D30019 : UINT; IP AT D30020 : ARRAY[0..1] OF WORD; Remote AT D30022 : UINT;
+    Time_Limit AT D30026 : UINT; Passive AT CIO 1519.01 : BOOL; Closing AT CIO 1519.05 : BOOL;
+    Go, Leave : BOOL; Rival_Socket : WORD := 2;"""
+
+
+def with_rival(socket: int, timing: str) -> Rig:
+    """A program has let another socket, or ours, wait for a caller who never comes, by our parameter area."""
+    rig = Rig(more=RIVAL, more_variables=RIVAL_VARIABLES, timing=timing, seed=4)
+    rig.set("conn_EN", False)
+    rig.set("Rival_Socket", socket)
+    rig.set("Go", True)
+    rig.scan(8)
+    rig.set("conn_EN", True)
+    return rig
+
+
+@pytest.mark.parametrize("timing", ["exact", "real"])
+def test_a_parameter_area_that_another_program_keeps_busy(timing: str) -> None:
+    """220F, again and again; when the program leaves it, the block connects by itself."""
+    rig = with_rival(2, timing)
+    assert rig.run_until("Main.conn.Error", 12) == pytest.approx(10, abs=0.3)
+    assert (rig.code("conn"), rig.get("conn.Waiting_Server")) == ("220F", True)
+    rig.scan(2000)
+    assert rig.code("conn") == "220F"
+    rig.set("Leave", True)
+    rig.run_until("Main.conn.ENO", 15)
+    assert rig.code("conn") == ""
+
+
+@pytest.mark.parametrize("timing", ["exact", "real"])
+def test_a_socket_that_another_program_lets_wait(timing: str) -> None:
+    """The close before each open ends that."""
+    rig = with_rival(1, timing)
+    assert rig.run_until("Main.conn.ENO", 12) < 2
+
+
+@pytest.mark.parametrize("timing", ["exact", "real"])
+def test_a_close_of_another_socket_that_is_under_way(timing: str) -> None:
+    """Its answer, 2210, is taken for that of ours, and our socket goes on waiting for a caller: it is closed later."""
+    rig = with_rival(1, timing)
+    rig.set("conn_EN", False)
+    rig.scan(4)
+    rig.set("Leave", True)
+    rig.set("conn_EN", True)
+    rig.run_until("Main.conn.ENO", 15)
+    assert rig.code("conn") == ""
+
+
+def test_a_unit_that_is_not_there() -> None:
+    """2211 after ten seconds, and the connection once there is one."""
+    rig = Rig()
+    units = [rig.plc.units.pop()]
+    assert rig.run_until("Main.conn.Error", 12) == pytest.approx(10, abs=0.1)
+    assert (rig.code("conn"), rig.get("conn.Waiting_Server"), rig.get("conn.ENO")) == ("2211", True, False)
+    rig.scan(1000)
+    assert rig.code("conn") == "2211"
+    rig.plc.units += units
+    rig.run_until("Main.conn.ENO", 3)
+    assert rig.code("conn") == ""
+
+
 def test_all_sockets_closed_by_force() -> None:
     rig = Rig().connect()
     rig.plc.write("CIO 1500.02", True)
