@@ -45,7 +45,7 @@ def test_a_library_is_described(folder: Path) -> None:
 @pytest.mark.parametrize("path", BLOCKS, ids=lambda path: path.stem)
 def test_no_block_gives_a_message(path: Path) -> None:
     """Functions are checked with the blocks that use them."""
-    made = compile_text(f"PROGRAM Main VAR b : {path.stem}; END_VAR END_PROGRAM")
+    made = compile_text(f"PROGRAM Main VAR b : {path.stem}; END_VAR b(); END_PROGRAM")
     assert made.diagnostics == []
 
 
