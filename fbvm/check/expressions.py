@@ -244,13 +244,14 @@ class Expressions:
         if variable is not None:
             return self._variable(expr, variable)
         members = self.project.enum_members.get(fold(expr.text), [])
-        wanted = [m for m in members if m[0] == want] or members
-        if len({kind.name for kind, _ in wanted}) == 1:
+        near = [m for m in members if m[2] == self.source.library]
+        wanted = [m for m in members if m[0] == want] or near or members
+        if len({kind.name for kind, _, _ in wanted}) == 1:
             self.facts.constants[expr] = wanted[0][1]
             return wanted[0][0]
         if wanted:
             self.error("S0201", expr, f"{expr.text} is a member of several enumerations",
-                       "write which: " + " or ".join(f"{kind}#{expr.text}" for kind, _ in wanted))
+                       "write which: " + " or ".join(f"{kind}#{expr.text}" for kind, _, _ in wanted))
             return None
         self._unknown(expr)
         return None

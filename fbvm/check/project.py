@@ -53,7 +53,8 @@ class Project:
         self.lists: set[str] = set()
         """Folded names of the files that declare global variables outside of a CONFIGURATION."""
         self.configurations: list[tuple[tree.Configuration, Source]] = []
-        self.enum_members: dict[str, list[tuple[EnumType, int]]] = {}
+        self.enum_members: dict[str, list[tuple[EnumType, int, str]]] = {}
+        """By folded name: enumeration, value, and the library that declares it ("" for the user's own)."""
         self.late_global: Callable[[tuple[str, str]], None] = lambda key: None
         """Declares a global variable whose turn has not come yet (set by the checker)."""
         self._loaded: set[str] = set()

@@ -306,7 +306,7 @@ class Specs:
             name = f"({', '.join(m.text for m, _ in spec.members)})"
         made = EnumType(name, base.size, base.align, base, members, shown)
         for member_name, value in members.items():
-            self.project.enum_members.setdefault(member_name, []).append((made, value))
+            self.project.enum_members.setdefault(member_name, []).append((made, value, source.library))
         return made, default(made)
 
     def _structure(self, spec: tree.StructSpec | tree.UnionSpec, source: Source, name: str) -> Resolved | None:
