@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
 from fbvm.base.memory import Memory, Snapshot
 from fbvm.breakpoints import Breakpoints, Halt
-from fbvm.code.image import Image, fingerprint
+from fbvm.code.image import Image
 from fbvm.engine.tiers import Engine, engine_for, native_of
 from fbvm.engine.trap import Trap
 from fbvm.flags import CLOCKWORK, TENTH_MS_NS, Flags
@@ -105,7 +105,7 @@ class Plc:
         self._write_initial()
         self._journal = journal
         if journal:
-            journal.begin(fingerprint(image), cycle_ns, budget, self.memory)
+            journal.begin(image.fingerprint, cycle_ns, budget, self.memory)
 
     # --- one scan -----------------------------------------------------------------------------------------------------
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from fbvm.base import cache
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli import status
 from fbvm.code.compiler import compile_files
@@ -17,18 +18,26 @@ from fbvm.code.image import Image
 
 
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
-    """FILE..., --program and --library, which all verbs on programs share."""
+    """FILE..., --program, --library and --no-cache, which all verbs on programs share."""
     files = click.argument("files", nargs=-1, required=True, metavar="FILE...",
                            type=click.Path(exists=True, dir_okay=False, path_type=Path))  # fmt: skip
     return source_options(files(function))
 
 
+def _without_cache(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        cache.switch(False)
+        context.call_on_close(lambda: cache.switch(True))
+
+
 def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """--program and --library."""
+    """--program, --library and --no-cache."""
     for decorate in (
         click.option("--library", "libraries", multiple=True, metavar="DIR",
                      type=click.Path(exists=True, file_okay=False, path_type=Path),
                      help="A folder of libraries of your own, besides those that fbvm brings; may be repeated."),
+        click.option("--no-cache", is_flag=True, expose_value=False, callback=_without_cache,
+                     help="Compile anew, and keep nothing of it on disk."),
         click.option("--program", metavar="NAME", help="The PROGRAM to run where no CONFIGURATION says it."),
     ):  # fmt: skip
         function = decorate(function)

@@ -17,6 +17,7 @@ from fbvm.check.library import Libraries
 from fbvm.check.lint import lint as look_for_slips
 from fbvm.check.project import Project
 from fbvm.check.silence import Silence, Wanted
+from fbvm.code import image_cache
 from fbvm.code.damage import Damage
 from fbvm.code.evaluation import evaluate
 from fbvm.code.image import Image, Objects, ProgramRun, Site, TaskRow
@@ -83,8 +84,10 @@ class Program:
 
 def compile_files(paths: Sequence[Path | str], program: str | None = None, libraries: Sequence[Path | str] = (),
                   runnable: bool = False, *, lint: bool = True, no_warn: Iterable[str] = (),
-                  warnings_as_errors: bool = False) -> Compilation:
-    """Compile source files.  `program` names the PROGRAM to run; `libraries` are folders asked before the shipped ones.
+                  warnings_as_errors: bool = False, cache: bool = True) -> Compilation:
+    """Compile source files, or with `cache` read what became of the same ones the last time.
+
+    `program` names the PROGRAM to run; `libraries` are folders asked before the shipped ones.
 
     With `runnable` it is an error if there is not exactly one thing to run.  `lint` looks for what is allowed and hardly
     meant; `no_warn` are codes of warnings that are not wanted, or "all".  Never raises for what files contain; a file that
@@ -97,8 +100,15 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
             sources.append(source)
         else:
             unreadable.append(source)
-    made = compile_sources(sources, program, libraries, runnable, lint=lint, no_warn=no_warn,
+    silenced = sorted(no_warn)
+    kept = None if unreadable or not cache else image_cache.name(
+        sources, [Path(folder) for folder in libraries], (program, runnable, lint, silenced, warnings_as_errors))
+    if kept and (known := image_cache.read(kept, sources)):
+        return Compilation(*known)
+    made = compile_sources(sources, program, libraries, runnable, lint=lint, no_warn=silenced,
                            warnings_as_errors=warnings_as_errors)
+    if kept and made.image:
+        image_cache.write(kept, sources, made.image, made.diagnostics)
     return Compilation(None, unreadable + made.diagnostics) if unreadable else made
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, Area, Mailbox, e_bank
 from fbvm.base.types import Field, Type
@@ -134,17 +135,17 @@ class Image:
     """Derived types and blocks by folded name."""
     objects: Objects = field(default_factory=Objects)
 
-
-def fingerprint(image: Image) -> str:
-    """A number in hexadecimal that another program, or the same in another layout, does not have."""
-    said = hashlib.sha256()
-    bodies = tuple((body.name, body.code, body.instance_size) for body in image.bodies)
-    left: list[object] = [(image.layout, image.tasks, image.initial, image.retained, image.objects, bodies)]
-    while left:  # code may be nested deeper than the host recurses
-        item = left.pop()
-        if isinstance(item, tuple):
-            said.update(b"(%d" % len(item))
-            left += item
-        else:
-            said.update(repr(item).encode())
-    return said.hexdigest()[:32]
+    @cached_property
+    def fingerprint(self) -> str:
+        """A number in hexadecimal that another program, or the same in another layout, does not have."""
+        said = hashlib.sha256()
+        bodies = tuple((body.name, body.code, body.instance_size) for body in self.bodies)
+        left: list[object] = [(self.layout, self.tasks, self.initial, self.retained, self.objects, bodies)]
+        while left:  # code may be nested deeper than the host recurses
+            item = left.pop()
+            if isinstance(item, tuple):
+                said.update(b"(%d" % len(item))
+                left += item
+            else:
+                said.update(repr(item).encode())
+        return said.hexdigest()[:32]

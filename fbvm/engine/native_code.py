@@ -13,7 +13,7 @@ from fbvm.engine.native_compiler import Linked, compile_text
 from fbvm.engine.native_context import Point
 from fbvm.engine.native_entries import Entry
 from fbvm.engine.native_library import module_text, parts_of, routines_of
-from fbvm.engine.native_module import Translation, deep, translate
+from fbvm.engine.native_module import Translation, translate
 from fbvm.engine.native_worker import worker
 
 QUICK, FAST = 0, 2
@@ -39,13 +39,6 @@ class Code:
     def translation(self) -> Translation:
         """The image in LLVM's language."""
         return translate(self.image, self.stops)
-
-    @cached_property
-    def _fingerprint(self) -> str:
-        """All of the image that its code depends on."""
-        with deep(self.image):
-            return repr(([(body.name, body.code, body.instance_size) for body in self.image.bodies],
-                         [[(run.body, run.offset) for run in task.programs] for task in self.image.tasks]))
 
     def prepare(self, level: int | None) -> None:
         """Have code of a level; of None, any, and the fast one later."""
@@ -88,7 +81,7 @@ class Code:
                 entry.point_to(self.address(task, None))
 
     def _name(self, level: int) -> str:
-        return name_of(f"image {level}{' with stops' * self.stops}", self._fingerprint)
+        return name_of(f"image {level}{' with stops' * self.stops}", self.image.fingerprint)
 
     def _known(self, level: int) -> Stored | None:
         return native_cache.read(self._name(level))

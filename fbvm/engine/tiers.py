@@ -21,6 +21,9 @@ from fbvm.engine.trap import Trap
 CHOICES = ("auto", "python", "native")
 PAYS = 300_000
 """Statements after which machine code is asked for: about a tenth of a second in Python."""
+LARGE = 1000
+"""Places in the source of a program that takes as long to be made into Python as into quick machine code, which is kept
+on disk."""
 
 
 class Engine(Protocol):
@@ -79,25 +82,32 @@ def python_of(engine: object) -> PythonEngine:
 
 
 class Tiers:
-    """Python first, machine code later."""
+    """Python first, machine code later; a large program begins with machine code that is soon there."""
 
     def __init__(self, image: Image, memory: Memory) -> None:
         self._image, self._memory = image, memory
-        self.python = PythonEngine(image, memory)
-        self._engine: Engine = self.python
+        self._python: PythonEngine | None = None
         self._code = code_of(image)
         self._budget = memory.views["i64"]
         self._done = 0
         self._asked = False
         self.native = False
-        """True once machine code runs."""
+        """True once fast machine code runs."""
+        self._engine: Engine = native.NativeEngine(image, memory, level=0) if len(image.sites) >= LARGE else self.python
+
+    @property
+    def python(self) -> PythonEngine:
+        """The engine that takes Python in place of blocks, made when it is needed."""
+        if self._python is None:
+            self._python = PythonEngine(self._image, self._memory)
+        return self._python
 
     def run(self, task_index: int) -> Trap | None:
         """Execute the programs of a task once, in whatever tier the run is."""
+        if self._python is not None and self._python.substitutes:
+            self._engine, self.native = self._python, False
         if self.native:
-            if not self.python.substitutes:
-                return self._engine.run(task_index)
-            self._engine, self.native = self.python, False
+            return self._engine.run(task_index)
         if self._asked:
             self._change()
         before = self._budget[BUDGET // 8]
@@ -110,6 +120,6 @@ class Tiers:
 
     def _change(self) -> None:
         """Go over to machine code if it is there."""
-        if self._code.ready and not self.python.substitutes:
+        if self._code.ready and not (self._python and self._python.substitutes):
             self._engine = native.NativeEngine(self._image, self._memory, level=2)
             self.native = True

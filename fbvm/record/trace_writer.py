@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Any, BinaryIO
 
 from fbvm.base.areas import AREAS
-from fbvm.code.image import Image, fingerprint
+from fbvm.code.image import Image
 from fbvm.plc import Phase, Plc
 from fbvm.record import symbols
 from fbvm.record.history import looking
@@ -257,7 +257,7 @@ def _header(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[str,
     meanings = {address: {str(value): text for value, text in known.items()} for attached in plc.units
                 for address, known in getattr(attached.unit, "meanings", {}).items()}  # fmt: skip
     return {
-        "format": FORMAT, "image": fingerprint(image), "cycle_ns": plc.cycle_ns, "depth": depth.value,
+        "format": FORMAT, "image": image.fingerprint, "cycle_ns": plc.cycle_ns, "depth": depth.value,
         "selected": list(selected), "slots": image.layout.slots_size, "e_banks": image.layout.e_banks,
         "mailboxes": [astuple(box) for box in image.layout.mailboxes],
         **symbols.to_data(image.symbols),

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from fbvm.code.image import Image, fingerprint
+from fbvm.code.image import Image
 from fbvm.goal import Goal
 from fbvm.net.journal import Act, End, Entry, Fingerprint, Header, JournalError, Scan
 from fbvm.plc import Mode, Plc, Stopped
@@ -58,7 +58,7 @@ class Replay:
         observed: bool = False,
         engine: str = "auto",
     ) -> None:
-        if fingerprint(image) != header.image:
+        if image.fingerprint != header.image:
             raise JournalError("the journal was written by another program, or by another version of fbvm")
         self._entries = entries
         self.plc = Plc(image, header.cycle_ns, budget=header.budget, observed=observed, engine=engine)

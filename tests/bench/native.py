@@ -21,12 +21,13 @@ from typing import Any
 HOUSE = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(HOUSE))
 
+from fbvm.base import cache  # noqa: E402
 from fbvm.base.areas import BUDGET, DUE, NEVER  # noqa: E402
 from fbvm.base.diagnostics import Source  # noqa: E402
 from fbvm.base.memory import Memory  # noqa: E402
 from fbvm.code.compiler import compile_sources  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
-from fbvm.engine import native_cache, native_statements  # noqa: E402
+from fbvm.engine import native_statements  # noqa: E402
 from fbvm.engine.native import NativeEngine  # noqa: E402
 from fbvm.engine.native_scans import Turn  # noqa: E402
 from fbvm.engine.native_writer import Writer  # noqa: E402
@@ -116,7 +117,7 @@ def in_python(image: Image, step_ns: int) -> Callable[[int], object]:
 def without(what: str) -> Iterator[None]:
     """New code is made without checks or without the budget, to see what they cost."""
     trap_if, charge = Writer.trap_if, native_statements.EMITTERS["charge"]
-    native_cache.switch(False)
+    cache.switch(False)
     if what == "checks":
         Writer.trap_if = lambda self, *operands: None  # type: ignore[method-assign]
     native_statements.EMITTERS["charge"] = lambda w, count, site: None
@@ -124,7 +125,7 @@ def without(what: str) -> Iterator[None]:
         yield
     finally:
         Writer.trap_if, native_statements.EMITTERS["charge"] = trap_if, charge  # type: ignore[method-assign]
-        native_cache.switch(True)
+        cache.switch(True)
 
 
 def programs() -> None:

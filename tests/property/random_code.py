@@ -410,9 +410,9 @@ def differing(random: Random) -> tuple[str, list[Block]] | None:
 
 
 if __name__ == "__main__":
-    from fbvm.engine import native_cache
+    from fbvm.base import cache
 
-    native_cache.switch(False)
+    cache.switch(False)
     first, count = int(sys.argv[2]) if len(sys.argv) > 2 else 0, int(sys.argv[1])
     for seed in range(first, first + count):
         if found := differing(Random(seed)):

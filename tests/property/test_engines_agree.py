@@ -17,9 +17,10 @@ import test_engine_expressions as expressions
 import test_engine_limits as limits
 import test_engine_statements as statements
 
+from fbvm.base import cache
 from fbvm.code.image import Image
 from fbvm.code.operations import Block
-from fbvm.engine import native, native_cache
+from fbvm.engine import native
 from fbvm.plc import Plc
 
 if not native.available():
@@ -48,9 +49,9 @@ def execute(*codes: Block, before: dict[int, bytes] | None = None, budget: int =
 def _every_engine(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     for module in (hand_image, expressions, limits, statements):
         monkeypatch.setattr(module, "execute", execute)
-    native_cache.switch(False)  # thousands of images that nobody runs again
+    cache.switch(False)  # thousands of images that nobody runs again
     yield
-    native_cache.switch(True)
+    cache.switch(True)
 
 
 def _again(module: Any) -> None:

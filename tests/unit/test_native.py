@@ -21,7 +21,8 @@ from fbvm.engine.native import NativeEngine
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
-from fbvm.engine import native_cache, native_compiler, native_entries
+from fbvm.base import cache
+from fbvm.engine import native_compiler, native_entries
 from fbvm.engine.native_module import BodyWriter, translate
 from fbvm.engine.native_scans import Turn
 from fbvm.engine.native_worker import worker
@@ -244,9 +245,9 @@ def test_functions_are_those_of_python(level: int) -> None:
 
 
 def test_without_the_cache_all_is_the_same() -> None:
-    native_cache.switch(False)
+    cache.switch(False)
     try:
         e = engine((*COUNT, store("i16", 4, ONE)))
         assert e.run(0) is None and slot(e) == 1
     finally:
-        native_cache.switch(True)
+        cache.switch(True)

@@ -13,6 +13,7 @@ from fbvm.engine import native
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
+from fbvm.base import cache
 from fbvm.engine import native_cache
 from fbvm.engine.native_cache import Stored
 
@@ -62,14 +63,14 @@ def test_the_oldest_go_when_there_are_too_many(folder: Path, monkeypatch: pytest
     for place, name in enumerate(names):
         native_cache.write(name, STORED)
         os.utime(folder / name, (place, place))
-    monkeypatch.setattr(native_cache, "LIMIT_BYTES", (folder / names[0]).stat().st_size * 4)
+    monkeypatch.setattr(native_cache.FILES, "limit_bytes", (folder / names[0]).stat().st_size * 4)
     assert native_cache.read(names[0]) == STORED
     native_cache.write("g" * 64, STORED)
     assert sorted(path.name[0] for path in folder.iterdir()) == ["a", "f", "g"]
 
 
 def test_small_ones_go_too(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(native_cache, "LIMIT_FILES", 8)
+    monkeypatch.setattr(native_cache.FILES, "limit_files", 8)
     names = [letter * 64 for letter in "abcdefghi"]
     for place, name in enumerate(names):
         native_cache.write(name, STORED)
@@ -91,10 +92,10 @@ def test_names_depend_on_every_part() -> None:
 
 def test_switched_off_nothing_is_read_or_written(folder: Path) -> None:
     native_cache.write(NAME, STORED)
-    native_cache.switch(False)
+    cache.switch(False)
     try:
         assert native_cache.read(NAME) is None
         native_cache.write("b" * 64, STORED)
     finally:
-        native_cache.switch(True)
+        cache.switch(True)
     assert not (folder / ("b" * 64)).exists()

@@ -1,0 +1,79 @@
+"""Compilations on disk: what was compiled once with the same sources, libraries, options and version is read the next
+time.  Only what compiled without error is kept."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fbvm.base.cache import Cache, modules_hash, name_of
+from fbvm.base.data import data_folder
+from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.code.image import Image
+from fbvm.code.stored_image import decode, encode
+
+FILES = Cache("images", b"fbvm image 1\n", 128 << 20)
+LENGTH_BYTES = 4
+ROOMS = ("base", "syntax", "check", "code")
+"""Where what makes images is."""
+
+
+def name(sources: Sequence[Source], libraries: Sequence[Path], options: Sequence[object]) -> str:
+    """The name for the compilation of these."""
+    texts = [part for source in sources for part in (source.name, source.library, source.text)]
+    return name_of((*texts, repr(tuple(options)), *map(_library, libraries), _own()))
+
+
+def read(named: str, sources: Sequence[Source]) -> tuple[Image, list[Diagnostic]] | None:
+    """The image and the warnings of a compilation of these sources; None if there is none that can be trusted."""
+    content = FILES.read(named)
+    if content is None:
+        return None
+    size = int.from_bytes(content[:LENGTH_BYTES], "little")
+    try:
+        rows = json.loads(content[LENGTH_BYTES:LENGTH_BYTES + size])
+        diagnostics = [_diagnostic(row, sources) for row in rows]
+        return decode(content[LENGTH_BYTES + size:]), diagnostics
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def write(named: str, sources: Sequence[Source], image: Image, diagnostics: Sequence[Diagnostic]) -> None:
+    """Keep a compilation, unless something in it cannot be written down."""
+    numbers = {id(source): number for number, source in enumerate(sources)}
+    try:
+        rows = json.dumps([_row(diagnostic, numbers) for diagnostic in diagnostics]).encode()
+        FILES.write(named, len(rows).to_bytes(LENGTH_BYTES, "little") + rows + encode(image))
+    except (LookupError, TypeError, RecursionError):
+        return
+
+
+def _row(diagnostic: Diagnostic, numbers: dict[int, int]) -> list[object]:
+    """A message about one of the sources.  Raises KeyError for one about a library."""
+    related = diagnostic.related and [numbers[id(diagnostic.related[0])], *diagnostic.related[1:]]
+    return [diagnostic.code, numbers[id(diagnostic.source)], diagnostic.start, diagnostic.end, diagnostic.message,
+            diagnostic.hint, related, diagnostic.raised]  # fmt: skip
+
+
+def _diagnostic(row: list[Any], sources: Sequence[Source]) -> Diagnostic:
+    code, number, start, end, message, hint, related, raised = row
+    other = (sources[related[0]], related[1], related[2]) if related else None
+    return Diagnostic(code, sources[number], start, end, message, hint, other, raised)
+
+
+@cache
+def _own() -> str:
+    """A hash of the modules that make images, of the grammar and of the libraries that come along."""
+    package = Path(__file__).parents[1]
+    modules = [path for room in ROOMS for path in sorted((package / room).glob("*.py"))]
+    return modules_hash(*modules, *sorted(data_folder("grammar").glob("*"))) + _library(data_folder("fblib"))
+
+
+def _library(folder: Path) -> str:
+    """All that compiling may find in a folder of libraries."""
+    parts = [part for path in sorted(folder.rglob("*")) if path.suffix in (".st", ".toml")
+             for part in (path.relative_to(folder).as_posix(), path.read_text(encoding="latin-1"))]  # fmt: skip
+    return name_of([str(folder), *parts])

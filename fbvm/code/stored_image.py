@@ -1,0 +1,205 @@
+"""Images as bytes and back: JSON, in which types stand once and are meant by their numbers, and code is a text that is
+read when somebody wants to execute, list or draw it; machine code needs none."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import astuple, dataclass, fields
+from functools import cached_property
+from typing import Any
+
+from fbvm.base.areas import Mailbox
+from fbvm.base.types import (
+    ANYTHING,
+    ELEMENTARY,
+    AnyType,
+    ArrayType,
+    Elementary,
+    EnumType,
+    Field,
+    OpenArrayType,
+    RefType,
+    StringType,
+    StructType,
+    SubrangeType,
+    Type,
+    string,
+)
+from fbvm.code.image import Body, Image, Layout, Objects, ProgramRun, Retained, Site, TaskRow
+from fbvm.code.operations import Block
+
+
+def encode(image: Image) -> bytes:
+    """The image as bytes.  Raises RecursionError for code that is nested deeper than the host's JSON goes."""
+    types = _Writer()
+    document = {
+        "fingerprint": image.fingerprint,
+        "layout": [image.layout.slots_size, image.layout.e_banks, [astuple(box) for box in image.layout.mailboxes]],
+        "bodies": [[body.name, body.kind, body.instance_size, body.statements, _dump(body.code)] for body in image.bodies],
+        "tasks": [[task.name, task.priority, task.interval_ns, task.single, [astuple(run) for run in task.programs]]
+                  for task in image.tasks],
+        "symbols": [[name, types.field(symbol)] for name, symbol in image.symbols.items()],
+        "initial": image.initial,
+        "retained": [astuple(row) for row in image.retained],
+        "sites": [astuple(site) for site in image.sites],
+        "objects": astuple(image.objects),
+        "derived": [[name, types.number(kind)] for name, kind in image.types.items()],
+    }
+    return _dump({**document, "types": types.rows}).encode("utf-8", "surrogatepass")
+
+
+def decode(content: bytes) -> Image:
+    """The image of such bytes.  Raises ValueError, LookupError or TypeError if they are none."""
+    stored = json.loads(content.decode("utf-8", "surrogatepass"), object_hook=_bytes)
+    types = _Reader(stored["types"])
+    slots_size, e_banks, mailboxes = stored["layout"]
+    image = Image(
+        Layout(slots_size, tuple(e_banks), tuple(Mailbox(*row) for row in mailboxes)),
+        tuple(_StoredBody.of(*row) for row in stored["bodies"]),
+        tuple(TaskRow(name, priority, interval_ns, single, tuple(ProgramRun(*run) for run in runs))
+              for name, priority, interval_ns, single, runs in stored["tasks"]),
+        {name: types.field(row) for name, row in stored["symbols"]},
+        _tuples(stored["initial"]),
+        tuple(Retained(*row) for row in stored["retained"]),
+        tuple(Site(*row) for row in stored["sites"]),
+        {name: types.type(number) for name, number in stored["derived"]},
+        Objects(*_tuples(stored["objects"])),
+    )
+    vars(image)["fingerprint"] = stored["fingerprint"]
+    return image
+
+
+class _StoredBody(Body):
+    """A body whose code is read when somebody wants it."""
+
+    @classmethod
+    def of(cls, name: str, kind: str, instance_size: int, statements: int, text: str) -> _StoredBody:
+        body = cls.__new__(cls)
+        vars(body).update(name=name, kind=kind, instance_size=instance_size, statements=statements, text=text)
+        return body
+
+    @cached_property
+    def code(self) -> Block:
+        code: Block = _tuples(json.loads(vars(self)["text"], object_hook=_bytes))
+        return code
+
+
+# --- plain data -----------------------------------------------------------------------------------------------------
+
+
+def _dump(item: object) -> str:
+    return json.dumps(item, separators=(",", ":"), ensure_ascii=False, default=_plain)
+
+
+def _plain(item: object) -> object:
+    if isinstance(item, bytes):
+        return {"bytes": item.decode("latin-1")}
+    raise TypeError(f"{item!r} is no part of an image")
+
+
+def _bytes(row: dict[str, Any]) -> Any:
+    return row["bytes"].encode("latin-1") if row.keys() == {"bytes"} else row
+
+
+def _tuples(item: Any) -> Any:
+    return tuple([_tuples(part) if type(part) is list else part for part in item])
+
+
+# --- types ----------------------------------------------------------------------------------------------------------
+
+COMMON = ("name", "size", "align")
+FIELD = tuple(each.name for each in fields(Field) if each.name != "type")
+
+
+@dataclass(frozen=True)
+class _Kind:
+    """How types of a class are written: a row's parts behind name, size and alignment."""
+
+    parts: Callable[[Any, _Writer], list[Any]]
+    make: Callable[[dict[str, Any], list[Any], _Reader], Type]
+    """From the common parts and the others."""
+
+
+class _Writer:
+    """Types as rows; `rows` grows."""
+
+    def __init__(self) -> None:
+        self.rows: list[list[Any] | None] = []
+        self._numbers: dict[int, int] = {}
+        self._kept: list[Type] = []
+
+    def number(self, kind: Type) -> int:
+        """The number of a type's row."""
+        number = self._numbers.get(id(kind))
+        if number is None:
+            number = self._numbers[id(kind)] = len(self.rows)
+            self._kept.append(kind)  # so that its id stays its own
+            self.rows.append(None)
+            name = type(kind).__name__
+            self.rows[number] = [name, *(getattr(kind, part) for part in COMMON), *KINDS[name].parts(kind, self)]
+        return number
+
+    def field(self, field: Field) -> list[Any]:
+        """A field as a row."""
+        return [self.number(field.type), *(getattr(field, part) for part in FIELD)]
+
+
+class _Reader:
+    """Rows as types, each once.  A structure is there before its fields, which may lead back to it."""
+
+    def __init__(self, rows: list[list[Any]]) -> None:
+        self._rows = rows
+        self._types: dict[int, Type] = {}
+
+    def type(self, number: int) -> Type:
+        kind = self._types.get(number)
+        if kind is None:
+            name, *row = self._rows[number]
+            common, parts = dict(zip(COMMON, row, strict=False)), row[len(COMMON):]
+            kind = self._types[number] = KINDS[name].make(common, parts, self)
+            if isinstance(kind, StructType):
+                kind.fields.update((folded, self.field(written)) for folded, written in parts[2])
+        return kind
+
+    def field(self, row: list[Any]) -> Field:
+        return Field(type=self.type(row[0]), **dict(zip(FIELD, row[1:], strict=True)))
+
+
+def _target(kind: RefType, writer: _Writer) -> list[Any]:
+    return [None if kind.target is None else writer.number(kind.target), kind.moves]
+
+
+def _structure(kind: StructType, writer: _Writer) -> list[Any]:
+    return [kind.block, kind.other_names, [[name, writer.field(field)] for name, field in kind.fields.items()]]
+
+
+def _elementary(common: dict[str, Any], parts: list[Any], reader: _Reader) -> Type:
+    return ELEMENTARY[common["name"]]
+
+
+KINDS: dict[str, _Kind] = {
+    Elementary.__name__: _Kind(lambda kind, w: [], _elementary),
+    AnyType.__name__: _Kind(lambda kind, w: [], lambda common, parts, r: ANYTHING[common["name"]]),
+    StringType.__name__: _Kind(lambda kind, w: [kind.capacity, kind.wide], lambda common, parts, r: string(*parts)),
+    ArrayType.__name__: _Kind(
+        lambda kind, w: [kind.bounds, w.number(kind.element)],
+        lambda common, parts, r: ArrayType(**common, bounds=_tuples(parts[0]), element=r.type(parts[1]))),
+    OpenArrayType.__name__: _Kind(
+        lambda kind, w: [kind.dimensions, w.number(kind.element)],
+        lambda common, parts, r: OpenArrayType(**common, dimensions=parts[0], element=r.type(parts[1]))),
+    StructType.__name__: _Kind(
+        _structure, lambda common, parts, r: StructType(**common, fields={}, block=parts[0], other_names=parts[1])),
+    EnumType.__name__: _Kind(
+        lambda kind, w: [kind.base.name, kind.members, list(kind.shown.items())],
+        lambda common, parts, r: EnumType(
+            **common, base=ELEMENTARY[parts[0]], members=parts[1], shown=dict(_tuples(parts[2])))),
+    SubrangeType.__name__: _Kind(
+        lambda kind, w: [kind.base.name, kind.low, kind.high],
+        lambda common, parts, r: SubrangeType(
+            **common, base=ELEMENTARY[parts[0]], low=parts[1], high=parts[2])),
+    RefType.__name__: _Kind(
+        _target, lambda common, parts, r: RefType(
+            **common, target=None if parts[0] is None else r.type(parts[0]), moves=parts[1])),
+}  # fmt: skip
+"""A row for each class of types."""

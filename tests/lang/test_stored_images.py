@@ -1,0 +1,26 @@
+"""Images of the corpus as bytes and back: nothing of them is lost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from lang_corpus import programs
+
+from fbvm.code.compiler import compile_text
+from fbvm.code.stored_image import decode, encode
+
+EACH = 6
+"""Every sixth program is taken: all would take long."""
+
+
+def test_programs_come_back_as_they_were() -> None:
+    compared = 0
+    for program in list(programs())[::EACH]:
+        image = compile_text(program.text, program.name).image
+        if image is not None:
+            back = decode(encode(image))
+            assert replace(back, bodies=()) == replace(image, bodies=()), program
+            assert [body.code for body in back.bodies] == [body.code for body in image.bodies], program
+            assert encode(back) == encode(image), program
+            compared += 1
+    assert compared > 50

@@ -1,0 +1,144 @@
+"""Compilations on disk: read when nothing that they depend on has changed, and only then."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fbvm.base import cache
+from fbvm.cli.main import main
+from fbvm.code import compiler, image_cache
+from fbvm.code.compiler import Compilation, compile_files
+from fbvm.code.stored_image import encode
+
+PROGRAM = """
+FUNCTION_BLOCK Own
+VAR_OUTPUT Done : BOOL; END_VAR
+    Done := TRUE;
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR b : Own; d : TON; l : Lib; unused : INT; END_VAR
+    b(); d(IN := b.Done, PT := T#1s); l();
+END_PROGRAM
+"""
+LIB = "FUNCTION_BLOCK Lib\nVAR n : INT; END_VAR\n    n := n + 1;\nEND_FUNCTION_BLOCK\n"
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "cache"))
+    monkeypatch.chdir(tmp_path)
+    Path("main.st").write_text(PROGRAM, encoding="utf-8")
+    Path("lib").mkdir()
+    Path("lib/Lib.st").write_text(LIB, encoding="utf-8")
+    return tmp_path / "cache" / "images"
+
+
+@pytest.fixture
+def anew(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Grows with each compilation that is done anew."""
+    counted: list[int] = []
+    compile_sources = compiler.compile_sources
+
+    def counting(*arguments: object, **options: object) -> Compilation:
+        counted.append(1)
+        return compile_sources(*arguments, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(compiler, "compile_sources", counting)
+    return counted
+
+
+def compiled(**options: object) -> Compilation:
+    made = compile_files(["main.st"], libraries=["lib"], **options)  # type: ignore[arg-type]
+    assert made.image
+    return made
+
+
+def test_the_second_time_it_is_read(anew: list[int]) -> None:
+    first, second = compiled(), compiled()
+    assert len(anew) == 1
+    assert first.image and second.image
+    assert encode(first.image) == encode(second.image)
+    assert [message.render() for message in first.diagnostics] == [message.render() for message in second.diagnostics]
+    assert [message.code for message in second.diagnostics] == ["S0290"]
+
+
+@pytest.mark.parametrize("options", [{"program": "Main"}, {"runnable": True}, {"lint": False}, {"no_warn": ["S0290"]}])
+def test_options_count(anew: list[int], options: dict[str, object]) -> None:
+    compiled()
+    compiled(**options)
+    compiled(**options)
+    assert len(anew) == 2
+
+
+@pytest.mark.parametrize(("file", "text"), [
+    ("main.st", PROGRAM + "// more\n"), ("lib/Lib.st", LIB.replace("+ 1", "+ 2")), ("lib/Other.st", LIB.replace("Lib", "Other")),
+    ("lib/library.toml", "globals = []\n"),
+])  # fmt: skip
+def test_sources_and_libraries_count(anew: list[int], file: str, text: str) -> None:
+    compiled()
+    Path(file).write_text(text, encoding="utf-8")
+    compiled()
+    assert len(anew) == 2
+
+
+def test_another_name_of_a_source_counts(anew: list[int]) -> None:
+    compiled()
+    Path("main.st").rename("other.st")
+    compile_files(["other.st"], libraries=["lib"])
+    assert len(anew) == 2
+
+
+def test_another_version_counts(anew: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled()
+    monkeypatch.setattr(image_cache, "_own", lambda: "another")
+    compiled()
+    assert len(anew) == 2
+
+
+def test_errors_are_not_kept(anew: list[int], folder: Path) -> None:
+    Path("main.st").write_text("PROGRAM Main\n    x := 1;\nEND_PROGRAM\n", encoding="utf-8")
+    for _ in range(2):
+        assert [message.code for message in compile_files(["main.st"]).diagnostics] == ["S0201"]
+    assert len(anew) == 2
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("at", [0, 20, 300, -1])
+def test_a_damaged_file_is_passed_over(anew: list[int], folder: Path, at: int) -> None:
+    compiled()
+    (file,) = folder.iterdir()
+    content = bytearray(file.read_bytes())
+    content[at] ^= 1
+    file.write_bytes(content)
+    assert compiled().image
+    assert len(anew) == 2
+
+
+def test_a_whole_file_of_something_else_is_passed_over(anew: list[int], folder: Path) -> None:
+    compiled()
+    (file,) = folder.iterdir()
+    image_cache.FILES.write(file.name, b"\4\0\0\0null{}")
+    assert compiled().image
+    assert len(anew) == 2
+
+
+def test_what_is_not_wanted_is_not_used(anew: list[int], folder: Path) -> None:
+    compiled(cache=False)
+    assert not folder.exists()
+    compiled()
+    compiled(cache=False)
+    assert len(anew) == 3
+
+
+def test_the_command_line_can_do_without(anew: list[int], folder: Path) -> None:
+    for _ in range(2):
+        result = CliRunner().invoke(main, ["run", "main.st", "--library", "lib", "--scans", "1", "--no-cache"])
+        assert result.exit_code == 0
+    assert len(anew) == 2
+    assert not folder.exists()
+    cache.switch(True)
+    compiled()
+    assert folder.exists()
