@@ -33,6 +33,8 @@ CODES: dict[str, Code] = {
         "S0106": "nested too deep",
         "S0107": "file cannot be read as text",
         "S0108": "literal out of range of its type",
+        "S0109": "no instruction of ladder",
+        "S0110": "ladder that cannot be executed",
         "S0201": "unknown name",
         "S0202": "name declared twice",
         "S0203": "POU or type declared twice",

@@ -39,7 +39,7 @@ from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, is_unt
 from fbvm.check.operators import Operators
 from fbvm.check.subscripts import Subscripts
 from fbvm.check.values import is_any
-from fbvm.syntax import tree
+from fbvm.syntax import ladder, tree
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
@@ -375,6 +375,15 @@ class Expressions:
     def _call(self, expr: tree.Call, want: Type | None) -> Type | None:
         return self.checker.calls(self).value(expr, want)
 
+    def _edge(self, expr: ladder.Edge, want: Type | None) -> Type | None:
+        self.infer(expr.memory)
+        self.condition(expr.of, "an edge")
+        return BOOL
+
+    def _element(self, expr: ladder.Element, want: Type | None) -> Type | None:
+        self.condition(expr.value, "a contact")
+        return BOOL
+
     def _unary(self, expr: tree.Unary, want: Type | None) -> Type | None:
         return self.operators.unary(expr, want)
 
@@ -398,4 +407,5 @@ _INFER: dict[type, Callable[..., Type | None]] = {
     tree.Direct: Expressions._direct, tree.Member: Expressions._member, tree.Index: Expressions._index,
     tree.Part: Expressions._part, tree.Deref: Expressions._deref, tree.NullLiteral: Expressions._null,
     tree.Call: Expressions._call, tree.Unary: Expressions._unary, tree.Binary: Expressions._binary,
+    ladder.Edge: Expressions._edge, ladder.Element: Expressions._element,
 }

@@ -24,7 +24,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from fbvm.base.areas import Mailbox, refusal
+from fbvm.base.areas import AREAS, Mailbox, refusal
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.types import fold
@@ -47,6 +47,8 @@ class Library:
     """By folded name of a POU the other names of its pins, folded, and their own."""
     spaces: frozenset[str] = frozenset()
     """Folded names under which programs know the library: `Standard` in Standard.TON."""
+    writes: tuple[str, ...] = ()
+    """Areas that programs may only read, and this library writes."""
     loaded: set[str] = field(default_factory=set)
 
 
@@ -71,7 +73,8 @@ def _libraries_below(root: Path) -> Iterator[Library]:
         name = folder.relative_to(root).as_posix() if folder != root else root.name
         files = {fold(p.stem): p for p in sorted(folder.glob("*.st"))}
         yield Library(name, folder, files, tuple(listed), _mailbox(table, described), _pins(table, described),
-                      frozenset(fold(str(space)) for space in spaces) if isinstance(spaces, list) else frozenset())
+                      frozenset(fold(str(space)) for space in spaces) if isinstance(spaces, list) else frozenset(),
+                      _written(table, described))
 
 
 def _pins(table: dict[str, object], described: Path) -> dict[str, dict[str, str]]:
@@ -83,6 +86,14 @@ def _pins(table: dict[str, object], described: Path) -> dict[str, dict[str, str]
             raise LibraryError(f"{described}: pins has for each POU a table of names and what the POU calls them")
         pins[fold(pou)] = {fold(other): fold(own) for other, own in row.items()}
     return pins
+
+
+def _written(table: dict[str, object], described: Path) -> tuple[str, ...]:
+    """The areas that the library writes though programs only read them."""
+    areas = table.get("writes", [])
+    if not isinstance(areas, list) or not all(area in AREAS for area in areas):
+        raise LibraryError(f"{described}: writes must be a list of areas")
+    return tuple(areas)
 
 
 def _mailbox(table: dict[str, object], described: Path) -> Mailbox | None:
@@ -127,6 +138,11 @@ class Libraries:
     def has_space(self, name: str) -> bool:
         """True if programs know a library under that name."""
         return any(fold(name) in library.spaces for library in self._libraries.values())
+
+    def writes(self, owner: str) -> tuple[str, ...]:
+        """Areas that a library writes though programs only read them."""
+        library = self._libraries.get(owner)
+        return library.writes if library else ()
 
     def block_names(self) -> list[str]:
         """The names under which files are found, as their files are named."""

@@ -11,7 +11,7 @@ from fbvm.check.facts import Pou, Value
 from fbvm.check.fitting import assignable, conversion_hint
 from fbvm.check.values import is_any
 from fbvm.check.writes import note_count, place, writable
-from fbvm.syntax import tree
+from fbvm.syntax import ladder, tree
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
@@ -216,6 +216,9 @@ class Statements:
             return
         self.expressions.fit(node.value, self.pou.result.type)
 
+    def _rungs(self, node: ladder.Ladder | ladder.Rung) -> None:
+        self.block(node.body)
+
     def _empty(self, node: tree.Empty) -> None:
         """Nothing is wrong with `;`."""
 
@@ -229,6 +232,7 @@ _CHECK: dict[type, Callable[..., None]] = {
     tree.Assign: Statements._assign, tree.CallStatement: Statements._call, tree.If: Statements._if,
     tree.Case: Statements._case, tree.For: Statements._for, tree.While: Statements._while,
     tree.Repeat: Statements._repeat, tree.Exit: Statements._leave, tree.Continue: Statements._leave,
+    ladder.Ladder: Statements._rungs, ladder.Rung: Statements._rungs,
     tree.Return: Statements._return, tree.Empty: Statements._empty, tree.RefusedStatement: Statements._refused,
 }
 
@@ -250,6 +254,6 @@ def bodies(statement: tree.Statement) -> list[tree.Block]:
         return [body for _, body in statement.branches] + [statement.otherwise or ()]
     if isinstance(statement, tree.Case):
         return [branch.body for branch in statement.branches] + [statement.otherwise or ()]
-    if isinstance(statement, tree.For | tree.While | tree.Repeat):
+    if isinstance(statement, tree.For | tree.While | tree.Repeat | ladder.Ladder | ladder.Rung):
         return [statement.body]
     return []

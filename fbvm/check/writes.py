@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.areas import AREAS
+from fbvm.base.areas import AREAS, Address
 from fbvm.base.types import fold
 from fbvm.check.facts import Facts, Variable
 from fbvm.syntax import tree
@@ -38,10 +38,17 @@ def writable(expressions: Expressions, expr: tree.Expr, purpose: str) -> bool:
                               (variable.source, variable.node.start, "declared here"))
             return False
         _note_input(expressions, expr, variable)
-    if address is not None and address.area in AREAS and address.number < AREAS[address.area].read_only:
+    if address is not None and _is_read_only(expressions, address):
         expressions.error("S0501", expr, f"{address} is read-only for programs and cannot {purpose}")
         return False
     return True
+
+
+def _is_read_only(expressions: Expressions, address: Address) -> bool:
+    """Whether the source may only read the address."""
+    if address.area not in AREAS or address.number >= AREAS[address.area].read_only:
+        return False
+    return address.area not in expressions.project.libraries.writes(expressions.source.library)
 
 
 def _note_input(expressions: Expressions, expr: tree.Expr, variable: Variable) -> None:

@@ -20,7 +20,7 @@ from fbvm.code.pointers import PointerLowering
 from fbvm.code.pou_calls import CallLowering
 from fbvm.code.values import DEEPEST, ValueLowering, is_aggregate
 from fbvm.code.weights import counted
-from fbvm.syntax import tree
+from fbvm.syntax import ladder, tree
 
 if TYPE_CHECKING:
     from fbvm.code.compiler import Program
@@ -317,6 +317,13 @@ class BodyLowering:
     def _next(self, node: tree.Continue, site: int) -> None:
         self.out.append(("next",))
 
+    def _ladder(self, node: ladder.Ladder, site: int) -> None:
+        self.block_into(node.body)
+
+    def _rung(self, node: ladder.Rung, site: int) -> None:
+        self.out.append(("observe", "rung", site, node.number))
+        self.block_into(node.body)
+
     def _return(self, node: tree.Return, site: int) -> None:
         if node.value is not None:
             assert self.pou.result is not None
@@ -332,5 +339,5 @@ _LOWER: dict[type, Callable[..., None]] = {
     tree.Assign: BodyLowering._assign, tree.CallStatement: BodyLowering._call, tree.If: BodyLowering._if,
     tree.Case: BodyLowering._case, tree.For: BodyLowering._for, tree.While: BodyLowering._while,
     tree.Repeat: BodyLowering._repeat, tree.Exit: BodyLowering._exit, tree.Continue: BodyLowering._next,
-    tree.Return: BodyLowering._return,
+    tree.Return: BodyLowering._return, ladder.Ladder: BodyLowering._ladder, ladder.Rung: BodyLowering._rung,
 }

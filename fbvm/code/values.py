@@ -23,7 +23,7 @@ from fbvm.check.facts import Guard, PouCall, StandardCall, Value
 from fbvm.check.values import is_any
 from fbvm.code.functions import FUNCTIONS
 from fbvm.code.operations import FLOATS, TEXT_UNITS, Node
-from fbvm.syntax import tree
+from fbvm.syntax import ladder, tree
 
 if TYPE_CHECKING:
     from fbvm.code.lower import BodyLowering
@@ -129,9 +129,27 @@ class ValueLowering:
             return self.body.pointers.to_parameter(expr)
         if isinstance(expr, tree.NullLiteral):
             return ("const", "ref", 0)
+        if isinstance(expr, ladder.Edge | ladder.Element):
+            return self._edge(expr) if isinstance(expr, ladder.Edge) else self._element(expr)
         place = self.body.places.of(expr)
         self.body.note_read(place, expr)
         return self.body.places.load(place)
+
+    def _edge(self, expr: ladder.Edge) -> Node:
+        """Whether a condition rises or falls; its memory is written where it is worked out."""
+        body = self.body
+        memory = body.places.of(expr.memory)
+        here = body.keep(self.value(expr.of, BOOL), always=True)
+        before = body.keep(body.places.load(memory), always=True)
+        body.out.append(body.places.store(memory, here, body.site(expr)))
+        now, then = (before, here) if expr.falling else (here, before)
+        return ("and", "b", now, ("not", "b", then))
+
+    def _element(self, expr: ladder.Element) -> Node:
+        """The state of a contact, or the power at an output, for those who look."""
+        here = self.body.keep(self.value(expr.value, BOOL), always=True)
+        self.body.out.append(("observe", "contact", self.body.site(expr), (expr.step, here)))
+        return here
 
     def _unary(self, expr: tree.Unary) -> Node:
         node = self.value(expr.operand)

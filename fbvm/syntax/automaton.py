@@ -42,8 +42,8 @@ class Mender(Protocol):
 class Automaton:
     """One parse in progress.  `states` and `values` are its stacks; `states` is longer by the start."""
 
-    def __init__(self, builder: Any, stream: Iterator[Token], text: str = "") -> None:
-        self.tables: Tables = tables()
+    def __init__(self, builder: Any, stream: Iterator[Token], text: str = "", language: str = "st") -> None:
+        self.tables: Tables = tables(language)
         self.rows = self.tables.actions
         self.actions: list[Callable[..., Any] | None] = [
             getattr(builder, r.action) if r.action else None for r in self.tables.rules]

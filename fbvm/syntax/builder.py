@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.syntax.ladder import Ladder
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
 from fbvm.syntax.tree import Expr, Name, Refused
@@ -41,6 +42,8 @@ class Builder:
         """Whether so many errors were found that the rest is not worth looking at."""
         self.selves: list[Token] = []
         """THIS and SUPER seen since the last statement."""
+        self.ladders: list[Ladder] = []
+        """LADDERs of the POU that is being read."""
         self.depths: dict[Expr, int] = {}
         """Depth of the expressions under construction, where it is not 1."""
 

@@ -64,8 +64,22 @@ class Declarations(Statements):
         refused += [Refused(b.start, b.end, b.what, b.code) for b in blocks]
         body = self.block([i for i in items if i not in blocks] if blocks else items)
         self.refuse_selves()
-        return Pou(word.start, end.end, word.text.upper(), name, result,
-                   tuple(s for s in sections if isinstance(s, VarSection)), body, tuple(refused))
+        declared = [s for s in sections if isinstance(s, VarSection)]
+        if self.ladders:
+            declared += self.ladder_sections(declared)
+        return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused))
+
+    def ladder_sections(self, sections: list[VarSection]) -> list[VarSection]:
+        """What the LADDERs of a POU need: memory of their steps, and instances that the POU has not declared itself."""
+        from fbvm.syntax.rung_blocks import undeclared
+
+        made: list[VarSection] = []
+        for ladder in self.ladders:
+            kept = (*ladder.variables, *undeclared(ladder.instances, sections, self.report))
+            made += [VarSection(ladder.start, ladder.end, kind, (), variables, True)
+                     for kind, variables in (("VAR", kept), ("VAR_TEMP", ladder.temporaries)) if variables]
+        self.ladders.clear()
+        return made
 
     def is_block(self, statement: RefusedStatement) -> bool:
         """Whether a refused statement is a METHOD, ACTION or the like, which belongs to the POU and not to its body."""

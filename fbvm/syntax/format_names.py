@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from fbvm.base.types import ELEMENTARY, GENERIC, SHORT_NAMES, fold
 from fbvm.syntax.format_scopes import Scope, declared_in, element, global_scope, members
+from fbvm.syntax.ladder import Ladder
 from fbvm.syntax.tree import (
     Argument,
     ArrayInit,
@@ -80,7 +81,7 @@ class Spelling:
             if isinstance(node, Pou):
                 scope = declared_in(node, self.globals)
             self._visit(node, scope)
-            todo.extend((child, scope) for child in _children(node))
+            todo.extend((child, scope) for child in _children(node) if not _is_ladder(child))
 
     def _visit(self, node: Node, scope: Scope) -> None:
         if isinstance(node, NameRef):
@@ -222,6 +223,11 @@ class Spelling:
         if isinstance(link, Call):
             return shape.result if isinstance(shape, Pou) else None
         return element(shape) if isinstance(link, (Index, Deref)) else None
+
+
+def _is_ladder(node: Node) -> bool:
+    """Whether a node belongs to a LADDER, whose names stay as they are written."""
+    return isinstance(node, Ladder) or isinstance(node, VarSection) and node.hidden
 
 
 def _children(node: Node) -> Iterator[Node]:

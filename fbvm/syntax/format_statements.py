@@ -10,6 +10,8 @@ from fbvm.syntax.format_comments import Comment
 from fbvm.syntax.format_expressions import ExpressionLayout, Phrase
 from fbvm.syntax.format_layout import BLANK, HARD, Doc, Hang, Indent, Leaf, Verbatim
 from fbvm.syntax.lexer import Token
+from fbvm.syntax.mnemonics import read_rungs
+from fbvm.syntax.rung_text import rung_lines
 
 Branch = tuple[Token, Phrase, Token, list[Phrase]]
 
@@ -123,6 +125,14 @@ class StatementLayout(ExpressionLayout):
         return self.refused(token)
 
     # --- compound statements ---
+
+    def ladder(self, token: Token) -> Phrase:
+        """LADDER .. END_LADDER, in the canonical form of its own."""
+        first, last = token.text.index("\n") + 1, token.text.rindex("\n") + 1
+        rungs = read_rungs(token.text, first, last, lambda *message: None)
+        words = Token("", "LADDER", token.start, token.end)
+        rows = [part for line in rung_lines(rungs) for part in (HARD, Verbatim(line, 0))]
+        return Phrase(token.start, self.leaf(words), *rows, HARD, "END_LADDER", level="refused")
 
     def head(self, word: Token, condition: Phrase, then: Token) -> Doc:
         return (self.leaf(word), " ", self.hung(condition), " ", self.closer(then))

@@ -46,7 +46,7 @@ class Anchor:
 
 def anchor(states: State, below: int | None = None) -> Anchor:
     """The innermost list of the stack, or of its first `below` states."""
-    names, actions = symbols(), tables().actions
+    names, actions = symbols(), tables("st").actions
     for at in range((len(states) if below is None else below) - 1, -1, -1):
         row = actions[states[at]]
         for symbol in LISTS:
@@ -77,7 +77,7 @@ def reopen(states: State, values: list[Any]) -> None:
         level = "primary_expr"
     else:
         level = "unary_expr" if isinstance(value, Unary) else "variable"
-    states[-1] = tables().actions[states[-2]].get(level, states[-1])
+    states[-1] = tables("st").actions[states[-2]].get(level, states[-1])
 
 
 def cut(states: State, values: list[Any], place: Anchor) -> None:
@@ -88,7 +88,7 @@ def cut(states: State, values: list[Any], place: Anchor) -> None:
     if values and values[-1] == [] and symbols()[states[-1]] in STATEMENT_LISTS:
         del states[-1], values[-1]
     if symbols()[states[-1]] in STATEMENT_LISTS:
-        states[-1] = tables().actions[states[-2]]["ended_list"]
+        states[-1] = tables("st").actions[states[-2]]["ended_list"]
 
 
 @dataclass(frozen=True)

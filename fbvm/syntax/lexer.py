@@ -39,6 +39,9 @@ END with a space behind it, and words that begin with VAR_."""
 _END_OF = re.compile(r"(?i)[ \t]+(?:IF|CASE|FOR|WHILE|REPEAT|VAR|STRUCT|TYPE|FUNCTION|FUNCTION_BLOCK|PROGRAM)\b")
 
 
+_END_LADDER = re.compile(r"(?im)^[ \t]*END_LADDER\b")
+
+
 def meant(text: str) -> str:
     """The terminal that a misspelt word was to be."""
     word = text.upper()
@@ -92,7 +95,7 @@ def lexis() -> Lexis:
     reserved: set[str] = set()
     signs: dict[str, str] = {}
     patterns: dict[str, str] = {}
-    for terminal in tables().terminals:
+    for terminal in tables("st").terminals:
         shape = re.fullmatch(_WORDS, terminal.pattern)
         if shape and terminal.ignore_case:
             words.update(dict.fromkeys(shape[1].split("|"), terminal.name))
@@ -157,6 +160,9 @@ class Lexer:
                 if kind == "MISSPELT" and len(word) == 3:
                     end_of = _END_OF.match(text, at)
                     kind, at = (kind, end_of.end()) if end_of else ("NAME", at)
+                    word = text[start:at]
+                elif kind == "LADDER":
+                    at = self._ladder(start, at)
                     word = text[start:at]
                 elif before == "AT" or (before in ends and text.startswith("=", at)):
                     kind, at = self._special(lex, before, kind, start, at)
@@ -233,6 +239,14 @@ class Lexer:
             self.report("S0190", start, end + 1, f"the pragma `{{{_short(contents.strip())}}}` is not known and has no effect",
                         "what it switches for another compiler is not switched here")
         return end + 1
+
+    def _ladder(self, start: int, end: int) -> int:
+        """Where LADDER .. END_LADDER ends."""
+        found = _END_LADDER.search(self.text, end)
+        if not found:
+            self.report("S0101", start, end, "LADDER without END_LADDER", "END_LADDER stands on a line of its own")
+            return len(self.text)
+        return found.end()
 
     def _comment(self, start: int) -> int:
         """Where the bracket comment of `start` ends; each kind nests in itself."""

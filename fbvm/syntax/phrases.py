@@ -12,7 +12,7 @@ GROUPS = (
     ("a statement", {"IF", "FOR", "SEMICOLON"}, {
         "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "REFUSED_BLOCK",
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS", "MINUS",
-        "NOT", "DIRECT", "SELF"}),
+        "NOT", "DIRECT", "SELF", "LADDER"}),
     ("an expression", {"NAME", "NUMBER", "LPAR"}, {
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS",
         "MINUS", "NOT", "DIRECT", "SELF"}),
@@ -46,7 +46,7 @@ MEANT = {"STEP": ("BY", "the step of a loop stands behind BY"), "DOWNTO": ("TO",
 
 def sign(kind: str) -> str:
     """How a terminal is written."""
-    for terminal in tables().terminals:
+    for terminal in tables("st").terminals:
         if terminal.name == kind:
             return terminal.pattern if terminal.literal else kind
     return "the end of the text" if kind == "$END" else kind

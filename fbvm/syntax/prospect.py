@@ -12,8 +12,8 @@ State = list[int]
 @cache
 def symbols() -> tuple[str, ...]:
     """For each state the grammar symbol by which it is reached; "" for the start."""
-    names = [""] * len(tables().actions)
-    for row in tables().actions:
+    names = [""] * len(tables("st").actions)
+    for row in tables("st").actions:
         for symbol, act in row.items():
             if act >= 0:
                 names[act] = symbol
@@ -23,12 +23,12 @@ def symbols() -> tuple[str, ...]:
 @cache
 def terminal_names() -> tuple[str, ...]:
     """All terminals, the end of the text included."""
-    return (*(t.name for t in tables().terminals), "$END")
+    return (*(t.name for t in tables("st").terminals), "$END")
 
 
 def advance(states: State, kind: str) -> State | None:
     """The stack after a terminal, or None where it cannot stand.  `states` is not changed."""
-    grammar = tables()
+    grammar = tables("st")
     stack = list(states)
     while True:
         act = grammar.actions[stack[-1]].get(kind)
@@ -47,5 +47,5 @@ def advance(states: State, kind: str) -> State | None:
 
 def expected(states: State) -> set[str]:
     """Every terminal that can stand here."""
-    here = tables().actions[states[-1]]
+    here = tables("st").actions[states[-1]]
     return {kind for kind in terminal_names() if kind in here and advance(states, kind)}

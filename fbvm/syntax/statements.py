@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from fbvm.syntax.expressions import Expressions
+from fbvm.syntax.ladder import Ladder
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
 from fbvm.syntax.tree import (
@@ -116,6 +117,14 @@ class Statements(Expressions):
         return RefusedStatement(token.start, token.end, *refused_what(token.text))
 
     # --- compound statements ---
+
+    def ladder(self, token: Token) -> Ladder:
+        """LADDER .. END_LADDER, which has a front end of its own."""
+        from fbvm.syntax.rungs import read_ladder
+
+        made = read_ladder(self, token)
+        self.ladders.append(made)
+        return made
 
     def if_statement(self, word: Token, condition: Expr, then: Token, items: Items, more: list[Branch],
                      other: Token | None, otherwise: Items | None, end: Token) -> Statement:

@@ -15,11 +15,12 @@ from typing import Any, NamedTuple
 
 from fbvm.base.data import cache_folder, data_folder
 
-FILES = ("common.lark", "declarations.lark", "st.lark")
+FILES = {"st": ("common.lark", "declarations.lark", "st.lark"), "mnemonics": ("mnemonics.lark",)}
+"""The files of each language."""
 FORMAT = 2
 """Of the cache file; another number makes old files worthless."""
 
-START = "source_text"
+STARTS = {"st": "source_text", "mnemonics": "line"}
 
 
 class Rule(NamedTuple):
@@ -56,20 +57,25 @@ class Tables(NamedTuple):
 
 
 @cache
-def tables() -> Tables:
-    """The tables of the grammar, from the cache if it holds them."""
-    text = "\n".join((data_folder("grammar") / name).read_text(encoding="utf-8") for name in FILES)
+def tables(language: str) -> Tables:
+    """The tables of a language's grammar, from the cache if it holds them."""
+    text = grammar_text(language)
     key = [FORMAT, sys.version, _lark_identity(), text]
-    path = cache_folder() / f"grammar-{sys.version_info[0]}.{sys.version_info[1]}.json"
+    path = cache_folder() / f"grammar-{language}-{sys.version_info[0]}.{sys.version_info[1]}.json"
     try:
         stored = json.loads(path.read_bytes())
         if stored["key"] == key:
             return _from_plain(stored["tables"])
     except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError):
         pass
-    plain = compile_grammar(text)
+    plain = compile_grammar(text, STARTS[language])
     _store(path, {"key": key, "tables": plain})
     return _from_plain(plain)
+
+
+def grammar_text(language: str) -> str:
+    """The grammar of a language as one text."""
+    return "\n".join((data_folder("grammar") / name).read_text(encoding="utf-8") for name in FILES[language])
 
 
 def _lark_identity() -> str:
@@ -101,7 +107,7 @@ def _from_plain(plain: dict[str, Any]) -> Tables:
     return Tables(plain["start"], plain["end"], actions, rules, tuple(Terminal(*row) for row in plain["terminals"]))
 
 
-def compile_grammar(text: str) -> dict[str, Any]:
+def compile_grammar(text: str, start: str) -> dict[str, Any]:
     """Run lark over the grammar's text and take its tables as plain lists and dictionaries."""
     from lark import Lark
     from lark.grammar import Rule as LarkRule
@@ -118,22 +124,22 @@ def compile_grammar(text: str) -> dict[str, Any]:
         def lex(self, lexer_state: Any, parser_state: Any) -> Any:
             return iter(())
 
-    lark = Lark(text, parser="lalr", lexer=NoLexer, start=START, keep_all_tokens=True, maybe_placeholders=True)
+    lark = Lark(text, parser="lalr", lexer=NoLexer, start=start, keep_all_tokens=True, maybe_placeholders=True)
     data, memo = lark.memo_serialize([TerminalDef, LarkRule])
     terminals = [
         [t.name, t.pattern.value, "i" in t.pattern.flags, t.pattern.type == "str", t.priority > 0]
         for t in lark.terminals]
-    return {**_numbered(data["parser"]["parser"], memo), "terminals": terminals}
+    return {**_numbered(data["parser"]["parser"], memo, start), "terminals": terminals}
 
 
-def _numbered(table: dict[str, Any], memo: dict[int, Any]) -> dict[str, Any]:
+def _numbered(table: dict[str, Any], memo: dict[int, Any], start: str) -> dict[str, Any]:
     """lark's states and rules with numbers that are the same on every run: states as they are met from the start, in
     the order of their symbols."""
     names = table["tokens"]
     used = {arg["@"] for row in table["states"].values() for kind, arg in row.values() if kind}
     rules = sorted(used, key=lambda number: _rule_key(memo[number]))
     rule_numbers = {number: index for index, number in enumerate(rules)}
-    todo = [table["start_states"][START]]
+    todo = [table["start_states"][start]]
     order = {todo[0]: 0}
     for state in todo:
         for _, (kind, arg) in sorted((names[token], act) for token, act in table["states"][state].items() if not act[0]):
@@ -147,7 +153,7 @@ def _numbered(table: dict[str, Any], memo: dict[int, Any]) -> dict[str, Any]:
         row = {name: order[arg] for name, (_, arg) in acts}
         row |= {name: ~rule_numbers[arg["@"]] for name, (_, arg) in sorted(reduces, key=lambda item: item[0])}
         actions.append(row)
-    return {"start": 0, "end": order[table["end_states"][START]], "actions": actions,
+    return {"start": 0, "end": order[table["end_states"][start]], "actions": actions,
             "rules": [_plain_rule(memo[number]) for number in rules]}
 
 

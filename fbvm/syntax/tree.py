@@ -246,11 +246,12 @@ class VarDecl(Node):
 @_node
 class VarSection(Node):
     """One VAR.. END_VAR: `kind` is VAR, VAR_INPUT, VAR_OUTPUT, VAR_IN_OUT, VAR_TEMP, VAR_EXTERNAL, VAR_GLOBAL,
-    VAR_STAT or VAR_INST; `qualifiers` the words behind it in capitals (CONSTANT, RETAIN, NON_RETAIN, PERSISTENT, PUBLIC ...)."""
+    VAR_STAT or VAR_INST; `qualifiers` the words behind it in capitals; `hidden` ones hold what rungs need, unwritten."""
 
     kind: str
     qualifiers: tuple[Name, ...]
     variables: tuple[VarDecl, ...]
+    hidden: bool = False
 
 
 # --- statements (7.3.3) --------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ import pytest
 
 from fbvm.base.data import data_folder
 from fbvm.syntax import tables as module
-from fbvm.syntax.tables import FILES, Tables, compile_grammar, tables
+from fbvm.syntax.tables import FILES, STARTS, Tables, compile_grammar, grammar_text, tables
 
 
 @pytest.fixture
@@ -23,14 +23,14 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 def fresh() -> Tables:
     """The tables as another process would get them."""
-    return tables.__wrapped__()
+    return tables.__wrapped__("st")
 
 
 def test_a_missing_file_is_written_and_used(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = fresh()
     (file,) = cache.iterdir()
-    monkeypatch.setattr(module, "compile_grammar", lambda text: pytest.fail("the cache is not used"))
-    assert fresh() == first == tables()
+    monkeypatch.setattr(module, "compile_grammar", lambda *grammar: pytest.fail("the cache is not used"))
+    assert fresh() == first == tables("st")
     assert file.suffix == ".json"
 
 
@@ -42,7 +42,7 @@ def test_a_damaged_file_is_replaced(cache: Path, content: bytes) -> None:
     (file,) = cache.iterdir()
     good = file.read_bytes()
     file.write_bytes(content)
-    assert fresh() == tables()
+    assert fresh() == tables("st")
     assert file.read_bytes() == good
 
 
@@ -57,19 +57,19 @@ def test_a_file_with_wrong_contents_is_replaced(cache: Path, spoil: object) -> N
     bad = json.loads(file.read_bytes())
     spoil(bad)  # type: ignore[operator]
     file.write_text(json.dumps(bad))
-    assert fresh() == tables()
+    assert fresh() == tables("st")
     assert json.loads(file.read_bytes()) == good
 
 
 def test_a_folder_that_cannot_be_made_does_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "file" / "cache"))
-    assert fresh() == tables()
+    assert fresh() == tables("st")
 
 
 def test_the_grammar_has_only_the_conflicts_that_are_meant(caplog: pytest.LogCaptureFixture) -> None:
     """A result type in front of a statement that begins with `(` or a name: the bracket or name belongs to the type."""
-    text = "\n".join((data_folder("grammar") / name).read_text(encoding="utf-8") for name in FILES)
+    text = grammar_text("st")
     with caplog.at_level(logging.DEBUG, logger=lark.logger.name):
         lark.Lark(text, parser="lalr", start="source_text", debug=True, keep_all_tokens=True, maybe_placeholders=True)
     messages = [line for record in caplog.records for line in record.getMessage().splitlines()]
@@ -79,12 +79,12 @@ def test_the_grammar_has_only_the_conflicts_that_are_meant(caplog: pytest.LogCap
 
 
 def test_the_grammar_is_plain_lark() -> None:
-    text = "\n".join((data_folder("grammar") / name).read_text(encoding="utf-8") for name in FILES)
+    text = grammar_text("st")
     tree = lark.Lark(text + "\n%ignore /\\s+/", parser="lalr", start="source_text").parse("PROGRAM p x := 1; END_PROGRAM")
-    assert isinstance(tree, lark.Tree) and compile_grammar(text)["rules"]
+    assert isinstance(tree, lark.Tree) and compile_grammar(text, STARTS["st"])["rules"]
 
 
 def test_every_production_is_named() -> None:
-    for name in FILES[1:]:
+    for name in FILES["st"][1:]:
         lines = (data_folder("grammar") / name).read_text(encoding="utf-8").splitlines()
         assert sum(line.startswith("// ") for line in lines) > 20

@@ -1,0 +1,64 @@
+"""The nodes of ladder (IEC 61131-3, 8.2): rungs as they were written, and what they do written as statements.
+
+A rung is a statement whose body is made of ordinary ones; what is only true of rungs are `Edge` and `Element`.  So
+whoever checks, lowers or executes needs to know these two, and whoever draws or prints needs to know the steps.
+"""
+
+from __future__ import annotations
+
+from fbvm.syntax.node import Node
+from fbvm.syntax.node import node as _node
+from fbvm.syntax.tree import Block, Expr, NameRef, Statement, VarDecl
+
+
+@_node
+class Edge(Expr):
+    """TRUE in the one evaluation in which `of` rises, or falls.  `memory` is the variable that holds what `of` was when it
+    was last evaluated."""
+
+    of: Expr
+    memory: NameRef
+    falling: bool
+
+
+@_node
+class Element(Expr):
+    """What is seen at a step of a rung: the state of a contact, or the power that reaches an output.  `step` is its
+    place in the rung's steps."""
+
+    step: int
+    value: Expr
+
+
+@_node
+class Step(Node):
+    """One instruction as a programming tool writes it: `prefix` is made of `!`, `@` and `%`, `operands` are as written."""
+
+    prefix: str
+    mnemonic: str
+    operands: tuple[str, ...]
+
+
+@_node
+class Rung(Statement):
+    """`steps` are what was written, `body` is what they do.  `notes` are comments as they were
+    written, with the number of the step that each stands in front of."""
+
+    number: int
+    comment: str
+    steps: tuple[Step, ...]
+    notes: tuple[tuple[int, str], ...]
+    body: Block
+
+
+@_node
+class Ladder(Statement):
+    """LADDER .. END_LADDER: `rungs` in the order of writing; in `body` some may stand inside loops.  `variables` are what
+    steps remember, `temporaries` what lives for one execution: neither has a name that can be written."""
+
+    rungs: tuple[Rung, ...]
+    body: Block
+    variables: tuple[VarDecl, ...]
+    temporaries: tuple[VarDecl, ...]
+    instances: tuple[VarDecl, ...]
+    """Instances that FBCALL names."""

@@ -1,0 +1,200 @@
+"""Text to steps: reads the lines between LADDER and END_LADDER, by the grammar of `grammar/mnemonics.lark`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache
+
+from fbvm.syntax.automaton import Automaton, Mender
+from fbvm.syntax.instruction_set import Instruction, instruction_set, spelling
+from fbvm.syntax.ladder import Step
+from fbvm.syntax.lexer import Token
+from fbvm.syntax.tables import tables
+
+Report = Callable[..., None]
+
+
+@dataclass
+class Line:
+    """An instruction as it was read: its row of the table, its step, and the places of its operands."""
+
+    row: Instruction
+    step: Step
+    places: list[tuple[int, int]]
+    coded: bool = False
+    """Whether its function code was written."""
+    remark: str = ""
+    """The comment behind it."""
+
+
+@dataclass
+class RungText:
+    """The lines of one rung, before anybody asked what they do."""
+
+    start: int
+    number: int = 0
+    comment: str = ""
+    lines: list[Line] = field(default_factory=list)
+    notes: list[tuple[int, str]] = field(default_factory=list)
+    declared: bool = False
+    """Whether a line RUNG began it."""
+    damaged: bool = False
+    """Whether a line of it could not be read."""
+
+
+class Refusal(Exception):
+    """A line cannot be read; the arguments are start, end, message and hint."""
+
+
+@cache
+def _patterns() -> dict[str, re.Pattern[str]]:
+    return {t.name: re.compile(t.pattern, re.I if t.ignore_case else 0) for t in tables("mnemonics").terminals}
+
+
+def read_rungs(text: str, start: int, end: int, report: Report) -> list[RungText]:
+    """The rungs of the lines in `text[start:end]`; a line that cannot be read has a diagnostic and is left out.
+
+    Where no line RUNG says so, a rung begins with an instruction at the bus bar that follows an output."""
+    rungs = [RungText(start)]
+    at = start
+    for line in text[start:end].splitlines(keepends=True):
+        reader = _LineReader(text, rungs)
+        try:
+            Automaton(reader, _tokens(text, at, at + len(line.rstrip("\r\n"))), text, "mnemonics").run(_stuck)
+        except Refusal as refusal:
+            report("S0109", *refusal.args)
+            rungs[-1].damaged = True
+        at += len(line)
+    return [rung for rung in rungs if rung.lines or rung.declared or rung.notes]
+
+
+def _stuck(automaton: Automaton) -> Mender:
+    raise Refusal(automaton.before.start, automaton.before.end, "this is no instruction", "")
+
+
+def _tokens(text: str, at: int, end: int) -> Iterator[Token]:
+    """The tokens of one line: what may stand where is said by the place."""
+    patterns = _patterns()
+    remark = None if patterns["RUNG"].match(text[at:end].lstrip()) else patterns["REMARK"].search(text, at, end)
+    end = remark.start() if remark else end
+
+    def take(kind: str) -> Token | None:
+        nonlocal at
+        while at < end and text[at] in " \t":
+            at += 1
+        found = patterns[kind].match(text, at, end)
+        if not found:
+            return None
+        token = Token(kind, found[0], at, found.end())
+        at = found.end()
+        return token
+
+    if token := take("NOTE"):
+        yield token
+    elif token := take("RUNG"):
+        yield token
+        yield from filter(None, (take("RUNG_NUMBER"), take("RUNG_COMMENT")))
+    else:
+        yield from filter(None, (take("STEP_NUMBER"), take("PREFIX")))
+        known = instruction_set().pattern.match(text, at, end)
+        if known:
+            yield Token("MNEMONIC", known[0], at, known.end())
+            at = known.end()
+        elif token := take("MNEMONIC"):
+            yield token
+        if token := take("CODE"):
+            yield token
+        while token := take("PIN") or take("OPERAND"):
+            yield token
+    if remark:
+        yield Token("REMARK", remark[0], remark.start(), remark.end())
+    yield Token("$END", "", end, end)
+
+
+class _LineReader:
+    """The functions of the grammar's rules."""
+
+    def __init__(self, text: str, rungs: list[RungText]) -> None:
+        self.text, self.rungs = text, rungs
+
+    def empty(self) -> list[Token]:
+        return []
+
+    def add(self, operands: list[Token], operand: Token) -> list[Token]:
+        operands.append(operand)
+        return operands
+
+    def operand(self, token: Token) -> Token:
+        return token
+
+    def pin(self, name: Token, value: Token) -> Token:
+        return Token("PIN", name.text + value.text, name.start, value.end)
+
+    def nothing(self) -> None:
+        """An empty line carries no meaning."""
+
+    def note(self, token: Token) -> None:
+        rung = self.rungs[-1]
+        rung.notes.append((len(rung.lines), token.text.strip()))
+
+    def rung(self, word: Token, number: Token | None, comment: Token | None) -> None:
+        before = self.rungs[-1]
+        if before.lines or before.declared or before.notes:
+            before = RungText(word.start)
+            self.rungs.append(before)
+        before.start, before.declared = word.start, True
+        before.number = int(number.text) if number else 0
+        before.comment = comment.text.strip() if comment else ""
+
+    def step(self, number: Token | None, prefix: Token | None, mnemonic: Token, code: Token | None,
+             operands: list[Token], remark: Token | None) -> None:
+        name = spelling(mnemonic.text)
+        row = instruction_set().rows.get(name)
+        if row is None:
+            raise Refusal(mnemonic.start, mnemonic.end, f"`{mnemonic.text}` is no instruction of this instruction set",
+                          "an unknown instruction is never left out: say what it does with others")
+        if code and int(code.text[1:-1]) != int(row.code or 1000):
+            raise Refusal(code.start, code.end, f"{name} has the function code {row.code or 'none'}, not {code.text[1:-1]}",
+                          "leave the code out, or write the mnemonic that belongs to it")
+        written = prefix.text if prefix else ""
+        if missing := [sign for sign in written if sign not in row.variations]:
+            raise Refusal(mnemonic.start - len(written), mnemonic.end, f"there is no {missing[0]}{name}",
+                          f"{name} has {', '.join(row.variations) or 'no variations'}")
+        self._begin(row, mnemonic)
+        step = Step(mnemonic.start - len(written), operands[-1].end if operands else mnemonic.end, written, name,
+                    tuple(operand.text for operand in operands))
+        self.rungs[-1].lines.append(Line(row, step, [(o.start, o.end) for o in operands],
+                                         code is not None, remark.text.strip() if remark else ""))
+
+    def _begin(self, row: Instruction, mnemonic: Token) -> None:
+        """Begin another rung if this instruction does."""
+        rung = self.rungs[-1]
+        if rung.lines and not rung.declared and row.inputs == 0 and closes(rung.lines):
+            self.rungs.append(RungText(mnemonic.start))
+
+
+def is_input(row: Instruction) -> bool:
+    """Whether an instruction makes the execution condition, and does nothing with it."""
+    return row.kind == "?" or row.does in (".load", ".and", ".or", ".and_block", ".or_block", ".not", ".up", ".down")
+
+
+def closes(lines: list[Line]) -> bool:
+    """Whether a rung may end behind these lines: the last one does something, and no condition is left for another."""
+    if is_input(lines[-1].row):
+        return False
+    left = 0
+    for line in lines:
+        row = line.row
+        if row.does == ".load" or row.kind == "?" and row.inputs == 0:
+            left += 0 if line.step.operands and _is_branch(line.step.operands[0]) else 1
+        elif row.does in (".and_block", ".or_block"):
+            left -= 1
+        elif row.inputs > 1:
+            left -= row.inputs - 1
+    return left <= 1
+
+
+def _is_branch(operand: str) -> bool:
+    return operand.upper().startswith("TR") and operand[2:].isdigit()

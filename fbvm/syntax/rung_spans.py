@@ -1,0 +1,236 @@
+"""What covers several rungs: jumps, interlocks and loops (C200HS p107, CPM1 p175; omissions of the manuals assumed).
+
+A jump over rungs is a variable that is ON while they are passed over; a jump back and FOR are loops around them; an
+interlock is a variable that says to each output whether it is inhibited.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from fbvm.syntax import tree
+from fbvm.syntax.ladder import Rung
+from fbvm.syntax.mnemonics import RungText
+from fbvm.syntax.tree import Block, Continue, Exit, Expr, For, NameRef, Repeat, Return, Statement
+
+if TYPE_CHECKING:
+    from fbvm.syntax.rungs import Rungs
+
+INTERLOCK = "$IL"
+JUMP_NUMBERS = 1024
+DEEPEST_LOOPS = 15
+WITHOUT_NUMBER = "0 without number"
+"""The number of JMP0 and JME0."""
+
+
+@dataclass
+class Frame:
+    """A loop that is open: what began it, and what stands in it so far."""
+
+    what: str
+    rung: Rung | None = None
+    statements: list[Statement] = field(default_factory=list)
+    count: Expr | None = None
+    counter: NameRef | None = None
+    again: NameRef | None = None
+
+
+class Spans:
+    """Keeps what covers the rung at work, and puts rungs where they belong."""
+
+    def __init__(self, rungs: Rungs) -> None:
+        self.rungs = rungs
+        self.frames = [Frame("")]
+        self.interlocked = False
+        self.jumps: dict[str, NameRef] = {}
+        """Jumps that may be passing over the rung at work, by number."""
+        self._landings: dict[str, list[int]] = {}
+        self._takeoffs: dict[str, list[int]] = {}
+        self._at = 0
+        self._opening: Frame | None = None
+        self._closing: str = ""
+
+    def look(self, texts: list[RungText]) -> None:
+        """Find out where jumps lead."""
+        for text in texts:
+            for line in text.lines:
+                if line.row.does in (".jump", ".jump_end"):
+                    table = self._landings if line.row.does == ".jump_end" else self._takeoffs
+                    number = _number(line.step.operands[0]) if line.step.operands else WITHOUT_NUMBER
+                    table.setdefault(number, []).append(line.step.start)
+
+    # --- putting rungs together -------------------------------------------------------------------------------------
+
+    def guarded(self, statements: Block, inhibited: Block) -> list[Statement]:
+        """Statements as they stand under the jumps and the interlock of this place."""
+        rungs, whole = self.rungs, list(statements)
+        if self.interlocked:
+            here = rungs.temporary(INTERLOCK)
+            whole = [rungs.when(here, *inhibited, otherwise=statements) if inhibited else
+                     rungs.when(rungs.negated(here), *statements)]
+        return self._passed_over(whole)
+
+    def _passed_over(self, statements: list[Statement]) -> list[Statement]:
+        if not self.jumps:
+            return statements
+        rungs = self.rungs
+        first, *more = self.jumps.values()
+        passing: Expr = first
+        for jump in more:
+            passing = rungs.binary("OR", passing, jump)
+        return [rungs.when(rungs.negated(passing), *statements)]
+
+    def place(self, rung: Rung) -> None:
+        """Put a rung where it belongs, and open or close the loops that it begins or ends."""
+        if self._closing == "FOR":
+            self._close_loop()
+        self.frames[-1].statements.append(rung)
+        if self._closing == "JMP":
+            self._close_again()
+        if self._opening is not None:
+            self._opening.rung = rung
+            self.frames.append(self._opening)
+        self._closing, self._opening = "", None
+
+    def close(self, end: int) -> Block:
+        """All rungs; loops that are still open have a diagnostic."""
+        for frame in self.frames[1:]:
+            assert frame.rung is not None
+            self.rungs.report("S0110", frame.rung.start, frame.rung.end, "FOR without NEXT" if frame.what == "FOR" else
+                              "the jump back to this JME leads into a loop", "FOR and NEXT stand in pairs, and jumps stay inside")
+        return tuple(self.frames[0].statements)
+
+    # --- the end ----------------------------------------------------------------------------------------------------
+
+    def end(self) -> None:
+        """END: what follows is not executed."""
+        self.rungs.emit(Return(self.rungs.start, self.rungs.end))
+
+    # --- interlocks -------------------------------------------------------------------------------------------------
+
+    def interlock(self) -> None:
+        """IL: from here to ILC outputs are inhibited unless the condition is ON."""
+        rungs = self.rungs
+        here = rungs.temporary(INTERLOCK)
+        condition = rungs.power()
+        if not self.interlocked:
+            rungs.emit(rungs.assign(here, rungs.negated(condition)))
+            self.interlocked = True
+        else:
+            rungs.emit(rungs.assign(here, rungs.negated(condition)))
+        if self.jumps:
+            raise self._refused("IL stands between a JMP and its JME", "interlock and jump may not overlap")
+
+    def clear(self) -> None:
+        """ILC ends all interlocks."""
+        self.interlocked = False
+        self.rungs.emit(self.rungs.assign(self.rungs.temporary(INTERLOCK), self.rungs.truth(False)))
+
+    # --- jumps ------------------------------------------------------------------------------------------------------
+
+    def jump(self) -> None:
+        """JMP and JMP0 (they jump when OFF), CJP (when ON), CJPN (when OFF)."""
+        rungs = self.rungs
+        number = self._jump_number()
+        power = rungs.power()
+        leaves = power if rungs.line.step.mnemonic == "CJP" else rungs.negated(power)
+        if any(at > rungs.start for at in self._landings.get(number, ())):
+            self._jump_over(number, leaves)
+        elif number in self._landings:
+            self._jump_back(number, leaves)
+        else:
+            raise self._refused(f"there is no JME {number}", "a jump leads to the JME of its number")
+
+    def _jump_over(self, number: str, leaves: Expr) -> None:
+        rungs = self.rungs
+        passing = rungs.temporary(f"$JMP{number}")
+        rungs.emit(rungs.assign(passing, leaves), inhibited=(rungs.assign(passing, rungs.truth(True)),))
+        self.jumps[number] = passing
+
+    def _jump_back(self, number: str, leaves: Expr) -> None:
+        rungs, frame = self.rungs, self.frames[-1]
+        if frame.what != f"JME{number}" or frame.again is None:
+            raise self._refused(f"the jump back to JME {number} leads into or out of a loop", "")
+        again = rungs.temporary(f"$JME{number}")
+        rungs.emit(rungs.when(leaves, rungs.assign(again, rungs.truth(True)), Continue(rungs.start, rungs.end)))
+        if rungs.start == max(self._takeoffs[number]):
+            self._closing = "JMP"
+
+    def land(self) -> None:
+        """JME and JME0."""
+        rungs = self.rungs
+        number = self._jump_number()
+        passing = self.jumps.pop(number, None)
+        if passing is not None:
+            rungs.out.append(rungs.assign(rungs.temporary(f"$JMP{number}"), rungs.truth(False)))
+        elif self._comes_back(number):
+            again = rungs.temporary(f"$JME{number}")
+            self._opening = Frame(f"JME{number}", again=again)
+
+    def _comes_back(self, number: str) -> bool:
+        """Whether a jump behind this JME leads back to it."""
+        here = self.rungs.start
+        later = [at for at in self._landings[number] if at > here]
+        return any(at > here and not any(landing > at for landing in later) for at in self._takeoffs.get(number, ()))
+
+    def _jump_number(self) -> str:
+        operands = self.rungs.line.step.operands
+        if not operands:
+            return WITHOUT_NUMBER
+        number = _number(operands[0])
+        if not number.isdigit() or int(number) >= JUMP_NUMBERS:
+            raise self._refused(f"{operands[0]} is no number of a jump", f"numbers are 0 to {JUMP_NUMBERS - 1}")
+        return number
+
+    def _close_again(self) -> None:
+        frame = self.frames.pop()
+        rungs = self.rungs
+        assert frame.again is not None
+        first = rungs.assign(frame.again, rungs.truth(False))
+        self.frames[-1].statements.append(Repeat(rungs.start, rungs.end, (first, *frame.statements),
+                                                 rungs.negated(rungs.temporary(frame.again.text))))
+
+    # --- FOR and NEXT -----------------------------------------------------------------------------------------------
+
+    def loop(self) -> None:
+        """FOR: what follows is executed so many times, up to NEXT."""
+        rungs = self.rungs
+        if self.jumps or self.interlocked:
+            raise self._refused("FOR stands between IL and ILC or between JMP and JME", "loops stay outside of them")
+        if sum(frame.what == "FOR" for frame in self.frames) >= DEEPEST_LOOPS:
+            raise self._refused(f"loops stand in each other more than {DEEPEST_LOOPS} deep", "")
+        count = tree.Call(rungs.start, rungs.end, NameRef(rungs.start, rungs.end, "TO_UINT"),
+                          (tree.Argument(rungs.start, rungs.end, "", None, rungs.operand(0)),))
+        self._opening = Frame("FOR", count=count, counter=rungs.temporary(rungs.name("count"), "UDINT"))
+
+    def next(self) -> None:
+        """NEXT."""
+        if self.frames[-1].what != "FOR":
+            raise self._refused("NEXT without FOR", "")
+        self._closing = "FOR"
+
+    def leave(self) -> None:
+        """BREAK: with the condition ON the innermost loop is left."""
+        rungs = self.rungs
+        if self.frames[-1].what != "FOR":
+            raise self._refused("BREAK stands outside FOR and NEXT", "")
+        rungs.emit(rungs.when(rungs.power(), Exit(rungs.start, rungs.end)))
+
+    def _close_loop(self) -> None:
+        frame, rungs = self.frames.pop(), self.rungs
+        assert frame.counter is not None and frame.count is not None
+        one = tree.Literal(rungs.start, rungs.end, "int", 1, None, "1")
+        self.frames[-1].statements.append(
+            For(rungs.start, rungs.end, frame.counter, one, frame.count, None, tuple(frame.statements)))
+
+    def _refused(self, message: str, hint: str) -> Exception:
+        from fbvm.syntax.rungs import Refused
+
+        return Refused(message, hint)
+
+
+def _number(operand: str) -> str:
+    """The number of a jump as text without sign and leading zeros."""
+    digits = operand.lstrip("#&")
+    return str(int(digits)) if digits.isdigit() else operand

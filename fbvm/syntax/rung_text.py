@@ -1,0 +1,42 @@
+"""Steps to text: rungs as everybody would write them."""
+
+from __future__ import annotations
+
+from fbvm.syntax.mnemonics import Line, RungText
+
+STEP = "    "
+"""What instructions stand further in than their RUNG."""
+OPERANDS_AT = 8
+"""Where operands begin, counted from the instruction."""
+
+
+def rung_lines(rungs: list[RungText]) -> list[str]:
+    """The lines between LADDER and END_LADDER.  Rungs without a line RUNG are set apart by an empty one."""
+    lines: list[str] = []
+    for rung in rungs:
+        if rung.declared:
+            number = str(rung.number) if rung.number else ""
+            lines.append(" ".join(filter(None, ("RUNG", number, rung.comment))))
+        elif lines:
+            lines.append("")
+        lines += _steps(rung)
+    return lines
+
+
+def _steps(rung: RungText) -> list[str]:
+    """The instructions of a rung and the notes between them, remarks one below the other."""
+    written = [_instruction(line) for line in rung.lines]
+    width = max((len(text) for text, line in zip(written, rung.lines, strict=True) if line.remark), default=0) + 2
+    lines: list[str] = []
+    for position in range(len(written) + 1):
+        lines += [STEP + text for at, text in rung.notes if at == position]
+        if position < len(written):
+            remark = rung.lines[position].remark
+            lines.append(STEP + (f"{written[position]:{width}}{remark}" if remark else written[position]))
+    return lines
+
+
+def _instruction(line: Line) -> str:
+    step = line.step
+    name = step.prefix + step.mnemonic + (f"({line.row.code})" if line.row.code and line.coded else "")
+    return f"{name:{OPERANDS_AT - 1}} {' '.join(step.operands)}".rstrip()
