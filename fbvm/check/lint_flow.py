@@ -5,7 +5,7 @@ from __future__ import annotations
 from fbvm.base.types import Elementary, EnumType, base
 from fbvm.check.lint_body import Body
 from fbvm.check.values import is_any
-from fbvm.syntax import tree
+from fbvm.syntax import ladder, tree
 
 _LEAVES = {tree.Return: "RETURN", tree.Exit: "EXIT", tree.Continue: "CONTINUE"}
 _TURNED = {"<": ">", ">": "<", "<=": ">=", ">=": "<="}
@@ -47,6 +47,8 @@ class _Flow:
             return statement.otherwise is not None and self.block(statement.otherwise) and all(ends)
         if isinstance(statement, tree.For | tree.While | tree.Repeat):
             return self.loop(statement)
+        if isinstance(statement, ladder.Ladder | ladder.Rung):
+            return self.block(statement.body)
         if isinstance(statement, tree.Exit) and self.left:
             self.left[-1] = True
         self.returns = self.returns or isinstance(statement, tree.Return)

@@ -203,6 +203,14 @@ class TypeLayout(StatementLayout):
         inside = self.listed(items, fill=fill)
         return Phrase(opener.start, self.leaf(opener), inside, self.closer(closer), level="list")
 
+    def array_bare(self, first: Phrase, comma: Token, items: list[Phrase]) -> Phrase:
+        """An array without brackets gets them."""
+        inside = self.listed([first, *items], fill=True)
+        return Phrase(first.start, "[", inside, "]", level="list")
+
+    def array_bare_repeated(self, count: Token, opener: Token, values: list[Phrase] | None, closer: Token) -> Phrase:
+        return Phrase(count.start, "[", self.array_repeated(count, opener, values, closer).doc, "]", level="list")
+
     def array_item(self, value: Phrase) -> Phrase:
         return value
 
