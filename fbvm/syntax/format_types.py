@@ -205,7 +205,7 @@ class TypeLayout(StatementLayout):
 
     def array_bare(self, first: Phrase, comma: Token, items: list[Phrase]) -> Phrase:
         """An array without brackets gets them."""
-        inside = self.listed([first, *items], fill=True)
+        inside = self.listed([*self.add_separated([first], comma, items[0]), *items[1:]], fill=True)
         return Phrase(first.start, "[", inside, "]", level="list")
 
     def array_bare_repeated(self, count: Token, opener: Token, values: list[Phrase] | None, closer: Token) -> Phrase:
