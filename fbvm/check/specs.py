@@ -15,9 +15,7 @@ from fbvm.base.types import (
     ArrayType,
     Elementary,
     EnumType,
-    Field,
     RefType,
-    StructType,
     SubrangeType,
     Type,
     array,
@@ -31,6 +29,7 @@ from fbvm.check.constants import default
 from fbvm.check.facts import Pou
 from fbvm.check.names import refuse_reserved
 from fbvm.check.project import Project, TypeEntry
+from fbvm.check.structures import RELATIVE, Members
 from fbvm.check.values import Values
 from fbvm.syntax import tree
 
@@ -52,13 +51,6 @@ def settle(awaited: list[RefType], target: Type | None) -> None:
     for kind in awaited:
         object.__setattr__(kind, "target", target)
     awaited.clear()
-
-
-def overlaid(content: bytearray, initial: bytes) -> bytearray:
-    """The initial bytes of a union when one more member comes: those of the first that is not all zero."""
-    if not any(content):
-        return bytearray(initial) + bytes(max(0, len(content) - len(initial)))
-    return content + bytes(max(0, len(initial) - len(content)))
 
 
 class Specs:
@@ -92,12 +84,11 @@ class Specs:
             return self._array(spec, source)
         if isinstance(spec, tree.EnumSpec):
             return self._enumeration(spec, source, name)
-        if isinstance(spec, tree.UnionSpec) or (isinstance(spec, tree.StructSpec) and not spec.overlap):
+        if isinstance(spec, tree.UnionSpec | tree.StructSpec):
             return self._structure(spec, source, name)
         if isinstance(spec, tree.RefSpec) and spec.kind != "REFERENCE TO":
             return self._reference(spec, source)
-        what = {tree.RefSpec: "REFERENCE TO here", tree.StructSpec: "STRUCT OVERLAP"}
-        self.report.add("S0901", source, spec, f"{what[type(spec)]} is understood but not executed by this version")
+        self.report.add("S0901", source, spec, "REFERENCE TO here is understood but not executed by this version")
         return None
 
     def _reference(self, spec: tree.RefSpec, source: Source) -> Resolved | None:
@@ -311,10 +302,7 @@ class Specs:
 
     def _structure(self, spec: tree.StructSpec | tree.UnionSpec, source: Source, name: str) -> Resolved | None:
         """A structure, or a union: its members share their place, and the first initial value holds."""
-        shared = isinstance(spec, tree.UnionSpec)
-        fields: dict[str, Field] = {}
-        content = bytearray()
-        align = 1
+        made = Members(shared=isinstance(spec, tree.UnionSpec) or spec.overlap)
         complete = True
         for declared in spec.members:
             resolved = self.resolve(declared.spec, source)
@@ -324,24 +312,14 @@ class Specs:
             kind, initial = resolved
             if declared.initial is not None:
                 initial = self.values.initial(kind, declared.initial, source, initial)
-            if declared.location is not None:
-                self.report.add("S0604", source, declared.location, "a member of a structure has no location of its own")
-            align = max(align, kind.align)
             for member in declared.names:
-                if fold(member.text) in fields:
+                if fold(member.text) in made.fields:
                     self.report.add("S0202", source, member, f"{member.text} stands twice in this structure")
-                    continue
-                if shared:
-                    fields[fold(member.text)] = Field(member.text, kind, 0)
-                    content = overlaid(content, initial)
-                    continue
-                content += bytes(-len(content) % kind.align)
-                fields[fold(member.text)] = Field(member.text, kind, len(content))
-                content += initial
+                elif wrong := made.add(member.text, kind, initial, declared.location):
+                    self.report.add("S0604", source, declared.location or member, wrong, RELATIVE)
         if not complete:
             return None
-        content += bytes(-len(content) % align)
         if not name:
             self._anonymous += 1
             name = f"STRUCT {self._anonymous}"
-        return StructType(name, len(content), align, fields), bytes(content)
+        return made.structure(name)

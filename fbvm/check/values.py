@@ -155,7 +155,11 @@ class Values:
                 continue
             seen.add(fold(name.text))
             span = slice(member.offset, member.offset + member.type.size)
-            content[span] = self.initial(member.type, value, source, bytes(content[span]))
+            if member.bit is None:
+                content[span] = self.initial(member.type, value, source, bytes(content[span]))
+            else:
+                made = self.initial(member.type, value, source, bytes((content[member.offset] >> member.bit & 1,)))
+                content[member.offset] = content[member.offset] & ~(1 << member.bit) | made[0] << member.bit
         return bytes(content)
 
 
@@ -185,7 +189,7 @@ def flattened(init: tree.ArrayInit) -> tree.ArrayInit:
 
 def initialisable(kind: StructType, member: Field) -> bool:
     """True for what an initialiser of a structure or of a block's instance may name."""
-    return not (member.reference or member.absolute or member.bit is not None or member.constant) and \
+    return not (member.reference or member.absolute or member.constant) and \
         (not kind.block or member.kind in ("VAR_INPUT", "VAR_OUTPUT", "VAR"))
 
 

@@ -81,7 +81,7 @@ class Places:
             if member.absolute:
                 of = self.body.program.located(member, self.facts.types[expr.of])
                 return Place(("abs", of.offset, ()), kind, of.bit)
-            return self.of(expr.of).moved(member.offset, kind)
+            return self.of(expr.of).moved(member.offset, kind, member.bit)
         if isinstance(expr, tree.Part):
             return self._part(expr, kind)
         if isinstance(expr, tree.Call):

@@ -137,7 +137,7 @@ class Recovery:
 
     def mended(self, mend: Mend, token: Token) -> list[Token]:
         """Do what `best_mend` found, and say it."""
-        self.report("S0101", mend.start, mend.end, mend.message, mend.hint, mend.opener)
+        self.report(mend.code, mend.start, mend.end, mend.message, mend.hint, mend.opener)
         self.last = max(self.last, mend.start)
         if mend.cut:
             cut(self.states, self.values, anchor(self.states))

@@ -29,6 +29,7 @@ class Mend:
     hint: str = ""
     opener: Token | None = None
     cut: bool = False
+    code: str = "S0101"
 
 
 def slip(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -198,6 +199,27 @@ def _location_behind_type(automaton: Automaton, token: Token, following: list[To
                 f"write it in front of the colon: x AT {location.text} : ...")
 
 
+INSTRUCTIONS = {
+    "LD", "LDN", "ST", "STN", "S", "R", "AND", "ANDN", "OR", "ORN", "XOR", "XORN", "NOT", "ADD", "SUB", "MUL", "DIV", "MOD", "GT",
+    "GE", "EQ", "NE", "LE", "LT", "JMP", "JMPC", "JMPCN", "CAL", "CALC", "CALCN", "RET", "RETC", "RETCN"}
+"""Operators of the instruction list, as names (IEC 61131-3 ed. 3, table 68)."""
+
+
+def _instruction_list(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`LD a` at the beginning of a line: the whole body is an instruction list."""
+    word = automaton.before
+    line = automaton.text[:word.start].rpartition("\n")[2].strip()
+    if word.type != "NAME" or word.text.upper() not in INSTRUCTIONS or (line and not line.endswith(":")):
+        return None
+    if token.type not in ("NAME", "NUMBER", "TYPED_LITERAL", "DIRECT") or "\n" in automaton.text[word.end:token.start]:
+        return None
+    while token.type not in POU_ENDS and token.type != "$END":
+        token = automaton.next()
+    return Mend([token], word.start, word.end, "the instruction list is understood but not executed by this version",
+                "write the body in Structured Text", cut=True, code="S0901")
+
+
 SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
     _misspelt, _statement_word, _nameless, _reserved_name, _end_of_section, _semicolon_behind_section, _colon_behind_else,
-    _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end, _location_behind_type)
+    _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end, _location_behind_type,
+    _instruction_list)

@@ -2,15 +2,41 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import os
 
 import pytest
-from lang_check import check
+from lang_check import BUDGET, BUILDS, check
 from lang_corpus import Program, programs
+from tables import GRAPHIC, HERE, LIST, listing, numbers, titles
 
-HERE = Path(__file__).parent
+from fbvm.code.image import Image
+from fbvm.engine import native
+from fbvm.plc import Plc
 
 
 @pytest.mark.parametrize("program", [pytest.param(p, id=f"{p.path.stem}:{p.line}") for p in programs(HERE)])
 def test_feature(program: Program) -> None:
     check(program)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
+@pytest.mark.parametrize("program", [pytest.param(p, id=f"{p.path.stem}:{p.line}") for p in programs(HERE) if p.runs])
+def test_feature_as_machine_code(program: Program, monkeypatch: pytest.MonkeyPatch) -> None:
+    def build(image: Image, cycle_ns: int) -> Plc:
+        return Plc(image, cycle_ns, budget=BUDGET, engine="native")
+
+    monkeypatch.setitem(BUILDS, "native", build)
+    check(program)
+
+
+def test_every_table_is_there() -> None:
+    covered = {number for path in HERE.glob("*.st") for number in numbers(path)} | set(GRAPHIC)
+    assert covered == set(titles()) == set(range(1, 77))
+
+
+def test_the_list_says_what_the_programs_show() -> None:
+    """`FBVM_REWRITE=1 pytest tests/conformance` writes the list anew; look at the difference before you keep it."""
+    if os.environ.get("FBVM_REWRITE"):
+        LIST.write_text(listing(), encoding="utf-8")
+    assert LIST.read_text(encoding="utf-8") == listing()

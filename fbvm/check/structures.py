@@ -1,0 +1,67 @@
+"""The members of a structure or a union, each put in its place: behind the others, or where it says.
+
+Relative locations count from the structure's start, in units of their own size: `%B2`, `%W1` and `%X2.0` begin at byte 2
+(IEC 61131-3 ed. 3, table 11, features 8 and 9)."""
+
+from __future__ import annotations
+
+import re
+
+from fbvm.base.types import BOOL, Field, StructType, Type, base, fold
+from fbvm.check.facts import is_block
+from fbvm.syntax import tree
+
+RELATIVE = "a place in a structure is written %B2 (byte 2), %W1 (word 1) or %X2.0 (bit 0 of byte 2)"
+_LOCATION = re.compile(r"%([XBWDL])([0-9]{1,9})(?:\.([0-7]))?", re.I)
+MOST = 1 << 28
+"""Bytes beyond which no structure reaches."""
+_UNITS = {"X": 1, "B": 1, "W": 2, "D": 4, "L": 8}
+
+
+class Members:
+    """Collects members.  `shared` ones lie on each other, and the first initial value that is not all zero holds."""
+
+    def __init__(self, shared: bool) -> None:
+        self.shared = shared
+        self.fields: dict[str, Field] = {}
+        self._content = bytearray()
+        self._taken: list[tuple[int, int]] = []
+        """First bit and bit behind of each member."""
+        self._align = 1
+
+    def add(self, name: str, kind: Type, initial: bytes, location: tree.Location | None) -> str:
+        """Put one more member in its place; what is wrong with it, "" if nothing."""
+        self._align = max(self._align, kind.align)
+        offset, bit = 0 if self.shared else len(self._content) + -len(self._content) % kind.align, None
+        if location is not None:
+            match = _LOCATION.fullmatch(location.text)
+            if match is None:
+                return f"{location.text} is no place in a structure"
+            offset, bit = int(match[2]) * _UNITS[match[1].upper()], int(match[3]) if match[3] else None
+            if (bit is not None) != (match[1].upper() == "X") or bit is not None and base(kind) != BOOL:
+                return f"{name} is {kind} and cannot lie at {location.text}"
+            if is_block(kind) and offset % kind.align:
+                return f"an instance lies at a multiple of {kind.align} bytes, not at {location.text}"
+        if offset + kind.size > MOST:
+            return f"{name} would lie beyond the end of any structure"
+        start = offset * 8 + (bit or 0)
+        end = start + 1 if bit is not None else start + kind.size * 8
+        if not self.shared and location is not None and any(start < above and below < end for below, above in self._taken):
+            return f"{name} lies on another member"
+        self._taken.append((start, end))
+        self.fields[fold(name)] = Field(name, kind, offset, bit=bit)
+        self._fill(offset, bit, initial)
+        return ""
+
+    def _fill(self, offset: int, bit: int | None, initial: bytes) -> None:
+        content = self._content
+        content += bytes(max(0, offset + len(initial) - len(content)))
+        if bit is not None:
+            content[offset] |= (initial[0] & 1) << bit
+        elif not any(content[offset:offset + len(initial)]):
+            content[offset:offset + len(initial)] = initial
+
+    def structure(self, name: str) -> tuple[StructType, bytes]:
+        """The type of the whole and its initial bytes."""
+        self._content += bytes(-len(self._content) % self._align)
+        return StructType(name, len(self._content), self._align, self.fields), bytes(self._content)
