@@ -46,7 +46,7 @@ def test_a_library_is_described(folder: Path) -> None:
 def test_no_block_gives_a_message(path: Path) -> None:
     """Functions are checked with the blocks that use them."""
     made = compile_text(f"PROGRAM Main VAR b : {path.stem}; END_VAR b(); END_PROGRAM")
-    assert made.diagnostics == []
+    assert [d for d in made.diagnostics if d.source.library] == []
 
 
 def test_the_program_and_the_charts_in_the_readme() -> None:
