@@ -239,6 +239,21 @@ TOO_MUCH = {
 }
 
 
+TOO_MUCH |= {
+    f"Fn{function}(Register_Address := 0, Register_Qty := 8, {pin} := {first})": "1101"
+    for function, pin, places in (
+        ("03", "RespData_DM", (29993, 30000, 30099, 32493, 32500, 32506, 32507, 32515, 32642)),
+        ("10", "DataAddress_DM", (32493, 32500, 32506, 32507, 32515, 32642)),
+    )
+    for first in places
+} | {
+    "Fn01(Coil_Address := 0, Coil_Qty := 1, RespData_DM := 30018)": "1101",
+    "Fn02(Coil_Address := 0, Coil_Qty := 17, RespData_DM := 32499)": "1101",
+    "Fn0F(Coil_Address := 0, Coil_Qty := 17, DataAddress_DM := 32499)": "1101",
+}  # fmt: skip
+"""Data in the words in which the exchange takes place, or where the unit keeps its parameters, would be wrong data."""
+
+
 @pytest.mark.parametrize("block", TOO_MUCH)
 def test_what_cannot_be_sent_fails_at_once(block: str) -> None:
     rig = Rig(rd=block).connect()
@@ -277,6 +292,29 @@ def test_the_longest_request_that_fits_a_frame() -> None:
     rig.command("rd")
     assert len(rig.peer.heard[0]) == 260
     assert rig.words(32630, 1) == [0]
+
+
+@pytest.mark.parametrize(
+    "block",
+    [
+        "Fn03(Register_Address := 1000, Register_Qty := 8, RespData_DM := 29992)",
+        "Fn03(Register_Address := 1000, Register_Qty := 8, RespData_DM := 30100)",
+        "Fn03(Register_Address := 1000, Register_Qty := 8, RespData_DM := 32492)",
+        "Fn03(Register_Address := 1000, Register_Qty := 8, RespData_DM := 32643)",
+        "Fn10(Register_Address := 1000, Register_Qty := 8, DataAddress_DM := 30018)",
+        "Fn10(Register_Address := 1000, Register_Qty := 8, DataAddress_DM := 32492)",
+        "Fn10(Register_Address := 1000, Register_Qty := 8, DataAddress_DM := 32643)",
+        "Fn05(Coil_Address := 0, Value := TRUE)",
+    ],
+)
+def test_data_beside_the_words_of_blocks_and_unit(block: str) -> None:
+    """Also the unit's own words may be written to a server."""
+    rig = Rig(rd=block).connect()
+    rig.server.holding_registers[1000:1008] = type(rig.server.holding_registers)("H", range(1, 9))
+    rig.command("rd")
+    assert rig.result("rd") == (1, "")
+    if "RespData_DM" in block:
+        assert rig.words(rig.number("rd_RespData_DM"), 8) == list(range(1, 9))
 
 
 def test_a_read_up_to_the_last_word() -> None:
