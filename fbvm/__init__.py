@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from fbvm.run.replay import Replay as Replay
     from fbvm.units.etn21 import Etn21 as Etn21
     from fbvm.units.noc import Noc as Noc
+    from fbvm.units.tianxing import Tianxing as Tianxing
     from fbvm.watch.paths import UnknownPlace as UnknownPlace
     from fbvm.wire.link import Peer as Peer
     from fbvm.wire.modbus_server import ModbusServer as ModbusServer
@@ -60,6 +61,7 @@ _HOMES = {
     "run.replay": ("Replay",),
     "units.etn21": ("Etn21",),
     "units.noc": ("Noc",),
+    "units.tianxing": ("Tianxing",),
     "watch.paths": ("UnknownPlace",),
     "wire.link": ("Peer",),
     "wire.modbus_server": ("ModbusServer",),

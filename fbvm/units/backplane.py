@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from fbvm.units import noc_map
+from fbvm.units import noc_map, tianxing
 from fbvm.units.etn21 import Etn21
 from fbvm.units.noc import Noc
+from fbvm.units.tianxing import Tianxing
 from fbvm.units.unit import Unit
 
-UNITS: Mapping[str, Callable[..., Unit]] = {"Etn21": Etn21, "Noc": Noc}
+UNITS: Mapping[str, Callable[..., Unit]] = {"Etn21": Etn21, "Noc": Noc, "Tianxing": Tianxing}
 """What makes a unit, by the name of its class, as journals write it."""
-BRINGERS: Mapping[str, Callable[[], Unit]] = {noc_map.AREA: Noc}
+BRINGERS: Mapping[str, Callable[[], Unit]] = {noc_map.AREA: Noc, tianxing.AREA: Tianxing}
 """What makes the unit that brings a mailbox, by the mailbox's name."""
 ETN21_ADDRESS = "192.168.250.21"
 

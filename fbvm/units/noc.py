@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fbvm.units import noc_map as at
-from fbvm.units.port import Port
+from fbvm.units.port import Port, mailbox
 from fbvm.units.unit import AreaMemory
 from fbvm.wire.link import Broken, Close, Connect, Event, Failed, Opened, PeerClosed, Received, Request, Send
 
@@ -83,7 +83,7 @@ class Noc:
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on: counters 0, services as configured, connections broken by RST."""
-        words = _mailbox(memory)
+        words = mailbox(memory, at.AREA)
         requests = self._port.reset(words)
         self._ready_ns, self._before, self._seen = None, b"", None
         self.wake_ns = 0 if words else NEVER_NS
@@ -95,7 +95,7 @@ class Noc:
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
         """One I/O refresh: connections, counters, restart.  A PLC whose program has no mailbox leaves it idle."""
-        words = _mailbox(memory)
+        words = mailbox(memory, at.AREA)
         if words is None:
             return []
         before = (words.tobytes(), self.link_up, self.configured)
@@ -172,12 +172,6 @@ class Noc:
             if more:
                 _set_counter(head, place, _counter(head, place) + more)
 
-
-def _mailbox(memory: AreaMemory) -> memoryview | None:
-    try:
-        return memory.words(at.AREA)
-    except KeyError:
-        return None
 
 
 def _counter(head: memoryview, place: int) -> int:

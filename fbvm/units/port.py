@@ -5,12 +5,20 @@ slots that carry its number."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 
 from fbvm.units import port_map as at
 from fbvm.units.port_line import Line
-from fbvm.units.port_map import State, Wish
+from fbvm.units.unit import AreaMemory
 from fbvm.wire.link import Event, Request
+
+
+def mailbox(memory: AreaMemory, area: str) -> memoryview | None:
+    """The words of a mailbox, None in a PLC whose program does not use it."""
+    try:
+        return memory.words(area)
+    except KeyError:
+        return None
 
 
 class Port:
@@ -37,7 +45,7 @@ class Port:
             line = self._lines[channel]
             if module == self.number or not line.is_idle:
                 slot = self._slot(words, channel)
-                requests += line.exchange(slot, module == self.number, lambda port: self._may_listen(words, port))
+                requests += line.exchange(slot, module == self.number)
         return requests
 
     def reset(self, words: memoryview | None) -> list[Request]:
@@ -55,13 +63,3 @@ class Port:
     def _slot(self, words: memoryview, channel: int) -> memoryview:
         start = self._head_words + channel * at.SLOT_WORDS
         return words[start : start + at.SLOT_WORDS]
-
-    def _may_listen(self, words: memoryview, port: int) -> bool:
-        """True if no other slot of this unit listens there: one after the other opens the door for its caller."""
-        slots = (self._slot(words, channel) for channel, line in enumerate(self._lines) if not line.is_idle)
-        return not any(_listens(slot, self.number, port) for slot in slots)
-
-
-def _listens(slot: Sequence[int], number: int, port: int) -> bool:
-    found = (slot[at.MODULE], slot[at.WISH], slot[at.STATE], slot[at.LOCAL_PORT])
-    return found == (number, Wish.LISTEN, State.OPENING, port)

@@ -64,19 +64,18 @@ class Line:
                 self._fail(error, words)
             case Sent():
                 self._is_sending = False
-                words[at.SENDING] = 0
             case Received(data=data):
                 self._store(data, words)
             case PeerClosed():
                 if words[at.STATE] == State.OPEN:
                     words[at.STATE] = State.ENDED
 
-    def exchange(self, words: memoryview, is_mine: bool, may_listen: Callable[[int], bool]) -> list[Request]:
+    def exchange(self, words: memoryview, is_mine: bool) -> list[Request]:
         """What the network has to do for the program's wish."""
         wish = words[at.WISH] if is_mine else Wish.CLOSED
         if wish in (Wish.CONNECT, Wish.LISTEN):
             if self.is_idle and words[at.STATE] in (State.CLOSED, State.CLOSING):
-                return self._open(wish, words, may_listen)
+                return [self._open(wish, words)]
             return self._work(words) if words[at.STATE] in _AT_WORK else []
         if self._in_use:
             words[at.STATE] = State.CLOSING
@@ -95,26 +94,22 @@ class Line:
         self._closes += 1
         return [Close(self.channel, reset)]
 
-    def _open(self, wish: int, words: memoryview, may_listen: Callable[[int], bool]) -> list[Request]:
+    def _open(self, wish: int, words: memoryview) -> Request:
         remote = Peer(_dotted(words[at.REMOTE_IP], words[at.REMOTE_IP + 1]), words[at.REMOTE_PORT])
         local_port, keep_alive = words[at.LOCAL_PORT], bool(words[at.OPTIONS] & at.KEEP_ALIVE)
         words[at.STATE] = State.OPENING
         words[at.ERROR] = words[at.RECEIVED] = 0
-        if wish == Wish.CONNECT:
-            request: Request = Connect(self.channel, remote, local_port, keep_alive)
-        elif may_listen(local_port):
-            request = Listen(self.channel, local_port, remote, keep_alive)
-        else:
-            words[at.STATE] = State.CLOSED
-            return []
         self._in_use = True
-        return [request]
+        if wish == Wish.CONNECT:
+            return Connect(self.channel, remote, local_port, keep_alive)
+        return Listen(self.channel, local_port, remote, keep_alive)
 
     def _work(self, words: memoryview) -> list[Request]:
         requests: list[Request] = []
         size = min(words[at.SENDING], at.OUTGOING_BYTES)
         if size and not self._is_sending:
             self._is_sending = True
+            words[at.SENDING] = 0
             data = b"".join(word.to_bytes(2, "big") for word in words[at.OUTGOING : at.OUTGOING + (size + 1) // 2])
             requests.append(Send(self.channel, data[:size]))
         room = max(0, at.INCOMING_BYTES - words[at.RECEIVED])

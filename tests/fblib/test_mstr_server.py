@@ -9,14 +9,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mstr_rig import CYCLE_NS, SERVER_IP, Rig, image_of
+from stream_client import Client
 
 from fbvm.base.areas import AREAS
-from fbvm.net.loop import LoopLink, LoopNetwork
+from fbvm.net.loop import LoopNetwork
 from fbvm.plc import Plc
 from fbvm.units import noc_map
 from fbvm.units.noc import Noc
-from fbvm.wire.link import Broken, Close, Connect, Event, Failed, Grant, Opened, Peer, PeerClosed, Received, Send
-from fbvm.wire.modbus import Adu, Splitter
+from fbvm.wire.link import Close, Connect, Peer, Send
+from fbvm.wire.modbus import Adu
 
 HERE = Peer("192.168.250.2", 502)
 
@@ -43,68 +44,7 @@ class Station:
         return self.plc.memory.u8[area.offset : area.offset + area.size_bytes].cast("H")
 
     def client(self, number: int = 50) -> Client:
-        return Client(self, self.network.attach(f"192.168.250.{number}"))
-
-
-class Client:
-    """Somebody who connects to the server and says bytes."""
-
-    def __init__(self, station: Station, link: LoopLink) -> None:
-        self.station, self.link = station, link
-        self.data = b""
-        self.end = ""
-        self.transaction = 0
-        self.is_open = False
-
-    def connect(self) -> Client:
-        for _ in range(20):
-            self.end, self.data, self.is_open = "", b"", False
-            self.submit(Close(1))
-            self.step()
-            self.end = ""
-            self.submit(Connect(1, HERE), Grant(1, 65536))
-            self.step(3)
-            if self.is_open and not self.end:
-                return self
-        raise AssertionError("nobody opens")
-
-    def submit(self, *requests: Connect | Grant | Send | Close) -> None:
-        self.link.submit(requests, self.station.plc.elapsed_ns)
-
-    def step(self, count: int = 1) -> None:
-        for _ in range(count):
-            self.station.scan()
-            for event in self.link.events(self.station.plc.elapsed_ns):
-                self._take(event)
-
-    def _take(self, event: Event) -> None:
-        match event:
-            case Opened():
-                self.is_open = True
-            case Received(data=data):
-                self.data += data
-                self.submit(Grant(1, 65536))
-            case PeerClosed():
-                self.end = self.end or "FIN"
-            case Broken(error=error) | Failed(error=error):
-                self.end = error
-
-    def exchange(self, pdu: bytes, unit: int = 0) -> bytes:
-        self.transaction += 1
-        self.submit(Send(1, Adu(self.transaction, unit, pdu).to_bytes()))
-        splitter = Splitter()
-        for _ in range(40):
-            self.step()
-            found = splitter.feed(self.data)
-            self.data = b""
-            if found:
-                [reply] = found
-                assert isinstance(reply, Adu) and (reply.transaction, reply.unit) == (self.transaction, unit)
-                return reply.pdu
-        raise AssertionError("no reply")
-
-    def ask(self, pdu: str, unit: int = 0) -> str:
-        return self.exchange(bytes.fromhex(pdu), unit).hex(" ").upper()
+        return Client(self.scan, self.plc, self.network.attach(f"192.168.250.{number}"), HERE)
 
 
 # --- the CPU ------------------------------------------------------------------------------------------------------------

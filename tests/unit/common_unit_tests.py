@@ -31,11 +31,12 @@ CYCLE_NS = 10_000_000
 PEER = Peer("192.168.250.7", 502)
 
 
-SIZES = {"CIO": 6144, "W": 512, "H": 1536, "A": 960, "D": 32768, "E0": 32768, "E2": 32768, "NOC": 13664}
+SIZES = {"CIO": 6144, "W": 512, "H": 1536, "A": 960, "D": 32768, "E0": 32768, "E2": 32768, "NOC": 13664,
+         "TXP": 12808}
 
 
 class FakeMemory:
-    """Areas as a PLC with two E banks and a mailbox has them."""
+    """Areas as a PLC with two E banks and mailboxes has them."""
 
     def __init__(self) -> None:
         self._areas = {name: memoryview(array("H", bytes(2 * size))) for name, size in SIZES.items()}

@@ -256,13 +256,13 @@ def test_an_open_that_fails_waits_for_the_program() -> None:
     assert rig.requests == [Connect(0, SERVER)]
 
 
-def test_slots_listen_one_after_the_other() -> None:
+def test_slots_listen_at_once_and_the_first_gets_the_first_caller() -> None:
     rig = Rig()
     first, second = slot(rig.memory, 3), slot(rig.memory, 5)
     for words in (first, second):
         wish(words, Wish.LISTEN, Peer("0.0.0.0", 0), 502)
     rig.step()
-    assert rig.requests == [Listen(3, 502)]
+    assert rig.requests == [Listen(3, 502), Listen(5, 502)]
     clients = [rig.network.attach(f"192.168.250.{number}") for number in (50, 51)]
     for client in clients:
         client.submit([Connect(1, OWN), Send(1, b"hi"), Grant(1, 100)], rig.now_ns)

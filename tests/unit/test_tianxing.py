@@ -1,0 +1,78 @@
+"""The Ethernet port of a Tianxing controller as a unit: what every unit owes, its head, its connections."""
+
+from __future__ import annotations
+
+import tomllib
+
+import pytest
+from common_unit_tests import CommonUnitTests, FakeMemory
+
+from fbvm.base.data import data_folder
+from fbvm.units import port_map, tianxing
+from fbvm.units.port_map import State, Wish
+from fbvm.units.tianxing import Tianxing
+from fbvm.units.unit import Unit
+from fbvm.wire.link import Connect, Failed, Peer
+
+
+def slot(memory: FakeMemory) -> memoryview:
+    return memory.words("TXP")[tianxing.HEAD_WORDS : tianxing.HEAD_WORDS + port_map.SLOT_WORDS]
+
+
+class TestTianxingIsAUnit(CommonUnitTests):
+    def new_unit(self) -> Unit:
+        return Tianxing()
+
+    def may_write(self) -> set[tuple[str, int]]:
+        unit_words = (port_map.WISH, port_map.STATE, port_map.ERROR, port_map.PEER_IP, port_map.PEER_IP + 1,
+                      port_map.PEER_PORT, port_map.SENDING, port_map.RECEIVED)  # fmt: skip
+        return {("TXP", word) for word in range(8)} | {("TXP", tianxing.HEAD_WORDS + word) for word in unit_words}
+
+    def data_words(self) -> set[tuple[str, int]]:
+        return {("TXP", tianxing.HEAD_WORDS + word) for word in range(port_map.INCOMING, port_map.SLOT_WORDS)}
+
+    def ask(self, memory: FakeMemory) -> None:
+        words = slot(memory)
+        words[port_map.MODULE] = tianxing.NUMBER
+        words[port_map.REMOTE_IP : port_map.REMOTE_PORT + 1] = memoryview(b"\xa8\xc0\x02\xfa\xf6\x01").cast("H")
+        words[port_map.WISH] = Wish.CONNECT
+
+    def is_answered(self, memory: FakeMemory) -> bool:
+        return slot(memory)[port_map.STATE] == State.OPEN
+
+
+def test_the_library_declares_what_the_port_brings() -> None:
+    written = tomllib.loads((data_folder("fblib") / "tianxing" / "mb_tcp_server" / "library.toml").read_text())["mailbox"]
+    assert written == {"area": "TXP", "head": tianxing.HEAD_WORDS, "slots": tianxing.SLOTS, "slot": port_map.SLOT_WORDS}
+
+
+@pytest.mark.parametrize(("model", "connections"), [("T3", 8), ("T4", 32)])
+def test_the_head(model: str, connections: int) -> None:
+    memory = FakeMemory()
+    Tianxing("10.1.2.3", model=model).reset(memory)
+    assert memory.words("TXP")[:4].tolist() == [1, connections, 0x0A01, 0x0203]
+
+
+def test_there_is_no_other_model() -> None:
+    with pytest.raises(ValueError, match="T3 and T4"):
+        Tianxing(model="T5")
+
+
+def test_what_fails_has_one_number() -> None:
+    port, memory = Tianxing(), FakeMemory()
+    port.reset(memory)
+    TestTianxingIsAUnit().ask(memory)
+    assert port.refresh(memory, [], 0) == [Connect(0, Peer("192.168.250.2", 502))]
+    port.refresh(memory, [Failed(0, "open", "ECONNREFUSED")], 1)
+    assert (slot(memory)[port_map.STATE], slot(memory)[port_map.ERROR]) == (State.FAILED, 1)
+
+
+def test_a_plc_without_a_mailbox_leaves_it_idle() -> None:
+    class Bare:
+        def words(self, area: str) -> memoryview:
+            raise KeyError(area)
+
+    port = Tianxing()
+    assert port.reset(Bare()) == []
+    assert port.refresh(Bare(), [], 0) == []
+    assert port.settings == {}
