@@ -369,6 +369,21 @@ def test_a_code_of_the_unit_is_passed_through(service: Switch, expected: str) ->
     next_command_is_good(rig)
 
 
+@pytest.mark.parametrize("word", [0, 2, 9, 0x0101, 0xFFFF])
+@pytest.mark.parametrize("after", [0, 1, 2, 3, 4])
+def test_somebody_overwrites_the_parameter_area(word: int, after: int) -> None:
+    """All of it, at any time: a command may fail, the next ones do not."""
+    rig = Rig(rd=READ).connect()
+    rig.set("rd.Reply_Time", 500_000_000)
+    rig.set("rd_Cmd", True)
+    rig.scan(after)
+    rig.fill(30018, [word] * 10)
+    rig.run_until("Main.rd.Exchange.State = 0", 3)
+    rig.set("rd_Cmd", False)
+    rig.scan(20)
+    next_command_is_good(rig)
+
+
 def test_the_socket_kept_busy_by_another_program() -> None:
     """A receive that the program itself requested waits for bytes that never come."""
     rig = Rig(ScriptedPeer(), rd=READ).connect()
