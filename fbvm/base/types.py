@@ -234,6 +234,11 @@ def array(bounds: tuple[tuple[int, int], ...], element: Type) -> ArrayType:
     return ArrayType(f"ARRAY [{shown}] OF {element.name}", count * element.size, element.align, bounds, element)
 
 
+def characters(text: StringType) -> ArrayType:
+    """A string as subscripts see it: bytes or words from 0 on, the one that ends the longest text among them."""
+    return array(((0, text.capacity),), WORD if text.wide else BYTE)
+
+
 def open_array(dimensions: int, element: Type) -> OpenArrayType:
     """ARRAY [*, ...] OF element."""
     name = f"ARRAY [{', '.join('*' * dimensions)}] OF {element.name}"

@@ -208,7 +208,7 @@ class Calls:
                     "pass a variable that has as many, or give both the same length"
             self.error("S0405", value, f"the in-out {variable.name} needs {variable.type}, this is {kind}", hint)
             return False
-        return writable(self.expressions, value, f"be passed to the in-out {variable.name}")
+        return variable.constant or writable(self.expressions, value, f"be passed to the in-out {variable.name}")
 
     def output(self, argument: tree.Argument, kind: Type, name: str) -> bool:
         """True if the target of `name => target` takes an output of `kind`; else a diagnostic."""

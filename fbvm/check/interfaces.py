@@ -29,8 +29,8 @@ _SECTIONS = {
     "PROGRAM": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL"),
 }
 _QUALIFIERS = {
-    "VAR": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"), "VAR_INPUT": ("RETAIN", "NON_RETAIN"),
-    "VAR_OUTPUT": ("RETAIN", "NON_RETAIN"), "VAR_IN_OUT": (), "VAR_TEMP": (), "VAR_EXTERNAL": ("CONSTANT",),
+    "VAR": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"), "VAR_INPUT": ("CONSTANT", "RETAIN", "NON_RETAIN"),
+    "VAR_OUTPUT": ("RETAIN", "NON_RETAIN"), "VAR_IN_OUT": ("CONSTANT",), "VAR_TEMP": (), "VAR_EXTERNAL": ("CONSTANT",),
     "VAR_GLOBAL": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"),
 }
 BORROWED = (OpenArrayType, AnyType)
@@ -138,7 +138,9 @@ class Interfaces:
         if made.constant and is_block(kind):
             self.report.add("S0206", source, name, "an instance cannot be CONSTANT")
         elif made.constant:
-            if declared.initial is None:
+            if section.kind in ("VAR_INPUT", "VAR_IN_OUT"):
+                pass  # what the caller gives; the block may only read it
+            elif declared.initial is None:
                 self.report.add("S0701", source, name, f"the constant {name.text} has no value", "write := and its value")
             elif isinstance(declared.initial, tree.Expr):
                 made.wrong = declared.initial in self.project.facts.wrong

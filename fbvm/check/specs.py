@@ -8,6 +8,7 @@ from contextlib import AbstractContextManager
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import (
     ANYTHING,
+    BOOL,
     ELEMENTARY,
     GENERIC,
     INT,
@@ -149,7 +150,8 @@ class Specs:
     def _meant(self, name: str) -> str:
         """A hint for a type that there is not."""
         if fold(name) in FOREIGN:
-            return f"its name here is {FOREIGN[fold(name)]}"
+            also = ", and BIT in structures" if fold(name) == "BIT" else ""
+            return f"its name here is {FOREIGN[fold(name)]}{also}"
         project = self.project
         return project.nearest(name, [*ELEMENTARY, "STRING", *(entry.tree.name.text for entry in project.types.values()),
                                       *(pou.name for pou in project.pous.values()), *project.libraries.block_names()])
@@ -305,7 +307,8 @@ class Specs:
         made = Members(shared=isinstance(spec, tree.UnionSpec) or spec.overlap)
         complete = True
         for declared in spec.members:
-            resolved = self.resolve(declared.spec, source)
+            packed = isinstance(declared.spec, tree.NamedType) and fold(declared.spec.text) == "BIT"
+            resolved = (BOOL, bytes(1)) if packed else self.resolve(declared.spec, source)
             if resolved is None:
                 complete = False
                 continue
@@ -315,7 +318,7 @@ class Specs:
             for member in declared.names:
                 if fold(member.text) in made.fields:
                     self.report.add("S0202", source, member, f"{member.text} stands twice in this structure")
-                elif wrong := made.add(member.text, kind, initial, declared.location):
+                elif wrong := made.add(member.text, kind, initial, declared.location, packed):
                     self.report.add("S0604", source, declared.location or member, wrong, RELATIVE)
         if not complete:
             return None

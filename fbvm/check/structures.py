@@ -29,10 +29,12 @@ class Members:
         """First bit and bit behind of each member."""
         self._align = 1
 
-    def add(self, name: str, kind: Type, initial: bytes, location: tree.Location | None) -> str:
-        """Put one more member in its place; what is wrong with it, "" if nothing."""
+    def add(self, name: str, kind: Type, initial: bytes, location: tree.Location | None, packed: bool = False) -> str:
+        """Put one more member in its place; what is wrong with it, "" if nothing.  `packed` ones are single bits."""
         self._align = max(self._align, kind.align)
         offset, bit = 0 if self.shared else len(self._content) + -len(self._content) % kind.align, None
+        if packed:
+            offset, bit = self._next_bit()
         if location is not None:
             match = _LOCATION.fullmatch(location.text)
             if match is None:
@@ -52,6 +54,13 @@ class Members:
         self.fields[fold(name)] = Field(name, kind, offset, bit=bit)
         self._fill(offset, bit, initial)
         return ""
+
+    def _next_bit(self) -> tuple[int, int]:
+        """Behind the bit that was put in last, or a new byte."""
+        last = next(reversed(self.fields.values()), None)
+        if last is None or last.bit is None or last.bit == 7 or self.shared:
+            return 0 if self.shared else len(self._content), 0
+        return last.offset, last.bit + 1
 
     def _fill(self, offset: int, bit: int | None, initial: bytes) -> None:
         content = self._content

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, RefType, StringType, Type
+from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, RefType, StringType, Type, characters
 from fbvm.check.fitting import fitting_hint
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
@@ -35,9 +35,14 @@ class Subscripts:
             return self._open(expr, whole, kinds)
         if isinstance(whole, RefType) and whole.moves:
             return self._behind(expr, whole, kinds)
+        if isinstance(whole, StringType):
+            if not self.expressions.is_variable(expr.of):
+                self.error("S0407", expr.of, "characters have subscripts in a variable only",
+                           "MID(s, 1, n) is character n of any text")
+                return None
+            whole = characters(whole)
         if not isinstance(whole, ArrayType):
-            self.error("S0304", expr.of, f"this is {whole}, not an array",
-                       "MID(s, 1, n) is character n of a text" if isinstance(whole, StringType) else "")
+            self.error("S0304", expr.of, f"this is {whole}, not an array")
             return None
         element: Type = whole
         rest = list(zip(expr.subscripts, kinds, strict=True))

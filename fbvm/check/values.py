@@ -189,7 +189,7 @@ def flattened(init: tree.ArrayInit) -> tree.ArrayInit:
 
 def initialisable(kind: StructType, member: Field) -> bool:
     """True for what an initialiser of a structure or of a block's instance may name."""
-    return not (member.reference or member.absolute or member.constant) and \
+    return not (member.reference or member.absolute or member.constant and member.kind != "VAR_INPUT") and \
         (not kind.block or member.kind in ("VAR_INPUT", "VAR_OUTPUT", "VAR"))
 
 

@@ -20,6 +20,7 @@ from fbvm.base.types import (
     SubrangeType,
     Type,
     base,
+    characters,
     fold,
     machine,
 )
@@ -123,7 +124,7 @@ class Places:
     def _index(self, expr: tree.Index, kind: Type) -> Place:
         place = self.of(expr.of)
         start, offset, terms = place.address
-        element: Type = place.type
+        element = characters(place.type) if isinstance(place.type, StringType) else place.type
         rest = list(expr.subscripts)
         while rest:
             assert isinstance(element, ArrayType)
