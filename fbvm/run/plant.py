@@ -17,7 +17,7 @@ from fbvm.plc import Plc
 from fbvm.run.project import PlcRow, Project, SetRow
 from fbvm.run.running import Running, TimedWrite
 from fbvm.run.toml_keys import Path, span
-from fbvm.units.etn21 import Etn21
+from fbvm.units.backplane import KINDS, make_unit
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, conform, parse_value
 from fbvm.wire.registers import server
@@ -116,7 +116,10 @@ class Plant:
         for place, unit in enumerate(row.units):
             try:
                 address = str(IPv4Address(unit.address) + number)
-                plc.attach(Etn21(unit.number, address, timing=unit.timing, seed=unit.seed + number), self.network)
+                options = dict(unit.options)
+                if "seed" in KINDS[unit.kind][1]:
+                    options["seed"] = options.get("seed", 0) + number
+                plc.attach(make_unit(unit.kind, address, options), self.network)
             except ValueError as error:
                 self._report(("plc", row.name, "unit", place), str(error))
                 return False

@@ -46,6 +46,7 @@ from fbvm.run.project_reader import (
 )
 from fbvm.run.running import PACES
 from fbvm.syntax.text import read
+from fbvm.units.backplane import KINDS as UNIT_KINDS
 from fbvm.wire.link import Peer
 
 FILE = "fbvm.toml"
@@ -66,9 +67,12 @@ FAULT: Keys = {
     "random_cut": Key(flag, None), "silent": Key(flag, None), "reset": Key(flag, None), "error": Key(text, None),
 }  # fmt: skip
 UNIT: Keys = {
-    "type": Key(one_of(("ETN21",)), "ETN21"), "number": Key(whole(0, 15), 0), "address": Key(ip),
-    "timing": Key(one_of(("exact", "real")), "exact"), "seed": Key(whole(0, 1 << 62), 0),
+    "type": Key(one_of(tuple(UNIT_KINDS)), "ETN21"), "address": Key(ip),
+    "number": Key(whole(0, 15), None), "timing": Key(one_of(("exact", "real")), None), "seed": Key(whole(0, 1 << 62), None),
+    "slot": Key(whole(0, 254), None), "mac": Key(text, None), "module": Key(whole(0, 31), None), "http": Key(flag, None),
+    "ftp": Key(flag, None), "restart": Key(time_ns, None), "model": Key(text, None),
 }  # fmt: skip
+"""All of these; which a unit has is said by its type."""
 SET: Keys = {"name": Key(text), "value": Key(anything), "at": Key(moment_ns, 0)}
 PLC: Keys = {
     "sources": Key(texts), "program": Key(text, None), "libraries": Key(texts, ()), "cycle": Key(time_ns, 10_000_000),
@@ -85,10 +89,10 @@ PROJECT: Keys = {
 class UnitRow:
     """A unit of the first PLC of its kind; the others have addresses that follow."""
 
-    number: int
+    kind: str
     address: str
-    timing: str
-    seed: int
+    options: Mapping[str, Any]
+    """What is written besides, by its keys."""
 
 
 @dataclass(frozen=True)
@@ -154,6 +158,8 @@ def read_project(path: Path) -> Project | list[Diagnostic]:
     table = reading.table(written, PROJECT)
     if table["plc"] == {}:
         reading.report("P0104", ("plc",), "there is no PLC", "begin one with [plc.NAME] and its sources")
+    if not errors(reading.diagnostics):
+        _check_units(reading, table["plc"])
     if errors(reading.diagnostics):
         return sorted(reading.diagnostics, key=Diagnostic.order)
     run = table["run"] or {name: key.default for name, key in RUN.items()}
@@ -174,11 +180,27 @@ def _fault(row: Mapping[str, Any]) -> Fault:
     return replace(KINDS[row["kind"]] if row["kind"] else NO_FAULT, **written)
 
 
+def _options(unit: Mapping[str, Any]) -> dict[str, Any]:
+    """What is written of a unit beside its type and address."""
+    return {key: value for key, value in unit.items() if key not in ("type", "address") and value is not None}
+
+
+def _check_units(reading: Reading, plcs: Mapping[str, Any]) -> None:
+    """Complain about keys that belong to units of another type."""
+    for name, row in plcs.items():
+        for number, unit in enumerate(row["unit"]):
+            kind = unit["type"]
+            for key in _options(unit).keys() - UNIT_KINDS[kind][1].keys():
+                path = ("plc", name, "unit", number, key)
+                known = ", ".join(UNIT_KINDS[kind][1])
+                reading.report("P0102", path, f"{key} is no key of a unit of type {kind}", f"it has address, {known}")
+
+
 def _plc(name: str, row: Mapping[str, Any], folder: Path) -> PlcRow:
     return PlcRow(
         name, tuple(folder / source for source in row["sources"]), row["program"],
         tuple(folder / library for library in row["libraries"]), row["cycle"], row["pace"], row["engine"], row["count"],
         row["until"], row["watch"],
-        tuple(UnitRow(unit["number"], unit["address"], unit["timing"], unit["seed"]) for unit in row["unit"]),
+        tuple(UnitRow(unit["type"], unit["address"], _options(unit)) for unit in row["unit"]),
         tuple(SetRow(one["name"], one["value"], one["at"]) for one in row["set"]),
     )  # fmt: skip

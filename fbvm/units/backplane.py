@@ -12,9 +12,22 @@ from fbvm.units.unit import Unit
 
 UNITS: Mapping[str, Callable[..., Unit]] = {"Etn21": Etn21, "Noc": Noc, "Tianxing": Tianxing}
 """What makes a unit, by the name of its class, as journals write it."""
+KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
+    "ETN21": ("Etn21", {"number": "unit_number", "timing": "timing", "seed": "seed"}),
+    "NOC": ("Noc", {"slot": "rack_slot", "mac": "mac", "module": "module_type", "http": "http", "ftp": "ftp",
+                    "restart": "restart_ns"}),
+    "Tianxing": ("Tianxing", {"model": "model"}),
+}  # fmt: skip
+"""What a project calls a unit: the class, and the arguments by the keys that are written for them."""
 BRINGERS: Mapping[str, Callable[[], Unit]] = {noc_map.AREA: Noc, tianxing.AREA: Tianxing}
 """What makes the unit that brings a mailbox, by the mailbox's name."""
 ETN21_ADDRESS = "192.168.250.21"
+
+
+def make_unit(kind: str, address: str, options: Mapping[str, object]) -> Unit:
+    """A unit as a project describes it.  Raises ValueError for what its class refuses."""
+    name, arguments = KINDS[kind]
+    return UNITS[name](address=address, **{arguments[key]: value for key, value in options.items()})
 
 
 def usual_units(mailboxes: Iterable[str], timing: str = "exact", seed: int = 0) -> list[Unit]:

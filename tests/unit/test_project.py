@@ -105,8 +105,8 @@ def test_everything_that_can_be_said(folder: Path) -> None:
     (plc,) = found.plcs
     assert (plc.name, plc.sources, plc.cycle_ns, plc.pace) == ("pump", (folder / "counter.st",), 5 * MS, "event")
     assert (plc.engine, plc.count, plc.until, plc.watch) == ("python", 3, "Main.n > 2", ("Main.n",))
-    assert [(unit.number, unit.address, unit.timing) for unit in plc.units] == [
-        (0, "192.168.250.21", "exact"), (1, "192.168.251.21", "real")]  # fmt: skip
+    assert [(unit.kind, unit.address, unit.options) for unit in plc.units] == [
+        ("ETN21", "192.168.250.21", {}), ("ETN21", "192.168.251.21", {"number": 1, "timing": "real"})]  # fmt: skip
     assert [(row.name, row.value, row.at_ns) for row in plc.sets] == [("Main.step", 2, 10 * MS)]
 
 
@@ -128,6 +128,8 @@ def test_the_least_that_must_be_said(folder: Path) -> None:
     ("[plc.a]\nsources = ['c.st']\ncycle = '0s'", [("P0103", 3, "plc.a.cycle: '0s' is no time that can pass")]),
     ("[plc.a]\nsources = ['c.st']\n[[plc.a.unit]]\naddress = '1.2.3.4'\n[[plc.a.unit]]\nnumber = 1", [
         ("P0104", 5, "plc.a.unit 2.address is missing")]),
+    ("[plc.a]\nsources = ['c.st']\n[[plc.a.unit]]\naddress = '1.2.3.4'\ntype = 'NOC'\nnumber = 1\nmodel = 'T3'", [
+        ("P0102", 6, "number is no key of a unit of type NOC"), ("P0102", 7, "model is no key of a unit of type NOC")]),
     ("[plc.a]\nsources = ['c.st']\nunit = 1", [("P0103", 3, "plc.a.unit is no list of tables")]),
     ("[plc.a]\nsources = ['c.st']\n[[server]]\naddress = 'here:502'", [
         ("P0103", 4, "server 1.address: 'here' is no IPv4 address; write \"192.168.250.21\"")]),
@@ -193,6 +195,42 @@ def plant(folder: Path, text: str, **options: int) -> Plant:
     built = Plant(project(folder, text), **options)  # type: ignore[arg-type]
     assert not errors(built.diagnostics), [diagnostic.render() for diagnostic in built.diagnostics]
     return built
+
+
+def test_units_of_each_type(folder: Path) -> None:
+    built = plant(folder, """
+[plc.a]
+sources = ["counter.st"]
+[[plc.a.unit]]
+address = "192.168.250.21"
+[[plc.a.unit]]
+type = "NOC"
+slot = 9
+address = "192.168.250.22"
+mac = "00:80:F4:01:02:03"
+http = false
+restart = "1s"
+[[plc.a.unit]]
+type = "Tianxing"
+model = "T3"
+address = "192.168.250.23"
+""")
+    units = [attached.unit for attached in built.kinds[0].runs[0].plc.units]
+    assert [unit.name for unit in units] == ["ETN21 0", "NOC 9", "Tianxing T3"]
+    assert (units[1].configuration["restart_ns"], units[1].configuration["http"]) == (1000 * MS, False)
+
+
+def test_a_unit_that_cannot_be_is_said(folder: Path) -> None:
+    found = project(folder, """
+[plc.a]
+sources = ["counter.st"]
+[[plc.a.unit]]
+type = "NOC"
+slot = 99
+address = "192.168.250.22"
+""")
+    assert said(errors(Plant(found).diagnostics)) == [
+        ("P0103", 4, "a module is in slot 0 to 16 of the rack, or 254 within the CPU; not 99")]
 
 
 def test_two_kinds_with_ends_of_their_own(folder: Path) -> None:
