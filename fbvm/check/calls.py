@@ -52,6 +52,8 @@ class Calls:
         callee = call.callee
         variable = self.expressions.variable(callee.text) if isinstance(callee, tree.NameRef) else None
         name = callee.text if isinstance(callee, tree.NameRef) else qualified.bare(self.expressions, callee)
+        if variable is None and (action := self._action(callee, name)) is not None:
+            return self._bind_action(call, action)
         if name is None or variable is not None and variable.kind != "RESULT":
             return self._instance(call, as_value)
         pou = self.project.pou(name, self.expressions.source)
@@ -64,6 +66,29 @@ class Calls:
             self._arguments_alone(call)
             return None
         return self.standard.call(call, fold(name), want, as_value)
+
+    def _action(self, callee: tree.Expr, name: str | None) -> tuple[Pou, tree.Expr | None] | None:
+        """The ACTION that is called, of an instance or of the POU itself."""
+        if name is not None:
+            home = self.expressions.pou.owner if self.expressions.pou is not None else None
+            action = home.actions.get(fold(name)) if home is not None else None
+            return (action, None) if action is not None else None
+        if not isinstance(callee, tree.Member):
+            return None
+        kind = self.expressions.infer(callee.of)
+        if not isinstance(kind, StructType) or not kind.block:
+            return None
+        action = self.checker.block_of(kind).actions.get(fold(callee.name.text))
+        return (action, callee.of) if action is not None else None
+
+    def _bind_action(self, call: tree.Call, found: tuple[Pou, tree.Expr | None]) -> str:
+        action, instance = found
+        if call.arguments:
+            self.error("S0402", call.arguments[0], f"the ACTION {action.tree.name.text} has no parameters",
+                       "write the inputs of its instance first")
+        self.expressions.note_call(action, call)
+        self.facts.calls[call] = PouCall(action, instance)
+        return ""
 
     def _arguments_alone(self, call: tree.Call) -> None:
         """Check the arguments of a call that could not be resolved, for their own mistakes."""

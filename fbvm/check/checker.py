@@ -148,6 +148,8 @@ class Checker:
         self.bodies.append(pou)
         pou.writes_eno = assigns_to(pou.tree.body, "ENO")
         Statements(self, pou).block(pou.tree.body)
+        for action in pou.actions.values():
+            self._body(action)
 
     def _complain_of_recursion(self) -> None:
         """POUs never call themselves, directly or through others (7.2)."""

@@ -26,6 +26,9 @@ class Configurations:
 
     def resolve(self, program: str | None) -> None:
         """Fill the checker's tasks: from the CONFIGURATION, or with the one program that there is or that is named."""
+        for section, source in self.project.settings:
+            what = "VAR_CONFIG" if isinstance(section, tree.ConfigVars) else "VAR_ACCESS"
+            self.report.add("S0901", source, section, f"{what} is understood but not executed by this version")
         configurations = self.project.configurations
         if program is None and configurations:
             for extra, source in configurations[1:]:

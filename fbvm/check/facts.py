@@ -10,7 +10,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.types import ArrayType, Elementary, EnumType, Field, RefType, StructType, Type, fold
 from fbvm.syntax import tree
 from fbvm.syntax.pragmas import shown_in_hexadecimal
-from fbvm.syntax.tree import Node
+from fbvm.syntax.tree import Action, Node
 
 Value = int | float | bool | bytes | str
 """A constant: bool for BOOL, int for integers, bits, times, enumerations and characters, float for reals, bytes for STRING,
@@ -100,6 +100,11 @@ class Pou:
     edges: list[Edge] = field(default_factory=list)
     referred: list[Variable] = field(default_factory=list)
     """Variables of an instance that something refers to; each is an object of its own."""
+    written_actions: list[tuple[Action, Source]] = field(default_factory=list)
+    actions: dict[str, Pou] = field(default_factory=dict)
+    """Its ACTIONs by folded name; each is a body that works on the same instance."""
+    home: Pou | None = None
+    """The POU that an ACTION belongs to."""
     types: dict[str, Type] = field(default_factory=dict)
     """What generic types stand for in a function that was made for one call."""
     leases: list[int] = field(default_factory=list)
@@ -108,6 +113,11 @@ class Pou:
     @property
     def is_function(self) -> bool:
         return self.kind == "FUNCTION"
+
+    @property
+    def owner(self) -> Pou:
+        """The POU whose variables its body sees: of an ACTION the one that it belongs to, else itself."""
+        return self.home or self
 
     def parameters(self, kind: str) -> list[Variable]:
         return [v for v in self.order if v.kind == kind]

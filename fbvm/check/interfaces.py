@@ -66,6 +66,21 @@ class Interfaces:
         else:
             self._frame(pou, pou.parameters("VAR_TEMP"))
             self._instance(pou)
+        for action, source in pou.written_actions:
+            self._action(action, source, pou)
+
+    def _action(self, action: tree.Action, source: Source, pou: Pou) -> None:
+        """An ACTION is a body of its own over the variables of its POU."""
+        name = fold(action.name.text)
+        if pou.is_function:
+            self.report.add("S0205", source, action.name, "a FUNCTION has no ACTION", "make it a FUNCTION_BLOCK")
+        elif name in pou.variables or name in pou.actions:
+            self.report.add("S0202", source, action.name, f"{action.name.text} is declared twice in {pou.name}",
+                            "an ACTION needs a name of its own")
+        else:
+            body = tree.Pou(action.start, action.end, "ACTION", action.name, None, (), action.body)
+            pou.actions[name] = Pou(f"{pou.name}.{action.name.text}", "ACTION", source, body, pou.variables, type=pou.type,
+                                    resolved=True, damaged=pou.damaged, home=pou)
 
     # --- sections ---------------------------------------------------------------------------------------------------
 

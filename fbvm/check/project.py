@@ -55,6 +55,8 @@ class Project:
         self.configurations: list[tuple[tree.Configuration, Source]] = []
         self.enum_members: dict[str, list[tuple[EnumType, int, str]]] = {}
         """By folded name: enumeration, value, and the library that declares it ("" for the user's own)."""
+        self.settings: list[tuple[tree.AccessVars | tree.ConfigVars, Source]] = []
+        """VAR_ACCESS and VAR_CONFIG sections."""
         self.late_global: Callable[[tuple[str, str]], None] = lambda key: None
         """Declares a global variable whose turn has not come yet (set by the checker)."""
         self._loaded: set[str] = set()
@@ -65,11 +67,19 @@ class Project:
 
     def collect(self, text: tree.SourceText, source: Source) -> None:
         """Take the declarations of one text; complain about names declared twice."""
+        last: Pou | None = None
         for declaration in text.declarations:
             if isinstance(declaration, tree.Refused):
                 self.report.add(declaration.code, source, declaration, _refusal(declaration))
             elif isinstance(declaration, tree.Pou):
-                self._add_pou(declaration, source)
+                last = self._add_pou(declaration, source)
+            elif isinstance(declaration, tree.Action):
+                self._add_action(declaration, source, declaration.owner, last)
+            elif isinstance(declaration, tree.Actions):
+                for refused in declaration.refused:
+                    self.report.add(refused.code, source, refused, _refusal(refused))
+                for action in declaration.actions:
+                    self._add_action(action, source, declaration.owner, last)
             elif isinstance(declaration, tree.TypeDecl):
                 key = (source.library, fold(declaration.name.text))
                 if not self._twice(key, declaration.name, source, "type"):
@@ -77,12 +87,26 @@ class Project:
             elif isinstance(declaration, tree.GlobalVars):
                 self.sections.append((declaration.section, source))
                 self.lists.add(fold(Path(source.name).stem))
+            elif isinstance(declaration, tree.ConfigVars):
+                self.settings.append((declaration, source))
             elif isinstance(declaration, tree.Configuration):
                 self.configurations.append((declaration, source))
+                self.settings += [(settings, source) for settings in declaration.settings]
+                self.settings += [(settings, source) for r in declaration.resources for settings in r.settings]
                 self.sections += [(s, source) for s in declaration.sections]
                 self.sections += [(s, source) for r in declaration.resources for s in r.sections]
 
-    def _add_pou(self, declaration: tree.Pou, source: Source) -> None:
+    def _add_action(self, action: tree.Action, source: Source, owner: tree.Name | None, last: Pou | None) -> None:
+        """An ACTION belongs to the POU that is named, else to the one in front of it."""
+        pou = self.pous.get((source.library, fold(owner.text))) if owner is not None else last
+        if pou is not None and not pou.is_function:
+            pou.written_actions.append((action, source))
+            return
+        named = f"there is no POU {owner.text}" if owner is not None and pou is None else \
+            "it stands in or behind a FUNCTION_BLOCK or PROGRAM, or names it: ACTION Motor.Reset"
+        self.report.add("S0205", source, action.name, f"the ACTION {action.name.text} belongs to no block or program", named)
+
+    def _add_pou(self, declaration: tree.Pou, source: Source) -> Pou | None:
         key = (source.library, fold(declaration.name.text))
         for refused in declaration.refused:
             self.report.add(refused.code, source, refused, _refusal(refused))
@@ -90,7 +114,10 @@ class Project:
             self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
             pou.other_names = self.libraries.other_pins(source.library, pou.name)
             pou.damaged |= {name for refused in declaration.refused if (name := _refused_name(refused, source))}
+            pou.written_actions += [(action, source) for action in declaration.actions]
             self.new_pous.append(pou)
+            return pou
+        return None
 
     def _twice(self, key: tuple[str, str], name: tree.Name, source: Source, what: str) -> bool:
         refuse_reserved(self.report, source, name)

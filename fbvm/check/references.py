@@ -77,8 +77,8 @@ def _held(expressions: Expressions, expr: tree.Expr, variable: Variable) -> Hold
     if variable.kind == "VAR_IN_OUT" or variable.place == "frame":
         number = facts.leases.setdefault(variable, len(facts.leases))
         assert expressions.pou is not None
-        if number not in expressions.pou.leases:
-            expressions.pou.leases.append(number)
+        if number not in expressions.pou.owner.leases:
+            expressions.pou.owner.leases.append(number)
         return Holder(expr, variable, number)
     if variable.reference:
         return Holder()

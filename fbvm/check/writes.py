@@ -57,8 +57,8 @@ def _note_input(expressions: Expressions, expr: tree.Expr, variable: Variable) -
     variable.written = True
     if pou is None:
         return
-    raw = any(edge.hidden is variable for edge in pou.edges)
-    if raw or variable.kind == "VAR_INPUT" and variable.owner is pou:
+    raw = any(edge.hidden is variable for edge in pou.owner.edges)
+    if raw or variable.kind == "VAR_INPUT" and variable.owner is pou.owner:
         expressions.error("S0591", expr, f"{variable.name.removesuffix(' edge')} is an input of {pou.name}"
                                          " and is written inside it")
 

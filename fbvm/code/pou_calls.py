@@ -31,7 +31,11 @@ class CallLowering:
 
     def statement(self, call: tree.Call, called: PouCall) -> None:
         """A call whose result, if there is one, is thrown away."""
-        self._guarded(call, called, None)
+        if called.pou.home is None:
+            self._guarded(call, called, None)
+            return
+        instance = self.body.places.of(called.instance) if called.instance is not None else Place(("self", 0, ()), BOOL)
+        self.body.out.append(("call", called.pou.number, instance.address))
 
     def value(self, call: tree.Call, called: PouCall) -> Node:
         """A call of a function for its result."""
@@ -107,6 +111,15 @@ class CallLowering:
         address: Address | None = instance.address if instance is not None else None
         self.body.out.append(("call", called.pou.number, address))
         self._outputs(called.outputs, called, instance, site)
+        for variable, expr in called.in_outs if called.pou.actions else ():
+            if self._ends(expr):  # an ACTION that is called later finds nothing instead of what has ended
+                body = self.body
+                body.out.append(("store", "ref", self._place(called, variable, instance).address, ("const", "ref", 0)))
+
+    def _ends(self, expr: tree.Expr) -> bool:
+        """True for what an in-out is bound to and may end with the body that passes it."""
+        variable = self.body.facts.variables.get(self.body.facts.root(expr))
+        return variable is not None and (variable.kind == "VAR_IN_OUT" or variable.place == "frame")
 
     def _inputs(self, called: PouCall, instance: Place | None, site: int) -> None:
         body = self.body

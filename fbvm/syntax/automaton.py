@@ -21,7 +21,7 @@ NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "ST
                      "POINTER", "REFERENCE"))
 REFUSED = frozenset(("REFUSED_SECTION", "REFUSED_BLOCK", "TRY"))
 DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT",
-                      "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM"))
+                      "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM", "END_ACTION"))
 """Words that end a list of statements.  The tables reduce the list for any of them and find out later that it was the
 wrong one; those who mend want to know before."""
 

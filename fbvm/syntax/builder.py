@@ -76,6 +76,10 @@ class Builder:
         items.append(item)
         return items
 
+    def pass_over(self, items: list[Any], semicolon: Token) -> list[Any]:
+        """A `;` behind the END of a declaration, which means nothing."""
+        return items
+
     def join(self, items: list[Any], more: Sequence[Any]) -> list[Any]:
         items.extend(more)
         return items

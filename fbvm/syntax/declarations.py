@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
 from fbvm.syntax.statements import Items, Statements
 from fbvm.syntax.tree import (
+    Access,
+    AccessVars,
+    Action,
+    Actions,
     Argument,
     ArrayInit,
     Configuration,
+    ConfigVar,
+    ConfigVars,
     Declaration,
     Expr,
     GlobalVars,
     Initial,
     Location,
+    Member,
     Name,
     NamedType,
+    Node,
     Pou,
     ProgramInstance,
     Refused,
@@ -31,7 +41,9 @@ from fbvm.syntax.tree import (
 
 Head = tuple[Name, list[Refused]]
 Item = tuple[Expr | None, Initial | None]
-ConfigItem = VarSection | Task | ProgramInstance | Refused
+Settings = AccessVars | ConfigVars
+Section = VarSection | Refused | Settings
+ConfigItem = VarSection | Task | ProgramInstance | Refused | Settings
 
 REPEATED_LIMIT = 1_000_000
 """Most values that one `n(a, b)` of an array may stand for."""
@@ -53,13 +65,14 @@ class Declarations(Statements):
     def pou_head(self, modifiers: list[Token], token: Token, inheritance: list[Refused]) -> Head:
         return self.declared(token), [*map(self.refused, modifiers), *inheritance]
 
-    def pou(self, word: Token, head: Head, sections: list[VarSection | Refused], items: Items, end: Token) -> Pou:
-        return self.function(word, head, None, None, sections, items, end)
+    def pou(self, word: Token, head: Head, sections: list[Section], items: Items, actions: list[Action | Refused],
+            end: Token) -> Pou:
+        return self.function(word, head, None, None, sections, items, actions, end)
 
     def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None,
-                 sections: list[VarSection | Refused], items: Items, end: Token) -> Pou:
+                 sections: list[Section], items: Items, actions: list[Action | Refused], end: Token) -> Pou:
         name, refused = head
-        refused += [s for s in sections if isinstance(s, Refused)]
+        refused += [_out_of_place(s) for s in (*sections, *actions) if not isinstance(s, VarSection | Action)]
         blocks = [i for i in items if isinstance(i, RefusedStatement) and self.is_block(i)]
         refused += [Refused(b.start, b.end, b.what, b.code) for b in blocks]
         body = self.block([i for i in items if i not in blocks] if blocks else items)
@@ -67,7 +80,8 @@ class Declarations(Statements):
         declared = [s for s in sections if isinstance(s, VarSection)]
         if self.ladders:
             declared += self.ladder_sections(declared)
-        return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused))
+        return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused),
+                   tuple(a for a in actions if isinstance(a, Action)))
 
     def ladder_sections(self, sections: list[VarSection]) -> list[VarSection]:
         """What the LADDERs of a POU need: memory of their steps, and instances that the POU has not declared itself."""
@@ -81,8 +95,18 @@ class Declarations(Statements):
         self.ladders.clear()
         return made
 
+    def action(self, word: Token, owner: Token | None, dot: Token | None, token: Token, colon: Token | None, items: Items,
+               end: Token) -> Action:
+        body = self.block(items)
+        self.refuse_selves()
+        return Action(word.start, end.end, self.name(owner) if owner else None, self.declared(token), body)
+
+    def actions_of(self, word: Token, owner: Token, actions: list[Action | Refused], end: Token) -> Actions:
+        return Actions(word.start, end.end, self.name(owner), tuple(a for a in actions if isinstance(a, Action)),
+                       tuple(a for a in actions if isinstance(a, Refused)))
+
     def is_block(self, statement: RefusedStatement) -> bool:
-        """Whether a refused statement is a METHOD, ACTION or the like, which belongs to the POU and not to its body."""
+        """Whether a refused statement is a METHOD or the like, which belongs to the POU and not to its body."""
         return statement.what not in ("THIS", "SUPER", "JMP", "__TRY") and not statement.what.startswith("label")
 
     def refuse_selves(self) -> None:
@@ -165,7 +189,7 @@ class Declarations(Statements):
             resources.append(_resource(loose[0].start, loose[-1].end, None, None, loose))
         return Configuration(
             word.start, end.end, self.declared(token), tuple(i for i in items if isinstance(i, VarSection)),
-            tuple(resources), tuple(i for i in items if isinstance(i, Refused)))
+            tuple(resources), tuple(i for i in items if isinstance(i, Refused)), _settings(items))
 
     def resource(self, word: Token, token: Token, on: Token | None, processor: Token | None, items: list[ConfigItem],
                  end: Token) -> Resource:
@@ -199,6 +223,24 @@ class Declarations(Statements):
             Name(type_name.start, type_name.end, type_name.text), tuple(c for c in given if isinstance(c, Argument)),
             tuple(c for c in given if isinstance(c, Refused)))
 
+    def path_direct(self, of: Expr, dot: Token, address: Token) -> Member:
+        return Member(of.start, address.end, of, Name(address.start, address.end, address.text))
+
+    def access_decl(self, token: Token, colon: Token, path: Expr, second: Token, spec: TypeSpec, direction: Token | None,
+                    end: Token) -> Access:
+        writable = direction is not None and direction.text.upper() == "READ_WRITE"
+        return Access(token.start, end.end, self.declared(token), path, spec, writable)
+
+    def access_vars(self, word: Token, variables: list[Access], end: Token) -> AccessVars:
+        return AccessVars(word.start, end.end, tuple(variables))
+
+    def config_decl(self, path: Expr, at: Token | None, location: Token | None, colon: Token, spec: TypeSpec,
+                    sign: Token | None, initial: Initial | None, end: Token) -> ConfigVar:
+        return ConfigVar(path.start, end.end, path, self.location(location) if location else None, spec, initial)
+
+    def config_vars(self, word: Token, variables: list[ConfigVar], end: Token) -> ConfigVars:
+        return ConfigVars(word.start, end.end, tuple(variables))
+
     def fb_task(self, instance: Expr, with_: Token, task: Token) -> Refused:
         return Refused(instance.start, task.end, "function block with a task of its own", "S0901")
 
@@ -208,4 +250,15 @@ def _resource(start: int, end: int, name: Name | None, processor: Name | None,
     return Resource(
         start, end, name, processor, tuple(i for i in items if isinstance(i, VarSection)),
         tuple(i for i in items if isinstance(i, Task)), tuple(i for i in items if isinstance(i, ProgramInstance)),
-        tuple(i for i in items if isinstance(i, Refused)))
+        tuple(i for i in items if isinstance(i, Refused)), _settings(items))
+
+
+def _out_of_place(item: Refused | Settings) -> Refused:
+    """What a POU cannot have."""
+    if isinstance(item, Refused):
+        return item
+    return Refused(item.start, item.end, f"{'VAR_ACCESS' if isinstance(item, AccessVars) else 'VAR_CONFIG'} of a POU", "S0901")
+
+
+def _settings(items: Sequence[Node]) -> tuple[Settings, ...]:
+    return tuple(i for i in items if isinstance(i, AccessVars | ConfigVars))

@@ -37,17 +37,42 @@ class DeclarationLayout(TypeLayout):
         words = tuple(part for word in modifiers for part in (word, " "))
         return (*words, self.leaf(token), *inheritance)
 
-    def pou(self, word: Token, head: Doc, sections: list[Phrase], items: list[Phrase], end: Token) -> Phrase:
-        return self.function(word, head, None, None, sections, items, end)
+    def pou(self, word: Token, head: Doc, sections: list[Phrase], items: list[Phrase], actions: list[Phrase],
+            end: Token) -> Phrase:
+        return self.function(word, head, None, None, sections, items, actions, end)
 
     def function(self, word: Token, head: Doc, colon: Token | None, result: Phrase | None, sections: list[Phrase],
-                 items: list[Phrase], end: Token) -> Phrase:
+                 items: list[Phrase], actions: list[Phrase], end: Token) -> Phrase:
         phrase = Phrase(word.start, self.leaf(word), " ", head)
         if colon and result:
             phrase.parts += (" ", self.leaf(colon), " ", result.doc)
-        declared, body = self.rows(sections), self.rows(items) + self.before_end(end)
-        phrase.parts += (lines(declared), Indent(lines(body, bool(declared))), HARD, self.leaf(end))
+        declared, body = self.rows(sections), self.rows(items)
+        if not actions:
+            body += self.before_end(end)
+        more = [row._replace(blank=True) for row in self.rows(actions)]
+        phrase.parts += (lines(declared), Indent(lines(body, bool(declared))), lines(more, True))
+        if actions:
+            phrase.parts.append(Indent(lines(self.before_end(end))))
+        phrase.parts += (HARD, self.leaf(end))
         return phrase
+
+    def action(self, word: Token, owner: Token | None, dot: Token | None, token: Token, colon: Token | None,
+               items: list[Phrase], end: Token) -> Phrase:
+        phrase = Phrase(word.start, self.leaf(word), " ")
+        if owner and dot:
+            phrase.parts += (self.leaf(owner), self.leaf(dot))
+        phrase.parts.append(self.leaf(token))
+        phrase.parts.append(self.leaf(colon) if colon else ":")
+        phrase.parts += (self.block(items, end), HARD, self.leaf(end))
+        return phrase
+
+    def actions_of(self, word: Token, owner: Token, actions: list[Phrase], end: Token) -> Phrase:
+        return Phrase(word.start, self.leaf(word), " ", self.leaf(owner), self.block(actions, end), HARD, self.leaf(end))
+
+    def pass_over(self, items: list[Phrase], semicolon: Token) -> list[Phrase]:
+        if items:
+            items[-1].parts.append(self.dropped(semicolon))
+        return items
 
     # --- variables ---
 
@@ -93,6 +118,34 @@ class DeclarationLayout(TypeLayout):
                           connections: list[Phrase] | None, closer: Token, end: Token) -> Phrase:
         program = Phrase(type_name.start, type_name.doc, self.leaf(opener), self.listed(connections), self.closer(closer))
         return self.program_instance(word, qualifiers, token, with_, task, colon, program, end)
+
+    def path_direct(self, of: Phrase, dot: Token, address: Token) -> Phrase:
+        return Phrase(of.start, of.doc, self.leaf(dot), self.leaf(address))
+
+    def access_decl(self, token: Token, colon: Token, path: Phrase, second: Token, spec: Phrase, direction: Token | None,
+                    end: Token) -> Phrase:
+        phrase = Phrase(token.start, self.leaf(token), " ", self.leaf(colon), " ", path.doc, " ", self.leaf(second), " ")
+        phrase.parts.append(spec.doc)
+        if direction:
+            phrase.parts += (" ", self.leaf(direction, direction.text.upper()))
+        phrase.parts.append(self.closer(end))
+        return phrase
+
+    def access_vars(self, word: Token, variables: list[Phrase], end: Token) -> Phrase:
+        return Phrase(word.start, self.leaf(word), self.block(variables, end), HARD, self.leaf(end))
+
+    config_vars = access_vars
+
+    def config_decl(self, path: Phrase, at: Token | None, location: Token | None, colon: Token, spec: Phrase,
+                    sign: Token | None, initial: Phrase | None, end: Token) -> Phrase:
+        phrase = Phrase(path.start, path.doc)
+        if at and location:
+            phrase.parts += (" ", self.leaf(at), " ", self.leaf(location))
+        phrase.parts += (" ", self.leaf(colon), " ", spec.doc)
+        if sign and initial:
+            phrase.parts += (" ", self.leaf(sign), " ", initial.doc)
+        phrase.parts.append(self.closer(end))
+        return phrase
 
     def fb_task(self, instance: Phrase, with_: Token, task: Token) -> Phrase:
         return Phrase(instance.start, instance.doc, " ", self.leaf(with_), " ", self.leaf(task))

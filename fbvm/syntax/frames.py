@@ -16,7 +16,8 @@ ENDS = {
     "IF": "END_IF", "CASE": "END_CASE", "FOR": "END_FOR", "WHILE": "END_WHILE", "REPEAT": "END_REPEAT",
     "VAR": "END_VAR", "VAR_GLOBAL": "END_VAR", "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE",
     "FUNCTION": "END_FUNCTION", "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "PROGRAM": "END_PROGRAM",
-    "CONFIGURATION": "END_CONFIGURATION", "RESOURCE": "END_RESOURCE"}
+    "CONFIGURATION": "END_CONFIGURATION", "RESOURCE": "END_RESOURCE", "ACTION": "END_ACTION", "ACTIONS": "END_ACTIONS",
+    "VAR_ACCESS": "END_VAR", "VAR_CONFIG": "END_VAR"}
 """Word that opens -> word that ends it."""
 
 OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL": {"REPEAT"}}
@@ -32,7 +33,8 @@ STATEMENT_WORDS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "
 HEADS = {"IF": "THEN", "ELSIF": "THEN", "WHILE": "DO", "FOR": "DO", "CASE": "OF", "UNTIL": "END_REPEAT"}
 """Words behind which a head stands, and the word that ends the head."""
 
-LISTS = ("ended_list", "var_decls", "type_decls", "declarations", "config_items", "resource_items")
+LISTS = ("ended_list", "var_decls", "type_decls", "declarations", "config_items", "resource_items", "some_actions",
+         "access_decls", "config_decls")
 STATEMENT_LISTS = {"ended_list", "open_list", "statement_list"}
 
 

@@ -8,7 +8,7 @@ from fbvm.syntax.tables import tables
 GROUPS = (
     ("a declaration (FUNCTION, FUNCTION_BLOCK, PROGRAM, TYPE, VAR_GLOBAL, CONFIGURATION)", {"FUNCTION", "TYPE"}, {
         "FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "REFUSED_SECTION",
-        "REFUSED_BLOCK", "$END"}),
+        "REFUSED_BLOCK", "ACTION", "ACTIONS", "VAR_CONFIG", "SEMICOLON", "$END"}),
     ("a statement", {"IF", "FOR", "SEMICOLON"}, {
         "IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN", "JMP", "SEMICOLON", "REFUSED_BLOCK",
         "NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "NULL", "LPAR", "PLUS", "MINUS",
@@ -32,7 +32,7 @@ LABEL_SIGNS = {"COLON", "COMMA", "RANGE", "SET_ASSIGN", "ATTEMPT"}
 """What may follow a name at the start of a statement, beside `:=`, `(` and `;`."""
 
 UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "TRY", "ACCESS", "INHERITANCE", "POU_MODIFIER", "SELF", "JMP", "QUALIFIER", "EDGE",
-          "OVERLAP"}
+          "OVERLAP", "ACTION", "DIRECTION"}
 """What may stand there and would be refused, or is seldom meant."""
 
 FIRST = ("SEMICOLON", "THEN", "DO", "OF", "TO", "ASSIGN", "COLON", "COMMA", "RPAR", "RSQB")
@@ -107,9 +107,8 @@ def hint(token: Token, kinds: set[str]) -> str:
         return "`:=` assigns and gives initial values, `=` compares"
     if token.type == "ASSIGN" and "EQUAL" in kinds:
         return "`=` compares, `:=` assigns"
-    if token.type in ("SEMICOLON", "VAR") and "TYPE" in kinds:
-        return "no `;` stands behind the END of a declaration" if token.type == "SEMICOLON" else (
-            "VAR sections stand in a FUNCTION, FUNCTION_BLOCK or PROGRAM; VAR_GLOBAL by itself")
+    if token.type == "VAR" and "TYPE" in kinds:
+        return "VAR sections stand in a FUNCTION, FUNCTION_BLOCK or PROGRAM; VAR_GLOBAL by itself"
     if token.type == "ASSIGN" and "COLON" in kinds and "NUMBER" not in kinds:
         return "a declaration has a type, and then its value: `x : INT := 5;`"
     if token.type == "VAR" and "SEMICOLON" in kinds:

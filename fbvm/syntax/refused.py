@@ -11,10 +11,10 @@ from fbvm.syntax.lexer import Token
 OBJECT_ORIENTED = {"CLASS", "INTERFACE", "NAMESPACE", "METHOD", "PROPERTY", "USING", "EXTENDS", "IMPLEMENTS", "THIS",
                    "SUPER", "ABSTRACT", "FINAL", "PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
 SFC = {"STEP", "INITIAL_STEP", "TRANSITION"}
-ENDS = {"INITIAL_STEP": "END_STEP", "VAR_CONFIG": "END_VAR", "VAR_ACCESS": "END_VAR", "USING": ";", "__TRY": "__ENDTRY"}
+ENDS = {"INITIAL_STEP": "END_STEP", "USING": ";", "__TRY": "__ENDTRY"}
 """What ends a refused text, where it is not END_ and the word."""
 
-HOUSES = {"CLASS", "INTERFACE", "NAMESPACE", "ACTIONS"}
+HOUSES = {"CLASS", "INTERFACE", "NAMESPACE"}
 """Texts that may contain whole POUs or methods; all others end at the latest with their POU."""
 
 LIMITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "CONFIGURATION", "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM",

@@ -5,14 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 from fbvm.syntax.automaton import Automaton
 from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, frames
 from fbvm.syntax.lexer import Token, lexis, meant
 from fbvm.syntax.phrases import found
 from fbvm.syntax.prospect import advance, symbols
-from fbvm.syntax.tree import Empty
 
 ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
 POU_ENDS = {ENDS[word] for word in POUS}
@@ -93,20 +91,6 @@ def _end_of_section(automaton: Automaton, token: Token, following: list[Token]) 
         return None
     return Mend([Token("END_VAR", "END_VAR", before.start, before.start), before, token], before.start, before.end,
                 f"END_VAR expected before {found(before)}, which begins a statement", "", word, cut=True)
-
-
-def _semicolon_behind_section(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """`END_VAR; VAR ..`"""
-    values: list[Any] = automaton.values
-    if token.type not in ("VAR", "VAR_GLOBAL") or symbols()[automaton.states[-1]] != "ended_list":
-        return None
-    if symbols()[automaton.states[-2]] != "sections" or not all(isinstance(item, Empty) for item in values[-1]):
-        return None
-    if not values[-1]:
-        return None
-    first = values[-1][0]
-    del automaton.states[-1], values[-1]
-    return Mend([token], first.start, first.end, "`;` stands in front of a VAR section", "END_VAR has no `;` behind it")
 
 
 def _colon_behind_else(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -220,6 +204,6 @@ def _instruction_list(automaton: Automaton, token: Token, following: list[Token]
 
 
 SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
-    _misspelt, _statement_word, _nameless, _reserved_name, _end_of_section, _semicolon_behind_section, _colon_behind_else,
+    _misspelt, _statement_word, _nameless, _reserved_name, _end_of_section, _colon_behind_else,
     _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end, _location_behind_type,
     _instruction_list)

@@ -113,7 +113,7 @@ class Statements(Expressions):
         return RefusedStatement(word.start, target.end, "JMP")
 
     def refused_statement(self, token: Token) -> RefusedStatement:
-        """A METHOD, ACTION, STEP ... among statements; directly in a body its POU takes it."""
+        """A METHOD, STEP ... among statements; directly in a body its POU takes it."""
         return RefusedStatement(token.start, token.end, *refused_what(token.text))
 
     # --- compound statements ---

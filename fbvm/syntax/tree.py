@@ -9,133 +9,21 @@ from __future__ import annotations
 
 from fbvm.syntax.node import Node as Node
 from fbvm.syntax.node import node as _node
-
-
-@_node
-class Name(Node):
-    """An identifier as written."""
-
-    text: str
-
-
-# --- expressions (Annex: 7.3.2) ------------------------------------------------------------------------------------
-
-
-@_node
-class Expr(Node):
-    pass
-
-
-@_node
-class Literal(Expr):
-    """A literal of an elementary type.
-
-    `kind` is "int", "real", "bool", "string", "wstring", "time", "date", "tod" or "dt"; `value` an int, float, bool,
-    str (one character per STRING byte or WSTRING unit) or whole nanoseconds; `type_name` the type written before `#`,
-    in capitals and in its long form (T -> TIME, D -> DATE, LTOD -> LTIME_OF_DAY), or None.  `text` is as written."""
-
-    kind: str
-    value: int | float | bool | str
-    type_name: str | None
-    text: str
-
-
-@_node
-class EnumLiteral(Expr):
-    """`Color#Red`."""
-
-    type_name: Name
-    member: Name
-
-
-@_node
-class NullLiteral(Expr):
-    """`NULL`."""
-
-
-@_node
-class NameRef(Expr):
-    """A plain identifier: variable, enumeration member, POU, type."""
-
-    text: str
-
-
-@_node
-class Direct(Expr):
-    """A directly represented variable such as `%MW10`, `%IX0.3`, `%D200`, `%CIO1519.03`; `text` as written."""
-
-    text: str
-
-
-@_node
-class Member(Expr):
-    """`of.name`."""
-
-    of: Expr
-    name: Name
-
-
-@_node
-class Part(Expr):
-    """Partial access `of.%X3`, `of.3`, `of.%B1`; `size` is X, B, W, D or L, `index` the number written."""
-
-    of: Expr
-    size: str
-    index: int
-
-
-@_node
-class Index(Expr):
-    """`of[subscripts]`."""
-
-    of: Expr
-    subscripts: tuple[Expr, ...]
-
-
-@_node
-class Deref(Expr):
-    """`of^`."""
-
-    of: Expr
-
-
-@_node
-class Unary(Expr):
-    """`op` is "-", "+" or "NOT"."""
-
-    op: str
-    operand: Expr
-
-
-@_node
-class Binary(Expr):
-    """`op` is one of OR XOR AND OR_ELSE AND_THEN = <> < > <= >= + - * / MOD ** (`&` is AND)."""
-
-    op: str
-    left: Expr
-    right: Expr
-    op_start: int
-
-
-@_node
-class Argument(Node):
-    """One argument of a call: `value`, `name := value` or `name => value`; `kind` is "", ":=" or "=>".
-
-    `value` is None for `name =>` and `name :=` with nothing behind; `negated` for `NOT name => value`."""
-
-    kind: str
-    name: Name | None
-    value: Expr | None
-    negated: bool = False
-
-
-@_node
-class Call(Expr):
-    """A call of a function, or of an instance when it stands as a statement."""
-
-    callee: Expr
-    arguments: tuple[Argument, ...]
-
+from fbvm.syntax.tree_expressions import Argument as Argument
+from fbvm.syntax.tree_expressions import Binary as Binary
+from fbvm.syntax.tree_expressions import Call as Call
+from fbvm.syntax.tree_expressions import Deref as Deref
+from fbvm.syntax.tree_expressions import Direct as Direct
+from fbvm.syntax.tree_expressions import EnumLiteral as EnumLiteral
+from fbvm.syntax.tree_expressions import Expr as Expr
+from fbvm.syntax.tree_expressions import Index as Index
+from fbvm.syntax.tree_expressions import Literal as Literal
+from fbvm.syntax.tree_expressions import Member as Member
+from fbvm.syntax.tree_expressions import Name as Name
+from fbvm.syntax.tree_expressions import NameRef as NameRef
+from fbvm.syntax.tree_expressions import NullLiteral as NullLiteral
+from fbvm.syntax.tree_expressions import Part as Part
+from fbvm.syntax.tree_expressions import Unary as Unary
 
 # --- initial values (6.4.4, 6.5.1.4) -------------------------------------------------------------------------------
 
@@ -376,13 +264,32 @@ class TypeDecl(Declaration):
 
 @_node
 class Pou(Declaration):
-    """FUNCTION, FUNCTION_BLOCK or PROGRAM.  `refused` are METHODs, ACTIONs, EXTENDS ... found in it."""
+    """FUNCTION, FUNCTION_BLOCK or PROGRAM.  `refused` are METHODs, EXTENDS ... found in it."""
 
     kind: str
     name: Name
     result: TypeSpec | None
     sections: tuple[VarSection, ...]
     body: Block
+    refused: tuple[Refused, ...] = ()
+    actions: tuple[Action, ...] = ()
+
+
+@_node
+class Action(Declaration):
+    """`ACTION name: .. END_ACTION` in a POU, or behind it, perhaps with the POU's name in front."""
+
+    owner: Name | None
+    name: Name
+    body: Block
+
+
+@_node
+class Actions(Declaration):
+    """`ACTIONS pou .. END_ACTIONS` around the actions of a POU."""
+
+    owner: Name
+    actions: tuple[Action, ...]
     refused: tuple[Refused, ...] = ()
 
 
@@ -416,6 +323,38 @@ class ProgramInstance(Node):
 
 
 @_node
+class Access(Node):
+    """`name : path : type READ_WRITE;` of VAR_ACCESS; a direct address is the last Member or the whole `path`."""
+
+    name: Name
+    path: Expr
+    spec: TypeSpec
+    writable: bool
+
+
+@_node
+class AccessVars(Node):
+    variables: tuple[Access, ...]
+
+
+@_node
+class ConfigVar(Node):
+    """`resource.program.instance.variable AT %IX0.0 : BOOL := TRUE;` of VAR_CONFIG."""
+
+    path: Expr
+    location: Location | None
+    spec: TypeSpec
+    initial: Initial | None
+
+
+@_node
+class ConfigVars(Declaration):
+    """A VAR_CONFIG section."""
+
+    variables: tuple[ConfigVar, ...]
+
+
+@_node
 class Resource(Node):
     """`RESOURCE name ON processor`; the one resource that a CONFIGURATION has without the word has name None."""
 
@@ -425,6 +364,7 @@ class Resource(Node):
     tasks: tuple[Task, ...]
     programs: tuple[ProgramInstance, ...]
     refused: tuple[Refused, ...] = ()
+    settings: tuple[AccessVars | ConfigVars, ...] = ()
 
 
 @_node
@@ -433,6 +373,7 @@ class Configuration(Declaration):
     sections: tuple[VarSection, ...]
     resources: tuple[Resource, ...]
     refused: tuple[Refused, ...] = ()
+    settings: tuple[AccessVars | ConfigVars, ...] = ()
 
 
 @_node

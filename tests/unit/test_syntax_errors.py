@@ -64,7 +64,6 @@ ONE_ERROR = [
     ("CASE a OF 1 x := 1; END_CASE y := 1;", "`:` expected before `x`", 2),
     ("fb(a := 1; b := 2); y := 1;", "`,` expected, but `;` found", 2),
     ("REPEAT x := 1; UNTIL a; y := 1;", "`END_REPEAT` expected before `y`", 2),
-    ("VAR a : INT; END_VAR; VAR b : INT; END_VAR y := 1;", "`;` stands in front of a VAR section", 1),
     ("VAR a := 1; END_VAR y := 1;", "`:`, `,` or `AT` expected, but `:=` found", 1),
     ("VAR_IN a : INT; END_VAR y := 1;", "`VAR_IN` is no word of Structured Text", 1),
     ("VAR END, VAR_X : INT; END_VAR END := VAR_X; VAR_X := END + VAR_X;", "", 2),
