@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import gc
 import io
+import os
 import select
 import socket
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -166,6 +169,25 @@ def test_a_journal_of_real_connections_is_done_again(name: str) -> None:
     replay = Replay(*open_journal(file.getvalue().splitlines(keepends=True)), image())
     assert (replay.run(), replay.differs, replay.plc.scans) == ("end", None, plc.scans)
     assert bytes(replay.plc.memory.u8) == memory
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/fd").exists(), reason="handles are counted in /proc")
+@pytest.mark.parametrize("name", ["black hole", "closed port", "closes at once", "resets in mid-request"])
+def test_many_lost_connections_leave_nothing_behind(name: str) -> None:
+    """Neither handles nor objects, however connections end."""
+    with PLACES[name]() as port, plc_at(port) as plc:
+        for wait in ("conn.Open_Time", "conn.Retry_Time", "rd.Reply_Time"):
+            plc.write(f"Main.{wait}", 5_000_000)
+        plc.write("Main.Poll", True)
+        seen = []
+        for _ in range(3):
+            run(plc, for_ns=SECOND_NS, pace="event")
+            gc.collect()
+            seen.append((len(os.listdir("/proc/self/fd")), len(gc.get_objects())))
+    (handles, objects), *later = seen
+    assert max(count for count, _ in later) <= handles + 2, "one is open or not, and the peer's"
+    assert max(count for _, count in later) <= objects + 500
 
 
 # --- no scan waits ----------------------------------------------------------------------------------------------------
