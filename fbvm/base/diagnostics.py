@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import bisect
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 from fbvm.base.codes import CODES
+
+
+def whole_lines(text: str) -> str:
+    """A text whose lines end with LF or CR LF: a CR alone, as very old machines write it, becomes LF."""
+    return _LONE_CR.sub("\n", text) if text.count("\r") != text.count("\r\n") else text
+
+
+_LONE_CR = re.compile(r"\r(?!\n)")
 
 
 @dataclass(eq=False)
@@ -19,6 +28,9 @@ class Source:
     text: str
     library: str = ""
     """Name of the library that the text belongs to, "" for the user's own."""
+
+    def __post_init__(self) -> None:
+        self.text = whole_lines(self.text)
 
     @cached_property
     def line_starts(self) -> list[int]:
@@ -53,6 +65,8 @@ class Diagnostic:
     related: tuple[Source, int, str] | None = field(default=None, compare=False)
     raised: bool = False
     """True for a warning that counts as an error, because somebody wants it so."""
+    lossless: bool = field(default=False, compare=False)
+    """True for a syntax error in spite of which all that was written has been read."""
 
     @property
     def severity(self) -> str:

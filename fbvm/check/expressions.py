@@ -40,6 +40,7 @@ from fbvm.check.operators import Operators
 from fbvm.check.subscripts import Subscripts
 from fbvm.check.values import is_any
 from fbvm.syntax import ladder, tree
+from fbvm.syntax.literals import WRONG
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
@@ -166,6 +167,8 @@ class Expressions:
     # --- literals and names -----------------------------------------------------------------------------------------
 
     def _literal(self, expr: tree.Literal, want: Type | None) -> Type | None:
+        if expr.kind == WRONG:
+            return None
         if isinstance(expr.value, str):
             return self._text_literal(expr, expr.value, want)
         value = self.facts.constants[expr] = expr.value
@@ -274,7 +277,8 @@ class Expressions:
             hint = f"for the address write %{name}, or declare a variable AT {address}"
         except AddressError:
             known = [v.name for v in self.pou.order] if self.pou else []
-            hint = self.project.nearest(name, [*known, *(v.name for v in self.project.globals.values())])
+            hint = ELSEWHERE.get(fold(name)) or self.project.nearest(
+                name, [*known, *(v.name for v in self.project.globals.values())])
         pou = self.project.pou(name, self.source)
         if pou is None:
             self.error("S0201", expr, f"{name} is not declared", hint)
@@ -399,6 +403,10 @@ _USES = {
     "PROGRAM": "a task runs it; what others need of it belongs in a VAR_GLOBAL",
 }
 """What to do with a POU of each kind that is named where a value is needed."""
+ELSEWHERE = dict.fromkeys(("DEFAULT", "OTHERS", "OTHERWISE"), "the rest of a CASE stands behind ELSE, without a colon") | {
+    "NIL": "write NULL", "NULLPTR": "write NULL", "PI": "write 3.14159265358979, or declare a constant",
+    "THEN": "THEN belongs to IF", "BREAK": "EXIT leaves a loop"}
+"""Names of other languages, and what to write here."""
 READABLE = ("", "VAR_INPUT", "VAR_OUTPUT")
 """Kinds of members that may be named from outside."""
 

@@ -109,7 +109,7 @@ class Operators:
             return self._folded(expr, timed, timed)
         kind = self._operand_type(expr, left, right, want)
         if kind is None or not self._defined(expr, kind):
-            self._undefined(expr, left, right)
+            self._undefined(expr, left, right, want)
             return None
         if kind not in (UNTYPED_INT, UNTYPED_REAL):
             for side, side_kind in ((expr.left, left), (expr.right, right)):
@@ -133,7 +133,7 @@ class Operators:
         elif expr.op == "+" and moves[1] and is_any(left, "ANY_INT", "ANY_BIT"):
             result = right
         if result is None:
-            self._undefined(expr, left, right)
+            self._undefined(expr, left, right, None)
             return None
         self.facts.operands[expr] = NULL
         return result
@@ -183,9 +183,16 @@ class Operators:
             return _FAMILY[op] == ("ANY_NUM",)
         return is_any(kind, *_FAMILY[op])
 
-    def _undefined(self, expr: tree.Binary, left: Type, right: Type) -> None:
+    def _undefined(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> None:
         hint = ""
-        if expr.op in ("AND", "OR", "XOR"):
+        timed = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
+        if expr.op == "*" and timed == [False, True]:
+            hint = f"the {right} stands in front: {self.expressions.text(expr.right)} * {self.expressions.text(expr.left)}"
+        elif any(timed) and expr.op not in ("*", "/") and UNTYPED_INT in (left, right):
+            hint = "a duration is written T#500ms"
+        elif expr.op in ("AND", "OR") and want == BOOL and not is_any(left, "ANY_BIT") and not is_any(right, "ANY_BIT"):
+            hint = "compare each of them, for example with <> 0"
+        elif expr.op in ("AND", "OR", "XOR"):
             wrong, other = (right, left) if is_any(left, "ANY_BIT") else (left, right)
             hint = _bit_hint(wrong, other)
         elif expr.op == "+" and isinstance(left, StringType):
@@ -223,7 +230,7 @@ class Operators:
             return self._folded(expr, UNTYPED_REAL, UNTYPED_REAL)
         numeric = (UNTYPED_INT, UNTYPED_REAL)
         if not all(k in numeric or is_any(k, "ANY_NUM") for k in (left, right)):
-            self._undefined(expr, left, right)
+            self._undefined(expr, left, right, want)
             return None
         kind: Type = left if is_any(left, "ANY_REAL") else LREAL
         if left in numeric and want is not None and base(want) == REAL and right == REAL:

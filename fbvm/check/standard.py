@@ -35,6 +35,18 @@ if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
 
 _SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations", "ANY_STRING": "STRING and WSTRING"}
+_WAIT = "a scan never waits: use a timer, such as TON"
+_PRINT = "a PLC prints nothing: watch a variable"
+ELSEWHERE = {
+    "SWITCH": "a choice among values is CASE x OF 1: .. END_CASE", "POW": "write a ** b, or EXPT(a, b)",
+    "POWER": "write a ** b, or EXPT(a, b)", "FABS": "write ABS", "SQR": "write x * x", "LOG10": "write LOG",
+    "ROUND": "a conversion rounds: REAL_TO_DINT(x)", "FLOOR": "TRUNC(x) drops the fraction",
+    "CEIL": "TRUNC(x) drops the fraction", "INT": "write TO_INT(x)", "REAL": "write TO_REAL(x)", "FLOAT": "write TO_REAL(x)",
+    "BOOL": "compare it: x <> 0", "STR": "write TO_STRING(x)", "STRLEN": "write LEN", "STRCAT": "write CONCAT",
+    "STRCMP": "compare texts with =", "STRCPY": "assign it: a := b", "SUBSTR": "write MID(text, length, position)",
+    "PRINT": _PRINT, "PRINTF": _PRINT, "PUTS": _PRINT, "SLEEP": _WAIT, "DELAY": _WAIT, "WAIT": _WAIT,
+    "IIF": "write SEL(condition, if_false, if_true)"}
+"""Functions of other languages, and what to write here."""
 UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
 
 
@@ -102,7 +114,7 @@ class StandardCalls:
         project = self.expressions.project
         known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]
         self.error("S0401", call.callee, f"there is no function or instance {callee(call)}",
-                   project.nearest(callee(call), known))
+                   ELSEWHERE.get(name) or project.nearest(callee(call), known))
         return None
 
     # --- kinds ------------------------------------------------------------------------------------------------------

@@ -82,7 +82,8 @@ class Statements:
             return
         kind = self.expressions.infer(node.call)
         if kind is not None:
-            self.error("S0401", node.call, "this is no statement: it does nothing",
+            compares = isinstance(node.call, tree.Binary) and node.call.op == "="
+            self.error("S0401", node.call, "this is no statement: it does nothing", "`=` compares, `:=` assigns" if compares else
                        "write () behind an instance to call it, or := to assign")
 
     # --- choices ----------------------------------------------------------------------------------------------------

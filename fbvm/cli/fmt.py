@@ -14,7 +14,7 @@ from pathlib import Path
 import click
 
 from fbvm.base.data import data_folder
-from fbvm.base.diagnostics import Source
+from fbvm.base.diagnostics import Source, whole_lines
 from fbvm.base.types import fold
 from fbvm.check.functions import OPERATORS, SIGNATURES, conversion, typed_name
 from fbvm.cli import status
@@ -108,9 +108,9 @@ def _encoded(before: str, after: str, data: bytes) -> bytes:
     for encoding, mark in ENCODINGS:
         if data.startswith(mark):
             try:
-                if mark + before.encode(encoding) == data:
+                if whole_lines(data[len(mark):].decode(encoding)) == before:
                     return mark + after.encode(encoding)
-            except UnicodeEncodeError:
+            except UnicodeError:
                 continue
     raise AssertionError("a text has the encoding with which it was read")
 

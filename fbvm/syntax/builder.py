@@ -19,6 +19,10 @@ ERROR_LIMIT = 100
 """Errors of one text after which the parser stops."""
 
 
+LOSSLESS = {"S0101", "S0105", "S0108"}
+"""Errors of single words that leave nothing out: an operator of another language, a literal without a value."""
+
+
 class Stop(Exception):
     """The rest of the text is not looked at."""
 
@@ -36,6 +40,8 @@ class Builder:
         self.errors = 0
         self.odd: list[int] = []
         """Where characters were passed over that no word begins with, and where strings without end end."""
+        self.unclosed: list[int] = []
+        """Where strings without end end, those with a wrong escape included."""
         self.cut_short = False
         """Whether a comment or pragma without end has swallowed the rest of the text."""
         self.full = False
@@ -47,8 +53,8 @@ class Builder:
         self.depths: dict[Expr, int] = {}
         """Depth of the expressions under construction, where it is not 1."""
 
-    def report(self, code: str, start: int, end: int, message: str, hint: str = "") -> None:
-        self.tell(Diagnostic(code, self.source, start, end, message, hint))
+    def report(self, code: str, start: int, end: int, message: str, hint: str = "", lossless: bool = True) -> None:
+        self.tell(Diagnostic(code, self.source, start, end, message, hint, lossless=lossless and code in LOSSLESS))
 
     def tell(self, diagnostic: Diagnostic) -> None:
         """Keep a message; of errors the first ERROR_LIMIT only."""
@@ -60,7 +66,13 @@ class Builder:
         self.cut_short |= diagnostic.code == "S0103"
         if diagnostic.code in ("S0102", "S0104"):
             self.odd.append(diagnostic.end)
+        if diagnostic.code == "S0104":
+            self.unclosed.append(diagnostic.end)
         self.diagnostics.append(diagnostic)
+
+    def forget(self, start: int, end: int) -> None:
+        """Take back what was told of a part of the text."""
+        self.diagnostics = [each for each in self.diagnostics if not start <= each.start < end]
 
     def empty(self) -> list[Any]:
         return []

@@ -64,11 +64,11 @@ class Expressions(Builder):
             kind, value, type_name = decode()
         except literals.OutOfRange as error:
             self.report("S0108", token.start, token.end, *error.args)
-            kind, value, type_name = instead
+            kind, value, type_name = literals.WRONG, *instead[1:]
         except literals.Malformed as error:
             code = "S0104" if instead[0] in ("string", "wstring") else "S0105"
             self.report(code, token.start, token.end, *error.args)
-            kind, value, type_name = instead
+            kind, value, type_name = literals.WRONG, *instead[1:]
         return Literal(token.start, token.end, kind, value, type_name, token.text)
 
     # --- variables ---

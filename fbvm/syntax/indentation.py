@@ -37,6 +37,13 @@ def advice(source: Source, opener: Token, until: Token) -> str:
     return ""
 
 
+def ends_alike(source: Source, opener: Token, end: Token) -> bool:
+    """Whether an END stands where that of a block is looked for: on its line, or as far in on a line of its own."""
+    if _line(source, opener) == _line(source, end):
+        return True
+    return _first(source, end) and _column(source, end) == _column(source, opener)
+
+
 def _silent(*message: Any) -> None:
     """What is wrong with these characters was told before."""
 

@@ -53,12 +53,24 @@ def meant(text: str) -> str:
 _FOREIGN = {"==": ("EQUAL", "=", "`=` compares"), "!=": ("UNEQUAL", "<>", "write `<>`"),
             "&&": ("AND", "AND", "write AND"), "||": ("OR", "OR", "write OR"), "|": ("OR", "OR", "write OR"),
             "!": ("NOT", "NOT", "write NOT, or `<>` for unequal"), "~": ("NOT", "NOT", "write NOT"),
-            "=:": ("ASSIGN", ":=", "write `:=`"), "++": ("", "", "write `x := x + 1`"), "--": ("", "", "write `x := x - 1`"),
+            "=:": ("ASSIGN", ":=", "write `:=`"), "=<": ("LESS_EQUAL", "<=", "write `<=`"),
+            "->": ("DOT", ".", "write `^.` behind a reference"),
+            "<<": ("STAR", "*", "write SHL(value, count)"), ">>": ("STAR", "*", "write SHR(value, count)"),
+            "++": ("", "", "write `x := x + 1`"), "--": ("", "", "write `x := x - 1`"),
             "%": ("MOD", "MOD", "write MOD for the remainder; an address has letters and digits behind `%`")}
 """Operators of other languages -> our terminal, its text, and advice."""
 
-_MEANT = {"?": "write SEL(condition, if_false, if_true)", "#": "a type stands in front of `#`, and no space",
-          "\\": "the escape in a string is `$`"}
+_SIGNS = tuple((re.compile(shape), advice) for shape, advice in (
+    (r"\?", "write SEL(condition, if_false, if_true)"),
+    (r"#[ \t]*(?:include|define|if|ifdef|ifndef|pragma)\b", "there is no preprocessor: declare constants in VAR CONSTANT"),
+    (r"[#$]([0-9A-Fa-f]+)\b", r"hexadecimal digits are written 16#\1"),
+    (r"#", "a type stands in front of `#`, and no space"),
+    (r"\\", "the escape in a string is `$`")))
+"""What no word begins with, and advice."""
+END_OF_FILE = "\x1a\0"
+"""Characters with which older machines fill a file behind its end."""
+NO_VALUE = ("<<", ">>", "++", "--")
+"""Operators of other languages for which there is none of ours."""
 _WORDS = r"(?s:\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?)"
 _BY_HAND = {"LOCATION", "SET_ASSIGN"}
 """Terminals that only exist behind certain others."""
@@ -108,7 +120,7 @@ def lexis() -> Lexis:
         else:
             patterns[terminal.name] = _pattern(terminal)
     patterns["COMMENT"] = r"//[^\n]*|\(\*|/\*"
-    patterns["FOREIGN"] = r"==|!=|&&|\|\||[-+*/]=|=:|:[ \t]+=(?!>)|(?:\+\+|--)(?=\s*;)|[!|~]|%(?![A-Za-z*])"
+    patterns["FOREIGN"] = r"==|=<|<<|>>|->|!=|&&|\|\||[-+*/]=|=:|:[ \t]+=(?!>)|(?:\+\+|--)(?=\s*;)|[!|~]|%(?![A-Za-z*])"
     patterns["SIGN"] = "|".join(re.escape(sign) for sign in sorted(signs, key=len, reverse=True))
     alternatives = "|".join(f"(?P<{name}>{patterns[name]})" for name in _ORDER)
     known = re.escape("".join(sorted(set("".join(signs) + "'\"{%"))))
@@ -201,6 +213,8 @@ class Lexer:
             return None, 1
         if character == "{":
             return None, self._pragma(at)
+        if character in END_OF_FILE and not text[at:].strip(END_OF_FILE + " \t\r\n"):
+            return None, len(text)
         if character in "'\"":
             return self._open_string(at)
         if word := lex.foreign_word.match(text, at):
@@ -210,14 +224,15 @@ class Lexer:
             return Token("NAME", word[0], at, word.end()), word.end()
         run = lex.unknown.match(text, at + 1)
         end = run.end() if run else at + 1
-        self.report("S0102", at, end, f"unexpected {_characters(text[at:end])}", _MEANT.get(character, ""))
+        advice = next((match.expand(words) for shape, words in _SIGNS if (match := shape.match(text, at))), "")
+        self.report("S0102", at, end, f"unexpected {_characters(text[at:end])}", advice)
         return None, end
 
     def _open_string(self, at: int) -> tuple[Token, int]:
         quote = self.text[at]
         end = min((e for e in (self.text.find("\n", at), self.text.find("\r", at)) if e >= 0), default=len(self.text))
         self.report("S0104", at, end, "string literal without end on its line",
-                    f"close it with {quote}, and write $N for a line end inside")
+                    f"close it with {quote}; inside, a {quote} is written ${quote}, and a line end $N")
         return Token("STRING_LITERAL", quote * 2, at, end), end
 
     def _foreign(self, word: str, start: int, end: int) -> tuple[str, str]:
@@ -225,7 +240,7 @@ class Lexer:
         kind, ours, advice = _FOREIGN.get(word, ("ASSIGN", ":=", f"write out `x := x {word[0]} ..`"))
         if word.startswith(":"):
             advice = "`:=` is one sign, without a space inside"
-        self.report("S0101", start, end, f"`{word}` is no operator of Structured Text", advice)
+        self.report("S0101", start, end, f"`{word}` is no operator of Structured Text", advice, word not in NO_VALUE)
         return kind, ours
 
     def _pragma(self, start: int) -> int:
@@ -235,7 +250,10 @@ class Lexer:
             return len(self.text)
         contents = self.text[start + 1:end]
         self.pragmas.append(Pragma(start, end + 1, contents))
-        if not harmless(contents):
+        if ";" in contents and not harmless(contents):
+            self.report("S0190", start, end + 1, "what stands in braces is a pragma, and no statement is executed in one",
+                        "blocks are written IF .. END_IF, FOR .. END_FOR, without braces")
+        elif not harmless(contents):
             self.report("S0190", start, end + 1, f"the pragma `{{{_short(contents.strip())}}}` is not known and has no effect",
                         "what it switches for another compiler is not switched here")
         return end + 1

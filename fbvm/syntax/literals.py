@@ -13,6 +13,10 @@ Decoded = tuple[str, Value, str | None]
 """kind, value and type name of a Literal."""
 
 
+WRONG = "wrong"
+"""Kind of a literal whose text has no value, which was said."""
+
+
 class Malformed(ValueError):
     """The text is no literal; `args` are message and hint."""
 
@@ -76,8 +80,27 @@ def _number(text: str) -> tuple[str, int | float]:
         return "int", int(text.replace("_", ""))
     if re.fullmatch(_REAL, text):
         return "real", float(text.replace("_", ""))
-    raise Malformed(f"`{text}` is no number",
-                    "digits with single `_` between them, a point with digits on both sides, an exponent")
+    raise Malformed(f"`{text}` is no number", _meant(text))
+
+
+_ELSEWHERE = (
+    (r"0[xX]([0-9A-Fa-f_]+)[uUlL]*", r"hexadecimal digits are written 16#\1"),
+    (r"0[bB]([01_]+)", r"binary digits are written 2#\1"),
+    (r"0[oO]([0-7_]+)", r"octal digits are written 8#\1"),
+    (r"([0-9.]+)[hH]", r"a duration is written T#\1h, hexadecimal digits 16#\1"),
+    (r"([0-9][0-9A-Fa-f]*)[hH]", r"hexadecimal digits are written 16#\1"),
+    (r"((?:[0-9.]+(?:d|h|m|s|ms|us|ns))+)", r"a duration is written T#\1"),
+    (r"([0-9.]+)[fFuUlL]+", r"write \1, without a letter behind it"),
+)
+"""Numbers as other languages write them, and what to write here."""
+
+
+def _meant(text: str) -> str:
+    """Advice for what is no number."""
+    for shape, advice in _ELSEWHERE:
+        if (match := re.fullmatch(shape, text)):
+            return match.expand(advice)
+    return "digits with single `_` between them, a point with digits on both sides, an exponent"
 
 
 def _based(text: str) -> int:
@@ -216,8 +239,9 @@ def duration(text: str) -> int:
     while rest:
         part = re.match(_DURATION_PART, rest)
         if not part or len(part[0]) > LONGEST:
+            known = "units are d h m s ms us ns, as in `T#1d2h3m4s5ms`"
             raise Malformed(f"`{_short(rest)}` is no part of a duration",
-                            "units are d h m s ms us ns, as in `T#1d2h3m4s5ms`")
+                            f"write its unit: `T#{_short(rest)}ms`" if rest.isdigit() else known)
         unit = units.index(part[3].lower())
         if unit <= last:
             raise Malformed(f"unit `{part[3]}` stands too late or twice in the duration",

@@ -22,7 +22,7 @@ from fbvm.syntax.frames import (
     open_head,
     reopen,
 )
-from fbvm.syntax.indentation import advice
+from fbvm.syntax.indentation import BLOCKS, advice, ends_alike
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.mends import BRACKETS, best_mend
 from fbvm.syntax.phrases import found, hint, sign, unlike
@@ -60,10 +60,11 @@ class Recovery:
             raise Stop
         if self.turns_in_circles(token):
             return []
-        self.mute = self.swallowed(token) or any(
+        following = self.peek(token)
+        self.mute = self.swallowed(token) or self.unclosed(token) or any(
             self.automaton.before.end <= odd <= token.start for odd in self.builder.odd)
         reopen(self.states, self.values)
-        mend = best_mend(self.automaton, token, self.peek(token))
+        mend = best_mend(self.automaton, token, following)
         if mend:
             return self.mended(mend, token)
         if token.type in UNITS and self.amid(token):
@@ -77,6 +78,11 @@ class Recovery:
     def swallowed(self, token: Token) -> bool:
         """Whether a comment without end has swallowed all that could stand here."""
         return token.type == "$END" and self.builder.cut_short
+
+    def unclosed(self, token: Token) -> bool:
+        """Whether a string without end stands on the line of a token or behind it there: quotes are mixed up."""
+        line_end = self.automaton.text.find("\n", token.start)
+        return any(token.start <= end and (end <= line_end or line_end < 0) for end in self.builder.unclosed)
 
     def turns_in_circles(self, token: Token) -> bool:
         """Whether the same token was refused at the same height before: then it must go, whatever it means."""
@@ -115,13 +121,14 @@ class Recovery:
 
     # --- telling ---
 
-    def report(self, code: str, start: int, end: int, message: str, help_: str, opener: Token | None = None) -> None:
+    def report(self, code: str, start: int, end: int, message: str, help_: str, opener: Token | None = None,
+               lossless: bool = False) -> None:
         if start <= self.last or self.mute:
             return
         self.last = start
         source = self.builder.source
         related = (source, opener.start, f"{found(opener)} stands here") if opener else None
-        self.builder.tell(Diagnostic(code, source, start, end, message, help_, related))
+        self.builder.tell(Diagnostic(code, source, start, end, message, help_, related, lossless=lossless))
 
     def tell(self, token: Token) -> None:
         """What is expected here, what was found."""
@@ -137,8 +144,11 @@ class Recovery:
 
     def mended(self, mend: Mend, token: Token) -> list[Token]:
         """Do what `best_mend` found, and say it."""
-        self.report(mend.code, mend.start, mend.end, mend.message, mend.hint, mend.opener)
+        lossless = bool(mend.tokens) and not mend.cut if mend.lossless is None else mend.lossless
+        self.report(mend.code, mend.start, mend.end, mend.message, mend.hint, mend.opener, lossless)
         self.last = max(self.last, mend.start)
+        if mend.silent:
+            self.builder.forget(mend.end, mend.silent)
         if mend.cut:
             cut(self.states, self.values, anchor(self.states))
         return mend.tokens
@@ -174,7 +184,7 @@ class Recovery:
         if token.type in OPENERS:
             target = next((f for f in reversed(open_) if f.word.type in OPENERS[token.type]), None)
             if target is None:
-                return self.no_opener(token)
+                return self.other_end(open_[-1].word, token) if open_ else self.no_opener(token)
             inner = open_[open_.index(target) + 1:]
         elif token.type not in UNITS:
             inner = open_[-1:]
@@ -205,17 +215,26 @@ class Recovery:
             return False
         return bool(self.values) and "\n" not in self.builder.source.text[before.end:token.start]
 
+    def other_end(self, word: Token, token: Token) -> list[Token]:
+        """`IF .. END_FOR`: the END of another block, where the indentation says that it ends this one."""
+        end = ENDS[word.type]
+        if not ends_alike(self.builder.source, word, token) or word.type not in BLOCKS:
+            return self.no_opener(token)
+        self.report("S0101", token.start, token.end, f"{end} expected, but {found(token)} found",
+                    f"{word.type} ends with {end}", word, lossless=True)
+        return [Token(end, end, token.start, token.end)]
+
     def no_opener(self, token: Token) -> list[Token]:
         words = " or ".join(sorted(OPENERS[token.type]))
-        self.report("S0101", token.start, token.end, f"{found(token)} without {words}", "")
+        self.report("S0101", token.start, token.end, f"{found(token)} without {words}", "", lossless=True)
         following = self.following()
         return [] if following.type == "SEMICOLON" else [following]
 
     def close(self, inner: list[Frame], token: Token) -> list[Token]:
         """End the open blocks, innermost first, and tell of each."""
         for frame in reversed(inner):
-            self.tell_open(frame, token)
             place = anchor(self.states)
+            self.tell_open(frame, token, place.size >= len(self.states))
             end = ENDS[frame.word.type]
             states = list(self.states)
             cut(states, [None] * len(states), place)
@@ -228,7 +247,7 @@ class Recovery:
         self.last = token.start
         return [token]
 
-    def tell_open(self, frame: Frame, token: Token) -> None:
+    def tell_open(self, frame: Frame, token: Token, lossless: bool) -> None:
         word, source = frame.word, self.builder.source
         line = source.place(word.start)[0]
         head = self.values[frame.at] if word.type in POUS and len(self.values) > frame.at else None
@@ -236,7 +255,7 @@ class Recovery:
         self.last = min(self.last, self.place(token) - 1)
         self.report("S0101", self.place(token), token.end,
                     f"{ENDS[word.type]} expected before {found(token)}: "
-                    f"the {word.text.upper()}{name} of line {line} is still open", advice(source, word, token), word)
+                    f"the {word.text.upper()}{name} of line {line} is still open", advice(source, word, token), word, lossless)
 
     # --- giving up a part ---
 

@@ -7,10 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fbvm.syntax.automaton import Automaton
-from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, frames
+from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, cut, frames
 from fbvm.syntax.lexer import Token, lexis, meant
+from fbvm.syntax.literals import ELEMENTARY
+from fbvm.syntax.pasted import INSTRUCTION_LIST, ladder_lines
 from fbvm.syntax.phrases import found
 from fbvm.syntax.prospect import advance, symbols
+from fbvm.syntax.tree import Deref, Name
 
 ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
 POU_ENDS = {ENDS[word] for word in POUS}
@@ -28,6 +31,10 @@ class Mend:
     opener: Token | None = None
     cut: bool = False
     code: str = "S0101"
+    lossless: bool | None = None
+    """Whether all that was written is read; None if that is so unless `cut`, or there being no tokens, says no."""
+    silent: int = 0
+    """Up to where nothing else is told, since the text is none of ours."""
 
 
 def slip(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -49,6 +56,11 @@ def _misspelt(automaton: Automaton, token: Token, following: list[Token]) -> Men
     if token.type != "MISSPELT":
         return None
     kind = meant(token.text)
+    inside = [frame.word.type for frame in frames(automaton.states, automaton.values)]
+    around = next((word for word in reversed(inside) if word in ("CASE", "FOR", "WHILE", "REPEAT")), "")
+    if kind == "EXIT" and around == "CASE":
+        return Mend([], token.start, token.end, f"{found(token)} is no word of Structured Text",
+                    "leave it out: a branch of CASE ends where the next one begins", lossless=True)
     advice = "write VAR, VAR_INPUT, VAR_OUTPUT, VAR_IN_OUT, VAR_TEMP or VAR_EXTERNAL" if kind == "VAR" else f"write {kind}"
     return Mend([Token(kind, kind, token.start, token.end)], token.start, token.end,
                 f"{found(token)} is no word of Structured Text", advice)
@@ -61,7 +73,7 @@ def _statement_word(automaton: Automaton, token: Token, following: list[Token]) 
         return None
     name = Token("NAME", word.text, word.start, word.end)
     return Mend([name, token], word.start, word.end, f"{found(word)} is a reserved word and cannot be a name",
-                "choose another name", cut=True)
+                "choose another name", cut=True, lossless=True)
 
 
 def _reserved_name(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -90,14 +102,14 @@ def _end_of_section(automaton: Automaton, token: Token, following: list[Token]) 
     if next_word and next_word[1]:
         return None
     return Mend([Token("END_VAR", "END_VAR", before.start, before.start), before, token], before.start, before.end,
-                f"END_VAR expected before {found(before)}, which begins a statement", "", word, cut=True)
+                f"END_VAR expected before {found(before)}, which begins a statement", "", word, cut=True, lossless=True)
 
 
 def _colon_behind_else(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
     """`ELSE: ..`"""
     if token.type != "COLON" or automaton.before.type != "ELSE":
         return None
-    return Mend([], token.start, token.end, "`:` behind ELSE", "ELSE is no label: it has no `:`")
+    return Mend([], token.start, token.end, "`:` behind ELSE", "ELSE is no label: it has no `:`", lossless=True)
 
 
 def _semicolon_in_call(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -133,7 +145,7 @@ def _nameless(automaton: Automaton, token: Token, following: list[Token]) -> Men
         return None
     kind = word.text.upper()
     return Mend([Token("NAME", "?", word.end, word.end), token], word.start, word.end, f"the {kind} has no name",
-                f"write it behind {kind}")
+                f"write it behind {kind}", lossless=False)
 
 
 def _access_in_front(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -142,7 +154,8 @@ def _access_in_front(automaton: Automaton, token: Token, following: list[Token])
     if word not in ("METHOD", "PROPERTY", "ACTION") or access.text.upper() not in ACCESS or len(following) < 2:
         return None
     return Mend([Token("REFUSED_BLOCK", token.text, token.start, token.end)], access.start, access.end,
-                f"{found(access)} stands in front of {word}", f"write {word} {access.text.upper()} {following[1].text}", cut=True)
+                f"{found(access)} stands in front of {word}", f"write {word} {access.text.upper()} {following[1].text}", cut=True,
+                lossless=True)
 
 
 def _no_instance(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -158,7 +171,7 @@ def _no_instance(automaton: Automaton, token: Token, following: list[Token]) -> 
         token = automaton.next()
         depth += {"LPAR": 1, "RPAR": -1}.get(token.type, 0)
     return Mend([] if not depth else [token], opener.start, opener.end, "the name of an instance is missing in front of `(`",
-                "write the name of the instance that is called", cut=True)
+                "write the name of the instance that is called", cut=True, lossless=True)
 
 
 def _other_end(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -179,31 +192,102 @@ def _location_behind_type(automaton: Automaton, token: Token, following: list[To
     if token.type != "AT" or anchor(automaton.states).symbol != "var_decls" or len(following) < 2:
         return None
     location = automaton.next()
+    names = [v[-1] for v in automaton.values if isinstance(v, list) and v and isinstance(v[-1], Name)]
+    name = names[-1].text if names else "x"
     return Mend([], token.start, location.end, "AT stands behind the type",
-                f"write it in front of the colon: x AT {location.text} : ...")
+                f"write it in front of the colon: {name} AT {location.text} : ...", lossless=True)
 
 
-INSTRUCTIONS = {
-    "LD", "LDN", "ST", "STN", "S", "R", "AND", "ANDN", "OR", "ORN", "XOR", "XORN", "NOT", "ADD", "SUB", "MUL", "DIV", "MOD", "GT",
-    "GE", "EQ", "NE", "LE", "LT", "JMP", "JMPC", "JMPCN", "CAL", "CALC", "CALCN", "RET", "RETC", "RETCN"}
-"""Operators of the instruction list, as names (IEC 61131-3 ed. 3, table 68)."""
+def _caret(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`a ^ 3` for XOR."""
+    caret = automaton.before
+    if caret.type != "CARET" or token.type not in ("NAME", "NUMBER", "TYPED_LITERAL", "LPAR") or not automaton.values:
+        return None
+    value = automaton.values[-1]
+    if not isinstance(value, Deref) or advance(automaton.states, "XOR") is None:
+        return None
+    automaton.values[-1] = value.of
+    return Mend([Token("XOR", "XOR", caret.start, caret.end), token], caret.start, caret.end,
+                "`^` stands behind a reference and leads to what it refers to", "write XOR for exclusive or, a ** b for powers")
+
+
+def _c_loop(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`for (i = 0; i < 10; i++)`"""
+    opener = open_bracket(automaton, "LPAR")
+    open_ = frames(automaton.states, automaton.values)
+    if opener is None or not open_ or open_[-1].word.type != "FOR" or token.type != "SEMICOLON":
+        return None
+    word, depth = open_[-1].word, 1
+    if automaton.text[word.end:opener.start].strip():
+        return None
+    while depth and token.type != "$END":
+        token = automaton.next()
+        depth += {"LPAR": 1, "RPAR": -1}.get(token.type, 0)
+    place = anchor(automaton.states, automaton.values.index(word) + 1)
+    cut(automaton.states, automaton.values, place)
+    head = [Token(*each, token.end, token.end) for each in HEAD]
+    return Mend([word, *head, *([token] if depth else [])], word.start, opener.end,
+                "a FOR loop has no brackets and semicolons", "write FOR i := 0 TO 9 DO .. END_FOR;", lossless=False)
+
+
+HEAD = (("NAME", "i"), ("ASSIGN", ":="), ("NUMBER", "0"), ("TO", "TO"), ("NUMBER", "0"), ("DO", "DO"))
+"""What is read in place of the head of a loop that is none of ours."""
+
+
+def _declared_in_body(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`int i;`, `i : INT;` among statements."""
+    name = automaton.before
+    states = automaton.states
+    if anchor(states).symbol != "ended_list" or len(states) != anchor(states).size + 1 or name.type != "NAME":
+        return None
+    if token.type != "NAME" or name.text.upper() not in C_TYPES or len(following) < 2:
+        return None
+    if following[1].type not in ("SEMICOLON", "ASSIGN", "EQUAL", "COMMA", "LSQB"):
+        return None
+    while token.type not in ("SEMICOLON", "$END"):
+        token = automaton.next()
+    ours = C_TYPES[name.text.upper()]
+    return Mend([] if token.type == "SEMICOLON" else [token], name.start, name.end,
+                f"{found(name)} begins a declaration, which stands in front of all statements",
+                f"write in a VAR section: {following[0].text} : {ours};", cut=True)
+
+
+C_TYPES = {name: name for name in ELEMENTARY if len(name) > 2} | {
+    "INTEGER": "INT", "BOOLEAN": "BOOL", "FLOAT": "REAL", "DOUBLE": "LREAL", "LONG": "DINT", "SHORT": "INT",
+    "UNSIGNED": "UDINT", "INT8_T": "SINT", "UINT8_T": "BYTE", "INT16_T": "INT", "UINT16_T": "WORD", "INT32_T": "DINT",
+    "UINT32_T": "DWORD", "AUTO": "INT", "CONST": "INT", "STATIC": "INT"}
+"""Words that begin a declaration in other languages, and what is declared here."""
+
+
+def _ladder(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`LD 0.00`, `OUT 100.00` among statements: rungs, without the words around them."""
+    symbol = anchor(automaton.states).symbol
+    first = {"declarations": token, "ended_list": automaton.before}.get(symbol)
+    if first is None or not ladder_lines(automaton.text, first.start):
+        return None
+    while token.type not in UNITS and token.type not in POU_ENDS:
+        token = automaton.next()
+    where = "in the body of a PROGRAM or FUNCTION_BLOCK, " if symbol == "declarations" else ""
+    return Mend([token], first.start, first.end, "these lines are ladder as mnemonics",
+                f"rungs stand {where}between LADDER and END_LADDER", cut=True, silent=token.start)
 
 
 def _instruction_list(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
     """`LD a` at the beginning of a line: the whole body is an instruction list."""
     word = automaton.before
     line = automaton.text[:word.start].rpartition("\n")[2].strip()
-    if word.type != "NAME" or word.text.upper() not in INSTRUCTIONS or (line and not line.endswith(":")):
+    if word.type != "NAME" or word.text.upper() not in INSTRUCTION_LIST or (line and not line.endswith(":")):
         return None
     if token.type not in ("NAME", "NUMBER", "TYPED_LITERAL", "DIRECT") or "\n" in automaton.text[word.end:token.start]:
         return None
     while token.type not in POU_ENDS and token.type != "$END":
         token = automaton.next()
     return Mend([token], word.start, word.end, "the instruction list is understood but not executed by this version",
-                "write the body in Structured Text", cut=True, code="S0901")
+                "write the body in Structured Text", cut=True, code="S0901", silent=token.start)
 
 
 SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
-    _misspelt, _statement_word, _nameless, _reserved_name, _end_of_section, _colon_behind_else,
-    _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end, _location_behind_type,
-    _instruction_list)
+    _ladder, _misspelt, _statement_word, _nameless, _reserved_name, _end_of_section,
+    _colon_behind_else, _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end,
+    _location_behind_type, _caret, _c_loop, _declared_in_body, _instruction_list)
+"""Asked one after the other; the first that knows the mistake mends it."""

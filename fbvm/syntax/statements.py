@@ -71,7 +71,8 @@ class Statements(Expressions):
         value, high = label.values[0]
         if len(label.values) == 1 and high is None and isinstance(value, NameRef):
             return RefusedStatement(label.start, label.end, f"label `{value.text}`")
-        self.report("S0101", label.start, label.end, "label of CASE outside of a CASE statement", "")
+        if not any(odd <= label.start and "\n" not in self.source.text[odd:label.start] for odd in self.odd):
+            self.report("S0101", label.start, label.end, "label of CASE outside of a CASE statement", "")
         return Empty(label.start, label.end)
 
     def checked(self, statement: Statement) -> Statement:

@@ -25,7 +25,7 @@ class Expr(Node):
 class Literal(Expr):
     """A literal of an elementary type.
 
-    `kind` is "int", "real", "bool", "string", "wstring", "time", "date", "tod" or "dt"; `value` an int, float, bool,
+    `kind` is "int", "real", "bool", "string", "wstring", "time", "date", "tod", "dt" or "wrong"; `value` an int, float, bool,
     str (one character per STRING byte or WSTRING unit) or whole nanoseconds; `type_name` the type written before `#`,
     in capitals and in its long form (T -> TIME, D -> DATE, LTOD -> LTIME_OF_DAY), or None.  `text` is as written."""
 

@@ -96,3 +96,9 @@ def test_a_file_keeps_its_encoding(encoding: str) -> None:
     Path("wild.st").write_bytes(f"// \N{DEGREE SIGN}\N{LATIN SMALL LETTER U WITH DIAERESIS}\n{WILD}".encode(encoding))
     assert fmt("wild.st").exit_code == 0
     assert Path("wild.st").read_text(encoding) == "// \N{DEGREE SIGN}\N{LATIN SMALL LETTER U WITH DIAERESIS}\n" + CANONICAL
+
+
+def test_lines_that_end_with_cr_alone_become_lines() -> None:
+    Path("wild.st").write_bytes(f"// \N{DEGREE SIGN}\r{WILD}\r\x1a".encode("cp1252"))
+    assert fmt("wild.st").exit_code == 0
+    assert Path("wild.st").read_bytes() == f"// \N{DEGREE SIGN}\n{CANONICAL}".encode("cp1252")

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.code.compiler import compile_text
 from fbvm.syntax.text import decode, read
 
 TEXT = "PROGRAM p (* é € *) END_PROGRAM\r\n"
@@ -54,3 +55,15 @@ def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
 def test_an_empty_file_is_a_source() -> None:
     source = decode(b"", "x")
     assert isinstance(source, Source) and source.text == ""
+
+
+def test_lines_may_end_with_cr_alone() -> None:
+    made = compile_text("PROGRAM Main // name\rVAR a : INT; END_VAR\r\n(* two\rlines *)\ra := c;\rEND_PROGRAM\r")
+    assert [(d.code, d.line, d.column) for d in made.diagnostics] == [("S0201", 5, 6)]
+    assert "a := c;" in made.diagnostics[0].render().splitlines()[1]
+
+
+@pytest.mark.parametrize("rest", ["\x1a", "\x1a\x1a\r\n", "\0\0\0", "\x1a\0 \n"])
+def test_what_old_machines_write_behind_a_text_is_passed_over(rest: str) -> None:
+    assert compile_text("PROGRAM Main\r\nEND_PROGRAM\r\n" + rest).diagnostics == []
+    assert [d.code for d in compile_text(f"PROGRAM Main {rest} END_PROGRAM").diagnostics] == ["S0102"]

@@ -1,0 +1,28 @@
+"""Recognises lines of ladder mnemonics that were pasted among statements, so that one message says so."""
+
+from __future__ import annotations
+
+from fbvm.syntax.instruction_set import instruction_set, spelling
+
+INSTRUCTION_LIST = frozenset((
+    "LD", "LDN", "ST", "STN", "S", "R", "AND", "ANDN", "OR", "ORN", "XOR", "XORN", "NOT", "ADD", "SUB", "MUL", "DIV", "MOD", "GT",
+    "GE", "EQ", "NE", "LE", "LT", "JMP", "JMPC", "JMPCN", "CAL", "CALC", "CALCN", "RET", "RETC", "RETCN"))
+"""Operators of the instruction list, as names (IEC 61131-3 ed. 3, table 68)."""
+LOOK, SURE = 600, 2
+"""Characters that are looked at, and lines that leave no doubt."""
+
+
+def ladder_lines(text: str, at: int) -> bool:
+    """Whether the line of a place and those below it are ladder: instructions only, and one that no other language has."""
+    start = text.rfind("\n", 0, at) + 1
+    lines, own = 0, False
+    for line in text[start:start + LOOK].split("\n"):
+        words = line.split()
+        if not words:
+            continue
+        found = instruction_set().pattern.match(line.strip().lstrip("@%!"))
+        if found is None or ":=" in line or line.rstrip().endswith(";"):
+            break
+        lines += 1
+        own = own or spelling(found[0]) not in INSTRUCTION_LIST
+    return own and lines >= SURE
