@@ -96,7 +96,7 @@ CODES: dict[str, Code] = {
         "S0592": "statement is never executed",
         "S0593": "condition is always the same",
         "S0594": "assignment without effect",
-        "S0595": "CASE forgets members of an enumeration",
+        "S0595": "CASE forgets a member of an enumeration",
         "S0596": "output written twice, and the first value lost",
         "S0690": "output written in two POUs",
         "S0691": "located variables share memory",

@@ -1,4 +1,4 @@
-"""Warnings about the way through a body: what is never executed, what always holds, members that a CASE forgets."""
+"""Warnings about the way through a body: what is never executed, what always holds, the member that a CASE forgets."""
 
 from __future__ import annotations
 
@@ -100,15 +100,14 @@ class _Flow:
         return None
 
     def members(self, node: tree.Case) -> None:
-        """Warn of members of an enumeration that a CASE without ELSE has no branch for."""
+        """Warn of the one member of an enumeration that a CASE without ELSE has no branch for; several are meant."""
         kind = self.body.facts.types.get(node.selector)
         if not isinstance(kind, EnumType) or node.otherwise is not None:
             return
         spans = [span for branch in node.branches for span in self.body.facts.labels.get(branch, ())]
         missing = [name for value, name in kind.shown.items() if not any(low <= value <= high for low, high in spans)]
-        if missing:
-            named = ", ".join(missing[:-1]) + " and " + missing[-1] if len(missing) > 1 else missing[0]
-            self.body.warn("S0595", node.selector, f"this CASE has no branch for {named}",
+        if len(missing) == 1 and len(kind.shown) > 2:
+            self.body.warn("S0595", node.selector, f"this CASE has a branch for every member but {missing[0]}",
                            "add it, or an ELSE for the rest")
 
 

@@ -17,11 +17,11 @@ def ladder_lines(text: str, at: int) -> bool:
     start = text.rfind("\n", 0, at) + 1
     lines, own = 0, False
     for line in text[start:start + LOOK].split("\n"):
-        words = line.split()
-        if not words:
+        if not line.strip():
             continue
-        found = instruction_set().pattern.match(line.strip().lstrip("@%!"))
-        if found is None or ":=" in line or line.rstrip().endswith(";"):
+        code = line.strip().lstrip("@%!")
+        found = instruction_set().pattern.match(code)
+        if found is None or code[found.end():found.end() + 1] not in ("", " ", "\t", "(") or ":=" in code or ";" in code:
             break
         lines += 1
         own = own or spelling(found[0]) not in INSTRUCTION_LIST
