@@ -18,6 +18,7 @@ VERBS = {
     "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
     "new": "Make a project with a block and its test.",
     "test": "Run the tests of a project.",
+    "learn": "Learn in twelve lessons what a scan cycle really does.",
     "run": "Run a program, in virtual time or over real TCP.",
     "step": "Step through the scans of a program, forth and back.",
     "replay": "Do a run again from its journal.",

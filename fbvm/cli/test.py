@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
-from importlib.metadata import entry_points
 from importlib.util import find_spec
 
 import click
 
 from fbvm.cli import status
 
-PLUGIN = "fbvm.testing.plugin"
 STATUS = {0: status.GOOD, 1: status.FAILED, 2: status.INTERRUPTED, 4: status.USAGE, 5: status.USAGE}
 """Statuses by pytest's own; 5 is that there was no test."""
 
@@ -25,7 +22,6 @@ def command(arguments: tuple[str, ...]) -> None:
     What follows goes to pytest.  Status 1 if a test failed, 2 if there is none."""
     if find_spec("pytest") is None:
         raise click.UsageError("tests need pytest: pip install pytest")
-    installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
-    plugin = [] if installed else ["-p", PLUGIN]
-    ended = subprocess.run([sys.executable, "-m", "pytest", *plugin, *arguments], check=False)
-    sys.exit(STATUS.get(ended.returncode, status.FAILED))
+    from fbvm.testing.lessons import run_pytest
+
+    sys.exit(STATUS.get(run_pytest(arguments), status.FAILED))

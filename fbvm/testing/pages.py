@@ -19,15 +19,17 @@ from fbvm.testing.subject import Subject
 from fbvm.watch.paths import Place
 
 FOLDER = ".fbvm"
-MOST_SCANS = 1000
-MOST_PAGES = 20
-"""Pages that one session writes."""
+MOST_SCANS = 400
 
 
 def page_path(root: Path, test: str) -> Path:
     """Where the page of a test lies: `.fbvm/tests.test_pump.test_it_waits.html`."""
-    name = re.sub(r"[^\w\-\[\].]+", ".", re.sub(r"\.(py|st)::", ".", test))
-    return root / FOLDER / f"{name[:150]}.html"
+    return root / FOLDER / f"{file_name(test)}.html"
+
+
+def file_name(test: str) -> str:
+    """A name for a file about a test, without its ending."""
+    return re.sub(r"[^\w\-\[\].]+", ".", re.sub(r"\.(py|st)::", ".", test))[:150]
 
 
 def write_page(path: Path, title: str, history: History, subject: Subject, asked: Sequence[Place],

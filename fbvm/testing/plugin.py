@@ -11,6 +11,7 @@ Files are looked for beside the test, then in the folders above it, up to that w
 from __future__ import annotations
 
 import ast
+import os
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -35,6 +36,8 @@ RIGS: pytest.StashKey[list[Rig]] = pytest.StashKey()
 """The rigs that a test has made."""
 PAGES: pytest.StashKey[list[Path]] = pytest.StashKey()
 """The pages that were written for failed tests."""
+MOST_PAGES = 20
+"""Pages of failed tests that one session writes."""
 SOURCE_FOLDER = "src"
 """Where a project keeps its blocks, below the folder of its pytest.ini or pyproject.toml."""
 
@@ -63,6 +66,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addini("fbvm_libraries", "folders of libraries of function blocks", type="paths", default=[])
     group = parser.getgroup("fbvm", "PLC programs")
     group.addoption("--fbvm-golden", action="store_true", help="write the golden traces of the tests anew")
+    group.addoption("--fbvm-pages", type=int, default=MOST_PAGES, metavar="N",
+                    help=f"write pages of so many failed tests at most (default: {MOST_PAGES})")  # fmt: skip
+    group.addoption("--fbvm-traces", metavar="DIR", help="keep a trace of every test, with every statement")
     group.addoption("--fbvm-cov", action="store_true", help="report which statements and branches of PLC code tests executed")
     group.addoption("--fbvm-cov-html", metavar="DIR", help="write the coverage of PLC code as pages")
     group.addoption("--fbvm-cov-xml", metavar="FILE", help="write the coverage of PLC code as Cobertura XML")
@@ -122,9 +128,7 @@ def plant(request: pytest.FixtureRequest) -> Iterator[PlantMaker]:
         made.append(PlantRig(project_near(folders_of(request.path, request.config.rootpath), project)))
         _rigs(request.node).extend(made[-1].rigs.values())
         for rig in made[-1].rigs.values():
-            counting = ExitStack()
-            counting.enter_context(counted(request.config, rig.plc, rig.subject))
-            request.addfinalizer(counting.close)
+            _attend(request, rig)
         return made[-1]
 
     yield make
@@ -183,12 +187,24 @@ def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
         rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, wanted=warned.wanted, **given)
         warned.note(rig.subject)
         rigs.append(rig)
-        counting = ExitStack()
-        counting.enter_context(counted(request.config, rig.plc, rig.subject))
-        request.addfinalizer(counting.close)
+        _attend(request, rig)
         return rig
 
     return make
+
+
+def _attend(request: pytest.FixtureRequest, rig: Rig) -> None:
+    """Counts what a rig executes and records it, if somebody wants that, until the test is over."""
+    attending = ExitStack()
+    attending.enter_context(counted(request.config, rig.plc, rig.subject))
+    if folder := request.config.getoption("fbvm_traces"):
+        from fbvm.testing.pages import file_name
+        from fbvm.testing.recorded import Recorded
+
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        name = f"{file_name(request.node.nodeid)}.{_rigs(request.node).index(rig)}.fbtrace"
+        attending.callback(Recorded(rig, Path(folder) / name).close)
+    request.addfinalizer(attending.close)
 
 
 def folders_of(path: Path, root: Path) -> list[Path]:
@@ -231,17 +247,17 @@ def pytest_runtest_makereport(
 
 def _page(item: pytest.Item, rig: Rig, lines: tuple[str, range] | None) -> str:
     """Writes the page of a failed test, and says where it is; "" without one."""
-    from fbvm.testing.pages import MOST_PAGES, page_path
+    from fbvm.testing.pages import page_path
 
-    written = item.config.stash.setdefault(PAGES, [])
+    written, most = item.config.stash.setdefault(PAGES, []), item.config.getoption("fbvm_pages")
     path = page_path(item.config.rootpath, item.nodeid if len(_rigs(item)) == 1 else f"{item.nodeid}.{_rigs(item).index(rig)}")
     try:
-        if len(written) >= MOST_PAGES or not rig.write_page(path, item.nodeid, lines):
+        if len(written) >= most or not rig.write_page(path, item.nodeid, lines):
             return ""
     except OSError as error:
         return f"the page could not be written: {error}"
     written.append(path)
-    return f"every scan, in a browser: {path.relative_to(item.config.rootpath)}"
+    return f"every scan, in a browser: {os.path.relpath(path, item.config.invocation_params.dir)}"
 
 
 def _asking(excinfo: pytest.ExceptionInfo[BaseException], rigs: Sequence[Rig]) -> list[tuple[Rig, tuple[str, range] | None]]:

@@ -1,0 +1,89 @@
+"""`fbvm learn`: lessons about what a scan cycle really does, for one learner, and a teacher's run over many."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import click
+
+from fbvm.cli import status
+
+FOLDER = "lessons"
+
+
+@click.command("learn")
+@click.argument("number", type=click.IntRange(min=1), required=False, metavar="[LESSON]")
+@click.option("--check", "checked", is_flag=True, help="Check the prediction and the program.")
+@click.option("--solution", "solved", is_flag=True, help="Show the solution, and why.")
+@click.option("--folder", type=click.Path(file_okay=False, path_type=Path), default=FOLDER, show_default=True,
+              help="Where your lessons are.")
+@click.option("--class", "learners", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="DIR",
+              help="For teachers: check all lessons in all folders of this folder, one a learner.")
+@click.option("--report", "out", type=click.Path(file_okay=False, path_type=Path), metavar="DIR", default="report",
+              show_default=True, help="With --class: where report.html, traces and pages go.")
+def command(number: int | None, checked: bool, solved: bool, folder: Path, learners: Path | None, out: Path) -> None:
+    """Twelve lessons: read, predict, look, change, check.
+
+    Without LESSON, lists them.  `fbvm learn 1` shows the first one and makes a folder for it; there, write your prediction into
+    answers.toml and change program.st, then `fbvm learn 1 --check`.  Status 1 if something is not right yet."""
+    from fbvm.testing.lessons import check, lessons
+
+    if (checked or learners) and find_spec("pytest") is None:
+        raise click.UsageError("checks need pytest: pip install pytest")
+    if learners is not None:
+        _class(learners, out)
+        return
+    if number is None:
+        if checked or solved:
+            raise click.UsageError("say which lesson: fbvm learn 1 --check")
+        _list(folder)
+        return
+    found = next((lesson for lesson in lessons() if lesson.number == number), None)
+    if found is None:
+        raise click.UsageError(f"there are lessons 1 to {len(lessons())}")
+    if solved:
+        click.echo(found.solution())
+        return
+    try:
+        target = found.begin(folder)
+        if not checked:
+            click.echo(found.text)
+            click.echo(f"Your files are in {target}.  When you are ready: fbvm learn {number} --check")
+            return
+        wrong = check(found, folder)
+    except OSError as error:
+        raise click.UsageError(f"{folder} cannot be written: {error.strerror}") from None
+    if wrong:
+        sys.exit(status.FAILED)
+    following = f"; the next one: fbvm learn {number + 1}" if number < len(lessons()) else "; that was the last one"
+    click.secho(f"lesson {number} is done{following}", fg="green")
+
+
+def _list(folder: Path) -> None:
+    from fbvm.testing.lessons import is_done, lessons
+
+    for lesson in lessons():
+        mark = "done" if is_done(lesson, folder) else "begun" if (folder / lesson.slug).is_dir() else ""
+        click.echo(f"{lesson.number:>4}  {lesson.title:<40}{mark}".rstrip())
+    click.echo("\nfbvm learn 1 begins with the first one")
+
+
+def _class(learners: Path, out: Path) -> None:
+    from fbvm.testing.class_report import report, summary
+    from fbvm.testing.lessons import check_class, lessons
+
+    if out.resolve().is_relative_to(learners.resolve()):
+        raise click.UsageError(f"{out} lies among the learners of {learners}; choose another --report")
+    try:
+        results = check_class(learners, out)
+        page = out / "report.html"
+        page.write_text(report(results, lessons(), out), encoding="utf-8")
+    except OSError as error:
+        raise click.UsageError(f"{out} cannot be written: {error.strerror}") from None
+    if not results:
+        raise click.UsageError(f"{learners} holds no folders of learners")
+    for line in summary(results, lessons()):
+        click.echo(line)
+    click.echo(f"written to {page}")

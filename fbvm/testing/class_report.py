@@ -1,0 +1,78 @@
+"""The report of a teacher's run: one HTML page with a row a learner and a column a lesson, and what went wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from urllib.parse import quote
+
+from fbvm.testing.lessons import OF_THE_LEARNER, Lesson, Result
+from fbvm.testing.pages import page_path
+
+_PAGE = """<!doctype html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title><style>
+:root {{ color-scheme: light dark; --good: light-dark(#1b7f4d, #4cc38a); --bad: light-dark(#c92a2a, #ff8787) }}
+body {{ font: 15px/1.5 system-ui, sans-serif; margin: 2rem auto; max-width: 75rem; padding: 0 1rem }}
+table {{ border-collapse: collapse }} th, td {{ padding: .25rem .7rem; border-bottom: 1px solid #8884; text-align: left }}
+.good {{ color: var(--good) }} .bad {{ color: var(--bad) }} .none {{ opacity: .4 }} .wide {{ overflow-x: auto }}
+</style></head><body><h1>{title}</h1>
+<p>A cell is the prediction, right or wrong, and how many checks of the program passed.</p>
+<div class="wide"><table><thead><tr><th>{heads}</thead><tbody>
+{rows}
+</tbody></table></div>
+{details}
+</body></html>
+"""
+
+
+def summary(results: Mapping[str, Mapping[str, Result]], lessons: tuple[Lesson, ...]) -> list[str]:
+    """Lines of text: each learner's lessons, `ok`, `3/5` or `-`."""
+    wide = max([len(name) for name in results] + [4])
+    heads = " ".join(f"{lesson.number:>5}" for lesson in lessons)
+    return [f"{'':<{wide}} {heads}  done"] + [
+        f"{name:<{wide}} {' '.join(f'{_short(begun.get(lesson.slug)):>5}' for lesson in lessons)}  "
+        f"{sum(result.whole for result in begun.values()):>4}" for name, begun in results.items()]  # fmt: skip
+
+
+def _short(result: Result | None) -> str:
+    if result is None:
+        return "-"
+    return "ok" if result.whole else f"{result.prediction + result.passed}/{1 + result.checks}"
+
+
+def report(results: Mapping[str, Mapping[str, Result]], lessons: tuple[Lesson, ...], out: Path) -> str:
+    """The page, whose links lead to pages of failures in `out`."""
+    numbers = [f'<abbr title="{escape(lesson.title)}">{lesson.number}</abbr>' for lesson in lessons]
+    heads = "<th>".join(["learner", *numbers, "done"])
+    rows = "\n".join(
+        f"<tr><th>{escape(name)}{''.join(_cell(name, lesson, begun.get(lesson.slug)) for lesson in lessons)}"
+        f"<td>{sum(result.whole for result in begun.values())}" for name, begun in results.items())  # fmt: skip
+    details = "\n".join(_details(name, lesson, begun[lesson.slug], out) for name, begun in results.items()
+                        for lesson in lessons if lesson.slug in begun and begun[lesson.slug].failed)  # fmt: skip
+    return _PAGE.format(title="Lessons", heads=heads, rows=rows, details=details)
+
+
+def _cell(name: str, lesson: Lesson, result: Result | None) -> str:
+    if result is None:
+        return '<td class="none">-'
+    mark = "✓" if result.prediction else "✗"
+    text = f"{mark} {result.passed}/{result.checks}"
+    return f'<td class="{"good" if result.whole else "bad"}"><a href="#{_anchor(name, lesson)}">{text}</a>' if result.failed \
+        else f'<td class="good">{text}'  # fmt: skip
+
+
+def _anchor(name: str, lesson: Lesson) -> str:
+    return escape(quote(f"{name}-{lesson.number}"))
+
+
+def _details(name: str, lesson: Lesson, result: Result, out: Path) -> str:
+    items = []
+    for test, why in result.failed:
+        page = page_path(out, f"{name}/{lesson.slug}/test_lesson.py::{test}")
+        link = f' <a href="{quote(page.relative_to(out).as_posix())}">every scan</a>' if page.exists() else ""
+        items.append(f"<li><b>{escape(test)}</b>: {escape(why)}{link}")
+    files = " and ".join(f'<a href="{quote(f"{name}/{lesson.slug}/{file}")}">{file}</a>' for file in OF_THE_LEARNER)
+    return (f'<h2 id="{_anchor(name, lesson)}">{escape(name)}: {lesson.number}. {escape(lesson.title)}</h2>'
+            f"<p>{files}</p><ul>{''.join(items)}</ul>")  # fmt: skip

@@ -1,0 +1,22 @@
+"""What the checks of lessons need besides the fixtures: the predictions that a learner has written down."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+FILE = "answers.toml"
+
+
+def predicted(test_file: str, name: str) -> object:
+    """The answer of that name beside a test.  Raises AssertionError if there is none yet."""
+    __tracebackhide__ = True
+    path = Path(test_file).parent / FILE
+    try:
+        answers = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise AssertionError(f"{FILE} cannot be read: {error}") from None
+    if answers.get(name, "") == "":
+        raise AssertionError(f"{FILE}: {name} is still empty; predict first, then look")
+    value: object = answers[name]
+    return value

@@ -1,0 +1,181 @@
+"""The lessons that `fbvm learn` gives, what a learner makes of them, and a teacher's run over many learners.
+
+A lesson is a folder of `lessons/`: `lesson.md` is its text, `given.st` a program, `answers.toml` asks for a prediction,
+`test_lesson.py` checks it and the learner's `program.st`; `solution/` is kept apart.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from xml.etree import ElementTree
+
+from fbvm.base.data import data_folder
+from fbvm.testing.lesson import FILE as ANSWERS
+from fbvm.testing.pages import FOLDER
+
+PROGRAM, GIVEN, TEXT, SOLUTION = "program.st", "given.st", "lesson.md", "solution"
+OF_THE_LEARNER = (PROGRAM, ANSWERS)
+DONE = ".done"
+PLUGIN = "fbvm.testing.plugin"
+LARGEST_BYTES = 1 << 20
+"""Of a learner's file; a larger one is left out."""
+QUIET = ("-q", "-rN", "--tb=short", "--import-mode=importlib", "-p", "no:cacheprovider", "--fbvm-no-warn", "all")
+PREDICTION = "test_prediction"
+
+
+@dataclass(frozen=True)
+class Lesson:
+    """One lesson; `slug` is the name of its folder, `03-level-against-edge`."""
+
+    number: int
+    slug: str
+    folder: Path
+
+    @property
+    def text(self) -> str:
+        """Its text, Markdown."""
+        return (self.folder / TEXT).read_text(encoding="utf-8")
+
+    @property
+    def title(self) -> str:
+        return self.text.split("\n", 1)[0].removeprefix("# ")
+
+    def solution(self) -> str:
+        """The right answers, the program, and why."""
+        parts = ((ANSWERS, ANSWERS), (PROGRAM, PROGRAM), ("why.md", ""))
+        texts = [(name, (self.folder / SOLUTION / file).read_text(encoding="utf-8")) for file, name in parts]
+        return "\n".join(f"--- {name}\n\n{text}" if name else text for name, text in texts)
+
+    def begin(self, folder: Path) -> Path:
+        """The learner's own folder for it; what is there already stays as it is."""
+        target = folder / self.slug
+        target.mkdir(parents=True, exist_ok=True)
+        for path in self._files():
+            if not (target / path.name).exists():
+                shutil.copyfile(path, target / path.name)
+        if not (target / PROGRAM).exists():
+            shutil.copyfile(self.folder / GIVEN, target / PROGRAM)
+        return target
+
+    def gather(self, source: Path, target: Path) -> None:
+        """A fresh folder for a check: the lesson's own files, and of the learner's the program and the answers only."""
+        target.mkdir(parents=True, exist_ok=True)
+        for path in self._files():
+            if path.name not in OF_THE_LEARNER:
+                shutil.copyfile(path, target / path.name)
+        for name in OF_THE_LEARNER:
+            if (source / name).is_file() and (source / name).stat().st_size <= LARGEST_BYTES:
+                shutil.copyfile(source / name, target / name)
+
+    def _files(self) -> list[Path]:
+        return sorted(path for path in self.folder.iterdir() if path.is_file() and path.name != TEXT)
+
+
+@cache
+def lessons() -> tuple[Lesson, ...]:
+    """All lessons in order."""
+    folders = sorted(path for path in data_folder("lessons").iterdir() if (path / TEXT).is_file())
+    return tuple(Lesson(int(path.name.partition("-")[0]), path.name, path) for path in folders)
+
+
+def run_pytest(arguments: Sequence[str], cwd: Path | None = None, quiet: bool = False) -> int:
+    """Runs pytest with the plugin in a process of its own; its status."""
+    installed = any(entry.value == PLUGIN for entry in entry_points(group="pytest11"))
+    command = [sys.executable, "-m", "pytest", *([] if installed else ["-p", PLUGIN]), *arguments]
+    return subprocess.run(command, cwd=cwd, check=False, stdout=subprocess.DEVNULL if quiet else None).returncode
+
+
+def check(lesson: Lesson, folder: Path) -> int:
+    """Checks what a learner made of a lesson, and remembers if all was right; pytest's status."""
+    target = folder / lesson.slug
+    status = run_pytest([*QUIET, "--rootdir", str(target), "-c", str(_ini(target)), str(target)])
+    if status == 0:
+        (target / DONE).touch()
+    return status
+
+
+def is_done(lesson: Lesson, folder: Path) -> bool:
+    """True if a check found all right."""
+    return (folder / lesson.slug / DONE).exists()
+
+
+def _ini(folder: Path) -> Path:
+    path = folder / "pytest.ini"
+    if not path.exists():
+        path.write_text("[pytest]\n", encoding="utf-8")
+    return path
+
+
+# --- a class ----------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Result:
+    """What a learner made of one lesson: the prediction, checks of the program, and what failed with a first line of why."""
+
+    prediction: bool = False
+    passed: int = 0
+    checks: int = 0
+    failed: list[tuple[str, str]] = field(default_factory=list)
+
+    @property
+    def whole(self) -> bool:
+        return self.prediction and self.passed == self.checks
+
+
+def learners(folder: Path) -> list[tuple[str, dict[str, Path]]]:
+    """Each learner's name, and the folders of the lessons that were begun."""
+    slugs = {lesson.slug for lesson in lessons()}
+    found = []
+    for path in sorted(each for each in folder.iterdir() if each.is_dir() and not each.name.startswith(".")):
+        begun = {each.name: each for each in sorted(path.rglob("*")) if each.is_dir() and each.name in slugs}
+        found.append((path.name, begun))
+    return found
+
+
+def check_class(folder: Path, out: Path) -> dict[str, dict[str, Result]]:
+    """Checks all lessons of all learners with the lessons' own tests; traces and pages of failures stay in `out`."""
+    results: dict[str, dict[str, Result]] = {}
+    out = out.resolve()
+    listing = out / "results.xml"
+    for old in (out / FOLDER, out / "traces"):
+        shutil.rmtree(old, ignore_errors=True)
+    listing.unlink(missing_ok=True)
+    out.mkdir(parents=True, exist_ok=True)
+    for name, begun in learners(folder):
+        results[name] = {}
+        for lesson in lessons():
+            if lesson.slug in begun:
+                shutil.rmtree(out / name / lesson.slug, ignore_errors=True)
+                lesson.gather(begun[lesson.slug], out / name / lesson.slug)
+                results[name][lesson.slug] = Result()
+    working = [name for name, begun in results.items() if begun]
+    if working:
+        run_pytest([*QUIET, "-c", str(_ini(out)), "--rootdir", str(out), f"--junitxml={listing}", "-o", "junit_family=xunit1",
+                    "--fbvm-traces", str(out / "traces"), "--fbvm-pages", "1000000", *working], cwd=out, quiet=True)  # fmt: skip
+    for name, slug, test, why in _rows(listing) if working else ():
+        result = results[name][slug]
+        if test == PREDICTION:
+            result.prediction = not why
+        else:
+            result.checks += 1
+            result.passed += not why
+        if why:
+            result.failed.append((test, why))
+    return results
+
+
+def _rows(listing: Path) -> Iterator[tuple[str, str, str, str]]:
+    """Learner, lesson, test and why it failed, "" if it did not."""
+    for case in ElementTree.parse(listing).iter("testcase"):
+        name, slug, *_ = Path(case.get("file", "")).parts
+        wrong = case.find("failure") if case.find("failure") is not None else case.find("error")
+        said = "" if wrong is None else (wrong.get("message") or "failed").split("\n")[0]
+        yield name, slug, case.get("name", ""), said

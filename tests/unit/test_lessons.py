@@ -1,0 +1,149 @@
+"""The lessons: one screen each, wrong as they are given, right as their solutions have them; and the run over a class."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+from urllib.parse import unquote
+from xml.etree import ElementTree
+
+import pytest
+from click.testing import CliRunner
+
+from fbvm.cli.main import main
+from fbvm.code.compiler import compile_files
+from fbvm.record.trace import Trace
+from fbvm.testing.class_report import report, summary
+from fbvm.testing.lesson import predicted
+from fbvm.testing.lessons import ANSWERS, GIVEN, PROGRAM, Lesson, check_class, lessons, run_pytest
+
+HOUSE = Path(__file__).resolve().parents[2]
+LINES, COLUMNS = 25, 79
+every_lesson = pytest.mark.parametrize("lesson", lessons(), ids=lambda lesson: lesson.slug)
+
+
+@pytest.fixture(autouse=True)
+def found_by_children(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is started by a test uses this fbvm, too."""
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(HOUSE), os.environ.get("PYTHONPATH", "")]))
+
+
+def test_there_are_twelve() -> None:
+    assert [lesson.number for lesson in lessons()] == list(range(1, 13))
+
+
+@every_lesson
+def test_a_lesson_is_one_screen_and_complete(lesson: Lesson) -> None:
+    lines = lesson.text.splitlines()
+    assert len(lines) <= LINES
+    assert max(map(len, lines)) <= COLUMNS
+    assert "## Predict" in lines and "## Do" in lines
+    for program in (lesson.folder / GIVEN, lesson.folder / "solution" / PROGRAM):
+        assert not compile_files([program], runnable=True).errors
+    asked = re.findall(r"^(\w+) = ", (lesson.folder / ANSWERS).read_text(encoding="utf-8"), re.M)
+    assert asked == re.findall(r"^(\w+) = ", (lesson.folder / "solution" / ANSWERS).read_text(encoding="utf-8"), re.M)
+    tests = (lesson.folder / "test_lesson.py").read_text(encoding="utf-8")
+    assert sorted(asked) == sorted(re.findall(r'predicted\(__file__, "(\w+)"\)', tests))
+
+
+@every_lesson
+def test_what_it_shows_of_a_program_stands_there(lesson: Lesson) -> None:
+    program = (lesson.folder / GIVEN).read_text(encoding="utf-8")
+    spaced = re.sub(r"\s+", " ", program)
+    for line in re.findall(r"^    (.*;)", lesson.text, re.M):
+        if "Edge(CLK" not in line:
+            assert re.sub(r"\s+", " ", line.strip()) in spaced
+
+
+@pytest.mark.slow
+def test_solutions_pass_and_what_is_given_does_not(tmp_path: Path) -> None:
+    (tmp_path / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
+    for lesson in lessons():
+        for solved in (False, True):
+            target = lesson.begin(tmp_path / ("solved" if solved else "given"))
+            if solved:
+                for path in (lesson.folder / "solution").iterdir():
+                    (target / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    arguments = ["-q", "--import-mode=importlib", "-p", "no:cacheprovider", "--fbvm-pages", "0", "-o", "junit_family=xunit1"]
+    assert run_pytest([*arguments, "--junitxml=solved.xml", "solved"], tmp_path, quiet=True) == 0
+    assert run_pytest([*arguments, "--junitxml=given.xml", "given"], tmp_path, quiet=True) == 1
+    failed: dict[str, list[str]] = {lesson.slug: [] for lesson in lessons()}
+    for case in ElementTree.parse(tmp_path / "given.xml").iter("testcase"):
+        if case.find("failure") is not None:
+            failed[Path(case.get("file", "")).parts[1]].append(case.get("name", ""))
+    for names in failed.values():
+        assert "test_prediction" in names
+        assert len(names) > 1
+
+
+@pytest.mark.slow
+def test_a_class(tmp_path: Path) -> None:
+    first, third = lessons()[0], lessons()[2]
+    for name in ("anna", "bert", "carla"):
+        (tmp_path / "class" / name).mkdir(parents=True)
+    for name, lesson in (("anna", first), ("anna", third), ("bert", first)):
+        lesson.begin(tmp_path / "class" / name / "lessons")
+    for path in (first.folder / "solution").iterdir():
+        (tmp_path / "class" / "anna" / "lessons" / first.slug / path.name).write_bytes(path.read_bytes())
+    (tmp_path / "class" / "bert" / "lessons" / first.slug / "test_lesson.py").write_text(
+        "def test_prediction(): pass\ndef test_program(): pass\n", encoding="utf-8")  # nobody marks his own work
+    results = check_class(tmp_path / "class", tmp_path / "out")
+    assert results["anna"][first.slug].whole
+    assert not results["bert"][first.slug].prediction
+    assert (results["bert"][first.slug].passed, results["bert"][first.slug].checks) == (0, 1)
+    assert results["carla"] == {}
+    assert [row.split()[:4] for row in summary(results, lessons())[1:]] == [
+        ["anna", "ok", "-", "1/4"], ["bert", "0/2", "-", "-"], ["carla", "-", "-", "-"]]  # fmt: skip
+    page = report(results, lessons(), tmp_path / "out")
+    for link in re.findall(r'href="([^#"]*)"', page):
+        assert (tmp_path / "out" / unquote(link)).exists()
+    [trace] = (tmp_path / "out" / "traces").glob("bert.*test_program*.fbtrace")
+    with Trace.open(trace) as opened:
+        assert opened.at(4).read("CIO 100.00") is True
+
+
+def test_predictions_are_read(tmp_path: Path) -> None:
+    test = str(tmp_path / "test_lesson.py")
+    with pytest.raises(AssertionError, match="cannot be read"):
+        predicted(test, "x")
+    (tmp_path / ANSWERS).write_text("x = ''\ny = 3\n", encoding="utf-8")
+    with pytest.raises(AssertionError, match="x is still empty; predict first"):
+        predicted(test, "x")
+    assert predicted(test, "y") == 3
+    (tmp_path / ANSWERS).write_text("x = [", encoding="utf-8")
+    with pytest.raises(AssertionError, match="cannot be read"):
+        predicted(test, "x")
+
+
+def called(*arguments: str) -> tuple[int, str]:
+    result = CliRunner().invoke(main, ["learn", *arguments])
+    return result.exit_code, result.output
+
+
+def test_the_verb(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert "   3  Level against edge\n" in called()[1]
+    code, output = called("3")
+    assert code == 0 and "# Level against edge" in output
+    own = tmp_path / "lessons" / "03-level-against-edge" / PROGRAM
+    own.write_text("// mine", encoding="utf-8")
+    called("3")
+    assert own.read_text(encoding="utf-8") == "// mine"
+    assert not (own.parent / "solution").exists() and not (own.parent / "lesson.md").exists()
+    assert re.search(r"Level against edge +begun\n", called()[1])
+    assert "Press(CLK := Button);" in called("3", "--solution")[1]
+    assert called("13")[0] == called("--check")[0] == called("--class", "nobody")[0] == 2
+    (tmp_path / "class").mkdir()
+    assert called("--class", "class", "--report", "class/out")[0] == called("--class", "class")[0] == 2
+
+
+@pytest.mark.slow
+def test_a_check(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert called("1", "--check")[0] == 1
+    for path in (lessons()[0].folder / "solution").iterdir():
+        (tmp_path / "lessons" / lessons()[0].slug / path.name).write_bytes(path.read_bytes())
+    code, output = called("1", "--check")
+    assert code == 0 and "lesson 1 is done; the next one: fbvm learn 2" in output
+    assert re.search(r"one scan late +done\n", called()[1])
