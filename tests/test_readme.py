@@ -60,7 +60,7 @@ def test_the_test_example_passes() -> None:
 
 
 def test_words_are_read_and_written_by_number() -> None:
-    text = f"PROGRAM Main\n{block('iecst', 1)}END_PROGRAM\n"
+    text = f"PROGRAM Main\n{block('iecst', 2)}END_PROGRAM\n"
     plc = Plc(compile_text(text).image)  # type: ignore[arg-type]
     plc.write("D201", 5)
     plc.run(scans=1)
