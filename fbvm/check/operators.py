@@ -10,6 +10,7 @@ from fbvm.base.types import (
     DINT,
     DT,
     ELEMENTARY,
+    IMPLICIT,
     LINT,
     LREAL,
     NULL,
@@ -152,14 +153,24 @@ class Operators:
         if left in untyped and right in untyped:
             kind = left if left is UNTYPED_REAL else right
             return BOOL if expr.op in ("AND_THEN", "OR_ELSE") else kind
-        for literal, other in ((left, right), (right, left)):
+        for side, literal, other in ((expr.left, left, right), (expr.right, right, left)):
             if literal is UNTYPED_INT:
-                return other
+                return self._meet_integer(expr.op, side, other)
             if literal is UNTYPED_REAL:
                 return self._meet_real(other, want)
         if isinstance(left, EnumType) and left == right:
             return left
         return common(left, right)
+
+    def _meet_integer(self, op: str, literal: tree.Expr, other: Type) -> Type:
+        """The type in which an untyped integer meets `other`: that, or where it computes and does not hold it a larger one."""
+        value, span = self.facts.constants.get(literal), constants.limits(other)
+        if op in COMPARISONS or not isinstance(value, int) or span is None or not is_any(other, "ANY_INT"):
+            return other
+        if span[0] <= value <= span[1]:
+            return other
+        larger = (ELEMENTARY[name] for name in IMPLICIT[base(other).name] if is_any(ELEMENTARY[name], "ANY_INT"))
+        return next((kind for kind in larger if kind.low <= value <= kind.high), other)
 
     def _meet_real(self, other: Type, want: Type | None) -> Type | None:
         """The real type in which an untyped real literal meets `other`."""
