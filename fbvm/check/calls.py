@@ -59,10 +59,12 @@ class Calls:
         pou = self.project.pou(name, self.expressions.source)
         if pou is not None and pou.is_function:
             return self._function(call, pou, want)
+        if isinstance(callee, tree.NameRef) and self.expressions.program(callee):
+            return self._instance(call, as_value)
         if pou is not None:
             self.error("S0401", callee, f"{pou.name} is a {pou.kind}: what is called is an instance of it",
                        f"declare one, such as  my_{pou.name.lower()} : {pou.name};" if pou.kind != "PROGRAM" else
-                       "programs are started by tasks")
+                       "a CONFIGURATION has several of it, and none is meant")
             self._arguments_alone(call)
             return None
         return self.standard.call(call, fold(name), want, as_value)

@@ -113,6 +113,21 @@ class Checker:
             self._body(pou)
         return True
 
+    def program(self, pou: Pou, node: tree.Node) -> Variable | None:
+        """The one instance of a program that is called or looked into by its name; None if a CONFIGURATION has several."""
+        named = [run.name.text for configuration, _ in self.project.configurations for resource in configuration.resources
+                 for run in resource.programs if fold(run.type_name.text) == fold(pou.name)]
+        if len(named) > 1 or not self.interface(pou, pou.source, node) or pou.type is None:
+            return None
+        name = named[0] if named else pou.name
+        known = self.project.globals.get(("", fold(name)))
+        if known is not None:
+            return known if known.type is pou.type else None
+        instance = Variable(name, pou.type, "PROGRAM", pou.source, pou.tree.name, place="abs", initial=pou.initial)
+        self.global_order.append(instance)
+        self.project.globals["", fold(name)] = instance
+        return instance
+
     @contextmanager
     def scope(self, pou: Pou | None) -> Iterator[None]:
         """Constants of `pou` are visible while its declarations are worked out."""

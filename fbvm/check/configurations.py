@@ -23,6 +23,8 @@ class Configurations:
         self.checker = checker
         self.project = checker.project
         self.report = checker.project.report
+        self._run: list[Variable] = []
+        """Instances of programs that a task runs."""
 
     def resolve(self, program: str | None) -> None:
         """Fill the checker's tasks: from the CONFIGURATION, or with the one program that there is or that is named."""
@@ -39,6 +41,9 @@ class Configurations:
         programs = [p for p in self.project.pous.values() if p.kind == "PROGRAM" and not p.source.library]
         if program is not None:
             programs = [p for p in programs if fold(p.name) == fold(program)]
+        elif len(programs) > 1:
+            called = {callee for body in self.checker.bodies for callee in body.calls}
+            programs = [p for p in programs if p not in called]
         if len(programs) == 1 and programs[0].type is not None:
             task = TaskFact("", LOWEST, 0)
             self._instance(programs[0].name, programs[0], task, programs[0].source, programs[0].tree.name)
@@ -48,14 +53,19 @@ class Configurations:
     def _instance(self, name: str, pou: Pou, task: TaskFact, source: Source, node: tree.Node) -> None:
         assert pou.type is not None
         key = ("", fold(name))
-        if key in self.project.globals:
-            other = self.project.globals[key]
+        other = self.project.globals.get(key)
+        if other is not None and other.type is pou.type and other not in self._run:
+            self._run.append(other)
+            task.programs.append((other, pou))
+            return
+        if other is not None:
             self.report.add("S0202", source, node, f"{name} is the name of a program and of a global variable", "",
                             (other.source, other.node.start, "the variable"))
             return
         instance = Variable(name, pou.type, "PROGRAM", source, node, place="abs", initial=pou.initial)
         self.checker.global_order.append(instance)
         self.project.globals[key] = instance
+        self._run.append(instance)
         task.programs.append((instance, pou))
 
     def _unconnected(self, pou: Pou, source: Source, node: tree.Node, connection: str) -> None:

@@ -259,6 +259,17 @@ class Expressions:
         self._unknown(expr)
         return None
 
+    def program(self, expr: tree.NameRef) -> bool:
+        """True for the name of a program that stands for its one instance; it is known from then on."""
+        if expr in self.facts.types or expr in self.facts.wrong:
+            return False
+        pou = self.project.pou(expr.text, self.source) if self.variable(expr.text) is None else None
+        instance = self.checker.program(pou, expr) if pou is not None and pou.kind == "PROGRAM" else None
+        if instance is None:
+            return False
+        self.facts.types[expr], self.facts.variables[expr] = instance.type, instance
+        return True
+
     def _variable(self, expr: tree.Expr, variable: Variable) -> Type | None:
         if variable.wrong:
             return None
@@ -309,6 +320,8 @@ class Expressions:
             self.error("S0210", expr.name, f"{expr.of.text} has no {expr.name.text}",
                        self.project.choices(expr.name.text, self.project.names_in(expr.of.text)))
             return None
+        if isinstance(expr.of, tree.NameRef):
+            self.program(expr.of)
         whole = self.infer(expr.of)
         if whole is None:
             return None
@@ -327,7 +340,8 @@ class Expressions:
             self.error("S0210", expr.name, f"{whole} has no {expr.name.text}",
                        self.project.choices(expr.name.text, readable))
             return None
-        if whole.block and member.kind not in READABLE:
+        if whole.block and member.kind not in READABLE and \
+                (member.kind != "VAR" or self.checker.block_of(whole).kind != "PROGRAM"):
             what = "an in-out of" if member.kind == "VAR_IN_OUT" else "internal to"
             self.error("S0210", expr.name, f"{member.name} is {what} {whole} and cannot be reached from outside")
             return None

@@ -56,7 +56,8 @@ def _globals(checker: Checker, uses: lint_declared.Uses) -> None:
 def _tasks(checker: Checker, own: list[Pou]) -> None:
     """Warn of programs that a CONFIGURATION forgets."""
     run = {instance.type for task in checker.tasks for instance, _ in task.programs}
+    called = {callee for pou in own for callee in pou.calls}
     for pou in own:
-        if pou.kind == "PROGRAM" and pou.type not in run:
+        if pou.kind == "PROGRAM" and pou.type not in run and pou not in called:
             checker.report.add("S0890", pou.source, pou.tree.name, f"no task runs the PROGRAM {pou.name}",
                                f"write in the CONFIGURATION: PROGRAM {pou.name}1 WITH task : {pou.name};")

@@ -12,6 +12,8 @@ from fbvm.syntax import tree
 if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
 
+_OWN = {"VAR": "a variable of its program", "VAR_OUTPUT": "an output"}
+"""What members are that only their own body writes."""
 Path = tuple[object, ...]
 """A variable or address, and the steps from it to a part."""
 
@@ -22,8 +24,8 @@ def writable(expressions: Expressions, expr: tree.Expr, purpose: str) -> bool:
     inner = expr
     while True:
         member = facts.fields.get(inner)
-        if member is not None and (member.constant or member.kind == "VAR_OUTPUT"):
-            what = "a constant" if member.constant else "an output"
+        if member is not None and (member.constant or member.kind in ("VAR", "VAR_OUTPUT")):
+            what = "a constant" if member.constant else _OWN[member.kind]
             expressions.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here")
             return False
         if not facts.is_part(inner):
