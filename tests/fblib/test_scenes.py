@@ -1,0 +1,66 @@
+"""The scenes of examples/: several makers' PLCs on one network, in memory, with faults, and over real TCP."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fbvm.base.diagnostics import errors
+from fbvm.net.faults import KINDS, Fault
+from fbvm.run import run_all
+from fbvm.run.plant import Plant
+from fbvm.run.project import Project, read_project
+from fbvm.wire.link import Peer
+
+SCENES = Path(__file__).resolve().parents[2] / "examples"
+SECOND_NS = 1_000_000_000
+TANK = Peer("192.168.250.23", 502)
+
+
+def scene(name: str, net: str = "loop", fault: Fault | None = None, max_s: int = 30) -> dict[str, dict[str, object]]:
+    """What is watched of each PLC when the scene has ended."""
+    project = read_project(SCENES / name / "fbvm.toml")
+    assert isinstance(project, Project)
+    plant = Plant(project, net=net, for_ns=max_s * SECOND_NS)
+    assert not errors(plant.diagnostics)
+    if fault:
+        plant.network.faults.append(fault)  # type: ignore[union-attr]
+    panel = next(kind for kind in plant.kinds if kind.row.name == "panel").runs[0]
+    run_all(plant.runs)
+    assert panel.reason == "until"
+    values = {kind.row.name: dict(kind.values(kind.runs[0])) for kind in plant.kinds}
+    plant.close()
+    return values
+
+
+def test_a_panel_fills_the_tank() -> None:
+    values = scene("tank")
+    assert values["panel"] == {"Main.Set_Point": 800, "Main.Level": 800}
+    assert values["tank"]["Main.Holding[0]"] == 800
+
+
+def test_three_plcs_in_a_row() -> None:
+    values = scene("row")
+    assert values["panel"] == {"Main.Level": 704}
+    assert values["gateway"] == {"Main.Wanted": 700, "Main.Level": 704, "Main.Failures": 0}
+
+
+@pytest.mark.parametrize("kind", ["slow", "cut", "joined", "unsteady"])
+def test_the_row_on_a_bad_network(kind: str) -> None:
+    assert scene("row", fault=KINDS[kind])["gateway"]["Main.Level"] == 704
+
+
+def test_the_row_when_the_tank_is_away_for_two_seconds() -> None:
+    away = Fault(TANK, reset=True, error="EHOSTUNREACH", from_ns=3 * SECOND_NS, until_ns=5 * SECOND_NS)
+    values = scene("row", fault=away)
+    assert values["gateway"]["Main.Level"] == 704
+    failures = values["gateway"]["Main.Failures"]
+    assert isinstance(failures, int) and failures > 1
+
+
+@pytest.mark.slow
+def test_the_row_over_real_tcp() -> None:
+    values = scene("row", net="tcp", max_s=15)
+    assert values["panel"] == {"Main.Level": 704}
+    assert values["gateway"]["Main.Failures"] == 0
