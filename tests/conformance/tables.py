@@ -10,6 +10,7 @@ from lang_corpus import Program, programs
 
 HERE = Path(__file__).resolve().parent
 LIST = HERE.parent.parent / "CONFORMANCE.md"
+CHOICES = HERE / "choices.txt"
 HEAD = """# Conformance to IEC 61131-3, third edition
 
 Feature by feature of the standard's tables: `yes` is executed, on every engine, as the program of that title in
@@ -63,7 +64,20 @@ def status(program: Program) -> str:
 
 def listing() -> str:
     """The list as text."""
-    return "\n".join([HEAD, *_lines()]) + "\n"
+    return "\n".join([HEAD, *_lines(), *_choices()]) + "\n"
+
+
+def choices() -> list[tuple[str, str, Path]]:
+    """What the standard leaves to the maker: the question, the answer here, and the programs that show it."""
+    rows = ([part.strip() for part in line.split(" | ")] for line in CHOICES.read_text(encoding="utf-8").splitlines())
+    return [(question, answer, HERE.parent / path) for question, answer, path in rows]
+
+
+def _choices() -> Iterator[str]:
+    yield "## What the standard leaves to the maker\n"
+    yield "| question | here | shown in |\n|---|---|---|"
+    for question, answer, path in choices():
+        yield f"| {question} | {answer} | `tests/{path.relative_to(HERE.parent).as_posix()}` |"
 
 
 def _lines() -> Iterator[str]:

@@ -6,8 +6,8 @@ import os
 
 import pytest
 from lang_check import BUDGET, BUILDS, check
-from lang_corpus import Program, programs
-from tables import GRAPHIC, HERE, LIST, listing, numbers, titles
+from lang_corpus import Program, programs, read
+from tables import GRAPHIC, HERE, LIST, choices, listing, numbers, titles
 
 from fbvm.code.image import Image
 from fbvm.engine import native
@@ -33,6 +33,10 @@ def test_feature_as_machine_code(program: Program, monkeypatch: pytest.MonkeyPat
 def test_every_table_is_there() -> None:
     covered = {number for path in HERE.glob("*.st") for number in numbers(path)} | set(GRAPHIC)
     assert covered == set(titles()) == set(range(1, 77))
+
+
+def test_every_choice_is_shown_by_programs() -> None:
+    assert [path for _, _, path in choices() if not any(read(path))] == []
 
 
 def test_the_list_says_what_the_programs_show() -> None:
