@@ -4,7 +4,7 @@
      "rows": {scan: [[where, instance, signal, text, ...], ...]}, "frames": [...], ...}
 
 A value is written when it changes.  Numbers of signals, statements and instances are places in their lists; of a row,
-`where` is a statement, or -1, -2, -3 for the phases of a scan.
+`where` is a statement, or -1, -2, -3 for the phases of a scan; signal -1 says whether an element of a rung conducts.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.memory import WHOLE_BYTES, Snapshot, compare
 from fbvm.base.types import StructType
 from fbvm.plc import Phase
-from fbvm.record.inside import Event, Frame, Passing, Statement, Write
+from fbvm.record.inside import Contact, Event, Frame, Passing, Statement, Write
 from fbvm.record.recorder import Signal
 from fbvm.record.trace import Moment, Trace
 from fbvm.record.trace_format import PHASES
@@ -30,6 +30,8 @@ MOST_ROWS = 200_000
 """Statements and phases that are kept, the latest ones; of earlier scans there are values only."""
 FEW_SIGNALS = 60
 """If there are more, those that stood still are left out unless somebody asks for them."""
+POWER = -1
+"""In place of a signal: whether an element of a rung conducts."""
 VERSION = 1
 
 
@@ -78,6 +80,8 @@ class Collector:
         """Notes a statement, and what it writes."""
         if isinstance(event, Passing):
             self.passed += [(moment.scans, passed) for passed in self._reader.read(event.now_ns, event.happening)]
+        elif isinstance(event, Contact):
+            self._add(moment.scans, [event.site, self._instance(event.frame), POWER, str(int(event.value))])
         elif isinstance(event, Statement):
             self._statement, self._row = (event.site, event.frame), None
             self._open(moment, event.site, event.frame)
@@ -89,9 +93,11 @@ class Collector:
             self._row += self._moved(self._written(event), moment)
 
     def _open(self, moment: Moment, site: int, frame: Frame) -> None:
-        path = self._trace.names.instance(frame.base)
-        self._row = [site, self.instances.setdefault(path, len(self.instances))]
+        self._row = [site, self._instance(frame)]
         self._add(moment.scans, self._row)
+
+    def _instance(self, frame: Frame) -> int:
+        return self.instances.setdefault(self._trace.names.instance(frame.base), len(self.instances))
 
     def _add(self, scan: int, row: list[Any]) -> None:
         self.rows.setdefault(scan, []).append(row)
@@ -217,8 +223,8 @@ def _signal(made: Collector, number: int, prefix: str) -> dict[str, Any]:
 
 
 def _renumbered(row: list[Any], new: dict[int, int], sites: dict[int, int]) -> list[Any]:
-    changed = [item for number, text in zip(row[2::2], row[3::2], strict=True) if number in new
-               for item in (new[number], text)]  # fmt: skip
+    changed = [item for number, text in zip(row[2::2], row[3::2], strict=True) if number in new or number == POWER
+               for item in (new.get(number, POWER), text)]  # fmt: skip
     return [sites.get(row[0], row[0]), row[1], *changed]
 
 

@@ -83,6 +83,10 @@ class Session:
         """What stopped the program here."""
         return self._twin.trap
 
+    def power(self, site: int, base: int) -> bool | None:
+        """Whether an element of a rung conducts in this scan; None if the rung was not executed yet."""
+        return self._twin.power.get((site, base))
+
     @property
     def now_ns(self) -> int:
         """The time of this scan."""

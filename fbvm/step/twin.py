@@ -14,7 +14,7 @@ from typing import Protocol
 from fbvm.base.memory import Memory
 from fbvm.engine.trap import Trap
 from fbvm.plc import Phase, Plc, State
-from fbvm.record.inside import Event, Frame, Inside, Statement
+from fbvm.record.inside import Contact, Event, Frame, Inside, Statement
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value
 
@@ -64,6 +64,8 @@ class Twin:
         self.statement: Statement | None = None
         self.count = 0
         """Statements of the scan that are done."""
+        self.power: dict[tuple[int, int], bool] = {}
+        """Of rungs that were executed in this scan: whether each element conducts, by statement and instance."""
         self._stop: Stop = lambda number, statement: False
         self._acts: Mapping[int, Sequence[Act]] = {}
         self._told: Told | None = None
@@ -74,6 +76,7 @@ class Twin:
         `acts` happen before the statements of their numbers, 0 before the scan."""
         self.plc.restore(state)
         self.statement, self.count = None, 0
+        self.power.clear()
         self._stop, self._acts, self._told = stop, acts, told
         if self.plc.trap:
             return False
@@ -95,6 +98,8 @@ class Twin:
             raise _Still
 
     def _event(self, event: Event) -> None:
+        if isinstance(event, Contact):
+            self.power[event.site, event.frame.base] = event.value
         if isinstance(event, Statement):
             if self.count:
                 for act in self._acts.get(self.count, ()):

@@ -14,6 +14,8 @@ from fbvm.watch.values import show, show_time
 AROUND = 2
 """Lines before and behind the one that comes next."""
 MOST_CHANGES = 8
+WIDE = 32
+"""Columns of a rung's line before it is said whether it conducts."""
 
 
 class Words:
@@ -55,10 +57,20 @@ class Words:
         site = self.site()
         if site is None:
             return
+        power = self._power(site.file)
         for number in range(max(1, site.line - lines), site.line + lines + 1):
             text = self.line(site.file, number)
             if text or number == site.line:
-                yield f" {'>' if number == site.line else ' '}{number:>4}  {text}".rstrip()
+                said = f"{text:<{WIDE}}  {'ON' if power[number] else 'off'}" if number in power else text
+                yield f" {'>' if number == site.line else ' '}{number:>4}  {said}".rstrip()
+
+    def _power(self, file: str) -> dict[int, bool]:
+        """Of rungs of this instance in this scan, line by line, whether the element conducts."""
+        statement, found = self._session.statement, dict[int, bool]()
+        for number, site in enumerate(self.sites) if statement else ():
+            if site.file == file and statement and (flows := self._session.power(number, statement.frame.base)) is not None:
+                found[site.line] = flows
+        return found
 
     def changes(self) -> Iterator[str]:
         """What the last move changed."""

@@ -6,8 +6,11 @@
 from __future__ import annotations
 
 import io
+import shutil
 import sys
+import tempfile
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 from fbvm.cli.demo import SIGNALS
@@ -16,6 +19,8 @@ from fbvm.code.image import Image
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.plc import Plc
+from fbvm.record.page import page
+from fbvm.record.page_data import page_data
 from fbvm.record.recorder import Recorder
 from fbvm.record.trace import Trace
 from fbvm.record.trace_writer import Depth, TraceWriter
@@ -25,6 +30,7 @@ from fbvm.wire.link import Peer
 HERE = Path(__file__).parent
 PROGRAMS = {"demo": HERE.parents[1] / "examples" / "demo.st", "100 rungs": HERE / "programs" / "logic.st",
             "PID": HERE / "programs" / "pid.st"}  # fmt: skip
+SCANS_OF_A_PAGE = 10_000
 MINUTES_10 = 60_000
 """Scans of ten minutes at 10 ms."""
 
@@ -74,6 +80,39 @@ def ten_minutes(image: Image) -> None:
     print(f"the last scan found and read: {(time.process_time() - start) * 1e3:.1f} ms, scan {moment.scans}")
 
 
+def opening(image: Image) -> None:
+    """The page of 10,000 scans: written, and opened by a browser where playwright and one are there."""
+    plc, file = plc_of(image), io.BytesIO()
+    writer = TraceWriter(plc, file)
+    plc.run(scans=SCANS_OF_A_PAGE)
+    writer.close()
+    start = time.process_time()
+    text = page(page_data(Trace(io.BytesIO(file.getvalue())), title="demo"))
+    print(f"\npage of {SCANS_OF_A_PAGE} scans: made in {time.process_time() - start:.1f} s, {len(text) / 1024:.0f} KiB")
+    program = shutil.which("chromium") or shutil.which("google-chrome")
+    if program is None or find_spec("playwright") is None:
+        print("opening it was not measured: needs playwright and chromium")
+        return
+    from playwright.sync_api import sync_playwright
+
+    with tempfile.TemporaryDirectory() as folder, sync_playwright() as playwright:
+        path = Path(folder) / "run.html"
+        path.write_text(text, encoding="utf-8")
+        browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        for name, viewport in (("desktop", {"width": 1300, "height": 850}), ("phone", {"width": 390, "height": 800})):
+            shown = browser.new_page(viewport=viewport)
+            begun = time.monotonic()
+            shown.goto(path.as_uri())
+            shown.wait_for_function("document.getElementById('where').textContent.startsWith('scan')")
+            opened = time.monotonic()
+            for _ in range(100):
+                shown.keyboard.press("ArrowRight")
+            shown.wait_for_function("document.getElementById('where').textContent.startsWith('scan 100,')")
+            step_ms = (time.monotonic() - opened) * 10
+            print(f"opened ({name}) in {(opened - begun) * 1e3:.0f} ms; a step of the cursor {step_ms:.1f} ms")
+        browser.close()
+
+
 def main() -> None:
     scans = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
     for name, path in PROGRAMS.items():
@@ -82,6 +121,7 @@ def main() -> None:
         bench(name, image, scans)
         if name == "demo":
             ten_minutes(image)
+            opening(image)
             print()
 
 

@@ -59,6 +59,7 @@ def test_the_rows_of_a_scan_lead_from_one_end_to_the_next(depth: Depth) -> None:
     for scan in range(1, 20):
         known = [value_in(signal["changes"], scan - 1) for signal in data["signals"]]
         for _, _, *moved in data["rows"][str(scan)]:
+            assert module.POWER not in moved[::2]
             for number, now in zip(moved[::2], moved[1::2], strict=True):
                 assert known[number] != now
                 known[number] = now
@@ -73,6 +74,15 @@ def test_a_row_says_which_statement_it_was() -> None:
     assert data["instances"][row[1]] == "Main"
     assert data["rows"]["3"][0][0] == -1  # the button was pressed between the scans
     assert data["names"]["CIO 100.00"] == "Main.Pump"
+
+
+def test_where_power_flows_in_rungs() -> None:
+    text = "PROGRAM Main\nLADDER\n    LD 0.00\n    ANDNOT 0.01\n    OUT 100.00\nEND_LADDER\nEND_PROGRAM\n"
+    plc = Plc(image(text))
+    data = page_data(Trace(io.BytesIO(record(plc, 5, Depth.STATEMENTS))))
+    flows = {scan: [(data["sites"][row[0]][1], row[3]) for row in data["rows"][scan] if row[2:3] == [module.POWER]]
+             for scan in ("2", "3")}  # fmt: skip
+    assert flows == {"2": [(3, "0"), (4, "1"), (5, "0")], "3": [(3, "1"), (4, "1"), (5, "1")]}
 
 
 def test_names_and_scans_choose() -> None:

@@ -216,6 +216,36 @@ def test_completion() -> None:
     assert commands.completions("print Nobody.") == []
 
 
+LADDER = """\
+PROGRAM Main
+VAR
+    Start AT CIO 0.00 : BOOL;
+    Motor AT CIO 100.00 : BOOL;
+END_VAR
+LADDER
+RUNG 1 Seal-in
+    LD      Start
+    OR      Motor
+    OUT     Motor
+RUNG 2
+    LDNOT   Motor
+    OUT     100.01
+END_LADDER
+END_PROGRAM
+"""
+
+
+def test_where_power_flows_in_rungs() -> None:
+    commands = made(LADDER)
+    assert " ON" not in said(commands, "list 10")
+    said(commands, "Main.Start = TRUE", "run 11")
+    text = said(commands, "list 10")
+    assert [row.split()[-1] for row in text.splitlines() if " LD " in row or " OR " in row] == ["ON", "off"]
+    assert "LDNOT   Motor\n" in text + "\n"
+    said(commands, "run 12")
+    assert not [row for row in said(commands, "goto 1", "list 10").splitlines() if row.endswith(("ON", "off"))]
+
+
 # --- units and network ------------------------------------------------------------------------------------------------
 
 

@@ -10,7 +10,7 @@ function start(data) {
   const run = new Run(data), span = Math.max(5, Math.min(run.count, 400));
   const pinned = data.pinned.map(name => run.signals.findIndex(signal => signal.name === name)).filter(number => number >= 0);
   const state = {scan: run.first, row: -1, start: run.first, span, chosen: pinned[0] ?? 0, filter: "", moving: false, pinned,
-                 every: false, hex: true, all: false, area: "", panel: "scan"};
+                 every: false, power: true, hex: true, all: false, area: "", panel: "scan"};
   const chart = new Chart(run, state, move);
   const panels = {scan: new ScanPanel(run, state, move), memory: new MemoryPanel(run, state, move),
                   frames: new FramesPanel(run, state, move)};
@@ -55,7 +55,7 @@ function start(data) {
   /** A step inside the scan; behind the last one comes the next scan. */
   function step(direction) {
     const rows = run.rows(state.scan);
-    const wanted = at => state.every || rows[at][0] < 0 || rows[at].length > 2;
+    const wanted = at => rows[at][2] === POWER ? state.power : state.every || rows[at][0] < 0 || rows[at].length > 2;
     let row = state.row < 0 && direction < 0 ? rows.length : state.row;
     do row += direction; while (row >= 0 && row < rows.length && !wanted(row));
     if (row >= 0 && row < rows.length) move({row});
@@ -93,10 +93,11 @@ function start(data) {
   for (const button of document.querySelectorAll("[data-move]")) button.addEventListener("click", moves[button.dataset.move]);
   for (const tab of document.querySelectorAll("#tabs button")) tab.addEventListener("click", () => move({panel: tab.dataset.panel}));
   filter.addEventListener("input", () => move({filter: filter.value}));
-  for (const name of ["moving", "every", "hex", "all"]) {
+  for (const name of ["moving", "every", "power", "hex", "all"]) {
     const box = document.getElementById(name);
     box.addEventListener("change", () => move({[name]: box.checked}));
   }
+  document.getElementById("flow").hidden = !Object.values(data.rows).some(rows => rows.some(row => row[2] === POWER));
   const wanted = parseInt(location.hash.slice(1), 10);
   move({scan: Number.isFinite(wanted) ? wanted : data.pinned.length ? run.last : run.first});
 }

@@ -1,5 +1,6 @@
 // The panels: what happened inside the scan, the memory at its end, what passed the network.
 
+const POWER = -1;
 const PHASES = {"-1": "inputs", "-2": "program over", "-3": "I/O refresh"};
 
 /** An element with a class and children; text is text, never markup. */
@@ -27,7 +28,7 @@ class ScanPanel {
   }
 
   draw() {
-    const {scan, pinned, every} = this.state, key = JSON.stringify([scan, pinned, every]);
+    const {scan, pinned, every, power} = this.state, key = JSON.stringify([scan, pinned, every, power]);
     if (key !== this.drawn) this.fill();
     this.drawn = key;
     for (const row of this.table.tBodies[0].rows) {
@@ -45,6 +46,10 @@ class ScanPanel {
     const made = [];
     rows.forEach(([where, instance, ...moved], at) => {
       const changes = [];
+      if (moved[0] === POWER) {
+        if (state.power) made.push(this.element(at, where, moved[1] === "1"));
+        return;
+      }
       for (let place = 0; place < moved.length; place += 2) {
         const signal = run.signals[moved[place]];
         changes.push([moved[place], signal, run.show(signal, before(moved[place])), run.show(signal, moved[place + 1])]);
@@ -55,6 +60,16 @@ class ScanPanel {
     });
     if (!made.length) made.push(element("tr", "phase", element("td", "", this.nothing(rows))));
     this.table.tBodies[0].replaceChildren(...made);
+  }
+
+  /** An element of a rung, and whether it conducts; a coil, whether power arrives. */
+  element(at, where, on) {
+    const [file, line, text] = this.run.data.sites[where], row = element("tr", "power");
+    row.dataset.row = at;
+    row.addEventListener("click", () => this.move({row: at}));
+    const cell = element("td", "", element("span", "dim mono", `${file.split("/").pop()}:${line} `), element("code", "", text));
+    row.append(cell, ...this.state.pinned.map(() => element("td")), element("td", on ? "flows" : "dim", on ? "━━ ON" : "╌╌ off"));
+    return row;
   }
 
   nothing(rows) {
@@ -97,7 +112,8 @@ class MemoryPanel {
     this.move = move;
     this.bits = this.unit();
     const areas = [...(this.bits.size ? ["unit"] : []), ...Object.keys(run.words)];
-    state.area = areas[0] ?? "";
+    const alive = [...this.bits.values()].some(row => run.words[row.area]?.has(row.word));
+    state.area = alive ? "unit" : areas.find(area => area !== "unit" && area !== "A") ?? areas[0] ?? "";
     this.buttons = areas.map(area => {
       const button = element("button", "", area === "unit" ? "Ethernet unit" : area);
       button.addEventListener("click", () => move({area}));
