@@ -19,7 +19,7 @@ from fbvm.plc import Plc
 from fbvm.record.chart import draw
 from fbvm.record.recorder import Recorder
 from fbvm.watch.paths import Place, Span
-from fbvm.watch.values import Value, plain_value, show, show_time
+from fbvm.watch.values import Value, in_hexadecimal, plain_value, show, show_time
 
 MS_NS = 1_000_000
 PIPE_WIDTH = 100
@@ -91,12 +91,14 @@ def _halt(halt: Halt) -> dict[str, object]:
 
 
 def shown(place: Place | Span, value: Value) -> str:
-    """A value for people; words of addresses also in hexadecimal."""
+    """A value for people; words of addresses, and what is declared to be read so, also in hexadecimal."""
     if isinstance(place, Span) and isinstance(value, list):
         return " ".join(show(part.type, item) for part, item in zip(place.places, value, strict=True))
     if not isinstance(place, Place):
         return ""
     text = show(place.type, value)
+    if place.hexadecimal and isinstance(value, int):
+        return f"{text} ({in_hexadecimal(place.type, value)})"
     return f"{text} ({show(place.type, value, hexadecimal=True)})" if place.area and isinstance(value, int) \
         and not isinstance(value, bool) else text  # fmt: skip
 

@@ -21,6 +21,7 @@ from fbvm.base.types import (
     ArrayType,
     Elementary,
     EnumType,
+    Field,
     RefType,
     StringType,
     StructType,
@@ -315,6 +316,18 @@ def plain_value(kind: Type, value: Value) -> Value:
     return shortest_real(value) if isinstance(value, float) and plain is REAL else value
 
 
+def in_hexadecimal(kind: Type, value: int) -> str:
+    """A whole number with all its digits: 16#0081."""
+    size = kind.size
+    return f"16#{value & (1 << 8 * size) - 1:0{2 * size}X}"
+
+
+def _member(field: Field, value: Value, hexadecimal: bool) -> str:
+    if field.hexadecimal and isinstance(value, int):
+        return in_hexadecimal(field.type, value)
+    return show(field.type, value, hexadecimal)
+
+
 def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
     """A value for people: TRUE, 12, 16#00FF, T#1s500ms, 'text', [1, 2], (a := 1); of an instance the pins first."""
     plain = base(kind)
@@ -325,7 +338,7 @@ def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
     if isinstance(plain, StructType) and isinstance(value, dict):
         members = [f for f in plain.fields.values() if f.name in value and not (plain.block and f.constant)]
         members.sort(key=lambda f: _PINS.get(f.kind, len(_PINS)))
-        return "(" + ", ".join(f"{f.name} := {show(f.type, value[f.name], hexadecimal)}" for f in members) + ")"
+        return "(" + ", ".join(f"{f.name} := {_member(f, value[f.name], hexadecimal)}" for f in members) + ")"
     if isinstance(value, bool):
         return "TRUE" if value else "FALSE"
     if isinstance(plain, EnumType) and isinstance(value, int):
@@ -339,5 +352,5 @@ def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
     if isinstance(value, int) and plain.name in ("TIME", "LTIME"):
         return show_time(value)
     if hexadecimal and isinstance(value, int) and isinstance(plain, Elementary) and "ANY_BIT" in plain.families:
-        return f"16#{value:0{plain.size * 2}X}"
+        return in_hexadecimal(plain, value)
     return str(value)

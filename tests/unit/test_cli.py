@@ -110,6 +110,13 @@ def test_values_are_shown(counter: str) -> None:
     )
 
 
+def test_what_is_declared_to_be_read_in_hexadecimal_is_shown_in_both_ways(counter: str) -> None:
+    Path(counter).write_text(
+        "PROGRAM Main VAR {attribute 'displaymode' := 'hex'} Code : UINT; END_VAR END_PROGRAM", encoding="utf-8"
+    )
+    assert run("--scans", "1", "--set", "Main.Code=129", "--show", "Main.Code").stdout == "Main.Code = 129 (16#0081)\n"
+
+
 @pytest.mark.parametrize(("setting", "name", "value"), [
     ("Main.step=-2", "Main.n", -6),
     ("Main.step=10@20ms", "Main.n", 12),

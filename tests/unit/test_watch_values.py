@@ -10,7 +10,7 @@ from fbvm.base.memory import Memory
 from fbvm.base.types import EnumType, Field, StructType, SubrangeType, Type
 from fbvm.watch import places
 from fbvm.watch.paths import Place, UnknownPlace
-from fbvm.watch.values import conform, literal, nearest_real, parse_time_ns, parse_value, show, show_time
+from fbvm.watch.values import conform, in_hexadecimal, literal, nearest_real, parse_time_ns, parse_value, show, show_time
 
 COLOUR = EnumType("Colour", 2, 2, t.INT, {"RED": 0, "GREEN": 5}, {0: "Red", 5: "Green"})
 LEVEL = SubrangeType("Level", 2, 2, t.INT, 0, 100)
@@ -194,3 +194,9 @@ def test_a_null_reference_reads_as_none_and_takes_nothing(memory: Memory) -> Non
 def test_a_constant_is_not_written(memory: Memory) -> None:
     with pytest.raises(ValueError, match="x is CONSTANT"):
         places.write(memory, Place("x", t.INT, SLOTS_OFFSET, constant=True), 1)
+
+
+def test_what_is_declared_to_be_read_in_hexadecimal_is_shown_so_in_an_instance() -> None:
+    fields = {"CODE": Field("Code", t.UINT, 0, hexadecimal=True), "N": Field("n", t.UINT, 2)}
+    assert show(StructType("Coded", 4, 2, fields), {"Code": 129, "n": 129}) == "(Code := 16#0081, n := 129)"
+    assert in_hexadecimal(t.INT, -2) == "16#FFFE"
