@@ -10,15 +10,14 @@ import os
 import sys
 from functools import cache
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any, NamedTuple
 
-from fbvm.base.data import cache_folder, data_folder
+from fbvm.base.cache import Cache, name_of
+from fbvm.base.data import data_folder
 
 FILES = {"st": ("common.lark", "declarations.lark", "st.lark"), "mnemonics": ("mnemonics.lark",)}
 """The files of each language."""
-FORMAT = 2
-"""Of the cache file; another number makes old files worthless."""
+STORED = Cache("grammars", b"fbvm grammar 3\n", 16 << 20)
 
 STARTS = {"st": "source_text", "mnemonics": "line"}
 
@@ -60,16 +59,12 @@ class Tables(NamedTuple):
 def tables(language: str) -> Tables:
     """The tables of a language's grammar, from the cache if it holds them."""
     text = grammar_text(language)
-    key = [FORMAT, sys.version, _lark_identity(), text]
-    path = cache_folder() / f"grammar-{language}-{sys.version_info[0]}.{sys.version_info[1]}.json"
+    name = name_of((sys.version, _lark_identity(), language, text))
     try:
-        stored = json.loads(path.read_bytes())
-        if stored["key"] == key:
-            return _from_plain(stored["tables"])
-    except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError):
-        pass
-    plain = compile_grammar(text, STARTS[language])
-    _store(path, {"key": key, "tables": plain})
+        return _from_plain(json.loads(STORED.read(name) or b""))
+    except (ValueError, TypeError, LookupError, AttributeError, RecursionError):
+        plain = compile_grammar(text, STARTS[language])
+    STORED.write(name, json.dumps(plain, separators=(",", ":")).encode())
     return _from_plain(plain)
 
 
@@ -85,17 +80,6 @@ def _lark_identity() -> str:
         return ""
     status = os.stat(spec.origin)
     return f"{spec.origin} {status.st_size} {status.st_mtime_ns}"
-
-
-def _store(path: Path, content: dict[str, Any]) -> None:
-    """Write through a file of its own, so that nobody reads half of it.  It does no harm if that is not possible."""
-    part = path.with_suffix(f".{os.getpid()}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(json.dumps(content, separators=(",", ":")), encoding="utf-8")
-        os.replace(part, path)
-    except OSError:
-        return
 
 
 def _from_plain(plain: dict[str, Any]) -> Tables:
