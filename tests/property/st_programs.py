@@ -249,9 +249,9 @@ def report(seed: int) -> str:
 
 
 if __name__ == "__main__":
-    from fbvm.engine import native_cache
+    from fbvm.base import cache
 
-    native_cache.switch(False)
+    cache.switch(False)
     first, count = int(sys.argv[2]) if len(sys.argv) > 2 else 0, int(sys.argv[1])
     differing = 0
     for seed in range(first, first + count):
