@@ -17,7 +17,7 @@ from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, 
 from fbvm.cli.outcome import Outcome, Progress
 from fbvm.cli.project import project_named, run_project
 from fbvm.cli.sources import compiled, source_options
-from fbvm.cli.traces import tracing
+from fbvm.cli.traces import paging, tracing
 from fbvm.code.image import Image
 from fbvm.engine.tiers import CHOICES
 from fbvm.net.journal import Journal
@@ -64,6 +64,8 @@ CYCLE_NS = 10_000_000
               help="Write what passed the network, for Wireshark.")
 @click.option("--journal", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Write every input of every scan, for `fbvm replay`.")
+@click.option("--html", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
+              help="Write the run as one page for a browser, with every statement.")
 @click.option("--trace", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Record the run for `fbvm chart`, `table`, `why` and `convert`.")
 @click.option("--depth", type=click.Choice([depth.value for depth in Depth]), default="scans", show_default=True,
@@ -109,7 +111,8 @@ def command(
         for unit in usual_units(mailboxes(image), options["timing"], options["seed"]):
             plc.attach(unit, network)
         _tell_doors(plc, network, options["mappings"])
-        with tracing(plc, options["trace"], options["depth"], options["selected"], files, libraries):
+        with tracing(plc, options["trace"], options["depth"], options["selected"], files, libraries), \
+                paging(plc, options["html"], files, libraries):  # fmt: skip
             outcome = _run(plc, as_json, **options)
         outcome.print()
         if plc.halted and not as_json:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +12,8 @@ import click
 
 from fbvm.code.image import Image
 from fbvm.plc import Plc
+from fbvm.record.page import page
+from fbvm.record.page_data import page_data
 from fbvm.record.recorder import Recording
 from fbvm.record.source_texts import source_texts
 from fbvm.record.trace import Trace
@@ -105,6 +108,25 @@ def tracing(
             yield
         finally:
             writer.close()
+
+
+@contextmanager
+def paging(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Sequence[Path]) -> Iterator[None]:
+    """Writes a run as one HTML file when it is over, if there is one to write."""
+    if path is None:
+        yield
+        return
+    with tempfile.TemporaryFile() as file:
+        writer = TraceWriter(plc, file, Depth.STATEMENTS, (), _lines(plc.image, files, libraries))
+        try:
+            yield
+        finally:
+            writer.close()
+        file.seek(0)
+        try:
+            path.write_text(page(page_data(Trace(file), title=path.stem)), encoding="utf-8")
+        except OSError as error:
+            raise click.UsageError(f"{path} cannot be written: {error.strerror}") from None
 
 
 def _lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:

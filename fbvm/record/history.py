@@ -12,6 +12,7 @@ from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from typing import Protocol
 
+from fbvm.base.memory import Snapshot
 from fbvm.engine.tiers import python_of
 from fbvm.plc import Phase, Plc, State
 from fbvm.record.inside import Event, Inside
@@ -58,6 +59,8 @@ class History:
         self._touched = True
         self._substituted: list[int] = []
         self._played: deque[tuple[int, int, bytes]] = deque(maxlen=keep * every)
+        self._ends: deque[tuple[int, Snapshot]] = deque(maxlen=keep)
+        plc.watchers.append(self._ended)
 
     def touch(self) -> None:
         """Something outside the program changed the PLC since its last scan."""
@@ -69,6 +72,11 @@ class History:
         if self._touched or plc.units or plc.scans - self._states[-1].scans >= self._every:
             self._states.append(plc.snapshot())
             self._touched = bool(plc.units)
+
+    def _ended(self, plc: Plc) -> None:
+        """What units changed is told apart from what is written before the next scan."""
+        if plc.units:
+            self._ends.append((plc.scans - 1, plc.memory.snapshot()))
 
     def substitute(self, body: int, function: Callable[[int], None]) -> None:
         """Python in place of a body, which is not called again when scans are: what it did is played back."""
@@ -103,8 +111,15 @@ class History:
             return
         twin = self._twin()
         self._bring(twin, scans.start)
-        states = {state.scans: state for state in self._states}
+        states, ends = {state.scans: state for state in self._states}, dict(self._ends)
+
+        def refresh(plc: Plc, phase: Phase) -> None:
+            """What the units did comes after the program."""
+            if phase is Phase.PROGRAM and plc.scans in ends:
+                plc.memory.restore(ends[plc.scans])
+
         with attached(twin):
+            twin.phases.append(refresh)
             for scan in scans:
                 if scan in states and scan != scans.start:
                     twin.restore(states[scan])

@@ -46,6 +46,8 @@ class Change:
     new: Value
     site: Site | None
     instance: str
+    phase: Phase | None = None
+    """In which it was if no statement did it."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +105,7 @@ class ScanTable:
         values, changed = self._look(plc)
         for signal, before, now, moved in zip(self.signals, self._values or values, values, changed, strict=True):
             if moved:
-                self.changes.append(Change(plc.scans, signal, before, now, None, ""))
+                self.changes.append(Change(plc.scans, signal, before, now, None, "", phase))
         self._values = values
         if phase is Phase.INPUTS or any(changed):
             self.bands[-1].rows.append(Row(phase.value, values, changed))

@@ -69,13 +69,14 @@ class Twin:
         self._stop: Stop = lambda number, statement: False
         self._acts: Mapping[int, Sequence[Act]] = {}
         self._told: Told | None = None
+        self._last: Event | None = None
 
     def play(self, state: State, acts: Mapping[int, Sequence[Act]], stop: Stop, told: Told | None = None) -> bool:
         """Does the scan after `state` until `stop` says so.  False if the program ended first.
 
         `acts` happen before the statements of their numbers, 0 before the scan."""
         self.plc.restore(state)
-        self.statement, self.count = None, 0
+        self.statement, self.count, self._last = None, 0, None
         self.power.clear()
         self._stop, self._acts, self._told = stop, acts, told
         if self.plc.trap:
@@ -100,7 +101,8 @@ class Twin:
     def _event(self, event: Event) -> None:
         if isinstance(event, Contact):
             self.power[event.site, event.frame.base] = event.value
-        if isinstance(event, Statement):
+        again, self._last = self._last == event, event
+        if isinstance(event, Statement) and not again:
             if self.count:
                 for act in self._acts.get(self.count, ()):
                     act(self.plc)
@@ -117,13 +119,15 @@ class Injector:
 
     def __init__(self, acts: Mapping[int, Sequence[Act]]) -> None:
         self._acts, self._count = acts, 0
+        self._last: Event | None = None
 
     def phase(self, plc: Plc, phase: Phase) -> None:
         """Nothing is done between phases."""
 
     def event(self, plc: Plc, event: Event) -> None:
-        """Counts statements as the twin does."""
-        if isinstance(event, Statement):
+        """Counts statements as the twin does; a rung is told twice at its beginning, and is one."""
+        again, self._last = self._last == event, event
+        if isinstance(event, Statement) and not again:
             if self._count:
                 for act in self._acts.get(self._count, ()):
                     act(plc)

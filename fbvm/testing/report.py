@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fbvm.base.types import StructType
-from fbvm.plc import Plc
+from fbvm.plc import Phase, Plc
 from fbvm.record.history import History
 from fbvm.record.names import Names, is_single
 from fbvm.record.recorder import Signal
@@ -72,6 +72,8 @@ class Report:
         else:
             at_ns = next(band.now_ns for band in table.bands if band.scan == change.scan)
             now += f" since scan {change.scan} ({show_time(at_ns)[2:]})"
+            if change.phase is Phase.REFRESH:
+                return f"{now}, by a unit in the I/O refresh"
             if change.site is None and change.instance == "":
                 return f"{now}, written from outside the program"
         if writer is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -342,3 +343,22 @@ scan 5   50ms   Running   Starts
 
 def test_nothing_asked_nothing_said() -> None:
     assert rig().scan().explain() == ""
+
+
+CALLER = """
+PROGRAM Main
+VAR c : MTCP_ETN_Connect; Wanted : BOOL; END_VAR
+    c(IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 1, Connect := Wanted);
+END_PROGRAM
+"""
+
+
+def test_what_a_unit_changed_is_told_apart_from_what_the_test_wrote() -> None:
+    caller = rig("Main", CALLER, etn21="192.168.250.21")
+    caller.network.place(Peer("192.168.250.1", 502), ModbusPeer())
+    caller.run(scans=3).run(scans=6, Wanted=True)
+    assert caller["D30009"] == 4 and caller.Wanted
+    said = caller.explain()
+    assert "Wanted is TRUE since scan 3 (30ms), written from outside the program" in said
+    assert re.search(r"D30009 is 4 since scan \d \(\d0ms\), by a unit in the I/O refresh", said)
+    assert "  I/O refresh" in said

@@ -56,6 +56,16 @@ def test_a_page_and_a_picture_of_a_trace(fbvm: Fbvm) -> None:
         assert fbvm("convert", "run.fbtrace", target, "--scans", "900..").exit_code == 2
 
 
+def test_a_run_as_a_page(fbvm: Fbvm) -> None:
+    arguments = ("run", "pump.st", "--scans", "60", "--set", "CIO 0.00=TRUE@30ms")
+    assert fbvm(*arguments, "--html", "run.html").exit_code == 0
+    made = Path("run.html").read_text(encoding="utf-8")
+    record(fbvm, "--depth", "statements")
+    assert fbvm("convert", "run.fbtrace", "run.html").exit_code == 0
+    assert Path("run.html").read_text(encoding="utf-8") == made
+    assert fbvm(*arguments, "--html", "no/run.html").exit_code == 2
+
+
 def test_a_table_of_a_trace(fbvm: Fbvm) -> None:
     record(fbvm, "--depth", "writes")
     result = fbvm("table", "run.fbtrace", "CIO 0.00,Main.Pump")
