@@ -357,7 +357,7 @@ VAR
     r1 : MTCP_ETN_Fn01; r2 : MTCP_ETN_Fn02; r3 : MTCP_ETN_Fn03; r4 : MTCP_ETN_Fn04;
     w5 : MTCP_ETN_Fn05; w6 : MTCP_ETN_Fn06; w15 : MTCP_ETN_Fn0F; w16 : MTCP_ETN_Fn10;
     Step, Code : UINT;
-    Done, Before : BOOL;
+    Done : BOOL;
 END_VAR
     conn(IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 1, Connect := TRUE);
     w5(EN := conn.ENO, Coil_Address := 34, Value := TRUE, Cmd_Write := Step = 1);
