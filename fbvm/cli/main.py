@@ -28,6 +28,7 @@ VERBS = {
     "convert": "Write a trace as a page, a picture, CSV or VCD, or a CSV as a trace.",
     "check": "Say what is wrong with a program; silent when nothing is.",
     "fmt": "Rewrite a program in canonical Structured Text.",
+    "ladder": "Draw the rungs of a program.",
     "list": "Print the compiled program, readable.",
     "explain": "Print the page of a diagnostic.",
     "serve": "Serve the memory of a PLC by Modbus TCP, through its server program.",

@@ -13,6 +13,7 @@ from fbvm.cli import status
 from fbvm.cli.banks import banks_in, with_banks
 from fbvm.cli.breakpoints import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.journals import start_journal
+from fbvm.cli.ladder import drawing
 from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, time_ns
 from fbvm.cli.outcome import Outcome, Progress
 from fbvm.cli.project import project_named, run_project
@@ -54,6 +55,7 @@ CYCLE_NS = 10_000_000
               help="Write once, before the scan at that time.")
 @click.option("--show", "shown", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST", help="Print this at the end.")
 @click.option("--chart", "charted", multiple=True, metavar="NAME|ADDRESS,...", help="Draw these, a column a scan.")
+@click.option("--ladder", "rungs", metavar="SCANS", help="Draw the rungs with their power in these scans: 3 or 3,5..7.")
 @click.option("--net", type=click.Choice(["loop", "tcp"]), default="loop", show_default=True,
               help="loop: in memory, virtual time.  tcp: real connections, real time.")
 @click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=HOST:PORT|peer",
@@ -112,7 +114,7 @@ def command(
             plc.attach(unit, network)
         _tell_doors(plc, network, options["mappings"])
         with tracing(plc, options["trace"], options["depth"], options["selected"], files, libraries), \
-                paging(plc, options["html"], files, libraries):  # fmt: skip
+                paging(plc, options["html"], files, libraries), drawing(plc, options["rungs"]):  # fmt: skip
             outcome = _run(plc, as_json, **options)
         outcome.print()
         if plc.halted and not as_json:

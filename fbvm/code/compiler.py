@@ -20,7 +20,7 @@ from fbvm.check.silence import Silence, Wanted
 from fbvm.code import image_cache
 from fbvm.code.damage import Damage
 from fbvm.code.evaluation import evaluate
-from fbvm.code.image import Image, Objects, ProgramRun, Site, TaskRow
+from fbvm.code.image import Image, Objects, ProgramRun, RungPicture, Site, TaskRow
 from fbvm.code.layout import Placed, place
 from fbvm.code.lower import BodyLowering
 from fbvm.code.operations import FIRST_OBJECT
@@ -50,6 +50,7 @@ class Program:
     def __init__(self, placed: Placed) -> None:
         self.areas: dict[str, Area] = placed.layout.areas
         self.sites: list[Site] = []
+        self.rungs: list[RungPicture] = []
         self.leases_at, self.held_bits = placed.objects.leases_at, placed.objects.held_bits
         self._objects = placed.objects
         self._area_objects: dict[str, tuple[int, int]] = {}
@@ -183,7 +184,7 @@ def _image(checker: Checker) -> Image:
         if entry.resolved is not None:
             types.setdefault(name, entry.resolved[0])
     return Image(placed.layout, bodies, tuple(tasks), placed.symbols, tuple(placed.initial), tuple(placed.retained),
-                 tuple(program.sites), types, program.objects)
+                 tuple(program.sites), types, program.objects, tuple(program.rungs))
 
 
 def _task(task: TaskFact) -> TaskRow:

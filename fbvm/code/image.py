@@ -118,6 +118,18 @@ class Objects:
 
 
 @dataclass(frozen=True)
+class RungPicture:
+    """A rung as it was written, for those who draw it: the number of its body, its place, and its steps, each with the
+    place that observations of it name, prefix, mnemonic and operands."""
+
+    body: int
+    site: int
+    number: int
+    comment: str
+    steps: tuple[tuple[int, str, str, tuple[str, ...]], ...]
+
+
+@dataclass(frozen=True)
 class Image:
     """A compiled program."""
 
@@ -134,6 +146,7 @@ class Image:
     types: dict[str, Type] = field(default_factory=dict)
     """Derived types and blocks by folded name."""
     objects: Objects = field(default_factory=Objects)
+    rungs: tuple[RungPicture, ...] = ()
 
     @cached_property
     def fingerprint(self) -> str:

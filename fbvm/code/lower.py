@@ -12,7 +12,7 @@ from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, PouCall, StandardCall
 from fbvm.code import byte_order
 from fbvm.code.functions import FUNCTIONS
-from fbvm.code.image import Body
+from fbvm.code.image import Body, RungPicture
 from fbvm.code.loops import LoopLowering
 from fbvm.code.operations import Block, Node
 from fbvm.code.places import Place, Places, detail
@@ -156,7 +156,8 @@ class BodyLowering:
             if isinstance(statement, tree.Empty):
                 continue
             site = self.site(statement)
-            self.out.append(("observe", "statement", site, None))
+            if not isinstance(statement, ladder.Ladder | ladder.Rung):
+                self.out.append(("observe", "statement", site, None))
             mark = len(self.out)
             _LOWER[type(statement)](self, statement, site)
             if self.reads:
@@ -321,6 +322,8 @@ class BodyLowering:
         self.block_into(node.body)
 
     def _rung(self, node: ladder.Rung, site: int) -> None:
+        steps = tuple((self.site(step), step.prefix, step.mnemonic, step.operands) for step in node.steps)
+        self.program.rungs.append(RungPicture(self.pou.number, site, node.number, node.comment, steps))
         self.out.append(("observe", "rung", site, node.number))
         self.block_into(node.body)
 

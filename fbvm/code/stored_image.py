@@ -26,7 +26,7 @@ from fbvm.base.types import (
     Type,
     string,
 )
-from fbvm.code.image import Body, Image, Layout, Objects, ProgramRun, Retained, Site, TaskRow
+from fbvm.code.image import Body, Image, Layout, Objects, ProgramRun, Retained, RungPicture, Site, TaskRow
 from fbvm.code.operations import Block
 
 
@@ -44,6 +44,7 @@ def encode(image: Image) -> bytes:
         "retained": [astuple(row) for row in image.retained],
         "sites": [astuple(site) for site in image.sites],
         "objects": astuple(image.objects),
+        "rungs": [astuple(rung) for rung in image.rungs],
         "derived": [[name, types.number(kind)] for name, kind in image.types.items()],
     }
     return _dump({**document, "types": types.rows}).encode("utf-8", "surrogatepass")
@@ -65,6 +66,7 @@ def decode(content: bytes) -> Image:
         tuple(Site(*row) for row in stored["sites"]),
         {name: types.type(number) for name, number in stored["derived"]},
         Objects(*_tuples(stored["objects"])),
+        tuple(RungPicture(*row) for row in _tuples(stored["rungs"])),
     )
     vars(image)["fingerprint"] = stored["fingerprint"]
     return image

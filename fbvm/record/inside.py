@@ -54,6 +54,7 @@ class Statement(NamedTuple):
 
     site: int
     frame: Frame
+    is_rung: bool = False
 
 
 class Read(NamedTuple):
@@ -141,7 +142,7 @@ class Inside:
         kind, site, detail = seen
         frame = self._frame
         if kind == "statement" or kind == "rung":
-            return Statement(site, frame)
+            return Statement(site, frame, kind == "rung")
         if kind == "read" or kind == "write":
             form, offset, bit = detail
             size = detail_size(form)

@@ -33,8 +33,15 @@ def formatted(source: Source, outside: Outside = NOTHING) -> tuple[str, list[Dia
     if "\r\n" in source.text:
         source = Source(source.name, source.text.replace("\r\n", "\n"), source.library)
         tree, _ = parse(source)
-    text = _printed(source, Spelling(tree, outside))
+    try:
+        text = _printed(source, Spelling(tree, outside))
+    except _NeedsMending:
+        return source.text, errors(diagnostics)
     return text.replace("\n", "\r\n") if windows else text, []
+
+
+class _NeedsMending(Exception):
+    """The text is understood as a whole only, as an instruction list is."""
 
 
 def _printed(source: Source, spelling: Spelling) -> str:
@@ -51,4 +58,4 @@ def _silent(*message: Any) -> None:
 
 
 def _no_mender(stuck: Automaton) -> Mender:
-    raise AssertionError("a text without errors needs no mending")
+    raise _NeedsMending

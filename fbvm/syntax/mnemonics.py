@@ -162,7 +162,8 @@ class _LineReader:
         if missing := [sign for sign in written if sign not in row.variations]:
             raise Refusal(mnemonic.start - len(written), mnemonic.end, f"there is no {missing[0]}{name}",
                           f"{name} has {', '.join(row.variations) or 'no variations'}")
-        self._begin(row, mnemonic)
+        if not (operands and _is_branch(operands[0].text)):
+            self._begin(row, mnemonic)
         step = Step(mnemonic.start - len(written), operands[-1].end if operands else mnemonic.end, written, name,
                     tuple(operand.text for operand in operands))
         self.rungs[-1].lines.append(Line(row, step, [(o.start, o.end) for o in operands],

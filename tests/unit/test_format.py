@@ -269,3 +269,9 @@ def test_depth_is_no_limit() -> None:
     assert body("a := " + "NOT " * 900 + "b;").count("NOT ") == 900
     assert body("a" + ".b" * 900 + " := c;").count(".b") == 900
     assert body("IF a THEN " * 150 + "b; " + "END_IF; " * 150).count("END_IF;") == 150
+
+
+def test_an_instruction_list_stays_as_it_is() -> None:
+    text = "PROGRAM Main\nVAR a, b : BOOL; END_VAR\n  LD a\n  AND b\n  ST a\nEND_PROGRAM\n"
+    written, wrong = formatted(Source("x.st", text))
+    assert written == text and [d.code for d in wrong] == ["S0901"]

@@ -1,0 +1,99 @@
+"""`fbvm ladder`: rungs as drawings; and what `fbvm run --ladder` draws."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from fbvm.base.types import StructType, fold
+from fbvm.cli.outcome import chart_width
+from fbvm.cli.sources import compiled, source_arguments
+from fbvm.code.image import Image, RungPicture
+from fbvm.plc import Plc
+from fbvm.record.history import looking
+from fbvm.record.ladder_svg import ladder_svg
+from fbvm.record.ladder_text import Places, States, ladder_text, rung_surface
+from fbvm.record.names import Names
+from fbvm.record.power import Power
+from fbvm.watch.paths import Place
+
+SVG_WIDTH = 120
+"""Columns of a picture."""
+_SPAN = re.compile(r"(\d+)(?:\.\.(\d+))?")
+
+
+@click.command("ladder")
+@source_arguments
+@click.option("--width", type=click.IntRange(min=24), help="Columns of text; the terminal's if not given.")
+@click.option("--svg", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE", help="Draw into a picture instead.")
+def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], width: int | None,
+            svg: Path | None) -> None:
+    """Draw the rungs of the files, POU by POU."""
+    image = compiled(files, program, libraries, runnable=False)
+    if not image.rungs:
+        raise click.UsageError("there is no LADDER .. END_LADDER in these files")
+    if svg:
+        drawn = [rung_surface(rung, width or SVG_WIDTH, None, _places(image, rung.body)) for rung in image.rungs]
+        svg.write_text(ladder_svg(drawn), encoding="utf-8")
+        return
+    body = -1
+    for rung in image.rungs:
+        if rung.body != body:
+            body = rung.body
+            click.echo(f"{image.bodies[body].kind} {image.bodies[body].name}")
+        _draw(image, rung, width or chart_width(), None)
+
+
+def _draw(image: Image, rung: RungPicture, width: int, states: States | None) -> None:
+    for line in ladder_text(rung, width, states, _places(image, rung.body)):
+        click.echo(line)
+    click.echo()
+
+
+def _places(image: Image, body: int) -> Places:
+    """The addresses of what a POU declares AT one, and of global variables."""
+    own = image.types.get(fold(image.bodies[body].name))
+    names = Names(image.symbols, image.layout.areas)
+
+    def place(symbol: str) -> str:
+        name = fold(symbol)
+        field = own.fields.get(name) if isinstance(own, StructType) else None
+        field = field or image.symbols.get(name)
+        if field is None or not field.absolute:
+            return ""
+        return names.address(Place(field.name, field.type, field.offset, field.bit)).removeprefix("CIO ")
+
+    return place
+
+
+def scans_named(text: str) -> Callable[[int], bool]:
+    """Which scans `3,5..7` names.  Another text is a mistake of usage."""
+    wanted: set[int] = set()
+    for part in text.split(","):
+        match = _SPAN.fullmatch(part.strip())
+        if not match:
+            raise click.UsageError(f"{text!r} names no scans; write 3 or 3,5..7")
+        wanted.update(range(int(match[1]), int(match[2] or match[1]) + 1))
+    return wanted.__contains__
+
+
+@contextmanager
+def drawing(plc: Plc, scans: str | None) -> Iterator[None]:
+    """Watches the power in the rungs of a PLC meanwhile, and then draws them as they were in these scans."""
+    if not scans:
+        yield
+        return
+    power = Power(plc.image, scans_named(scans))
+    with looking(plc, power):
+        yield
+    names = Names(plc.image.symbols, plc.memory.areas)
+    before: tuple[int, int] | None = None
+    for made in power.executed:
+        if before != (made.scan, made.base):
+            before = made.scan, made.base
+            click.echo(f"scan {made.scan}, {names.instance(made.base)}")
+        _draw(plc.image, made.picture, chart_width(), made.states)

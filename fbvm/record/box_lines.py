@@ -1,0 +1,85 @@
+"""A drawing surface of characters on which lines meet: each cell knows which ways lines leave it, thin or thick."""
+
+from __future__ import annotations
+
+import unicodedata
+from functools import cache
+
+LEFT, RIGHT, UP, DOWN = range(4)
+_WAYS = {"LEFT": (LEFT,), "RIGHT": (RIGHT,), "UP": (UP,), "DOWN": (DOWN,), "HORIZONTAL": (LEFT, RIGHT), "VERTICAL": (UP, DOWN)}
+THIN, THICK = 1, 2
+_WEIGHTS = {"LIGHT": THIN, "HEAVY": THICK}
+
+
+@cache
+def _characters() -> dict[tuple[int, int, int, int], str]:
+    """Box drawing characters by the weight of the lines that leave to the left, right, up and down.
+
+    Their names say it: DOWN LIGHT AND RIGHT HEAVY, VERTICAL HEAVY AND RIGHT LIGHT, LIGHT HORIZONTAL."""
+    found = {(0, 0, 0, 0): " "}
+    for code in range(0x2500, 0x2580):
+        words = unicodedata.name(chr(code)).removeprefix("BOX DRAWINGS ").split()
+        if not set(words) <= {*_WAYS, *_WEIGHTS, "AND"}:
+            continue
+        weights = [0, 0, 0, 0]
+        for ways, weight in _parts(words):
+            for way in ways:
+                weights[way] = weight
+        found.setdefault((weights[LEFT], weights[RIGHT], weights[UP], weights[DOWN]), chr(code))
+    return found
+
+
+def _parts(words: list[str]) -> list[tuple[tuple[int, ...], int]]:
+    """Ways and weights that a name gives: a weight stands in front of its ways, or behind them."""
+    if words[0] not in _WEIGHTS:
+        return [(ways, weight) for ways, weight in _parts(words[::-1])]
+    parts: list[tuple[tuple[int, ...], int]] = []
+    weight = 0
+    for word in words:
+        if word in _WEIGHTS:
+            weight = _WEIGHTS[word]
+        elif word != "AND":
+            parts.append((_WAYS[word], weight))
+    return parts
+
+
+class Surface:
+    """Characters by column and row, and lines between them."""
+
+    def __init__(self) -> None:
+        self.lines: dict[tuple[int, int], list[int]] = {}
+        self.texts: dict[tuple[int, int], str] = {}
+
+    def _leave(self, x: int, y: int, way: int, thick: bool) -> None:
+        cell = self.lines.setdefault((x, y), [0, 0, 0, 0])
+        cell[way] = max(cell[way], THICK if thick else THIN)
+
+    def across(self, x: int, until: int, y: int, thick: bool = False) -> None:
+        """A line from the middle of one cell to that of another in its row."""
+        for at in range(x, until):
+            self._leave(at, y, RIGHT, thick)
+            self._leave(at + 1, y, LEFT, thick)
+
+    def down(self, x: int, y: int, until: int, thick: bool = False) -> None:
+        """A line from the middle of one cell to that of another in its column."""
+        for at in range(y, until):
+            self._leave(x, at, DOWN, thick)
+            self._leave(x, at + 1, UP, thick)
+
+    def write(self, x: int, y: int, text: str) -> None:
+        """Text over whatever is there."""
+        for at, character in enumerate(text):
+            self.texts[x + at, y] = character
+
+    def cut(self, depth: int) -> None:
+        """Leave out what lies above the first row, or in row `depth` and below."""
+        self.lines = {(x, y): ways for (x, y), ways in self.lines.items() if 0 <= y < depth}
+
+    def rows(self) -> list[str]:
+        """What was drawn, spaces at the ends left out."""
+        cells = {place: _characters()[(a, b, c, d)] for place, (a, b, c, d) in self.lines.items()} | self.texts
+        if not cells:
+            return []
+        depth = max(y for _, y in cells) + 1
+        width = max(x for x, _ in cells) + 1
+        return ["".join(cells.get((x, y), " ") for x in range(width)).rstrip() for y in range(depth)]

@@ -1,0 +1,50 @@
+"""The power in rungs: what contacts, outputs and blocks of ladder saw in the scans that somebody asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from fbvm.code.image import Image, RungPicture
+from fbvm.plc import Phase, Plc
+from fbvm.record.inside import Contact, Event, Statement
+
+
+@dataclass(eq=False)
+class Executed:
+    """One execution of a rung: where its instance begins, and what was seen at each step, in the order of time."""
+
+    scan: int
+    base: int
+    picture: RungPicture
+    states: dict[int, list[bool]] = field(default_factory=dict)
+
+
+class Power:
+    """A listener that keeps the executions of rungs in the scans that `wanted` names, in order."""
+
+    def __init__(self, image: Image, wanted: Callable[[int], bool]) -> None:
+        self.executed: list[Executed] = []
+        self._wanted = wanted
+        self._rungs = {rung.site: rung for rung in image.rungs}
+        self._steps = {place: (rung.site, step) for rung in image.rungs
+                       for step, (place, _, _, _) in enumerate(rung.steps)}  # fmt: skip
+        self._latest: dict[tuple[int, int], Executed] = {}
+
+    def phase(self, plc: Plc, phase: Phase) -> None:
+        """Nothing is left from the scan before."""
+        if phase is Phase.INPUTS:
+            self._latest.clear()
+
+    def event(self, plc: Plc, event: Event) -> None:
+        """Follow rungs and their contacts."""
+        if not self._wanted(plc.scans):
+            return
+        if isinstance(event, Statement) and event.is_rung:
+            made = Executed(plc.scans, event.frame.base, self._rungs[event.site])
+            self._latest[event.frame.base, event.site] = made
+            self.executed.append(made)
+        elif isinstance(event, Contact) and event.site in self._steps:
+            rung, step = self._steps[event.site]
+            if here := self._latest.get((event.frame.base, rung)):
+                here.states.setdefault(step, []).append(event.value)

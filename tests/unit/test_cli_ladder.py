@@ -1,0 +1,61 @@
+"""`fbvm ladder` and `fbvm run --ladder`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fbvm.cli.main import main
+
+PROGRAM = """PROGRAM Main
+VAR
+    Start AT CIO 0.00 : BOOL;
+    Motor AT CIO 100.00 : BOOL;
+END_VAR
+LADDER
+RUNG 1 Seal-in
+    LD      Start
+    OR      Motor
+    OUT     Motor
+END_LADDER
+END_PROGRAM
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "motor.st"
+    path.write_text(PROGRAM, encoding="utf-8")
+    return path
+
+
+def test_rungs_are_drawn_with_addresses(file: Path) -> None:
+    result = CliRunner().invoke(main, ["ladder", str(file), "--width", "60"])
+    assert result.exit_code == 0
+    assert result.output.splitlines()[:3] == ["PROGRAM Main", "RUNG 1 Seal-in", "│  Start          Motor  │"]
+    assert "│ 100.00" in result.output
+
+
+def test_a_picture_goes_to_a_file(file: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(main, ["ladder", str(file), "--svg", str(tmp_path / "motor.svg")])
+    assert (result.exit_code, result.output) == (0, "")
+    assert (tmp_path / "motor.svg").read_text(encoding="utf-8").startswith("<svg ")
+
+
+def test_a_run_draws_the_power_of_some_scans(file: Path) -> None:
+    options = ["--scans", "5", "--set", "Main.Start=TRUE@20ms", "--ladder", "1..2"]
+    result = CliRunner().invoke(main, ["run", str(file), *options])
+    first, second = result.output.split("scan 2, Main")
+    assert first.startswith("scan 1, Main") and "┫ ┣" not in first
+    assert "┣┳━━┫ ┣━━┳" in second
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (["ladder"], "there is no LADDER"), (["run", "--scans", "1", "--ladder", "x"], "'x' names no scans")])
+def test_mistakes_of_usage(tmp_path: Path, arguments: list[str], said: str) -> None:
+    path = tmp_path / "empty.st"
+    path.write_text("PROGRAM Main VAR a : BOOL; END_VAR a := TRUE; END_PROGRAM", encoding="utf-8")
+    result = CliRunner().invoke(main, [*arguments, str(path)])
+    assert result.exit_code == 2 and said in result.output

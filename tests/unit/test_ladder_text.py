@@ -1,0 +1,183 @@
+"""Rungs as drawings: what stands where, what is thick when power was there, and what has no drawing."""
+
+from __future__ import annotations
+
+from textwrap import dedent
+from xml.etree import ElementTree
+
+import pytest
+
+from fbvm.code.compiler import compile_text
+from fbvm.code.image import Image
+from fbvm.plc import Plc
+from fbvm.record.history import looking
+from fbvm.record.ladder_svg import ladder_svg
+from fbvm.record.ladder_text import ladder_text, rung_surface
+from fbvm.record.power import Executed, Power
+
+
+def image(rungs: str, declarations: str = "a, b, c, d, e, f : BOOL;") -> Image:
+    made = compile_text(f"PROGRAM Main VAR {declarations} END_VAR\nLADDER\n{rungs}\nEND_LADDER\nEND_PROGRAM")
+    assert made.image is not None, made.errors[0].render()
+    return made.image
+
+
+def drawn(rungs: str, width: int = 80) -> str:
+    """The drawing of the first rung without its headline."""
+    return "\n".join(ladder_text(image(rungs).rungs[0], width)[1:])
+
+DRAWINGS = {
+    "series, parallel and coil": ("LD a\nOR b\nANDNOT c\nOUT d", """
+        │    a       c        d   │
+        ├┬──┤ ├─┬───┤/├──────( )──┤
+        ││   b  │                 │
+        │└──┤ ├─┘                 │
+    """),
+    "blocks joined": ("LD a\nLD b\nAND c\nLD d\nANDNOT e\nORLD\nANDLD\nOUT f", """
+        │   a       b      c         f   │
+        ├──┤ ├──┬──┤ ├────┤ ├─┬─────( )──┤
+        │       │   d      e  │          │
+        │       └──┤ ├────┤/├─┘          │
+    """),
+    "branch points": ("LD a\nOUT TR0\nAND b\nOUT c\nLD TR0\nANDNOT d\n@SET e", """
+        │   a      b             c   │
+        ├──┤ ├─┬──┤ ├───────────( )──┤
+        │      │   d            e    │
+        │      └──┤/├────────(@SET)──┤
+    """),
+    "edges": ("@LD a\n%AND b\nUP\nDIFU c", """
+        │   a      b    ┌────┐       c   │
+        ├──┤↑├────┤↓├───┤ UP ├──────(↑)──┤
+        │               └────┘           │
+    """),
+    "a box with two inputs": ("LD a\nLD b\nLD c\nANDLD\nCNT 5 #10", """
+        │   a          ┌─────┐ │
+        ├──┤ ├─────────┤ CNT │ │
+        │   b      c   │ 5   │ │
+        ├──┤ ├────┤ ├──┤ #10 │ │
+        │              └─────┘ │
+    """),
+    "a block that lets power on": ("LD a\nFBCALL TON t IN:=b PT:=T#1s\nAND t.Q\nOUT c", """
+        │   a    ┌──────────┐    t.Q       c   │
+        ├──┤ ├───┤ t : TON  ├────┤ ├──────( )──┤
+        │        │ IN:=b    │                  │
+        │        │ PT:=T#1s │                  │
+        │        └──────────┘                  │
+    """),
+    "a comparison": ("LD=S D0 -5\nOR a\nOUT b", """
+        │   D0 -5          b   │
+        ├┬──┤=S├─┬────────( )──┤
+        ││   a   │             │
+        │└──┤ ├──┘             │
+    """),
+}
+
+
+def text(drawing: str) -> list[str]:
+    return dedent(drawing).strip("\n").rstrip().split("\n")
+
+
+@pytest.mark.parametrize("name", DRAWINGS)
+def test_drawing(name: str) -> None:
+    rungs, drawing = DRAWINGS[name]
+    assert drawn(rungs).split("\n") == text(drawing)
+
+
+def test_a_long_rung_goes_on_below() -> None:
+    assert drawn("LD a\nAND b\nAND c\nAND d\nAND e\nAND f\nOUT a", 40).split("\n") == text("""
+        │   a      b      c      d      e      │
+        ├──┤ ├────┤ ├────┤ ├────┤ ├────┤ ├───►1│
+        │         f                        a   │
+        │ ►1╶────┤ ├──────────────────────( )──┤
+    """)
+
+
+def test_addresses_stand_below_and_nothing_collides() -> None:
+    here = image("LD Start\nOUT W0.00", "Start AT CIO 0.05 : BOOL;")
+    assert ladder_text(here.rungs[0], places=lambda name: {"Start": "0.05"}.get(name, ""))[1:] == text("""
+        │ Start         W0.00  │
+        ├──┤ ├───────────( )───┤
+        │ 0.05                 │
+    """)
+
+
+def test_what_has_no_drawing_is_shown_as_instructions() -> None:
+    assert drawn("LD a\nOUT b\nOR c\nOUT d").split("\n") == ["    LD a", "    OUT b", "    OR c", "    OUT d"]
+
+
+@pytest.mark.parametrize("width", range(24, 200, 7))
+def test_no_line_is_wider_than_asked(width: int) -> None:
+    rungs = "LD a\nOR b\n" + "\n".join(f"AND {name}" for name in "cdefab") + "\nOUT a\nAND c\n@MOV #1 D0"
+    lines = drawn(rungs, width).split("\n")
+    assert max(map(len, lines)) <= width
+    assert {line[0] for line in lines} <= set("│├") and {line[-1] for line in lines} <= set("│┤") | {"1", "2", "3"}
+
+
+# --- power --------------------------------------------------------------------------------------------------------
+
+
+def executed(rungs: str, on: str, declarations: str = "a, b, c, d, e, f : BOOL;") -> list[Executed]:
+    """What the first scan saw with these variables ON."""
+    plc = Plc(image(rungs, declarations))
+    power = Power(plc.image, lambda scan: scan == 0)
+    for name in on:
+        plc.write(f"Main.{name}", True)
+    with looking(plc, power):
+        plc.scan()
+        plc.scan()
+    return power.executed
+
+
+def lit(rungs: str, on: str) -> list[str]:
+    made = executed(rungs, on)[0]
+    return ladder_text(made.picture, states=made.states)[1:]
+
+
+def test_power_ends_at_a_contact_that_is_open() -> None:
+    assert lit("LD a\nOR b\nANDNOT c\nOUT d", "ac") == text("""
+        ┃    a       c        d   │
+        ┣┳━━┫ ┣━┳━━━┤/├──────( )──┤
+        ┃┃   b  ┃                 │
+        ┃┗━━┤ ├─┚                 │
+    """)
+
+
+def test_power_is_what_was_seen_and_not_what_is_there_at_the_end_of_the_scan() -> None:
+    """The contact was closed when the rung was executed; the next rung opens it."""
+    first, second = executed("LD a\nOUT b\nLD P_On\nRSET a\n", "a")
+    assert first.states == {0: [True], 1: [True]}
+    assert "┫ ┣━━" in ladder_text(first.picture, states=first.states)[2]
+    assert second.picture.steps[1][2] == "RSET"
+
+
+def test_a_rung_that_was_passed_over_is_not_there() -> None:
+    made = executed("LD a\nJMP 1\nLD b\nOUT c\nJME 1", "b")
+    assert [len(one.states) for one in made] == [2, 0, 0]
+    assert "┫" not in "".join(ladder_text(made[1].picture, states=made[1].states))
+
+
+def test_each_instance_has_its_own_power() -> None:
+    plc = Plc(compile_text("""
+        FUNCTION_BLOCK Lamp
+        VAR_INPUT on : BOOL; END_VAR
+        VAR_OUTPUT light : BOOL; END_VAR
+        LADDER
+            LD on
+            OUT light
+        END_LADDER
+        END_FUNCTION_BLOCK
+        PROGRAM Main VAR one, two : Lamp; END_VAR one(on := TRUE); two(on := FALSE); END_PROGRAM
+    """).image)
+    power = Power(plc.image, lambda scan: True)
+    with looking(plc, power):
+        plc.scan()
+    assert [made.states for made in power.executed] == [{0: [True], 1: [True]}, {0: [False], 1: [False]}]
+    assert power.executed[0].base != power.executed[1].base
+
+
+def test_a_picture_is_well_formed_and_shows_power() -> None:
+    made = executed("LD= D0 #0\nOUT a", "")[0]
+    root = ElementTree.fromstring(ladder_svg([rung_surface(made.picture, 60, made.states)]))
+    kinds = [(part.tag.rpartition("}")[2], part.get("class")) for part in root]
+    assert ("path", None) in kinds and ("path", "power") in kinds and ("text", "head") in kinds
+    assert "D0 #0" in [part.text for part in root]
