@@ -114,11 +114,11 @@ class Values:
                                 f"too many initial values: {kind} has {kind.count} elements")
                 return bytes(content)
             if value is not None and count:
-                self._elements(kind.element, value, source, content, range(at * size, (at + count) * size, size))
+                self._elements(kind.element, value, source, content, [n * size for n in range(at, at + count)])
             at += count
         return bytes(content)
 
-    def _elements(self, kind: Type, value: tree.Initial, source: Source, content: bytearray, places: range) -> None:
+    def _elements(self, kind: Type, value: tree.Initial, source: Source, content: bytearray, places: list[int]) -> None:
         """The same initial value for some elements of an array; each keeps its own default where that says nothing."""
         made: dict[bytes, bytes] = {}
         for start in places:
