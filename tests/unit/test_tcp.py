@@ -11,6 +11,7 @@ import pytest
 
 from fbvm.net.addresses import AddressMap
 from fbvm.net.switchboard import MAX_ORPHANS, ORPHAN_LIMIT_NS, UDP
+from fbvm.net.switchboard import Watcher
 from fbvm.net.tcp import TcpLink, TcpNetwork
 from fbvm.wire.link import (
     Bind,
@@ -311,6 +312,24 @@ def test_orphans_are_bounded(network: TcpNetwork, device: Device) -> None:
 def call(network: TcpNetwork, endpoint: Peer) -> socket.socket:
     real = network.host_endpoint(endpoint)
     return socket.create_connection((real.host, real.port), timeout=BOUND_S)
+
+
+def keeps_alive(link: TcpLink, channel: int) -> bool:
+    line = link.channels[channel]
+    assert isinstance(line, Watcher)
+    sock: socket.socket = line.sock  # type: ignore[attr-defined]
+    return bool(sock.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE))
+
+
+@pytest.mark.parametrize("wanted", [False, True])
+def test_keep_alive_is_the_hosts_on_either_side(network: TcpNetwork, device: Device, wanted: bool) -> None:
+    link = network.attach(UNIT)
+    link.submit([Connect(1, SERVER, 0, wanted), Listen(2, 502, keep_alive=wanted)], now_ns())
+    until(link, bool)
+    with call(network, Peer(UNIT, 502)):
+        until(link, bool)
+        assert [keeps_alive(link, channel) for channel in (1, 2)] == [wanted, wanted]
+        link.submit([Close(1), Close(2)], now_ns())
 
 
 def test_listening_on_a_port_that_the_system_chose(network: TcpNetwork) -> None:
