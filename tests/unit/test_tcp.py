@@ -10,8 +10,7 @@ from collections.abc import Callable, Iterator
 import pytest
 
 from fbvm.net.addresses import AddressMap
-from fbvm.net.switchboard import MAX_ORPHANS, ORPHAN_LIMIT_NS, UDP
-from fbvm.net.switchboard import Watcher
+from fbvm.net.switchboard import MAX_ORPHANS, ORPHAN_LIMIT_NS, UDP, Watcher
 from fbvm.net.tcp import TcpLink, TcpNetwork
 from fbvm.wire.link import (
     Bind,
