@@ -38,6 +38,8 @@ PAGES: pytest.StashKey[list[Path]] = pytest.StashKey()
 """The pages that were written for failed tests."""
 MOST_PAGES = 20
 """Pages of failed tests that one session writes."""
+PACKAGE = Path(__file__).resolve().parent.parent
+"""Frames of a failure that lie here say nothing about the test."""
 SOURCE_FOLDER = "src"
 """Where a project keeps its blocks, below the folder of its pytest.ini or pyproject.toml."""
 
@@ -236,6 +238,8 @@ def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
     """A failed test says what became of the variables that it asked for."""
+    if call.excinfo is not None and RIGS in item.stash and not item.config.option.fulltrace:
+        _shorten(call.excinfo.value)
     report = yield
     if report.failed and call.when == "call" and call.excinfo is not None:
         for rig, lines in _asking(call.excinfo, _rigs(item)):
@@ -243,6 +247,20 @@ def pytest_runtest_makereport(
             if text:
                 report.sections.append((f"fbvm {rig!r}", text))
     return report
+
+
+def _shorten(error: BaseException) -> None:
+    """A misspelt name or a value that does not fit is the test's affair: its traceback ends where the test called fbvm."""
+    own = type(error).__module__.startswith("fbvm.")
+    if not own and not isinstance(error, LookupError | TypeError | ValueError | AttributeError | AssertionError | OSError):
+        return
+    entry, last = error.__traceback__, None
+    while entry is not None:
+        if not Path(entry.tb_frame.f_code.co_filename).is_relative_to(PACKAGE):
+            last = entry
+        entry = entry.tb_next
+    if last is not None:
+        last.tb_next = None
 
 
 def _page(item: pytest.Item, rig: Rig, lines: tuple[str, range] | None) -> str:

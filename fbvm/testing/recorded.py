@@ -70,7 +70,7 @@ class Recorded:
             raise ValueError(f"{name} is a range; name one place")
         with self.open() as trace:
             text = told(trace, why(trace, place, trace.scans[-1] if scan is None else scan))
-        return text.replace(self._rig.subject.prefix, "") if self._rig.subject.prefix else text
+        return self._rig.subject.plain(text)
 
     def _recording(self, trace: Trace, names: Sequence[str]) -> Recording:
         made = recording(trace, [self._rig.find(name).name for name in names])

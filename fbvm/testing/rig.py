@@ -170,7 +170,7 @@ class Rig:
             try:
                 return find(symbols, areas, name)
             except UnknownPlace as outer:
-                raise (inner if self.subject.prefix else outer) from None
+                raise UnknownPlace(self.subject.plain(str(inner if self.subject.prefix else outer))) from None
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -190,8 +190,12 @@ class Rig:
             raise AttributeError(str(error)) from None
 
     def __setitem__(self, name: str, value: object) -> None:
+        __tracebackhide__ = True
         self._history.touch()
-        write(self.plc, self.find(name), value)
+        try:
+            write(self.plc, self.find(name), value)
+        except (TypeError, ValueError) as error:
+            raise type(error)(self.subject.plain(str(error))) from None
 
     def write(self, inputs: Mapping[str, object] | None = None, /, **named: object) -> Rig:
         """Writes variables by name; those whose name is no word of Python by a mapping: `{"CIO 0.00": True}`."""

@@ -59,6 +59,10 @@ class Subject:
             return f"{WRAPPER}.{INSTANCE}_{name}"
         return f"{self.prefix}{name}"
 
+    def plain(self, text: str) -> str:
+        """A message without the names of the program that was put around a block."""
+        return text.replace(self.prefix, "").replace(self.prefix.rstrip("."), self.name) if self.prefix else text
+
     def line(self, file: str, number: int) -> str:
         """A line of the source without its margin, "" if it is not known."""
         rows = self.texts.get(file, "").split("\n")

@@ -104,6 +104,30 @@ def test_a_failure_says_where_its_page_is(project: pytest.Pytester) -> None:
     assert "test_wrong</title>" in (project.path / name).read_text(encoding="utf-8")
 
 
+def test_a_mistake_of_the_test_ends_in_the_test(project: pytest.Pytester) -> None:
+    project.makepyfile("""
+        def test_name(fb):
+            fb("src/pump.st::Pump").scan(Strat=True)
+        def test_condition(fb):
+            fb("src/pump.st::Pump").until("Runing")
+        def test_value(fb):
+            fb("src/pump.st::Pump").Start = 5
+        def test_block(fb):
+            fb("src/pump.st::Pumps")
+        def test_file(fb):
+            fb("src/pumps.st::Pump")
+    """)
+    result = run(project)
+    result.assert_outcomes(failed=5)
+    result.stdout.fnmatch_lines([
+        "E*: Pump has no Strat; it has Start, Running, Starts, Delay, Edge", "E*: Pump has no Runing; *",
+        "E*TypeError: Start is BOOL and takes TRUE or FALSE, not 5", "E*: there is no Pumps; there is Pump",
+        "E*FileNotFoundError: src/pumps.st is neither in *",
+    ])  # fmt: skip
+    result.stdout.no_fnmatch_line("*rig.py:*")
+    assert "rig.py:" in run(project, "--full-trace", "-k", "test_value").stdout.str()
+
+
 def test_what_a_function_of_the_test_asked_for_counts(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def check(pump):
