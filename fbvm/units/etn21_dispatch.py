@@ -260,9 +260,15 @@ class Dispatch:
         return self._forced is not None
 
     def force_close(self, now_ns: int) -> list[Request]:
-        """Close every socket, whatever it does (W421 6-7-5 p120).  Stores no response code of its own (assumed)."""
+        """Close every socket, whatever it does (W421 6-7-5 p120).  Stores no response code of its own (assumed).
+
+        Requests that were seen and are not accepted yet end, too (assumed)."""
         requests: list[Request] = []
         self._forced = []
+        for service in self._services:
+            if service.code is None and service.parameters is None:
+                service.code = codes.SOCKET_CLOSED
+                service.earliest_cycle = self.cycle + 1
         for socket in self._sockets.values():
             if socket.phase in (Phase.OPENING, Phase.OPEN):
                 service = Service(Switch.CLOSE, None, self.cycle)

@@ -286,6 +286,18 @@ def test_force_close_with_nothing_open_goes_off_in_the_next_refresh_assumed() ->
     assert rig.cio[1500] == 0
 
 
+@pytest.mark.parametrize("switch", [Switch.ACTIVE_OPEN, Switch.UDP_OPEN, Switch.PASSIVE_OPEN])
+def test_force_close_ends_a_request_that_was_not_accepted_yet_assumed(switch: Switch) -> None:
+    """With the delays of a device the request is accepted a refresh after its switch was seen."""
+    rig = Rig(Etn21(timing="real", seed=3))
+    rig.parameters(local_port=3000)
+    rig.cio[1500] |= 4
+    assert rig.scan(switch) == []
+    for _ in range(10):
+        assert rig.scan() == []
+    assert (rig.code(), rig.is_on(switch), rig.cio[1500]) == ("0081", False, 0)
+
+
 def test_force_close_ends_a_service_that_starts_in_the_same_cycle_assumed() -> None:
     rig = Rig()
     rig.parameters()
