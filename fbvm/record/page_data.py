@@ -18,7 +18,7 @@ from fbvm.base.memory import WHOLE_BYTES, Snapshot, compare
 from fbvm.base.types import StructType
 from fbvm.plc import Phase
 from fbvm.record.inside import Contact, Event, Frame, Passing, Statement, Write
-from fbvm.record.recorder import Signal
+from fbvm.record.recorder import Signal, signals_at
 from fbvm.record.trace import Moment, Trace
 from fbvm.record.trace_format import PHASES
 from fbvm.record.trace_signals import chosen_signals
@@ -167,7 +167,10 @@ def page_data(trace: Trace, names: Sequence[str] = (), scans: range | None = Non
 
     `prefix` is not shown in names; variables that are `pinned` have columns in the scan table, and the last scan is
     shown first."""
-    made = Collector(trace, chosen_signals(trace, names) if names else _in_order(trace))
+    signals = chosen_signals(trace, names) if names else _in_order(trace)
+    known = {signal.place.name for signal in signals}
+    signals += [signal for name in pinned if name not in known for signal in signals_at(trace.find(name), trace.described)]
+    made = Collector(trace, signals)
     trace.follow(made, scans)
     every = bool(names) or len(made.signals) <= FEW_SIGNALS
     made.changes = [changes if every or len(changes) > 2 or signal.place.name in pinned else []

@@ -252,10 +252,7 @@ def _different(start: int, now: bytes, old: bytes) -> Iterator[tuple[int, bytes]
 def _header(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[str, Mapping[int, str]]) -> dict[str, Any]:
     image = plc.image
     files = sorted({site.file for site in image.sites})
-    described = {address: text for attached in plc.units
-                 for address, text in getattr(attached.unit, "descriptions", {}).items()}  # fmt: skip
-    meanings = {address: {str(value): text for value, text in known.items()} for attached in plc.units
-                for address, known in getattr(attached.unit, "meanings", {}).items()}  # fmt: skip
+    known = {address: {str(value): text for value, text in rows.items()} for address, rows in meanings(plc).items()}
     return {
         "format": FORMAT, "image": image.fingerprint, "cycle_ns": plc.cycle_ns, "depth": depth.value,
         "selected": list(selected), "slots": image.layout.slots_size, "e_banks": image.layout.e_banks,
@@ -263,9 +260,19 @@ def _header(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[str,
         **symbols.to_data(image.symbols),
         "files": files, "sites": [[files.index(s.file), s.pou, s.line, s.column] for s in image.sites],
         "outer": outer_statements(image), "bodies": [[body.name, body.kind] for body in image.bodies],
-        "described": described, "meanings": meanings,
+        "described": descriptions(plc), "meanings": known,
         "lines": {file: {str(n): text for n, text in rows.items()} for file, rows in lines.items()},
     }  # fmt: skip
+
+
+def descriptions(plc: Plc) -> dict[str, str]:
+    """What the units of a PLC call their words and bits, by address."""
+    return {address: text for attached in plc.units for address, text in getattr(attached.unit, "descriptions", {}).items()}
+
+
+def meanings(plc: Plc) -> dict[str, dict[int, str]]:
+    """What values of the units' words mean, by address."""
+    return {address: dict(rows) for attached in plc.units for address, rows in getattr(attached.unit, "meanings", {}).items()}
 
 
 def source_lines(image: Image, texts: Mapping[str, str]) -> dict[str, dict[int, str]]:

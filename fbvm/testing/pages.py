@@ -13,7 +13,7 @@ from fbvm.record.history import History
 from fbvm.record.page import page
 from fbvm.record.page_data import frame_rows, page_data
 from fbvm.record.trace import Trace
-from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
+from fbvm.record.trace_writer import Depth, TraceWriter, descriptions, meanings, source_lines
 from fbvm.record.traffic import Passed
 from fbvm.testing.subject import Subject
 from fbvm.watch.paths import Place
@@ -32,9 +32,9 @@ def file_name(test: str) -> str:
     return re.sub(r"[^\w\-\[\].]+", ".", re.sub(r"\.(py|st)::", ".", test))[:150]
 
 
-def write_page(path: Path, title: str, history: History, subject: Subject, asked: Sequence[Place],
+def write_page(path: Path, title: str, history: History, subject: Subject, units: Plc, asked: Sequence[Place],
                passed: Sequence[tuple[int, Passed]]) -> bool:  # fmt: skip
-    """Writes the page of a run; False if there was no scan.  Raises OSError."""
+    """Writes the page of a run of a PLC with units; False if there was no scan.  Raises OSError."""
     scans = history.scans
     if not scans:
         return False
@@ -50,6 +50,7 @@ def write_page(path: Path, title: str, history: History, subject: Subject, asked
 
     history.redo(range(max(scans.start, scans.stop - MOST_SCANS), scans.stop), recorded)
     trace = Trace(io.BytesIO(file.getvalue()))
+    trace.described, trace.meanings = descriptions(units), meanings(units)  # those that did it again had no units
     data = page_data(trace, title=title, prefix=subject.prefix, pinned=[place.name for place in asked])
     data["frames"] = frame_rows([row for row in passed if row[0] in trace.scans])
     path.parent.mkdir(parents=True, exist_ok=True)

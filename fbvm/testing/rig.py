@@ -38,6 +38,7 @@ from fbvm.wire.tap import Happening
 
 MOST_PASSED = 10_000
 """Frames that are kept for the page of a failure."""
+MOST_SAID = 6
 PATIENCE = "1m"
 """How long `until` waits if nobody says, in virtual time."""
 
@@ -346,11 +347,15 @@ class Rig:
         """What a failed test wants to know: the variables it asked for, when they changed last and by which line.
 
         `lines` are a file and the lines in it that asked; without, all that was asked for since the last scan."""
-        return self._report.text(lines)
+        said = self._report.text(lines)
+        if said and self._passed:
+            rows = [f"  scan {scan:<4} {passed}" for scan, passed in list(self._passed)[-MOST_SAID:]]
+            said += "\n\n" + "\n".join(["what passed the network last:", *rows])
+        return said
 
     def write_page(self, path: Path, title: str, lines: tuple[str, range] | None = None) -> bool:
         """Writes the last scans as one HTML file, which shows what `lines` asked for; False if there was no scan."""
-        return write_page(path, title, self._history, self.subject, self._reads.places(*(lines or ())), self._passed)
+        return write_page(path, title, self._history, self.subject, self.plc, self._reads.places(*(lines or ())), self._passed)
 
 
 def _file(path: str, folders: Sequence[Path]) -> Path:

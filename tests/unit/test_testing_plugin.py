@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import base64
+import json
 import re
+import zlib
 from importlib.metadata import entry_points
 from pathlib import Path
 
@@ -498,3 +501,35 @@ def test_a_project_file_that_is_wrong(project: pytest.Pytester) -> None:
     (project.path / "fbvm.toml").write_text("[plc.a]\nsource = 1\n", encoding="utf-8")
     project.makepyfile("def test_wrong(plant):\n    plant()\ndef test_none(plant):\n    plant('other.toml')\n")
     run(project).stdout.fnmatch_lines(["E*fbvm.toml:2:*", "E*FileNotFoundError: other.toml is neither in*"])
+
+
+CALLER = """
+    from fbvm import ModbusPeer, Peer
+
+    TEXT = \'\'\'
+    PROGRAM Main
+    VAR c : MTCP_ETN_Connect; END_VAR
+        c(IP_Address1 := 192, IP_Address2 := 168, IP_Address3 := 250, IP_Address4 := 1, Connect := TRUE);
+    END_PROGRAM\'\'\'
+
+    def test_wrong(fb, network):
+        network.place(Peer("192.168.250.1", 502), ModbusPeer())
+        main = fb("Main", text=TEXT, etn21="192.168.250.21", network=network).run(scans=8)
+        assert main["D200"] == 5
+"""
+
+
+def test_a_failure_with_a_unit_shows_the_network_and_the_units_words(project: pytest.Pytester) -> None:
+    project.makepyfile(CALLER)
+    run(project).stdout.fnmatch_lines([
+        "D200 is 0 since power-on; no statement wrote it", "what passed the network last:",
+        "  scan 2    192.168.250.21:49152 -> 192.168.250.1:502  asks for a connection",
+    ])  # fmt: skip
+    [page] = (project.path / ".fbvm").glob("*.html")
+    found = re.search(r'id="data">([^<]*)<', page.read_text(encoding="utf-8"))
+    assert found
+    data = json.loads(zlib.decompress(base64.b64decode(found[1])))
+    assert data["pinned"] == ["D200"] and "D200" in [signal["name"] for signal in data["signals"]]
+    assert data["described"]["CIO 1519.03"] == "Send Request Switch"
+    assert data["meanings"]["D30009"]["4"] == "ESTABLISHED"
+    assert data["frames"][0][4] == "asks for a connection"
