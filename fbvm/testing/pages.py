@@ -33,9 +33,11 @@ def file_name(test: str) -> str:
 
 
 def write_page(path: Path, title: str, history: History, subject: Subject, units: Plc, asked: Sequence[Place],
-               passed: Sequence[tuple[int, Passed]]) -> bool:  # fmt: skip
-    """Writes the page of a run of a PLC with units; False if there was no scan.  Raises OSError."""
-    scans = history.scans
+               passed: Sequence[tuple[int, Passed]] = (), unfinished: bool = False) -> bool:  # fmt: skip
+    """Writes the page of a run of a PLC with units; False if there was no scan.  Raises OSError.
+
+    `unfinished` if the last scan was not done to its end; the page shows it as it would have gone on."""
+    scans = range(history.scans.start, history.scans.stop + unfinished)
     if not scans:
         return False
     file = io.BytesIO()

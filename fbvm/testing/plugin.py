@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import ast
 import os
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -264,13 +264,19 @@ def _shorten(error: BaseException) -> None:
 
 
 def _page(item: pytest.Item, rig: Rig, lines: tuple[str, range] | None) -> str:
-    """Writes the page of a failed test, and says where it is; "" without one."""
+    """Writes the page of one of the rigs of a failed test, and says where it is; "" without one."""
+    number = "" if len(_rigs(item)) == 1 else f".{_rigs(item).index(rig)}"
+    return page_of(item, number, lambda path: rig.write_page(path, item.nodeid, lines))
+
+
+def page_of(item: pytest.Item, number: str, write: Callable[[Path], bool]) -> str:
+    """Has the page of a failed test written, and says where it is; "" if none was."""
     from fbvm.testing.pages import page_path
 
     written, most = item.config.stash.setdefault(PAGES, []), item.config.getoption("fbvm_pages")
-    path = page_path(item.config.rootpath, item.nodeid if len(_rigs(item)) == 1 else f"{item.nodeid}.{_rigs(item).index(rig)}")
+    path = page_path(item.config.rootpath, f"{item.nodeid}{number}")
     try:
-        if len(written) >= most or not rig.write_page(path, item.nodeid, lines):
+        if len(written) >= most or not write(path):
             return ""
     except OSError as error:
         return f"the page could not be written: {error}"

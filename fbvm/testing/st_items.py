@@ -22,7 +22,8 @@ from fbvm.record.names import Names, is_single
 from fbvm.record.recorder import Signal
 from fbvm.record.table import ScanTable
 from fbvm.syntax.text import read
-from fbvm.testing.plugin import counted, library_folders
+from fbvm.testing.pages import write_page
+from fbvm.testing.plugin import counted, library_folders, page_of
 from fbvm.testing.rig import Trapped
 from fbvm.testing.subject import Subject, SubjectError, pous, subject
 from fbvm.testing.warned import warned_of
@@ -41,7 +42,7 @@ class AssertFailed(AssertionError):
     def __init__(self, site: Site, scan: int, now_ns: int, values: list[tuple[Signal, Value]]) -> None:
         super().__init__(f"{site}: ASSERT failed in scan {scan}")
         self.site, self.scan, self.now_ns, self.values = site, scan, now_ns, values
-        self.table = ""
+        self.table = self.page = ""
 
 
 class StFile(pytest.File):
@@ -83,6 +84,9 @@ class StItem(pytest.Item):
             table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])
             history.again(range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1), table)
             failed.table = table.draw([band for band in table.bands if band.moved][-BANDS:]) if failed.values else ""
+            asked = [signal.place for signal, _ in failed.values]
+            failed.page = page_of(self, "", lambda path: write_page(path, self.nodeid, history, made, plc, asked,
+                                                                    unfinished=True))  # fmt: skip
             raise
         if not watch.asserted:
             raise AssertionError(f"{self.name} ended without one ASSERT")
@@ -94,7 +98,7 @@ class StItem(pytest.Item):
             lines = [f"{name}:{site.line}: in {site.pou}, scan {error.scan} ({show_time(error.now_ns)[2:]})",
                      f">   {self.subject.line(name, site.line)}",
                      *(f"E   {signal.label} = {signal.text(value)}" for signal, value in error.values)]  # fmt: skip
-            return "\n".join([*lines, *(["", error.table] if error.table else [])])
+            return "\n".join([*lines, *(part for said in (error.table, error.page) if said for part in ("", said))])
         if isinstance(error, Trapped | AssertionError | SubjectError):
             return str(error)
         return super().repr_failure(excinfo, style)

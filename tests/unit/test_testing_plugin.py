@@ -299,6 +299,7 @@ END_PROGRAM
         "E   P.Running = TRUE",
         "scan 8*",
         "  pump.st:14*>TRUE",
+        "every scan, in a browser: .fbvm/*.html",
         "FAILED test_pump.st::Test_wrong*",
     ])  # fmt: skip
 
@@ -340,7 +341,9 @@ def in_readme(language: str, part: str) -> str:
 def test_the_tests_of_the_readme_pass(project: pytest.Pytester) -> None:
     project.makepyfile(in_readme("python", "def test_the_pump_waits_50_ms"))
     project.makefile(".st", test_pump=in_readme("iecst", "PROGRAM Test_the_pump_waits"))
-    run(project).assert_outcomes(passed=2)
+    result = run(project)
+    result.assert_outcomes(passed=2)
+    result.stdout.no_fnmatch_line("*warning S*")
 
 
 def test_the_failure_of_the_readme_looks_like_that(project: pytest.Pytester) -> None:
