@@ -117,6 +117,7 @@ def command(
                 paging(plc, options["html"], files, libraries), drawing(plc, options["rungs"]):  # fmt: skip
             outcome = _run(plc, as_json, **options)
         outcome.print()
+        _tell_unused(plc, network)
         if plc.halted and not as_json:
             for line in halt_lines(plc, plc.halted, files):
                 click.secho(line, fg="yellow", err=True)
@@ -205,6 +206,15 @@ def _tell_doors(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Map
     except OSError as error:
         click.echo(f"the network cannot be used: {error}", err=True)
         sys.exit(status.NETWORK)
+
+
+def _tell_unused(plc: Plc, network: LoopNetwork | TcpNetwork) -> None:
+    """Says which rows of --map were of no use: most often the address is a mistake."""
+    if isinstance(network, LoopNetwork):
+        return
+    units = ", ".join(f"{attached.unit.name} has {attached.unit.address}" for attached in plc.units)
+    for said in network.map.unused:
+        click.secho(f"--map {said}: nobody used it; {units}", fg="yellow", err=True)
 
 
 def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork) -> Capture:

@@ -44,6 +44,12 @@ class AddressMap:
     def __init__(self, rows: Mapping[Peer, Peer], bind: str) -> None:
         self._rows = dict(rows)
         self._bind = bind
+        self._used: set[Peer] = set()
+
+    @property
+    def unused(self) -> list[Peer]:
+        """What the program was said to name, and did not name until now."""
+        return [said for said in self._rows if said not in self._used]
 
     def outward(self, remote: Peer) -> Peer:
         """Where to connect to, or send a datagram to."""
@@ -60,11 +66,17 @@ class AddressMap:
         others = [(said, real) for said, real in self._rows.items() if said.host not in own]
         for said, real in others:
             if real == caller:
+                self._used.add(said)
                 return Peer(said.host, said.port or caller.port)
         for said, real in others:
             if real == Peer(caller.host, 0) and said.port == 0:
+                self._used.add(said)
                 return Peer(said.host, caller.port)
         return caller
 
     def _row(self, endpoint: Peer) -> Peer | None:
-        return self._rows.get(endpoint) or self._rows.get(Peer(endpoint.host, 0))
+        for said in (endpoint, Peer(endpoint.host, 0)):
+            if said in self._rows:
+                self._used.add(said)
+                return self._rows[said]
+        return None

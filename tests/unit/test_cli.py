@@ -451,6 +451,13 @@ END_PROGRAM
     assert "symbol    %QX1.3       Main.Lamp : BOOL" in lines
 
 
+def test_a_row_of_the_map_that_nobody_used_is_told(counter: str) -> None:
+    rows = [part for row in ("1.2.3.4:502=127.0.0.1:9", "192.168.250.21:502=127.0.0.1:0") for part in ("--map", row)]
+    result = run("--scans", "1", "--net", "tcp", *rows)
+    told = [line for line in result.stderr.splitlines() if "nobody" in line]
+    assert told == ["--map 1.2.3.4:502: nobody used it; ETN21 0 has 192.168.250.21"]
+
+
 def test_a_host_that_is_not_known_is_named(counter: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def unknown(host: str) -> str:
         raise OSError(2, "Name or service not known")
