@@ -55,6 +55,8 @@ class Watcher(ABC):
 
     link: ChannelLink
     """Whose it is."""
+    watched = 0
+    """What of the host it waits for at the moment."""
 
     @abstractmethod
     def ready(self, ready: int, now_ns: int) -> None:
@@ -142,14 +144,15 @@ class Switchboard(ABC):
 
     def watch(self, sock: HasFileno, wanted: int, channel: Watcher) -> None:
         """Be told when the host is ready for what is wanted: READ, WRITE, both or nothing."""
-        known = self._selector.get_map().get(sock)
+        if wanted == channel.watched:
+            return
         if not wanted:
-            if known:
-                self._selector.unregister(sock)
-        elif not known:
-            self._selector.register(sock, wanted, channel)
-        elif known.events != wanted:
+            self._selector.unregister(sock)
+        elif channel.watched:
             self._selector.modify(sock, wanted, channel)
+        else:
+            self._selector.register(sock, wanted, channel)
+        channel.watched = wanted
 
     def adopt(self, orphan: Orphan, now_ns: int) -> None:
         """Keep a closed connection until it has ended."""

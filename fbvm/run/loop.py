@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import heapq
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol, cast
 
 from fbvm.plc import Plc
@@ -71,7 +71,7 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
 def _scan_all(queue: _Queue, now_ns: int, real: bool) -> None:
     """One scan of everybody whose time has come, with the same time for all."""
     first_ns = began_ns = time.monotonic_ns()
-    for run in queue.due(now_ns):
+    for number, run in queue.take(now_ns):
         plc, scan, due_ns = run.plc, run.plc.scans, run.due_ns
         run.scan(now_ns)
         if plc.scans > scan:
@@ -80,6 +80,7 @@ def _scan_all(queue: _Queue, now_ns: int, real: bool) -> None:
             if real and run.pace == CYCLIC:
                 plc.lateness.note(scan, now_ns - due_ns + began_ns - first_ns)
             began_ns = ended_ns
+        queue.put(number, run)
 
 
 class _Queue:
@@ -87,38 +88,44 @@ class _Queue:
 
     def __init__(self, runs: Sequence[Running]) -> None:
         self._runs = runs
-        self._rows = [(run.due_ns, number) for number, run in enumerate(runs) if not run.reason]
-        self._queued = {number: due_ns for due_ns, number in self._rows}
-        """The row of each that counts; others of its number are out of date."""
+        self._rows: list[tuple[int, int]] = []
+        self._queued: list[int | None] = [None] * len(runs)
+        """When each is due, by its row that counts; others of its number are out of date."""
+        for number, run in enumerate(runs):
+            self.put(number, run)
+
+    def put(self, number: int, run: Running) -> None:
+        """Remember when a run is due, unless it has ended."""
+        if not run.reason:
+            self._queued[number] = run.due_ns
+            heapq.heappush(self._rows, (run.due_ns, number))
 
     def next_ns(self) -> int | None:
         """When somebody is due; None if all have ended."""
-        while self._rows and self._queued.get(self._rows[0][1]) != self._rows[0][0]:
-            heapq.heappop(self._rows)
-        return self._rows[0][0] if self._rows else None
+        rows, queued = self._rows, self._queued
+        while rows:
+            due_ns, number = rows[0]
+            if queued[number] == due_ns:
+                return due_ns
+            heapq.heappop(rows)
+        return None
 
     def hasten(self, number: int, now_ns: int) -> None:
         """Let one be due already now."""
-        if self._queued.get(number, now_ns) > now_ns:
+        queued_ns = self._queued[number]
+        if queued_ns is not None and queued_ns > now_ns:
             self._runs[number].due_ns = now_ns
-            self._put(number, now_ns)
+            self.put(number, self._runs[number])
 
-    def due(self, now_ns: int) -> Iterator[Running]:
-        """Takes out those that are due, each once; when the caller has scanned it, it is put back."""
-        taken = []
-        while (next_ns := self.next_ns()) is not None and next_ns <= now_ns:
-            number = heapq.heappop(self._rows)[1]
-            del self._queued[number]
-            taken.append(number)
-        for number in taken:
-            run = self._runs[number]
-            yield run
-            if not run.reason:
-                self._put(number, run.due_ns)
-
-    def _put(self, number: int, due_ns: int) -> None:
-        self._queued[number] = due_ns
-        heapq.heappush(self._rows, (due_ns, number))
+    def take(self, now_ns: int) -> list[tuple[int, Running]]:
+        """Takes out all that are due, with their numbers; who has scanned one puts it back."""
+        rows, queued, taken = self._rows, self._queued, []
+        while rows and rows[0][0] <= now_ns:
+            due_ns, number = heapq.heappop(rows)
+            if queued[number] == due_ns:
+                queued[number] = None
+                taken.append((number, self._runs[number]))
+        return taken
 
 
 class _Clock(Protocol):

@@ -60,12 +60,15 @@ class Display:
     def flush(self, memory: AreaMemory, cycle: int) -> bool:
         """Write everything that is due; True if that is anything."""
         queue, self._queue = self._queue, []
+        if not queue:
+            return False
+        cio, d = memory.words("CIO"), memory.words("D")
         for change in queue:
             due_cycle, (area, at), stays, turns_on = change
             if due_cycle > cycle:
                 self._queue.append(change)
             else:
-                words = memory.words(area)
+                words = d if area == "D" else cio
                 words[at] = words[at] & stays | turns_on
         if not self._queue:
             self._last_due.clear()
