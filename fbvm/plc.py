@@ -125,7 +125,8 @@ class Plc:
                 return None
             if self._forces:
                 self._apply_forces()
-            self._over(Phase.PROGRAM)
+            if self.phases:
+                self._over(Phase.PROGRAM)
         self._end()
         return self.trap
 
@@ -138,14 +139,16 @@ class Plc:
         if self._mode is Mode.RUN:
             if self._forces:
                 self._apply_forces()
-            self._over(Phase.INPUTS)
+            if self.phases:
+                self._over(Phase.INPUTS)
             self._due.extend(self._schedule.due(now_ns))
 
     def _end(self) -> None:
         """A scan from the end of its program on."""
         if not self.trap:
             self._refresh()
-            self._over(Phase.REFRESH)
+            if self.phases:
+                self._over(Phase.REFRESH)
         self.scans += 1
         self._system[SCANS // 8] = self.scans
         if self._journal:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fbvm.base.areas import NEVER
+
 DIGIT_BITS = 5
 """Bits that a time keeps when it is sorted in: a share is true to 3 %."""
 
@@ -9,8 +11,11 @@ DIGIT_BITS = 5
 class Times:
     """Many times, one a scan, of which only the longest and how many there were of each size are kept."""
 
-    def __init__(self) -> None:
+    def __init__(self, limit_ns: int = NEVER) -> None:
+        self._limit_ns = limit_ns
         self.count = 0
+        self.beyond = 0
+        """How many were longer than the limit."""
         self.longest_ns = 0
         self.longest_scan = 0
         """Number of the longest one."""
@@ -22,6 +27,8 @@ class Times:
         """Take one in."""
         self.count += 1
         self._total_ns += time_ns
+        if time_ns > self._limit_ns:
+            self.beyond += 1
         if time_ns > self.longest_ns:
             self.longest_ns, self.longest_scan = time_ns, scan
         dropped = max(time_ns.bit_length() - DIGIT_BITS, 0)
@@ -46,6 +53,7 @@ class Times:
     def add(self, other: Times) -> None:
         """Take in all of another PLC's; the number of the longest scan is one of that PLC."""
         self.count += other.count
+        self.beyond += other.beyond
         self._total_ns += other._total_ns
         if other.longest_ns > self.longest_ns:
             self.longest_ns, self.longest_scan = other.longest_ns, other.longest_scan
@@ -62,20 +70,12 @@ class ScanTimes(Times):
     """Durations of scans as `fbvm.run` measured them; empty for a PLC that was only told the time."""
 
     def __init__(self, cycle_ns: int) -> None:
-        super().__init__()
-        self._cycle_ns = cycle_ns
-        self.overruns = 0
+        super().__init__(cycle_ns)
+
+    @property
+    def overruns(self) -> int:
         """Scans that took longer than the cycle."""
-
-    def note(self, scan: int, time_ns: int) -> None:
-        super().note(scan, time_ns)
-        if time_ns > self._cycle_ns:
-            self.overruns += 1
-
-    def add(self, other: Times) -> None:
-        super().add(other)
-        if isinstance(other, ScanTimes):
-            self.overruns += other.overruns
+        return self.beyond
 
     def __str__(self) -> str:
         if not self.count:

@@ -32,24 +32,27 @@ class Schedule:
     def __post_init__(self) -> None:
         self.fresh.update(range(len(self.tasks)))
         self._order = sorted(range(len(self.tasks)), key=lambda number: self.tasks[number].priority)
+        self._always = not any(task.single or task.interval_ns for task in self.tasks)
 
     def due(self, now_ns: int) -> list[int]:
         """Numbers of the tasks that run in the scan at `now_ns`, by priority."""
+        if self._always:
+            return self._order
         return [number for number in self._order if self._is_due(number, now_ns)]
 
     def next_ns(self, now_ns: int) -> int:
         """The earliest time after `now_ns` at which an interval has passed; NEVER if no task has one."""
+        if not self._next_ns:
+            return NEVER
         return min((planned_ns for planned_ns in self._next_ns.values() if planned_ns > now_ns), default=NEVER)
 
     def _is_due(self, number: int, now_ns: int) -> bool:
         task = self.tasks[number]
-        if not task.single and not task.interval_ns:
-            return True
         level = bool(task.single) and self.single(task.single)
         edge = level and not self._levels.get(number, False)
         self._levels[number] = level
         if not task.interval_ns:
-            return edge
+            return edge or not task.single
         planned_ns = self._next_ns.setdefault(number, now_ns)
         if now_ns < planned_ns:
             return edge

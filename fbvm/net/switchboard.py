@@ -90,6 +90,8 @@ class Switchboard(ABC):
         self.links: dict[str, ChannelLink] = {}
         self._selector = selectors.DefaultSelector()
         self._number = _number(self._selector)
+        self._watched = 0
+        """How many sockets the selector has."""
         self._own: dict[tuple[str, Peer], Peer] = {}
         self._orphans: deque[tuple[int, Orphan]] = deque()
         self.closed = False
@@ -114,7 +116,7 @@ class Switchboard(ABC):
         if self.closed:
             return []
         woken: list[Link] = []
-        for key, ready in self._selector.select(0) if self._selector.get_map() else ():
+        for key, ready in self._selector.select(0) if self._watched else ():
             key.data.ready(ready, now_ns)
             woken.append(key.data.link)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):
@@ -148,10 +150,12 @@ class Switchboard(ABC):
             return
         if not wanted:
             self._selector.unregister(sock)
+            self._watched -= 1
         elif channel.watched:
             self._selector.modify(sock, wanted, channel)
         else:
             self._selector.register(sock, wanted, channel)
+            self._watched += 1
         channel.watched = wanted
 
     def adopt(self, orphan: Orphan, now_ns: int) -> None:

@@ -52,9 +52,10 @@ class Display:
         """Report what changed of a socket since it was last shown."""
         protocol = socket.protocol
         status, received, state = self._words_of[protocol, socket.number]
-        self._differences(status, socket.status(), skew, cycle)
+        size_bytes = socket.bytes_shown()
+        self._differences(status, socket.status(size_bytes), skew, cycle)
         if protocol == "TCP":
-            self._differences(received, socket.bytes_shown(), skew, cycle)
+            self._differences(received, size_bytes, skew, cycle)
             self._differences(state, socket.state, skew, cycle)
 
     def flush(self, memory: AreaMemory, cycle: int) -> bool:

@@ -85,14 +85,12 @@ class Socket:
 
     # --- what the words show -----------------------------------------------------------------------------------------
 
-    def status(self) -> int:
-        """The status word n+1..n+16."""
+    def status(self, bytes_shown: int) -> int:
+        """The status word n+1..n+16, with what `bytes_shown` gives."""
         word = at.OPEN if self.connected else 0
         for flag in self.services:
             word |= flag
-        if self.connected and self.bytes_shown():
-            word |= at.DATA_RECEIVED
-        return word
+        return word | at.DATA_RECEIVED if bytes_shown else word
 
     def bytes_shown(self) -> int:
         """The word m+1..m+8: 0 while a receive runs, at most 1,984 (W420 4-2 p88)."""
