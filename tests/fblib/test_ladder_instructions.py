@@ -131,6 +131,7 @@ def test_nothing_is_done_with_the_condition_off() -> None:
     assert plc.memory.words("D")[:3].tolist() == [0, 0, 0]
 
 
+@pytest.mark.slow
 def test_every_instruction_that_is_not_refused_compiles() -> None:
     """With operands of the kinds that it takes; those that are refused say so."""
     shown = {"b": "0.00", "w": "D0", "d": "D0", "r": "D0", "B": "W0.00", "W": "D20", "A": "D20", "t": "5", "c": "5"}
