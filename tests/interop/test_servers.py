@@ -1,0 +1,233 @@
+"""All server programs behind real TCP: other people's clients, nmap's script, what tshark says, and hostile clients."""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from foreign_clients import BOUND_S, CLIENTS, expected
+from wireshark import TSHARK
+
+from fbvm.wire.modbus import Adu
+
+HOUSE = Path(__file__).resolve().parents[2]
+NMAP = shutil.which("nmap")
+MB_TCP = """
+PROGRAM Main
+VAR Server : MB_TCP_SERVER; Config : TCP_CONNECTCONFIG; Coils : ARRAY[0..99] OF BOOL; Inputs : ARRAY[0..9] OF BYTE;
+    Holding, Registers : ARRAY[0..199] OF WORD; END_VAR
+    Server(DISCONNECT := FALSE, CONNECT := Config, COIL_DATAAREA := Coils, DISCRETE_DATAAREA := Inputs,
+           HOLDING_REG_DATAAREA := Holding, INPUT_REG_DATAAREA := Registers);
+END_PROGRAM
+"""
+MSTR = "PROGRAM Main VAR Server : MSTR_Server; END_VAR Server(Idle_Time := T#2s); END_PROGRAM"
+
+pytestmark = pytest.mark.slow
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A server program, its unit's endpoint, its function codes, and words that a hostile client must not change."""
+
+    program: str
+    endpoint: str
+    functions: frozenset[int]
+    kept: tuple[str, ...]
+    settings: tuple[str, ...] = ()
+
+
+KINDS = {
+    "etn_modbus": Kind("", "192.168.250.21:502", frozenset((1, 2, 3, 4, 5, 6, 8, 16)), ("D0..D9", "CIO 0..CIO 9"),
+                       ("Main.Server.Idle_Time=2s",)),
+    "mbp_mstr": Kind(MSTR, "192.168.250.22:502", frozenset((3, 6, 16, 23)), ("%MW1..%MW9",)),
+    "mb_tcp_server": Kind(MB_TCP, "192.168.250.23:502", frozenset((1, 2, 3, 4, 5, 6, 15, 16)),
+                          ("Main.Holding[0]", "Main.Holding[199]", "Main.Coils[0]")),
+}  # fmt: skip
+every_kind = pytest.mark.parametrize("kind", KINDS)
+
+
+@dataclass
+class Server:
+    process: subprocess.Popen[str]
+    port: int
+    output: str = ""
+
+    def end(self) -> dict[str, Any]:
+        """Ctrl-C; the values shown at the end."""
+        self.process.send_signal(signal.SIGINT)
+        output, _ = self.process.communicate(timeout=BOUND_S)
+        values = json.loads(output)["values"]
+        assert isinstance(values, dict)
+        return values
+
+    def size(self) -> tuple[int, int]:
+        """KiB in memory, open handles."""
+        status = Path(f"/proc/{self.process.pid}/status").read_text()
+        resident = next(int(line.split()[1]) for line in status.splitlines() if line.startswith("VmRSS"))
+        return resident, len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
+
+
+@contextmanager
+def serving(name: str, folder: Path, capture: bool = False) -> Iterator[Server]:
+    kind = KINDS[name]
+    file = HOUSE / "examples" / "server.st"
+    if kind.program:
+        file = folder / "server.st"
+        file.write_text(kind.program)
+    command = [
+        sys.executable, "-m", "fbvm", "run", str(file), "--net", "tcp", "--pace", "event", "--for", "600s", "--json",
+        "--map", f"{kind.endpoint}=127.0.0.1:0", *(part for one in kind.settings for part in ("--set", one)),
+        *(part for one in kind.kept for part in ("--show", one)),
+        *(["--pcap", str(folder / "server.pcapng")] if capture else []),
+    ]  # fmt: skip
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=HOUSE) as process:
+        assert process.stderr is not None
+        try:
+            line = process.stderr.readline()
+            assert line.startswith(kind.endpoint), line + process.stderr.read()
+            server = Server(process, int(line.rpartition(":")[2]))
+            settled(name, server.port)
+            yield server
+        finally:
+            process.kill()
+
+
+def ask(kind: str) -> bytes:
+    """A request that the server answers without changing anything."""
+    return Adu(1, 1, b"\3\0\0\0\1").to_bytes()
+
+
+def connected(kind: str, port: int) -> socket.socket:
+    """A connection on which the server has answered; until it listens, others are refused."""
+    end_s = time.monotonic() + BOUND_S
+    while True:
+        sock = socket.socket()
+        sock.settimeout(BOUND_S)
+        try:
+            sock.connect(("127.0.0.1", port))
+            sock.sendall(ask(kind))
+            if len(heard(sock, 11)) == 11:
+                return sock
+        except OSError:
+            pass
+        sock.close()
+        assert time.monotonic() < end_s, "it does not serve any more"
+
+
+def settled(kind: str, port: int) -> None:
+    """Wait until the server answers, and leave politely."""
+    connected(kind, port).close()
+
+
+def heard(sock: socket.socket, count: int) -> bytes:
+    """So many bytes, or what came before the end."""
+    data = b""
+    while len(data) < count:
+        part = sock.recv(count - len(data))
+        if not part:
+            break
+        data += part
+    return data
+
+
+# --- other people's clients -------------------------------------------------------------------------------------------
+
+
+@every_kind
+@pytest.mark.parametrize("name", CLIENTS)
+def test_a_client_of_other_people(kind: str, name: str, tmp_path: Path) -> None:
+    with serving(kind, tmp_path, capture=True) as server:
+        end_s = time.monotonic() + BOUND_S
+        while True:
+            try:
+                found = CLIENTS[name](server.port)
+                break
+            except (OSError, AssertionError):  # the socket is just being opened again
+                assert time.monotonic() < end_s
+        server.end()
+    assert found == {step: value for step, value in expected(set(KINDS[kind].functions)).items() if step in found}
+    assert len(found) == 9
+    nothing_malformed(tmp_path / "server.pcapng")
+
+
+def nothing_malformed(capture: Path) -> None:
+    """Of the dissectors' warnings only that of RST is right: a server may close with linger."""
+    if not TSHARK:
+        return
+    wrong = "_ws.malformed || tcp.checksum.status == 0 || (_ws.expert.severity >= 6291456 && !tcp.flags.reset == 1)"
+    command = [TSHARK, "-n", "-r", str(capture), "-o", "tcp.check_checksum:TRUE", "-Y", wrong]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == ""
+    frames = [TSHARK, "-n", "-r", str(capture), "-Y", "modbus"]
+    assert subprocess.run(frames, capture_output=True, text=True, check=True).stdout.count("\n") > 10
+
+
+@every_kind
+def test_nmap_finds_a_modbus_server(kind: str, tmp_path: Path) -> None:
+    if not NMAP:
+        pytest.skip("nmap is not installed")
+    with serving(kind, tmp_path) as server:
+        # With + the script runs for any port.
+        command = [NMAP, "-sT", "-Pn", "-n", "-p", str(server.port), "--script", "+modbus-discover", "127.0.0.1"]
+        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=120)
+        assert "modbus-discover" in done.stdout, done.stdout
+        assert "ILLEGAL FUNCTION" in done.stdout.upper(), done.stdout
+        settled(kind, server.port)
+
+
+# --- hostile clients --------------------------------------------------------------------------------------------------
+
+
+def random_frame(dice: random.Random, functions: frozenset[int]) -> bytes:
+    """Bytes that may be a frame: right and wrong headers, any function code, any length.  Writes are never complete."""
+    code = dice.choice((*functions, dice.randrange(256)))
+    body = dice.randbytes(dice.choice((0, 1, 2, 3, 4, 5, 7, 12, 60, 252)))
+    if code in (5, 6, 15, 16, 23):
+        body = body[:3]
+    pdu = bytes((code,)) + body
+    length = dice.choice((len(pdu) + 1,) * 6 + (0, 1, 2, 255, 65535, dice.randrange(65536)))
+    protocol = dice.choice((0,) * 9 + (dice.randrange(65536),))
+    head = dice.randrange(65536).to_bytes(2, "big") + protocol.to_bytes(2, "big") + length.to_bytes(2, "big")
+    return head + bytes((dice.randrange(255),)) + pdu
+
+
+@every_kind
+def test_twenty_thousand_random_frames(kind: str, tmp_path: Path) -> None:
+    """No word changes, memory and handles do not grow, and the server goes on."""
+    dice = random.Random(7)
+    with serving(kind, tmp_path) as server:
+        sizes = []
+        sent = 0
+        while sent < 20_000:
+            sock = connected(kind, server.port)
+            burst = dice.choice((1, 3, 40, 400))
+            data = b"".join(random_frame(dice, KINDS[kind].functions) for _ in range(burst))
+            sent += burst
+            try:
+                sock.settimeout(2)
+                sock.sendall(data)
+                if dice.random() < 0.5:
+                    sock.shutdown(socket.SHUT_WR)
+                    while sock.recv(65536):
+                        pass
+            except OSError:
+                pass
+            sock.close()
+            sizes.append(server.size())
+        settled(kind, server.port)
+        values = server.end()
+    assert all(value in (0, False, 10 * [0], 9 * [0]) for value in values.values()), values
+    quarter = len(sizes) // 4
+    assert sizes[-1][0] - sizes[quarter][0] < 4096, "KiB"
+    assert max(handles for _, handles in sizes) < 40
