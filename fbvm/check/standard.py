@@ -254,6 +254,8 @@ class StandardCalls:
         kinds = [self.expressions.infer(value, want) for value in values]
         if None in kinds:
             return None
+        character = next((kind for kind in kinds if kind is not None and is_any(kind, "ANY_CHAR")), None)
+        kinds = [self.expressions.as_character(value, character) or kind for value, kind in zip(values, kinds, strict=True)]
         bound: Type | None = None
         for kind in kinds:
             assert kind is not None
