@@ -11,10 +11,11 @@ from fbvm.cli.options import split_names
 from fbvm.cli.traces import SUFFIX, opened, recorded, scans_option
 from fbvm.record.page import page
 from fbvm.record.page_data import page_data
+from fbvm.record.pcapng import Capture
 from fbvm.record.rows import RowsError, read_rows, write_rows
 from fbvm.record.svg import Drawing
 from fbvm.record.trace import Trace
-from fbvm.record.trace_signals import traffic
+from fbvm.record.trace_signals import happenings, traffic
 from fbvm.record.vcd import write_vcd
 
 CSV = ".csv"
@@ -44,8 +45,19 @@ def _html(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     path.write_text(page(page_data(trace, names, scans, path.stem)), encoding="utf-8")
 
 
+def _pcapng(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
+    if names:
+        raise click.UsageError("a capture holds what passed the network; it takes no names")
+    with path.open("wb") as file:
+        said = ""
+        capture = Capture(file, comment=lambda address: said)
+        for scan, event in happenings(trace, scans):
+            said = f"scan {scan}"
+            capture.tap(event.now_ns, event.happening.local.host, event.happening)
+
+
 FORMATS: dict[str, Callable[[Trace, Names, range | None, Path], None]] = {
-    ".html": _html, ".svg": _svg, CSV: _csv, ".vcd": _vcd,
+    ".html": _html, ".svg": _svg, CSV: _csv, ".vcd": _vcd, ".pcapng": _pcapng,
 }  # fmt: skip
 
 
@@ -62,6 +74,7 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
     .svg   a time chart for documents
     .csv   a table; FROM may be one, too, and becomes a trace
     .vcd   for GTKWave and Surfer
+    .pcapng  what passed the network, for Wireshark
 
     Without names, all variables that changed are written."""
     try:

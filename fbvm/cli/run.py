@@ -109,7 +109,7 @@ def command(
         journal = start_journal(stack, path, files, program, libraries, banks, said) if path else None
         plc = _plc(image, cycle_ns, options["engine"], journal)
         if options["pcap"]:
-            network.tap = _capture(stack, options["pcap"], network).tap
+            network.tap = _capture(stack, options["pcap"], network, plc).tap
         for unit in usual_units(mailboxes(image), options["timing"], options["seed"]):
             plc.attach(unit, network)
         _tell_doors(plc, network, options["mappings"])
@@ -217,12 +217,12 @@ def _tell_unused(plc: Plc, network: LoopNetwork | TcpNetwork) -> None:
         click.secho(f"--map {said}: nobody used it; {units}", fg="yellow", err=True)
 
 
-def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork) -> Capture:
+def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork, plc: Plc) -> Capture:
     try:
         file = stack.enter_context(path.open("wb"))
     except OSError as error:
         raise click.UsageError(f"{path} cannot be written: {error.strerror}") from None
-    return Capture(file, 0 if network.virtual_time else loop.epoch_ns())
+    return Capture(file, 0 if network.virtual_time else loop.epoch_ns(), lambda address: f"scan {plc.scans}")
 
 
 def _check_usage(

@@ -4,12 +4,13 @@
         network.tap = Capture(file).tap
 
 The bytes and times are those of the run.  What the tap does not know is made up plausibly: MAC addresses, sequence
-numbers, the acknowledgements.  File format: draft-ietf-opsawg-pcapng, sections 4.1 to 4.3.
+numbers, the acknowledgements.  File format: draft-ietf-opsawg-pcapng, sections 3.5 and 4.1 to 4.3.
 """
 
 from __future__ import annotations
 
 import struct
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
@@ -21,7 +22,7 @@ from fbvm.wire.tap import Happening, What
 SECTION_HEADER, INTERFACE, ENHANCED_PACKET = 0x0A0D0D0A, 1, 6
 BYTE_ORDER_MAGIC = 0x1A2B3C4D
 LINKTYPE_ETHERNET = 1
-OPTION_END, IF_NAME, SHB_USERAPPL, IF_TSRESOL = 0, 2, 4, 9
+OPTION_END, COMMENT, IF_NAME, SHB_USERAPPL, IF_TSRESOL = 0, 1, 2, 4, 9
 NANOSECONDS = b"\x09"
 """Resolution of time stamps: 10 to the power of -9."""
 
@@ -40,10 +41,12 @@ class Capture:
     """Writes a pcapng file as things happen.  The file is the caller's, who closes it.
 
     `epoch_ns` is added to all times, so that virtual time 0 may be some date.  Each unit is an interface of the file,
-    named by its address; what two units of one network say to each other is written once."""
+    named by its address; what two units of one network say to each other is written once.  `comment` says something about
+    each packet of a unit, by its address: the scan in which it was."""
 
-    def __init__(self, file: BinaryIO, epoch_ns: int = 0) -> None:
+    def __init__(self, file: BinaryIO, epoch_ns: int = 0, comment: Callable[[str], str] | None = None) -> None:
         self._file = file
+        self._comment = comment
         self._epoch_ns = epoch_ns
         self._flows: dict[frozenset[Peer], _Flow] = {}
         self._interfaces: dict[str, int] = {}
@@ -126,7 +129,8 @@ class Capture:
         head = struct.pack(
             "<IIIII", self._interfaces[address], stamp >> 32, stamp & 0xFFFF_FFFF, len(frame), len(frame)
         )
-        self._block(ENHANCED_PACKET, head + _padded(frame))
+        said = _option(COMMENT, self._comment(address).encode()) + _option(OPTION_END, b"") if self._comment else b""
+        self._block(ENHANCED_PACKET, head + _padded(frame) + said)
 
     def _block(self, kind: int, body: bytes) -> None:
         size = struct.pack("<I", 12 + len(body))

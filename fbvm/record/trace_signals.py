@@ -30,24 +30,29 @@ def recording(trace: Trace, names: Sequence[str] = (), scans: range | None = Non
 
 def traffic(trace: Trace, scans: range | None = None) -> list[tuple[int, Passed]]:
     """What passed the network in some scans, with their numbers."""
+    reader = Reader()
+    return [(scan, passed) for scan, event in happenings(trace, scans) for passed in reader.read(event.now_ns, event.happening)]
+
+
+def happenings(trace: Trace, scans: range | None = None) -> list[tuple[int, Passing]]:
+    """The same as the network told it."""
     heard = _Heard()
     trace.follow(heard, scans)
-    return heard.passed
+    return heard.rows
 
 
 class _Heard:
-    """Follows a trace and keeps what passed the network."""
+    """Follows a trace and keeps what the network told."""
 
     def __init__(self) -> None:
-        self.passed: list[tuple[int, Passed]] = []
-        self._reader = Reader()
+        self.rows: list[tuple[int, Passing]] = []
 
     def phase(self, moment: Moment, phase: Phase) -> None:
         """Nothing passes between phases."""
 
     def event(self, moment: Moment, event: Event) -> None:
         if isinstance(event, Passing):
-            self.passed += [(moment.scans, passed) for passed in self._reader.read(event.now_ns, event.happening)]
+            self.rows.append((moment.scans, event))
 
 
 def chosen_signals(trace: Trace, names: Sequence[str]) -> list[Signal]:

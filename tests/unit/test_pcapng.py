@@ -91,6 +91,20 @@ def test_the_file_begins_with_its_section_and_names_its_interfaces() -> None:
     assert b"10.0.0.2" in file.getvalue()
 
 
+def test_a_comment_names_the_scan() -> None:
+    file, said = io.BytesIO(), ""
+    capture = Capture(file, comment=lambda address: f"{address}: {said}")
+    for scan in (7, 12):
+        said = f"scan {scan}"
+        capture.tap(0, UNIT, Happening(What.UDP, Peer(UNIT, 1), SERVER, True, b"x"))
+    packets = [body for kind, body in blocks(file.getvalue()) if kind == 6]
+    for body, number in zip(packets, ("7", "12"), strict=True):
+        size = struct.unpack_from("<I", body, 12)[0]
+        code, length = struct.unpack_from("<HH", body, 20 + size + -size % 4)
+        at = 24 + size + -size % 4
+        assert (code, body[at : at + length]) == (1, f"{UNIT}: scan {number}".encode())
+
+
 def test_a_refused_connection_and_a_tap_that_came_late() -> None:
     file = io.BytesIO()
     capture = Capture(file)

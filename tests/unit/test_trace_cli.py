@@ -56,6 +56,15 @@ def test_a_page_and_a_picture_of_a_trace(fbvm: Fbvm) -> None:
         assert fbvm("convert", "run.fbtrace", target, "--scans", "900..").exit_code == 2
 
 
+def test_a_capture_of_a_trace(fbvm: Fbvm, tmp_path: Path) -> None:
+    demo = str(Path(__file__).parents[2] / "examples" / "demo.st")
+    assert fbvm("run", demo, "--until", "Main.Done", "--map", "192.168.250.1:502=peer", "--trace", "demo.fbtrace",
+                "--pcap", "run.pcapng").exit_code == 0  # fmt: skip
+    assert fbvm("convert", "demo.fbtrace", "trace.pcapng").exit_code == 0
+    assert Path("trace.pcapng").read_bytes() == Path("run.pcapng").read_bytes()
+    assert fbvm("convert", "demo.fbtrace", "trace.pcapng", "Main.Done").exit_code == 2
+
+
 def test_a_run_as_a_page(fbvm: Fbvm) -> None:
     arguments = ("run", "pump.st", "--scans", "60", "--set", "CIO 0.00=TRUE@30ms")
     assert fbvm(*arguments, "--html", "run.html").exit_code == 0
