@@ -100,6 +100,7 @@ CODES: dict[str, Code] = {
         "S0596": "output written twice, and the first value lost",
         "S0690": "output written in two POUs",
         "S0691": "located variables share memory",
+        "S0692": "location left open",
         "S0790": "text is cut",
         "S0791": "constant loses digits",
         "S0890": "program that no task runs",

@@ -16,6 +16,7 @@ from fbvm.check.generics import is_generic
 from fbvm.check.globals import Globals
 from fbvm.check.interfaces import Interfaces
 from fbvm.check.project import Project
+from fbvm.check.settings import Settings
 from fbvm.check.specs import Specs, settle
 from fbvm.check.statements import Statements, assigns_to
 from fbvm.check.values import Values
@@ -45,14 +46,20 @@ class Checker:
         self.mailboxes: dict[str, Mailbox] = {}
         """Those that the program uses."""
         self.tasks: list[TaskFact] = []
+        self.resource: tree.Resource | None = None
+        """The RESOURCE that the PLC is."""
+        self.settings: Settings
         self.globals = Globals(self)
         self.bodies: list[Pou] = []
         """POUs with checked bodies; their `number` is the position here."""
         self._scope: Pou | None = None
         self._blocks: dict[int, Pou] = {}
 
-    def check(self, program: str | None = None) -> None:
+    def check(self, program: str | None = None, resource: str | None = None) -> None:
         """Check everything that the user wrote and what it uses of libraries; choose what the tasks run."""
+        configurations = Configurations(self)
+        self.resource = configurations.choose(resource, program)
+        self.globals.enroll()
         for entry in list(self.project.types.values()):
             if not entry.source.library:
                 self.specs.declared(entry.tree.name.text, entry.source)
@@ -61,7 +68,11 @@ class Checker:
             pou = self.project.new_pous.pop(0)
             if not pou.source.library and not is_generic(pou):
                 self._body(pou)
-        Configurations(self).resolve(program)
+        configurations.resolve(program)
+        named = self.resource.name.text if self.resource is not None and self.resource.name is not None else ""
+        self.settings = Settings(self, named)
+        if program is None:
+            self.settings.resolve()
         self._complain_of_recursion()
 
     @property
@@ -115,8 +126,8 @@ class Checker:
 
     def program(self, pou: Pou, node: tree.Node) -> Variable | None:
         """The one instance of a program that is called or looked into by its name; None if a CONFIGURATION has several."""
-        named = [run.name.text for configuration, _ in self.project.configurations for resource in configuration.resources
-                 for run in resource.programs if fold(run.type_name.text) == fold(pou.name)]
+        named = [run.name.text for run in (self.resource.programs if self.resource is not None else ())
+                 if fold(run.type_name.text) == fold(pou.name)]
         if len(named) > 1 or not self.interface(pou, pou.source, node) or pou.type is None:
             return None
         name = named[0] if named else pou.name

@@ -26,11 +26,28 @@ class Configurations:
         self._run: list[Variable] = []
         """Instances of programs that a task runs."""
 
+    def choose(self, wanted: str | None, program: str | None) -> tree.Resource | None:
+        """The RESOURCE that is to run: a PLC is one of them.  Its global variables are declared, and not those of others."""
+        if not self.project.configurations:
+            return None
+        configuration, source = self.project.configurations[0]
+        names = [r.name.text for r in configuration.resources if r.name is not None]
+        fitting = [r for r in configuration.resources
+                   if wanted is None or r.name is not None and fold(r.name.text) == fold(wanted)]
+        if wanted is not None and not fitting:
+            self.report.add("S0801", source, configuration.name, f"there is no RESOURCE {wanted}",
+                            self.project.choices(wanted, names))
+        elif len(fitting) > 1 and program is None:
+            self.report.add("S0801", source, fitting[1].name or fitting[1],
+                            f"{configuration.name.text} has {len(fitting)} resources, and a PLC is one of them",
+                            f"choose one with --resource {' or --resource '.join(names)}")
+        if not fitting:
+            return None
+        self.project.sections += [(section, source) for section in fitting[0].sections]
+        return fitting[0]
+
     def resolve(self, program: str | None) -> None:
         """Fill the checker's tasks: from the CONFIGURATION, or with the one program that there is or that is named."""
-        for section, source in self.project.settings:
-            what = "VAR_CONFIG" if isinstance(section, tree.ConfigVars) else "VAR_ACCESS"
-            self.report.add("S0901", source, section, f"{what} is understood but not executed by this version")
         configurations = self.project.configurations
         if program is None and configurations:
             for extra, source in configurations[1:]:
@@ -80,11 +97,8 @@ class Configurations:
     def _configuration(self, configuration: tree.Configuration, source: Source) -> None:
         for refused in configuration.refused:
             self._refuse(refused, source)
-        for extra in configuration.resources[1:]:
-            self.report.add("S0901", source, extra.name or extra,
-                            "a second RESOURCE is understood but not executed by this version")
-        for resource in configuration.resources[:1]:
-            self._resource(resource, source)
+        if self.checker.resource is not None:
+            self._resource(self.checker.resource, source)
 
     def _resource(self, resource: tree.Resource, source: Source) -> None:
         for refused in resource.refused:

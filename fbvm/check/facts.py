@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import TypeGuard
 
 from fbvm.base.areas import Address
@@ -46,6 +47,8 @@ class Variable:
     constant: bool = False
     retain: bool = False
     reference: bool = False
+    open: bool = False
+    """True for `AT %I*` that VAR_CONFIG completes: a reference then, which never changes."""
     any_length: bool = False
     """True for an in-out STRING that is declared without a length."""
     location: Address | None = None
@@ -223,6 +226,36 @@ class Facts:
     """Constants that their places do not keep as they are written: where, code and message of the warning."""
 
 
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """A variable that is named by its path: members and numbers of elements behind a program or global variable.
+
+    Without a root it is an address."""
+
+    root: Variable | None
+    steps: tuple[Field | int, ...]
+    type: Type
+    address: Address | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Completed:
+    """What VAR_CONFIG says about a variable: the address that it is a name for from now on, or its initial bytes."""
+
+    spot: Spot
+    address: Address | None
+    initial: bytes | None
+
+
+@dataclass(frozen=True, eq=False)
+class AccessPath:
+    """What VAR_ACCESS says: another name, and whether it can be written by that."""
+
+    name: str
+    spot: Spot
+    writable: bool
+
+
 @dataclass
 class TaskFact:
     """A task of the configuration, or the one task that runs everything."""
@@ -252,6 +285,16 @@ class Report:
 def is_block(kind: Type) -> bool:
     """True for the type of a function block's or program's instances."""
     return isinstance(kind, StructType) and kind.block
+
+
+def is_open(location: tree.Location) -> bool:
+    """True for `%I*`, which VAR_CONFIG completes."""
+    return location.text.rstrip().endswith("*")
+
+
+def list_name(source: Source) -> str:
+    """The folded name under which programs know the global variables of a source: that of its file."""
+    return fold(Path(source.name).stem)
 
 
 def holds_block(kind: Type) -> bool:

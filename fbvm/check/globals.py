@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
-from fbvm.check.facts import Variable
+from fbvm.check.facts import Variable, is_open, list_name
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -35,25 +35,37 @@ class Globals:
         self.project = checker.project
         self.order: list[Variable] = []
         """Global variables and program instances in the order of their slots."""
+        self._turns: list[Turn] = []
         self._waiting: dict[Key, Turn] = {}
         self._busy: set[Key] = set()
         self._damaged: set[Key] = set()
         self.project.late_global = self._on_demand
 
-    def declare(self) -> None:
-        """Declare everything that was read since the last time."""
+    def enroll(self) -> None:
+        """Know the names of everything that was read since the last time; who asks for one has it declared."""
         new = self.project.sections
         self.project.sections = []
         turns = [Turn(declared, section, source) for section, source in new for declared in section.variables]
         for section, source in new:
             self.checker.interfaces.qualified(section, source, "program")
         for turn in turns:
-            for name in turn.declared.names:
-                self._waiting.setdefault((turn.source.library, fold(name.text)), turn)
-        for turn in turns:
-            self._declare(turn)
-        if self.project.sections:
-            self.declare()
+            for key in self._keys(turn):
+                self._waiting.setdefault(key, turn)
+        self._turns += turns
+
+    def declare(self) -> None:
+        """Declare everything that was read."""
+        self.enroll()
+        while self._turns:
+            turns, self._turns = self._turns, []
+            for turn in turns:
+                self._declare(turn)
+            self.enroll()
+
+    def _keys(self, turn: Turn) -> list[Key]:
+        """Under which names the variables of a declaration are found; with that of their list if they must have it."""
+        space = f"{list_name(turn.source)}." if turn.section in self.project.qualified_only else ""
+        return [(turn.source.library, f"{space}{fold(name.text)}") for name in turn.declared.names]
 
     def is_told(self, name: tree.NameRef, source: Source) -> bool:
         """True if it has been said why there is no such variable; says it if the name asks for itself."""
@@ -73,7 +85,7 @@ class Globals:
         if turn.taken:
             return
         turn.taken = True
-        keys = [(turn.source.library, fold(name.text)) for name in turn.declared.names]
+        keys = self._keys(turn)
         self._busy.update(keys)
         resolved = self.checker.interfaces.typed(turn.declared, turn.source, None)
         self._busy.difference_update(keys)
@@ -82,7 +94,7 @@ class Globals:
             return
         for name, key in zip(turn.declared.names, keys, strict=True):
             variable = self.checker.interfaces.variable(turn.declared, name, turn.section, turn.source, resolved)
-            variable.place = "area" if turn.declared.location is not None else "abs"
+            variable.place = "area" if turn.declared.location is not None and not is_open(turn.declared.location) else "abs"
             other = self.project.globals.setdefault(key, variable)
             if other is variable:
                 self.order.append(variable)

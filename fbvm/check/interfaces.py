@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, AnyType, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold
-from fbvm.check.facts import Edge, Pou, Variable, holds_block, is_block
+from fbvm.check.facts import Edge, Pou, Variable, holds_block, is_block, is_open
 from fbvm.check.names import refuse_reserved
 from fbvm.check.specs import MAX_SIZE
 from fbvm.check.statements import assigns_to
@@ -24,18 +24,19 @@ if TYPE_CHECKING:
 OBJECTS_AT = 4
 """Where an instance has the number of the first of its objects: behind its type identifier, 32 bits each."""
 _SECTIONS = {
-    "FUNCTION": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL"),
-    "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL"),
-    "PROGRAM": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL"),
+    "FUNCTION": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT"),
+    "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT"),
+    "PROGRAM": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT"),
 }
 _QUALIFIERS = {
     "VAR": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"), "VAR_INPUT": ("CONSTANT", "RETAIN", "NON_RETAIN"),
     "VAR_OUTPUT": ("RETAIN", "NON_RETAIN"), "VAR_IN_OUT": ("CONSTANT",), "VAR_TEMP": (), "VAR_EXTERNAL": ("CONSTANT",),
     "VAR_GLOBAL": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"),
+    "VAR_STAT": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"),
 }
 BORROWED = (OpenArrayType, AnyType)
 """Types whose slot holds a reference and more."""
-_LATER = ("VAR_STAT", "VAR_INST", "VAR_ACCESS", "VAR_CONFIG")
+_LATER = ("VAR_INST", "VAR_ACCESS", "VAR_CONFIG")
 
 
 class Interfaces:
@@ -111,7 +112,8 @@ class Interfaces:
                 self._external(declared, section, pou)
                 continue
             resolved = self.typed(declared, pou.source, pou)
-            borrowed = resolved is not None and isinstance(resolved[0], AnyType) and section.kind == "VAR_INPUT"
+            referring = isinstance(declared.spec, tree.RefSpec) and declared.spec.kind == "REFERENCE TO"
+            borrowed = resolved is not None and section.kind == "VAR_INPUT" and (referring or isinstance(resolved[0], AnyType))
             for name in declared.names:
                 pou.later.discard(fold(name.text))
                 if resolved is None:
@@ -120,12 +122,14 @@ class Interfaces:
                 variable = self.variable(declared, name, section, pou.source, resolved)
                 variable.owner = pou
                 if borrowed:
-                    variable.kind = "VAR_IN_OUT"  # CODESYS passes an input of type ANY by its place
+                    variable.kind = "VAR_IN_OUT"  # CODESYS passes an input of type ANY or REFERENCE TO by its place
                 if is_block(variable.type) and variable.kind in ("VAR_INPUT", "VAR_OUTPUT"):
                     self.report.add("S0901", pou.source, name, f"an instance as {section.kind} is understood but not "
                                     "executed by this version", "pass it as VAR_IN_OUT")
                 self._place(variable, declared, pou)
                 self._register(variable, pou)
+                if variable.kind == "VAR_STAT":
+                    self.checker.global_order.append(variable)
 
     def typed(self, declared: tree.VarDecl, source: Source, pou: Pou | None) -> tuple[Type, bytes] | None:
         """Type and initial bytes of a declaration in `pou`, or of a global one; None after a diagnostic."""
@@ -168,9 +172,7 @@ class Interfaces:
         """The address behind AT, checked against the type; None after a diagnostic."""
         node = declared.location
         assert node is not None
-        if node.text.rstrip().endswith("*"):
-            self.report.add("S0901", source, node, f"{node.text} is understood but not executed by this version",
-                            "write the whole address")
+        if is_open(node):
             return None
         try:
             address = parse_address(node.text, self.checker.areas)
@@ -209,12 +211,16 @@ class Interfaces:
     def _place(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"
         self._open(variable, declared, pou)
-        if isinstance(declared.spec, tree.RefSpec) and declared.spec.kind == "REFERENCE TO":
+        if isinstance(declared.spec, tree.RefSpec) and declared.spec.kind == "REFERENCE TO" and not variable.reference:
             self._bound(variable, declared, pou)
         variable.any_length = variable.reference and isinstance(declared.spec, tree.StringSpec) and declared.spec.length is None
-        if variable.kind == "VAR_TEMP" or pou.is_function:
+        if variable.kind == "VAR_STAT":
+            variable.place = "abs"  # one for all instances and calls
+        elif variable.kind == "VAR_TEMP" or pou.is_function:
             variable.place = "self" if pou.is_function else "frame"
-        if declared.location is not None:
+        if declared.location is not None and is_open(declared.location) and variable.kind == "VAR" and not pou.is_function:
+            self._completed(variable, declared.location, pou)
+        elif declared.location is not None:
             if variable.kind != "VAR" or pou.is_function:
                 self.report.add("S0604", pou.source, declared.location,
                                 f"{variable.kind} of a {pou.kind} has no location", "declare it in a VAR section")
@@ -223,6 +229,14 @@ class Interfaces:
             self._edge(variable, declared, pou)
         if fold(variable.name) == "EN" and variable.kind == "VAR_INPUT" and not variable.explicit:
             variable.initial = b"\x01"  # EN is TRUE where nobody connects it
+
+    def _completed(self, variable: Variable, location: tree.Location, pou: Pou) -> None:
+        """`AT %I*`: where VAR_CONFIG says, for each instance another place; without that it is a variable as others."""
+        variable.open = self.project.completes(variable.name)
+        variable.reference = variable.reference or variable.open
+        if not variable.open:
+            self.report.add("S0692", pou.source, location, f"no VAR_CONFIG says where {variable.name} AT {location.text} lies",
+                            "it keeps its value as a variable of its own; for a place in the area write the whole address")
 
     def _open(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         """ARRAY [*] and ANY are parameters that borrow bounds, size and type from what is passed."""
@@ -351,5 +365,5 @@ def _append(content: bytearray, variable: Variable) -> None:
 
 def _field(variable: Variable) -> Field:
     """The variable as a member of its block's type; a location is filled in when the layout is known."""
-    return Field(variable.name, variable.type, variable.offset, variable.kind, absolute=variable.place == "area",
+    return Field(variable.name, variable.type, variable.offset, variable.kind, absolute=variable.place in ("area", "abs"),
                  reference=variable.reference, constant=variable.constant, hexadecimal=variable.hexadecimal)

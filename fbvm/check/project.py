@@ -8,15 +8,15 @@ import difflib
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TypeVar
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import EnumType, RefType, Type, fold
-from fbvm.check.facts import Facts, Pou, Report, Variable
+from fbvm.check.facts import Facts, Pou, Report, Variable, list_name
 from fbvm.check.library import Libraries
 from fbvm.check.names import refuse_reserved
 from fbvm.syntax import tree
+from fbvm.syntax.pragmas import attributes
 
 
 @dataclass(eq=False)
@@ -52,6 +52,8 @@ class Project:
         """VAR_GLOBAL sections that still have to be declared."""
         self.lists: set[str] = set()
         """Folded names of the files that declare global variables outside of a CONFIGURATION."""
+        self.qualified_only: set[tree.VarSection] = set()
+        """Sections whose variables are named with their list in front only."""
         self.configurations: list[tuple[tree.Configuration, Source]] = []
         self.enum_members: dict[str, list[tuple[EnumType, int, str]]] = {}
         """By folded name: enumeration, value, and the library that declares it ("" for the user's own)."""
@@ -86,7 +88,9 @@ class Project:
                     self.types[key] = TypeEntry(declaration, source)
             elif isinstance(declaration, tree.GlobalVars):
                 self.sections.append((declaration.section, source))
-                self.lists.add(fold(Path(source.name).stem))
+                self.lists.add(list_name(source))
+                if "qualified_only" in attributes(text, declaration):
+                    self.qualified_only.add(declaration.section)
             elif isinstance(declaration, tree.ConfigVars):
                 self.settings.append((declaration, source))
             elif isinstance(declaration, tree.Configuration):
@@ -94,7 +98,6 @@ class Project:
                 self.settings += [(settings, source) for settings in declaration.settings]
                 self.settings += [(settings, source) for r in declaration.resources for settings in r.settings]
                 self.sections += [(s, source) for s in declaration.sections]
-                self.sections += [(s, source) for r in declaration.resources for s in r.sections]
 
     def _add_action(self, action: tree.Action, source: Source, owner: tree.Name | None, last: Pou | None) -> None:
         """An ACTION belongs to the POU that is named, else to the one in front of it."""
@@ -174,13 +177,19 @@ class Project:
     def listed(self, space: str, name: str, source: Source) -> Variable | None:
         """The global variable of that folded name in a list, or in any if a library is named."""
         variable = self.global_variable(f"{space}.{name}", source) or self.global_variable(name, source)
-        if variable is not None and space in self.lists and fold(Path(variable.source.name).stem) != space:
+        if variable is not None and space in self.lists and list_name(variable.source) != space:
             return None
         return variable
 
     def names_in(self, space: str) -> list[str]:
         """The global variables of a list."""
-        return [v.name for v in self.globals.values() if fold(Path(v.source.name).stem) == fold(space)]
+        return [v.name for v in self.globals.values() if list_name(v.source) == fold(space)]
+
+    def completes(self, name: str) -> bool:
+        """True if a VAR_CONFIG gives places to variables of that name."""
+        return any(isinstance(last, tree.Member) and fold(last.name.text) == fold(name) and row.location is not None
+                   for section, _ in self.settings if isinstance(section, tree.ConfigVars)
+                   for row in section.variables for last in (row.path,))
 
     def choices(self, name: str, candidates: Iterable[str]) -> str:
         """A hint that names the candidates most like a misspelt name, or the first ones if none is like it."""

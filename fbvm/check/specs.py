@@ -27,7 +27,7 @@ from fbvm.base.types import (
     string,
 )
 from fbvm.check.constants import default
-from fbvm.check.facts import Pou
+from fbvm.check.facts import Pou, is_open
 from fbvm.check.names import refuse_reserved
 from fbvm.check.project import Project, TypeEntry
 from fbvm.check.structures import RELATIVE, Members
@@ -315,10 +315,11 @@ class Specs:
             kind, initial = resolved
             if declared.initial is not None:
                 initial = self.values.initial(kind, declared.initial, source, initial)
+            place = declared.location if declared.location is not None and not is_open(declared.location) else None
             for member in declared.names:
                 if fold(member.text) in made.fields:
                     self.report.add("S0202", source, member, f"{member.text} stands twice in this structure")
-                elif wrong := made.add(member.text, kind, initial, declared.location, packed):
+                elif wrong := made.add(member.text, kind, initial, place, packed):
                     self.report.add("S0604", source, declared.location or member, wrong, RELATIVE)
         if not complete:
             return None

@@ -11,7 +11,7 @@ from fbvm.base.diagnostics import errors
 from fbvm.check.silence import Wanted
 from fbvm.cli import status
 from fbvm.cli.patience import patience
-from fbvm.cli.sources import report, source_arguments
+from fbvm.cli.sources import chosen, report, source_arguments
 from fbvm.code.compiler import compile_files
 
 
@@ -34,7 +34,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         raise click.BadParameter(str(error), param_hint="--no-warn") from None
     with patience(f"checking {', '.join(path.name for path in files)}"):
         compilation = compile_files(files, program=program, libraries=libraries, no_warn=codes,
-                                    warnings_as_errors=warnings_as_errors)
+                                    warnings_as_errors=warnings_as_errors, **chosen())
     if compilation.diagnostics or as_json:
         report(compilation.diagnostics, as_json)
     if errors(compilation.diagnostics):

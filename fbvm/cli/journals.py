@@ -14,7 +14,7 @@ import fbvm
 from fbvm.base.diagnostics import Source
 from fbvm.cli import status
 from fbvm.cli.banks import with_banks
-from fbvm.cli.sources import report
+from fbvm.cli.sources import chosen, report
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
 from fbvm.net.journal import Entry, Header, Journal, JournalError, open_journal
@@ -34,7 +34,7 @@ def start_journal(
         raise click.UsageError(f"{path} cannot be written: {error.strerror}") from None
     texts = [read(name, str(name)) for name in files]
     journal = Journal(file, {
-        "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program,
+        "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program, "chosen": chosen(),
         "libraries": [str(folder) for folder in libraries], "banks": list(banks),
         "options": dict(options),
         "sources": [[text.name, text.text] for text in texts if isinstance(text, Source)],
@@ -73,12 +73,13 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
         folders = list(libraries) or [Path(folder) for folder in about["libraries"]]
         banks = [str(name) for name in about.get("banks", ())]
         program = None if about["program"] is None else str(about["program"])
+        choice = {str(name): str(value) for name, value in about.get("chosen", {}).items()}
     except (KeyError, TypeError, ValueError):
         raise JournalError("it holds no program; one that Python wrote is done again from Python") from None
     for folder in folders:
         if not folder.is_dir():
             raise JournalError(f"the program needs the library folder {folder}; say where it is now with --library")
-    compilation = compile_sources(sources, program, folders, runnable=True, lint=False)
+    compilation = compile_sources(sources, program, folders, runnable=True, lint=False, resource=choice.get("resource"))
     if compilation.image is None:
         report(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)

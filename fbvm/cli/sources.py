@@ -18,7 +18,7 @@ from fbvm.code.image import Image
 
 
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
-    """FILE..., --program, --library and --no-cache, which all verbs on programs share."""
+    """FILE..., --program, --resource, --library and --no-cache, which all verbs on programs share."""
     files = click.argument("files", nargs=-1, required=True, metavar="FILE...",
                            type=click.Path(exists=True, dir_okay=False, path_type=Path))  # fmt: skip
     return source_options(files(function))
@@ -30,14 +30,26 @@ def _without_cache(context: click.Context, parameter: click.Parameter, wanted: b
         context.call_on_close(lambda: cache.switch(True))
 
 
+def _kept(context: click.Context, parameter: click.Parameter, value: str | None) -> None:
+    context.meta[f"fbvm.{parameter.name}"] = value
+
+
+def chosen() -> dict[str, Any]:
+    """What the options of the present command say about how to compile, as arguments of the compiler."""
+    meta = click.get_current_context().meta
+    return {name: meta[f"fbvm.{name}"] for name in ("resource",) if meta.get(f"fbvm.{name}") is not None}
+
+
 def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """--program, --library and --no-cache."""
+    """--program, --resource, --library and --no-cache."""
     for decorate in (
         click.option("--library", "libraries", multiple=True, metavar="DIR",
                      type=click.Path(exists=True, file_okay=False, path_type=Path),
                      help="A folder of libraries of your own, besides those that fbvm brings; may be repeated."),
         click.option("--no-cache", is_flag=True, expose_value=False, callback=_without_cache,
                      help="Compile anew, and keep nothing of it on disk."),
+        click.option("--resource", metavar="NAME", expose_value=False, callback=_kept,
+                     help="The RESOURCE that the PLC is, where a CONFIGURATION has several."),
         click.option("--program", metavar="NAME", help="The PROGRAM to run where no CONFIGURATION says it."),
     ):  # fmt: skip
         function = decorate(function)
@@ -50,7 +62,7 @@ def compiled(
     """The Image of the files.  Reports warnings; reports errors and ends with status 3 if there are any.
 
     With `runnable` it is an error, too, if nothing says which program to run."""
-    compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable, lint=False)
+    compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable, lint=False, **chosen())
     if compilation.image is None:
         report(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)

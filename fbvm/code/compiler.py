@@ -84,11 +84,12 @@ class Program:
 
 
 def compile_files(paths: Sequence[Path | str], program: str | None = None, libraries: Sequence[Path | str] = (),
-                  runnable: bool = False, *, lint: bool = True, no_warn: Iterable[str] = (),
+                  runnable: bool = False, *, resource: str | None = None, lint: bool = True, no_warn: Iterable[str] = (),
                   warnings_as_errors: bool = False, cache: bool = True) -> Compilation:
     """Compile source files, or with `cache` read what became of the same ones the last time.
 
-    `program` names the PROGRAM to run; `libraries` are folders asked before the shipped ones.
+    `program` names the PROGRAM to run, `resource` the RESOURCE of a CONFIGURATION that has several; `libraries` are folders
+    asked before the shipped ones.
 
     With `runnable` it is an error if there is not exactly one thing to run.  `lint` looks for what is allowed and hardly
     meant; `no_warn` are codes of warnings that are not wanted, or "all".  Never raises for what files contain; a file that
@@ -103,10 +104,10 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
             unreadable.append(source)
     silenced = sorted(no_warn)
     kept = None if unreadable or not cache else image_cache.name(
-        sources, [Path(folder) for folder in libraries], (program, runnable, lint, silenced, warnings_as_errors))
+        sources, [Path(folder) for folder in libraries], (program, runnable, resource, lint, silenced, warnings_as_errors))
     if kept and (known := image_cache.read(kept, sources)):
         return Compilation(*known)
-    made = compile_sources(sources, program, libraries, runnable, lint=lint, no_warn=silenced,
+    made = compile_sources(sources, program, libraries, runnable, resource=resource, lint=lint, no_warn=silenced,
                            warnings_as_errors=warnings_as_errors)
     if kept and made.image:
         image_cache.write(kept, sources, made.image, made.diagnostics)
@@ -114,14 +115,15 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
 
 
 def compile_text(text: str, name: str = "text.st", program: str | None = None, libraries: Sequence[Path | str] = (), *,
-                 lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False) -> Compilation:
+                 resource: str | None = None, lint: bool = True, no_warn: Iterable[str] = (),
+                 warnings_as_errors: bool = False) -> Compilation:
     """Compile one text; see `compile_files`."""
-    return compile_sources([Source(name, text)], program, libraries, lint=lint, no_warn=no_warn,
+    return compile_sources([Source(name, text)], program, libraries, resource=resource, lint=lint, no_warn=no_warn,
                            warnings_as_errors=warnings_as_errors)
 
 
 def compile_sources(sources: Sequence[Source], program: str | None = None, libraries: Sequence[Path | str] = (),
-                    runnable: bool = False, *, lint: bool = True, no_warn: Iterable[str] = (),
+                    runnable: bool = False, *, resource: str | None = None, lint: bool = True, no_warn: Iterable[str] = (),
                     warnings_as_errors: bool = False) -> Compilation:
     """Compile texts; see `compile_files`."""
     wanted, silence, report = Wanted.of(no_warn, warnings_as_errors), Silence(), Report()
@@ -135,7 +137,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
             project.collect(text, source)
         unread = len(report.diagnostics)
         checker = Checker(project, evaluate)
-        checker.check(program)
+        checker.check(program, resource)
         if runnable and not errors(report.diagnostics):
             _demand_program(checker, program, sources, report)
         if lint and not errors(report.diagnostics):

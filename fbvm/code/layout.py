@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
-from fbvm.base.areas import SLOTS_OFFSET
+from fbvm.base.areas import FLAG_AREAS, SLOTS_OFFSET, Address
+from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import ArrayType, Field, StructType, Type, fold
 from fbvm.check.checker import Checker
-from fbvm.check.facts import Pou, Variable, holds_block
+from fbvm.check.facts import Completed, Pou, Spot, Variable, holds_block
 from fbvm.code.image import Layout, Objects, Retained
 from fbvm.code.objects import Numbering
-from fbvm.code.operations import LEASE_BYTES
+from fbvm.code.operations import BUFFER_OBJECT, LEASE_BYTES, OBJECT_SHIFT, OFFSET_SHIFT
 
 _CHUNK = 64
 """Initial bytes are kept in runs of chunks that are not all zero."""
@@ -51,12 +52,61 @@ def place(checker: Checker) -> Placed:
     _place_located(located, placed)
     for pou in checker.bodies:
         _fill_in(pou)
+    for row in checker.settings.completed:
+        _complete(row, slots, placed)
     placed.objects = Objects(_numbered(checker, slots), leases, leases_at)
     placed.initial += _runs(slots)
     for variable in checker.global_order:
-        placed.symbols.setdefault(fold(variable.name), _symbol(variable))
+        placed.symbols.setdefault(fold(_path(variable)), _symbol(variable))
         placed.retained += _retained(variable, checker)
+    for access in checker.settings.accesses:
+        offset, bit = _where(access.spot, placed)
+        placed.symbols.setdefault(fold(access.name), Field(
+            access.name, access.spot.type, offset, "VAR_ACCESS", bit, absolute=True, constant=not access.writable))
     return placed
+
+
+def _where(spot: Spot, placed: Placed) -> tuple[int, int | None]:
+    """Where in the buffer, and on which bit, a path leads."""
+    if spot.root is None:
+        assert spot.address is not None
+        return _at(spot.address, placed)
+    offset, bit, kind = spot.root.offset, variable_bit(spot.root), spot.root.type
+    for step in spot.steps:
+        if isinstance(step, int):
+            assert isinstance(kind, ArrayType)
+            kind = kind.element
+            offset += step * kind.size
+            continue
+        assert isinstance(kind, StructType)
+        field = kind.fields[fold(step.name)]
+        offset, bit, kind = field.offset if field.absolute else offset + field.offset, field.bit, field.type
+    return offset, bit
+
+
+def _at(address: Address, placed: Placed) -> tuple[int, int | None]:
+    is_bit = address.bit is not None or address.area in FLAG_AREAS
+    return placed.layout.areas[address.area].offset + address.byte_offset(), address.bit_in_byte() if is_bit else None
+
+
+def _complete(row: Completed, slots: bytearray, placed: Placed) -> None:
+    """Put what VAR_CONFIG says into the initial bytes: a reference to the place, and the first value there."""
+    offset, bit = _where(row.spot, placed)
+    if row.address is not None:
+        there, bit = _at(row.address, placed)
+        reference = BUFFER_OBJECT << OBJECT_SHIFT | there << OFFSET_SHIFT | (WHOLE_BYTES if bit is None else bit)
+        slots[offset - SLOTS_OFFSET:offset - SLOTS_OFFSET + 8] = reference.to_bytes(8, "little")
+        offset = there
+    if row.initial is None:
+        return
+    if bit is not None:
+        value = 1 << bit if any(row.initial) else 0
+        others = sum(data[0] for at, data in placed.initial if at == offset and len(data) == 1)
+        placed.initial.append((offset, bytes(((others & ~(1 << bit)) | value,))))
+    elif SLOTS_OFFSET <= offset < SLOTS_OFFSET + len(slots):
+        slots[offset - SLOTS_OFFSET:offset - SLOTS_OFFSET + len(row.initial)] = row.initial
+    else:
+        placed.initial.append((offset, row.initial))
 
 
 def _numbered(checker: Checker, slots: bytearray) -> tuple[tuple[int, int], ...]:
@@ -102,9 +152,14 @@ def _fill_in(pou: Pou) -> None:
     if pou.type is None:
         return
     for variable in pou.order:
-        if variable.place == "area":
+        if variable.place in ("area", "abs"):
             made = pou.type.fields[fold(variable.name)]
             pou.type.fields[fold(variable.name)] = replace(made, offset=variable.offset, bit=variable_bit(variable))
+
+
+def _path(variable: Variable) -> str:
+    """The name under which a variable is found from outside; a VAR_STAT has that of its POU in front."""
+    return f"{variable.owner.name}.{variable.name}" if variable.owner is not None else variable.name
 
 
 def _symbol(variable: Variable) -> Field:
@@ -126,7 +181,7 @@ def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:
 
 def _retained(variable: Variable, checker: Checker) -> Iterator[Retained]:
     if variable.place == "abs":
-        yield from _retained_in(variable.type, variable.offset, variable.name, checker, variable.retain)
+        yield from _retained_in(variable.type, variable.offset, _path(variable), checker, variable.retain)
 
 
 def _retained_in(kind: Type, offset: int, path: str, checker: Checker, whole: bool) -> Iterator[Retained]:

@@ -72,7 +72,9 @@ class Declarations(Statements):
     def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None,
                  sections: list[Section], items: Items, actions: list[Action | Refused], end: Token) -> Pou:
         name, refused = head
-        refused += [_out_of_place(s) for s in (*sections, *actions) if not isinstance(s, VarSection | Action)]
+        accesses = [s for s in sections if isinstance(s, AccessVars) and word.type == "PROGRAM"]
+        refused += [_out_of_place(s) for s in (*sections, *actions)
+                    if s not in accesses and not isinstance(s, VarSection | Action)]
         blocks = [i for i in items if isinstance(i, RefusedStatement) and self.is_block(i)]
         refused += [Refused(b.start, b.end, b.what, b.code) for b in blocks]
         body = self.block([i for i in items if i not in blocks] if blocks else items)
@@ -81,7 +83,7 @@ class Declarations(Statements):
         if self.ladders:
             declared += self.ladder_sections(declared)
         return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused),
-                   tuple(a for a in actions if isinstance(a, Action)))
+                   tuple(a for a in actions if isinstance(a, Action)), tuple(accesses))
 
     def ladder_sections(self, sections: list[VarSection]) -> list[VarSection]:
         """What the LADDERs of a POU need: memory of their steps, and instances that the POU has not declared itself."""

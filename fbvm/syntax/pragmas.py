@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from fbvm.syntax.tree import Declaration, SourceText
+
 WORDS = {"region", "endregion", "warning", "info", "text", "elsif", "else", "end_if"}
 """First words of pragmas for the reader or for messages of a compiler that we are not, and of those that go on with an
 IF, which was warned of."""
@@ -34,3 +36,10 @@ def shown_in_hexadecimal(text: str, start: int) -> bool:
     """Whether `{attribute 'displaymode' := 'hex'}` stands before the name that begins at `start`, as CODESYS has it."""
     before = text[max(0, start - _REACH):start]
     return before.rstrip().endswith("}") and _HEXADECIMAL.search(before) is not None
+
+
+def attributes(text: SourceText, declaration: Declaration) -> set[str]:
+    """Names of the attributes that stand directly in front of a declaration."""
+    before = max((d.end for d in text.declarations if d.end <= declaration.start), default=0)
+    found = (_SHAPE.match(p.text) for p in text.pragmas if before <= p.start and p.end <= declaration.start)
+    return {match[1].lower() for match in found if match and match[1] is not None}

@@ -273,6 +273,7 @@ class Pou(Declaration):
     body: Block
     refused: tuple[Refused, ...] = ()
     actions: tuple[Action, ...] = ()
+    accesses: tuple[AccessVars, ...] = ()
 
 
 @_node

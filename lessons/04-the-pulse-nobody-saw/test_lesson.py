@@ -1,4 +1,5 @@
 import pytest
+
 from fbvm.testing.lesson import predicted
 
 

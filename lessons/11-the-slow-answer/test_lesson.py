@@ -1,4 +1,5 @@
 import pytest
+
 from fbvm import ModbusPeer, Peer
 from fbvm.net.faults import Fault
 from fbvm.testing import ns

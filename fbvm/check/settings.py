@@ -1,0 +1,197 @@
+"""VAR_CONFIG and VAR_ACCESS: paths from a configuration to variables of instances (IEC 61131-3 ed. 3, tables 16 and 62).
+
+    VAR_CONFIG  station.program.instance.variable AT %IX0.3 : BOOL;  END_VAR      the place of `AT %I*`, or a first value
+    VAR_ACCESS  name : station.program.variable : INT READ_WRITE;  END_VAR        another name, for those outside
+
+The name of the RESOURCE may stand in front.  A path leads to what lies in an instance: not to in-outs and VAR_TEMP.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from fbvm.base.areas import AddressError, parse_address
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, Field, StructType, Type, fold
+from fbvm.check.facts import AccessPath, Completed, Spot, Variable
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.checker import Checker
+
+_WIDTHS: dict[int, Type] = {1: BOOL, 8: BYTE, 32: DWORD, 64: LWORD}
+_UNREACHED = ("VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL")
+
+
+class Settings:
+    """What the VAR_CONFIG and VAR_ACCESS sections of a project say, once its programs have their instances."""
+
+    def __init__(self, checker: Checker, resource: str) -> None:
+        self.checker = checker
+        self.report = checker.report
+        self.resource = fold(resource)
+        """Folded name of the RESOURCE, "" if it has none."""
+        self.completed: list[Completed] = []
+        self.accesses: list[AccessPath] = []
+
+    def resolve(self) -> None:
+        """Work out all sections; complain about what VAR_CONFIG leaves out."""
+        for section, source in self.checker.project.settings:
+            for row in section.variables:
+                if isinstance(row, tree.ConfigVar):
+                    self._config(row, source)
+                else:
+                    self._access(row, source)
+        for root in self.checker.global_order:
+            if root.kind == "PROGRAM" and isinstance(root.type, StructType):
+                pou = self.checker.block_of(root.type)
+                for row in (row for section in pou.tree.accesses for row in section.variables):
+                    self._access(row, pou.source, Spot(root, (), root.type))
+        self._left_out()
+
+    def _config(self, row: tree.ConfigVar, source: Source) -> None:
+        spot = self._spot(row.path, source)
+        resolved = self.checker.specs.resolve(row.spec, source)
+        if spot is None or resolved is None or not self._fits(row.path, spot, resolved[0], source):
+            return
+        declared = spot.steps[-1] if spot.steps and isinstance(spot.steps[-1], Field) else None
+        if declared is not None and declared.constant:
+            self.report.add("S0501", source, row.path, f"{declared.name} is CONSTANT and takes no other value")
+            return
+        address = None
+        if row.location is not None:
+            if declared is None or not declared.reference:
+                self.report.add("S0604", source, row.location, "only a variable AT %I*, %Q* or %M* takes a place from VAR_CONFIG",
+                                "declare it  AT %I*")
+                return
+            shown = tree.VarDecl(row.start, row.end, (), row.location, row.spec, None)
+            address = self.checker.interfaces.location(shown, spot.type, source)
+            if address is None:
+                return
+        initial = self.checker.values.initial(spot.type, row.initial, source, resolved[1]) if row.initial is not None else None
+        self.completed.append(Completed(spot, address, initial))
+
+    def _access(self, row: tree.Access, source: Source, program: Spot | None = None) -> None:
+        spot = self._spot(row.path, source, program)
+        resolved = self.checker.specs.resolve(row.spec, source)
+        if spot is None or resolved is None or not self._fits(row.path, spot, resolved[0], source):
+            return
+        constant = spot.steps and isinstance(spot.steps[-1], Field) and spot.steps[-1].constant
+        if row.writable and (constant or spot.root is not None and spot.root.constant):
+            self.report.add("S0501", source, row.path, f"{row.name.text} leads to a CONSTANT, which nobody writes")
+            return
+        self.accesses.append(AccessPath(row.name.text, spot, row.writable))
+
+    def _fits(self, node: tree.Node, spot: Spot, kind: Type, source: Source) -> bool:
+        if kind == spot.type:
+            return True
+        self.report.add("S0301", source, node, f"this is {spot.type}, and {kind} is written behind it")
+        return False
+
+    # --- paths ------------------------------------------------------------------------------------------------------
+
+    def _spot(self, path: tree.Expr, source: Source, program: Spot | None = None) -> Spot | None:
+        """What a path names, seen from a program or from the configuration, or None after a diagnostic."""
+        if isinstance(path, tree.Direct):
+            return self._direct(path.text, path, source)
+        if isinstance(path, tree.NameRef) and program is not None:
+            name = tree.Name(path.start, path.end, path.text)
+            return self._member(program, tree.Member(path.start, path.end, path, name), source)
+        if isinstance(path, tree.NameRef):
+            return self._root(path.text, path, source)
+        if isinstance(path, tree.Member):
+            if program is None and isinstance(path.of, tree.NameRef) and fold(path.of.text) == self.resource:
+                name = path.name
+                return self._direct(name.text, name, source) if name.text[0] == "%" else self._root(name.text, name, source)
+            of = self._spot(path.of, source, program)
+            return self._member(of, path, source) if of is not None else None
+        if isinstance(path, tree.Index):
+            of = self._spot(path.of, source, program)
+            return self._element(of, path, source) if of is not None else None
+        self.report.add("S0801", source, path, "a path is made of names, points and subscripts")
+        return None
+
+    def _root(self, name: str, node: tree.Node, source: Source) -> Spot | None:
+        variable = self.checker.project.globals.get(("", fold(name)))
+        if variable is not None:
+            return Spot(variable, (), variable.type)
+        known = [v.name for v in self.checker.project.globals.values()]
+        self.report.add("S0801", source, node, f"there is no program, global variable or resource {name} here",
+                        self.checker.project.nearest(name, [*known, self.resource]))
+        return None
+
+    def _direct(self, text: str, node: tree.Node, source: Source) -> Spot | None:
+        try:
+            address = parse_address(text, self.checker.areas)
+        except AddressError as error:
+            self.report.add("S0601", source, node, str(error))
+            return None
+        self.checker.use_area(address.area)
+        kind = BOOL if address.bit is not None else _WIDTHS.get(address.size_bits, WORD)
+        return Spot(None, (), kind, address)
+
+    def _member(self, of: Spot, path: tree.Member, source: Source) -> Spot | None:
+        kind = of.type
+        field = kind.member(path.name.text) if isinstance(kind, StructType) else None
+        reached = field is not None and field.kind not in _UNREACHED and \
+            not (field.reference and not self._is_open(kind, field))
+        if field is None or not reached:
+            known = [f.name for f in kind.fields.values()] if isinstance(kind, StructType) else []
+            self.report.add("S0210", source, path.name, f"{kind} has no {path.name.text} that a path can reach",
+                            self.checker.project.choices(path.name.text, known))
+            return None
+        return Spot(of.root, (*of.steps, field), field.type)
+
+    def _is_open(self, kind: Type, field: Field) -> bool:
+        assert isinstance(kind, StructType)
+        return kind.block and self.checker.block_of(kind).variables[fold(field.name)].open
+
+    def _element(self, of: Spot, path: tree.Index, source: Source) -> Spot | None:
+        kind = of.type
+        numbers = [self.checker.values.integer(subscript, source) for subscript in path.subscripts]
+        if not isinstance(kind, ArrayType) or len(numbers) != len(kind.bounds):
+            self.report.add("S0304", source, path, f"this is {kind}, which has no such element")
+            return None
+        at = 0
+        for number, (low, high) in zip(numbers, kind.bounds, strict=True):
+            if number is None:
+                return None
+            if not low <= number <= high:
+                self.report.add("S0702", source, path, f"subscript {number} is outside {low}..{high} of {kind}")
+                return None
+            at = at * (high - low + 1) + number - low
+        return Spot(of.root, (*of.steps, at), kind.element)
+
+    # --- what is left out -------------------------------------------------------------------------------------------
+
+    def _left_out(self) -> None:
+        """Each instance needs a place for each of its variables that some VAR_CONFIG completes."""
+        done = {(row.spot.root, _key(row.spot)) for row in self.completed if row.address is not None}
+        for root in self.checker.global_order:
+            for path, key, variable in self._open_in(root.type, root.name, ()):
+                if (root, key) not in done:
+                    self.report.add("S0801", variable.source, variable.node, f"no VAR_CONFIG says where {path} lies",
+                                    f"write  {path} AT %IX0.0 : {variable.type};  or the whole address here")
+
+    def _open_in(self, kind: Type, path: str, key: tuple[object, ...]) -> Iterator[tuple[str, tuple[object, ...], Variable]]:
+        if isinstance(kind, ArrayType) and isinstance(kind.element, ArrayType | StructType):
+            for index in range(kind.count if self._has_open(kind.element) else 0):
+                yield from self._open_in(kind.element, f"{path}[{kind.bounds[0][0] + index}]", (*key, index))
+        elif isinstance(kind, StructType) and not kind.block:
+            for field in kind.fields.values():
+                yield from self._open_in(field.type, f"{path}.{field.name}", (*key, fold(field.name)))
+        elif isinstance(kind, StructType):
+            for variable in self.checker.block_of(kind).order:
+                inner, step = f"{path}.{variable.name}", (*key, fold(variable.name))
+                if variable.open:
+                    yield inner, step, variable
+                elif variable.place == "self" and not variable.reference:
+                    yield from self._open_in(variable.type, inner, step)
+
+    def _has_open(self, kind: Type) -> bool:
+        return next(self._open_in(kind, "", ()), None) is not None
+
+
+def _key(spot: Spot) -> tuple[object, ...]:
+    return tuple(fold(step.name) if isinstance(step, Field) else step for step in spot.steps)
