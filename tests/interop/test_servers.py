@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import random
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import time
@@ -232,3 +234,74 @@ def test_twenty_thousand_random_frames(kind: str, tmp_path: Path) -> None:
     quarter = len(sizes) // 4
     assert sizes[-1][0] - sizes[quarter][0] < 4096, "KiB"
     assert max(handles for _, handles in sizes) < 40
+
+
+ASK = ask("")
+TRASH = [
+    b"", b"\0", ASK[:6], ASK[:7], ASK[:11], b"\0\1\0\0\0\0", b"\0\1\0\0\0\1\xff", b"\0\1\0\0\0\xff" + bytes(300),
+    b"GET / HTTP/1.1\r\nHost: x\r\n\r\n", b"\xff" * 5000, bytes(5000), ASK * 500, b"\0\1\0\7\0\6\1\6\0\0\x55\x55",
+    b"\0\1\0\0\0\6\1\6\0\0\x55", Adu(1, 1, b"\x10\0\0\0\1\3\x55\x55").to_bytes(), b"\x16\3\1\0\xa5\1\0\0",
+    b"".join(Adu(code, 1, bytes((code,))).to_bytes() for code in range(256)),
+    Adu(1, 1, b"\x10\0\0\0\x7c\xf6" + 246 * b"\x55").to_bytes(), Adu(1, 1, b"\6\xff\xff\x55\x55").to_bytes(),
+]  # fmt: skip
+
+
+def reset(sock: socket.socket) -> None:
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    sock.close()
+
+
+@every_kind
+def test_rude_clients_change_nothing(kind: str, tmp_path: Path) -> None:
+    """Each leaves in its own way; some are silent for longer than a server waits."""
+    with serving(kind, tmp_path) as server:
+        for data in TRASH:
+            for leave in (socket.socket.close, reset):
+                sock = connected(kind, server.port)
+                with contextlib.suppress(OSError):
+                    sock.sendall(data)
+                leave(sock)
+        if kind != "mb_tcp_server":  # whose sheet knows no time limit
+            silent = connected(kind, server.port)
+            silent.sendall(ASK[:5])
+            settled(kind, server.port)
+            silent.close()
+        settled(kind, server.port)
+        values = server.end()
+    assert all(value in (0, False, 10 * [0], 9 * [0]) for value in values.values()), values
+
+
+@every_kind
+def test_pipelines_single_bytes_and_half_closed_clients(kind: str, tmp_path: Path) -> None:
+    reply = Adu(1, 1, b"\3\2\0\0").to_bytes()
+    with serving(kind, tmp_path) as server, connected(kind, server.port) as sock:
+        sock.sendall(300 * ASK)
+        assert heard(sock, 300 * len(reply)) == 300 * reply
+        for byte in ASK:
+            sock.sendall(bytes((byte,)))
+        assert heard(sock, len(reply)) == reply
+        sock.sendall(40 * ASK)
+        sock.shutdown(socket.SHUT_WR)
+        assert heard(sock, 40 * len(reply)) == 40 * reply
+
+
+@every_kind
+def test_a_crowd(kind: str, tmp_path: Path) -> None:
+    """Two hundred connections at once, then a thousand in turn: the one that is served goes on, and no handle is kept."""
+    with serving(kind, tmp_path) as server:
+        first = connected(kind, server.port)
+        crowd = []
+        for _ in range(200):
+            sock = socket.socket()
+            sock.setblocking(False)
+            sock.connect_ex(("127.0.0.1", server.port))
+            crowd.append(sock)
+        first.sendall(ASK)
+        assert len(heard(first, 11)) == 11
+        for sock in (*crowd, first):
+            sock.close()
+        for _ in range(1000):
+            with socket.socket() as sock:
+                sock.connect_ex(("127.0.0.1", server.port))
+        settled(kind, server.port)
+        assert server.size()[1] < 40
