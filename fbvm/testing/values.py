@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fbvm.base.types import StringType, StructType, base
+from fbvm.base.types import StructType, base
 from fbvm.plc import Plc
 from fbvm.watch.paths import Place, Span, UnknownPlace
-from fbvm.watch.values import Value, parse_value
+from fbvm.watch.values import Value, parse_value, sort_of
 
 Told = Callable[[Place], None]
 """Who is told that a variable was read."""
@@ -18,7 +18,7 @@ def write(plc: Plc, place: Place | Span, value: object) -> None:
     """Writes a value; text is read as the program would write it (`"50ms"`, `"16#FF"`).
 
     Raises ValueError (out of range) or TypeError (a value of another kind)."""
-    if isinstance(place, Place) and isinstance(value, str) and not isinstance(base(place.type), StringType):
+    if isinstance(place, Place) and isinstance(value, str) and sort_of(place.type) != "text":
         value = parse_value(place.type, value, place.name)
     plc.write(place, value)
 

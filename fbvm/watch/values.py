@@ -100,7 +100,8 @@ _EXAMPLES = {
 def refusal(kind: Type, name: str, text: str) -> TypeError:
     """That `name` does not take `text`, and what it takes."""
     number = "a number" if "ANY_REAL" in families(kind) else "a whole number"
-    return TypeError(f"{name} is {kind.name} and takes {_EXAMPLES.get(sort_of(kind), number)}, not {text}")
+    example = "one character" if "ANY_CHAR" in families(kind) else _EXAMPLES.get(sort_of(kind), number)
+    return TypeError(f"{name} is {kind.name} and takes {example}, not {text}")
 
 
 def nearest_real(value: float) -> float:

@@ -14,6 +14,7 @@ from fbvm.watch.values import conform, in_hexadecimal, literal, nearest_real, pa
 
 COLOUR = EnumType("Colour", 2, 2, t.INT, {"RED": 0, "GREEN": 5}, {0: "Red", 5: "Green"})
 LEVEL = SubrangeType("Level", 2, 2, t.INT, 0, 100)
+CHAR, WCHAR, WIDE = t.ELEMENTARY["CHAR"], t.ELEMENTARY["WCHAR"], t.string(3, wide=True)
 PAIR = StructType("Pair", 16, 8, {"N": Field("n", t.INT, 0), "S": Field("s", t.string(5), 2)})
 
 
@@ -58,6 +59,8 @@ def test_literals(text: str, value: object) -> None:
     (t.TOD, "TOD#00:00:01", 1_000_000_000), (t.REAL, "0.1", nearest_real(0.1)), (t.string(), "'a$27b'", "a'b"),
     (t.array(((1, 3),), t.INT), "1,2,3", [1, 2, 3]), (t.array(((1, 3),), t.INT), "[1, -2, 16#F]", [1, -2, 15]),
     (t.array(((1, 2),), t.string()), "'a,b', c", ["a,b", "c"]), (COLOUR, "5", 5), (LEVEL, "100", 100),
+    (CHAR, "a", "a"), (CHAR, "'", "'"), (CHAR, "'$0A'", "\n"), (CHAR, "CHAR#'x'", "x"), (WCHAR, '"$20AC"', "\u20ac"),
+    (WCHAR, "\u20ac", "\u20ac"), (WIDE, '"a$00e9"', "a\u00e9"), (WIDE, "\u20ac1", "\u20ac1"), (WIDE, "WSTRING#'ab'", "ab"),
 ])  # fmt: skip
 def test_text_becomes_a_value_of_the_type(kind: Type, text: str, value: object) -> None:
     assert parse_value(kind, text, "x") == value
@@ -72,6 +75,10 @@ def test_text_becomes_a_value_of_the_type(kind: Type, text: str, value: object) 
     (t.string(3), "four", "x: 4 characters are out of range of STRING[3]"),
     (t.string(3), "\u20ac", "cannot hold the character"),
     (t.string(3), "a\0", "cannot hold the character"),
+    (WIDE, "four", "x: 4 characters are out of range of WSTRING[3]"),
+    (WIDE, "\U0001f600\U0001f600", "x: 4 characters are out of range of WSTRING[3]"),
+    (CHAR, "\u20ac", "x: CHAR cannot hold the character"), (WCHAR, "\U0001f600", "WCHAR cannot hold the character"),
+    (CHAR, "ab", "x is CHAR and takes one character, not 2"), (WCHAR, "", "x is WCHAR and takes one character, not 0"),
     (COLOUR, 1, "1 is no member of Colour; it has Red (0), Green (5)"),
     (COLOUR, "Blue", "Colour has no member Blue"),
 ])
@@ -83,7 +90,7 @@ def test_a_value_out_of_range_is_refused(kind: Type, value: object, message: str
 
 @pytest.mark.parametrize(("kind", "value"), [
     (t.INT, 1.0), (t.INT, True), (t.BOOL, 2), (t.BOOL, "TRUE"), (t.REAL, "1"), (t.REAL, True), (t.string(), 5),
-    (PAIR, 5), (t.array(((0, 1),), t.INT), [1, 2]),
+    (CHAR, 65), (WCHAR, 65), (WIDE, 5), (PAIR, 5), (t.array(((0, 1),), t.INT), [1, 2]),
 ])  # fmt: skip
 def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
     with pytest.raises(TypeError, match="x is "):
@@ -114,7 +121,8 @@ def test_text_of_another_kind_is_refused(kind: Type, text: str, message: str) ->
     (t.BOOL, True, "TRUE"), (t.INT, -5, "-5"), (t.WORD, 255, "255"), (t.TIME, 1_500_000_000, "T#1s500ms"),
     (t.string(), "a", "'a'"), (COLOUR, 5, "Green (5)"), (COLOUR, 3, "? (3)"), (t.REAL, math.inf, "inf"),
     (t.array(((0, 1),), t.BOOL), [True, False], "[TRUE, FALSE]"), (PAIR, {"n": 1, "s": "x"}, "(n := 1, s := 'x')"),
-    (t.NULL, None, "NULL"),
+    (t.NULL, None, "NULL"), (t.string(), "it's $5\n\x01", "'it$'s $$5$L$01'"), (CHAR, "a", "'a'"), (CHAR, "\0", "'$00'"),
+    (WCHAR, "\u20ac", '"\u20ac"'), (WIDE, 'a"\x07', '"a$"$0007"'),
 ])  # fmt: skip
 def test_values_are_shown(kind: Type, value: object, text: str) -> None:
     assert show(kind, value) == text  # type: ignore[arg-type]
@@ -134,7 +142,8 @@ def memory() -> Memory:
 
 @pytest.mark.parametrize(("kind", "value"), [
     (t.BOOL, True), (t.LINT, -(1 << 63)), (t.ULINT, (1 << 64) - 1), (t.REAL, 1.5), (t.TIME, -1), (t.string(5), "h\xe9"),
-    (t.string(5, True), "h\u20ac"), (COLOUR, 5), (t.array(((1, 2), (0, 1)), t.INT), [1, -2, 3, 4]),
+    (t.string(5, True), "h\u20ac"), (t.string(2, True), "\U0001f600"),
+    (CHAR, "\xff"), (WCHAR, "\u20ac"), (CHAR, "\0"), (COLOUR, 5), (t.array(((1, 2), (0, 1)), t.INT), [1, -2, 3, 4]),
     (t.array(((0, 1),), PAIR), [{"n": 1, "s": "a"}, {"n": 2, "s": ""}]),
 ])  # fmt: skip
 def test_what_was_written_is_read(memory: Memory, kind: Type, value: object) -> None:
