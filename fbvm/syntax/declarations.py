@@ -80,22 +80,24 @@ class Declarations(Statements):
         body = self.block([i for i in items if i not in blocks] if blocks else items)
         self.refuse_selves()
         declared = [s for s in sections if isinstance(s, VarSection)]
+        own = [a for a in actions if isinstance(a, Action)]
         if self.ladders:
+            own += [subroutine for ladder in self.ladders for subroutine in ladder.subroutines]
             declared += self.ladder_sections(declared)
-        return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused),
-                   tuple(a for a in actions if isinstance(a, Action)), tuple(accesses))
+        return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused), tuple(own),
+                   tuple(accesses))
 
     def ladder_sections(self, sections: list[VarSection]) -> list[VarSection]:
         """What the LADDERs of a POU need: memory of their steps, and instances that the POU has not declared itself."""
         from fbvm.syntax.rung_blocks import undeclared
 
-        made: list[VarSection] = []
-        for ladder in self.ladders:
-            kept = (*ladder.variables, *undeclared(ladder.instances, sections, self.report))
-            made += [VarSection(ladder.start, ladder.end, kind, (), variables, True)
-                     for kind, variables in (("VAR", kept), ("VAR_TEMP", ladder.temporaries)) if variables]
+        first, last = self.ladders[0], self.ladders[-1]
+        instances = undeclared([i for ladder in self.ladders for i in ladder.instances], sections, self.report)
+        kept = {v.names[0].text: v for ladder in self.ladders for v in ladder.variables}
+        temporaries = {v.names[0].text: v for ladder in self.ladders for v in ladder.temporaries}
         self.ladders.clear()
-        return made
+        return [VarSection(first.start, last.end, kind, (), tuple(variables), True)
+                for kind, variables in (("VAR", [*kept.values(), *instances]), ("VAR_TEMP", temporaries.values())) if variables]
 
     def action(self, word: Token, owner: Token | None, dot: Token | None, token: Token, colon: Token | None, items: Items,
                end: Token) -> Action:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fbvm.syntax.node import Node
 from fbvm.syntax.node import node as _node
-from fbvm.syntax.tree import Block, Expr, NameRef, Statement, VarDecl
+from fbvm.syntax.tree import Action, Block, Expr, NameRef, Statement, VarDecl
 
 
 @_node
@@ -62,3 +62,5 @@ class Ladder(Statement):
     temporaries: tuple[VarDecl, ...]
     instances: tuple[VarDecl, ...]
     """Instances that FBCALL names."""
+    subroutines: tuple[Action, ...]
+    """What stands between SBN and RET."""

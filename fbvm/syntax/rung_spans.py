@@ -12,13 +12,14 @@ from typing import TYPE_CHECKING
 from fbvm.syntax import tree
 from fbvm.syntax.ladder import Rung
 from fbvm.syntax.mnemonics import RungText
-from fbvm.syntax.tree import Block, Continue, Exit, Expr, For, NameRef, Repeat, Return, Statement
+from fbvm.syntax.tree import Action, Block, Continue, Exit, Expr, For, NameRef, Repeat, Return, Statement
 
 if TYPE_CHECKING:
     from fbvm.syntax.rungs import Rungs
 
 INTERLOCK = "$IL"
-JUMP_NUMBERS = 1024
+NUMBERS = 1024
+"""Of jumps, and of subroutines."""
 DEEPEST_LOOPS = 15
 WITHOUT_NUMBER = "0 without number"
 """The number of JMP0 and JME0."""
@@ -47,7 +48,9 @@ class Spans:
         """Jumps that may be passing over the rung at work, by number."""
         self._landings: dict[str, list[int]] = {}
         self._takeoffs: dict[str, list[int]] = {}
-        self._at = 0
+        self._visited: dict[str, tuple[int, int]] = {}
+        self._begun: set[str] = set()
+        self.subroutines: list[Action] = []
         self._opening: Frame | None = None
         self._closing: str = ""
 
@@ -88,6 +91,8 @@ class Spans:
         self.frames[-1].statements.append(rung)
         if self._closing == "JMP":
             self._close_again()
+        elif self._closing == "RET":
+            self._close_subroutine()
         if self._opening is not None:
             self._opening.rung = rung
             self.frames.append(self._opening)
@@ -97,9 +102,45 @@ class Spans:
         """All rungs; loops that are still open have a diagnostic."""
         for frame in self.frames[1:]:
             assert frame.rung is not None
-            self.rungs.report("S0110", frame.rung.start, frame.rung.end, "FOR without NEXT" if frame.what == "FOR" else
-                              "the jump back to this JME leads into a loop", "FOR and NEXT stand in pairs, and jumps stay inside")
+            message, hint = _OPEN.get(frame.what[:3], ("the jump back to this JME leads into a loop", "jumps stay inside"))
+            self.rungs.report("S0110", frame.rung.start, frame.rung.end, message, hint)
+        for number, (start, end) in self._visited.items():
+            if number not in self._begun:
+                self.rungs.report("S0110", start, end, f"there is no SBN {number}",
+                                  "a subroutine stands between SBN and RET, before END")
         return tuple(self.frames[0].statements)
+
+    # --- subroutines ------------------------------------------------------------------------------------------------
+
+    def visit(self) -> None:
+        """SBS: the subroutine is executed when the condition is ON."""
+        rungs = self.rungs
+        number = self._number(rungs.line.step.operands[0], "subroutine")
+        self._visited.setdefault(number, (rungs.start, rungs.end))
+        call = tree.Call(rungs.start, rungs.end, NameRef(rungs.start, rungs.end, f"$SBN{number}"), ())
+        rungs.emit(rungs.when(rungs.variation(rungs.power()), tree.CallStatement(rungs.start, rungs.end, call)))
+
+    def subroutine(self) -> None:
+        """SBN: what follows, up to RET, is executed by SBS only."""
+        number = self._number(self.rungs.line.step.operands[0], "subroutine")
+        if len(self.frames) > 1 or self.jumps or self.interlocked:
+            raise self._refused("SBN stands inside of a loop, a jump, an interlock or another subroutine",
+                                "subroutines stand by themselves, before END")
+        if number in self._begun:
+            raise self._refused(f"there is another SBN {number}", "")
+        self._begun.add(number)
+        self._opening = Frame(f"SBN{number}")
+
+    def go_back(self) -> None:
+        """RET ends a subroutine."""
+        if not self.frames[-1].what.startswith("SBN"):
+            raise self._refused("RET without SBN", "")
+        self._closing = "RET"
+
+    def _close_subroutine(self) -> None:
+        frame, rungs = self.frames.pop(), self.rungs
+        name = tree.Name(rungs.start, rungs.end, f"${frame.what}")
+        self.subroutines.append(Action(rungs.start, rungs.end, None, name, tuple(frame.statements)))
 
     # --- the end ----------------------------------------------------------------------------------------------------
 
@@ -176,11 +217,12 @@ class Spans:
 
     def _jump_number(self) -> str:
         operands = self.rungs.line.step.operands
-        if not operands:
-            return WITHOUT_NUMBER
-        number = _number(operands[0])
-        if not number.isdigit() or int(number) >= JUMP_NUMBERS:
-            raise self._refused(f"{operands[0]} is no number of a jump", f"numbers are 0 to {JUMP_NUMBERS - 1}")
+        return self._number(operands[0], "jump") if operands else WITHOUT_NUMBER
+
+    def _number(self, operand: str, what: str) -> str:
+        number = _number(operand)
+        if not number.isdigit() or int(number) >= NUMBERS:
+            raise self._refused(f"{operand} is no number of a {what}", f"numbers are 0 to {NUMBERS - 1}")
         return number
 
     def _close_again(self) -> None:
@@ -228,6 +270,11 @@ class Spans:
         from fbvm.syntax.rungs import Refused
 
         return Refused(message, hint)
+
+
+_OPEN = {"FOR": ("FOR without NEXT", "FOR and NEXT stand in pairs"),
+         "SBN": ("SBN without RET", "RET ends a subroutine")}
+"""What is wrong with a frame that nothing has closed."""
 
 
 def _number(operand: str) -> str:

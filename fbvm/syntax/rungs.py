@@ -44,6 +44,7 @@ class Rungs:
         self.used: set[str] = set()
         """Conditions of this rung that an output has used, by the names under which they are kept."""
         self.rung = 0
+        """Which rung of the POU it is, whatever number was written."""
         self.step = 0
         self.line: Line
         self.instances: list[tree.VarDecl] = []
@@ -54,17 +55,19 @@ class Rungs:
         """The LADDER of these rungs."""
         self.spans.look(texts)
         rungs = []
+        before = sum(len(ladder.rungs) for ladder in self.builder.ladders)
         for position, text in enumerate(texts, 1):
+            self.rung = before + position
             rung = self._rung(text, text.number or position)
             rungs.append(rung)
             self.spans.place(rung)
         body = self.spans.close(end)
         located = tuple(self.operands.located.values())
         return Ladder(start, end, tuple(rungs), body, (*located, *self.variables.values()),
-                      tuple(self.temporaries.values()), tuple(self.instances))
+                      tuple(self.temporaries.values()), tuple(self.instances), tuple(self.spans.subroutines))
 
     def _rung(self, text: RungText, number: int) -> Rung:
-        self.rung, self.out, self.condition, self.saved, self.used = number, [], None, [], set()
+        self.out, self.condition, self.saved, self.used = [], None, [], set()
         for step, line in enumerate(text.lines):
             self.line, self.step = line, step
             try:
@@ -316,7 +319,8 @@ _NATIVE: dict[str, Callable[[Rungs], None]] = {
     ".interlock": lambda rungs: rungs.spans.interlock(), ".interlock_clear": lambda rungs: rungs.spans.clear(),
     ".jump": lambda rungs: rungs.spans.jump(), ".jump_end": lambda rungs: rungs.spans.land(),
     ".for": lambda rungs: rungs.spans.loop(), ".next": lambda rungs: rungs.spans.next(),
-    ".break": lambda rungs: rungs.spans.leave(),
+    ".break": lambda rungs: rungs.spans.leave(), ".call_subroutine": lambda rungs: rungs.spans.visit(),
+    ".subroutine": lambda rungs: rungs.spans.subroutine(), ".return": lambda rungs: rungs.spans.go_back(),
 }
 
 
