@@ -28,7 +28,7 @@ def command(path: Path, names: tuple[str, ...], scans: range | None, every: bool
         if trace.depth is Depth.SCANS:
             raise click.UsageError(f"{path} holds values at scan ends only; write it with --depth statements")
         signals = [signal for text in names for name in split_names(text)
-                   for signal in signals_at(trace.find(name), trace.described)]  # fmt: skip
+                   for signal in signals_at(trace.find(name), trace.described, trace.meanings)]  # fmt: skip
         table = ScanTable(trace.sites, trace.names, signals, every)
         trace.follow(table, scans)
     bands = [band for band in table.bands if every or band.moved]

@@ -125,7 +125,7 @@ def _row(track: Track, scans: range, piece: Sequence[int | None]) -> tuple[str, 
     if signal.is_bit:
         cells = "".join(GAP if scan is None else "#" if values[scan - scans.start] else "." for scan in piece)
     else:
-        texts = [None if scan is None else signal.text(values[scan - scans.start]) for scan in piece]
+        texts = [None if scan is None else signal.said(values[scan - scans.start]) for scan in piece]
         cells, complete = _numbers(texts)
         if not complete:
             note = f"{_sequence(track, piece)}   {note}".rstrip()
@@ -159,7 +159,7 @@ def _sequence(track: Track, piece: Sequence[int | None]) -> str:
     for at, (scan, value) in enumerate(track.changes):
         end = track.changes[at + 1][0] if at + 1 < len(track.changes) else drawn[-1] + 1
         if scan <= drawn[-1] and end > drawn[0]:
-            texts.append(track.signal.text(value))
+            texts.append(track.signal.said(value))
     more = f", ... ({len(texts)} values)" if len(texts) > 12 else ""
     return "= " + ", ".join(texts[:12]) + more
 

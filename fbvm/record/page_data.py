@@ -110,7 +110,7 @@ class Collector:
     def _text(self, number: int, moment: Moment) -> str:
         signal = self.signals[number]
         value = moment.read(signal.place)
-        return str(int(value is True)) if signal.is_bit else signal.text(value)
+        return str(int(value is True)) if signal.is_bit else signal.said(value)
 
     def _touched(self, now: Snapshot) -> set[int]:
         """The signals in bytes that differ from the phase before."""
@@ -169,7 +169,8 @@ def page_data(trace: Trace, names: Sequence[str] = (), scans: range | None = Non
     shown first."""
     signals = chosen_signals(trace, names) if names else _in_order(trace)
     known = {signal.place.name for signal in signals}
-    signals += [signal for name in pinned if name not in known for signal in signals_at(trace.find(name), trace.described)]
+    signals += [signal for name in pinned if name not in known
+                for signal in signals_at(trace.find(name), trace.described, trace.meanings)]  # fmt: skip
     made = Collector(trace, signals)
     trace.follow(made, scans)
     every = bool(names) or len(made.signals) <= FEW_SIGNALS

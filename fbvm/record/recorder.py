@@ -24,6 +24,8 @@ class Signal:
     place: Place
     label: str
     description: str = ""
+    meanings: tuple[tuple[int, str], ...] = ()
+    """What some values mean, such as the states of a socket."""
 
     @property
     def is_bit(self) -> bool:
@@ -38,6 +40,10 @@ class Signal:
         if isinstance(kind, EnumType) and isinstance(value, int):
             return kind.shown.get(value, str(value))
         return show(self.place.type, value).removeprefix("T#")
+
+    def said(self, value: Value) -> str:
+        """The same, or what the value means if somebody knows it; for people only."""
+        return next((text for known, text in self.meanings if known == value), None) or self.text(value)
 
 
 @dataclass
@@ -113,15 +119,17 @@ def signals_of(plc: Plc, given: str | tuple[str, str] | Signal) -> list[Signal]:
     return [signal(place, description or described(plc, place)) for place in places]
 
 
-def signals_at(found: Place | Span, descriptions: Mapping[str, str]) -> list[Signal]:
-    """The signals at a place or in a span, with descriptions by address."""
+def signals_at(found: Place | Span, descriptions: Mapping[str, str], meanings: Mapping[str, Mapping[int, str]] | None = None,
+               ) -> list[Signal]:  # fmt: skip
+    """The signals at a place or in a span, with descriptions, and what values mean, by address."""
     places = found.places if isinstance(found, Span) else (found,)
-    return [signal(place, descriptions.get(place.name, "") if place.area else "") for place in places]
+    return [signal(place, descriptions.get(place.name, "") if place.area else "",
+                   (meanings or {}).get(place.name, {}) if place.area else {}) for place in places]  # fmt: skip
 
 
-def signal(place: Place, description: str = "") -> Signal:
+def signal(place: Place, description: str = "", meanings: Mapping[int, str] | None = None) -> Signal:
     """The signal of one place.  Raises TypeError for an array or structure."""
-    return Signal(_single(place), place.name.replace("CIO ", "CIO"), description)
+    return Signal(_single(place), place.name.replace("CIO ", "CIO"), description, tuple((meanings or {}).items()))
 
 
 def _single(place: Place) -> Place:

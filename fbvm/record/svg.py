@@ -93,7 +93,7 @@ class Drawing:
         tip = f"<title>{escape(track.signal.description)}</title>" if track.signal.description else ""
         yield f'<text x="{MARGIN}" y="{y + 17}">{label}{tip}</text>'
         ends = [scan for scan, _ in track.changes[1:]] + [self._scans.stop]
-        counts = not isinstance(base(track.signal.place.type), EnumType)
+        counts = not track.signal.meanings and not isinstance(base(track.signal.place.type), EnumType)
         levels = _levels([value if counts else 0 for _, value in track.changes])
         for (scan, value), end, level in zip(track.changes, ends, levels, strict=True):
             left, right = self._x(scan), self._x(end)
@@ -103,7 +103,7 @@ class Drawing:
                 continue
             height = y + ROW - 6 - level * (ROW - 12)
             yield f'<path class="word" d="M{left},{y + 4} V{y + ROW - 4} M{left},{height:.1f} H{right}"/>'
-            if text := _fitting(track.signal.text(value), right - left - 6):
+            if text := _fitting(track.signal.said(value), right - left - 6):
                 yield f'<text x="{left + 4}" y="{y + 16}">{escape(text)}</text>'
 
 

@@ -187,7 +187,7 @@ class ScanTable:
         return "\n".join(lines)
 
     def _cell(self, at: int, row: Row) -> str:
-        text = self.signals[at].text(row.values[at])
+        text = self.signals[at].said(row.values[at])
         return text if len(text) <= WIDEST_CELL else text[: WIDEST_CELL - 3] + "..."
 
 

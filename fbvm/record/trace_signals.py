@@ -57,7 +57,7 @@ class _Heard:
 
 def chosen_signals(trace: Trace, names: Sequence[str]) -> list[Signal]:
     """The signals of some names; without names, those that were selected or all single ones.  Raises as `recording`."""
-    return [signal for name in names for signal in signals_at(trace.find(name), trace.described)] or _every(trace)
+    return [signal for name in names for signal in signals_at(trace.find(name), trace.described, trace.meanings)] or _every(trace)
 
 
 def _every(trace: Trace) -> list[Signal]:
@@ -72,4 +72,4 @@ def _every(trace: Trace) -> list[Signal]:
     if not trace.selected:
         described = [trace.find(name) for name in trace.described]
         found.update(dict.fromkeys(place for place in described if isinstance(place, Place)))
-    return [signal for place in found for signal in signals_at(place, trace.described)]
+    return [signal for place in found for signal in signals_at(place, trace.described, trace.meanings)]

@@ -17,7 +17,7 @@ from fbvm.net.peers import ModbusPeer
 from fbvm.plc import Plc
 from fbvm.record.page import page
 from fbvm.record.page_data import page_data
-from fbvm.record.recorder import Signal
+from fbvm.record.recorder import signals_at
 from fbvm.record.trace import Trace
 from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
 from fbvm.units.etn21 import Etn21
@@ -126,8 +126,8 @@ def test_values_are_those_of_the_trace(shown: Any, trace: Trace) -> None:
         for title, text in labels:
             place = trace.find(title.partition(": ")[0])
             assert isinstance(place, Place)
-            value = moment.read(place)
-            assert text == (str(value).upper() if isinstance(value, bool) else Signal(place, "").text(value)), title
+            [signal], value = signals_at(place, {}, trace.meanings), moment.read(place)
+            assert text == (str(value).upper() if isinstance(value, bool) else signal.said(value)), title
 
 
 def test_steps_inside_a_scan(shown: Any) -> None:

@@ -69,7 +69,7 @@ def test_what_is_declared_to_be_read_in_hexadecimal_is() -> None:
             {attribute 'displaymode' := 'hex'} Byte_Code : USINT := 16#5;
         END_VAR
         END_PROGRAM""")
-    assert made.image is not None and not made.diagnostics
+    assert made.image is not None and not made.errors
     names = ("a.Error_Code", "a.Plain", "a.Codes[0]", "a.Codes[1]", "a.Decimal", "Byte_Code")
     symbols = from_data(to_data(made.image.symbols))
     for found in (made.image.symbols, symbols):

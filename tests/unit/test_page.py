@@ -36,7 +36,7 @@ def text(trace: Trace, name: str, scan: int) -> str:
     place = trace.find(name)
     assert isinstance(place, Place)
     value = trace.at(scan).read(place)
-    return str(int(value)) if isinstance(value, bool) else Signal(place, name).text(value)
+    return str(int(value)) if isinstance(value, bool) else Signal(place, name).said(value)
 
 
 @pytest.mark.parametrize("depth", list(Depth))

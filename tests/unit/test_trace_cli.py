@@ -65,6 +65,14 @@ def test_a_capture_of_a_trace(fbvm: Fbvm, tmp_path: Path) -> None:
     assert fbvm("convert", "demo.fbtrace", "trace.pcapng", "Main.Done").exit_code == 2
 
 
+def test_states_of_sockets_have_names(fbvm: Fbvm) -> None:
+    demo = str(Path(__file__).parents[2] / "examples" / "demo.st")
+    assert fbvm("run", demo, "--until", "Main.Done", "--map", "192.168.250.1:502=peer", "--trace", "demo.fbtrace").exit_code == 0
+    assert "= CLOSED, SYN_SENT, ESTABLISHED   TCP Connection State" in fbvm("chart", "demo.fbtrace", "D30009").output
+    assert fbvm("convert", "demo.fbtrace", "demo.csv", "D30009").exit_code == 0
+    assert Path("demo.csv").read_text(encoding="utf-8").splitlines()[-1].endswith(",4")
+
+
 def test_a_run_as_a_page(fbvm: Fbvm) -> None:
     arguments = ("run", "pump.st", "--scans", "60", "--set", "CIO 0.00=TRUE@30ms")
     assert fbvm(*arguments, "--html", "run.html").exit_code == 0
