@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -62,7 +63,8 @@ def run_project(file: Path, context: click.Context) -> int:
             run_all(plant.runs, lambda: progress.update(first))
     finally:
         plant.close()
-    _print(plant, as_json, context.params["scan_time"])
+    real = not plant.network.virtual_time and not as_json and sys.stderr.isatty()
+    _print(plant, as_json, context.params["scan_time"] or real)
     return max(EXIT_STATUS.get(run.reason, status.GOOD) for run in plant.runs)
 
 

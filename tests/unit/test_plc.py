@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import pytest
 from images import D200, counter_image, task
 
+from fbvm.base.areas import DUE
 from fbvm.plc import Mode, Plc, Stopped
 from fbvm.units.unit import AreaMemory
 from fbvm.watch.conditions import ConditionError
@@ -368,6 +369,19 @@ def test_each_unit_is_refreshed_once_after_the_program(plc: Plc) -> None:
     plc.attach(_Echo(), wire)
     plc.run(scans=2)
     assert (plc.read("D300"), plc.read("D301"), wire.sent) == (2, 1, [(0, b"\1"), (10 * MS, b"\2")])
+
+
+def test_the_next_scan_is_worth_while_when_timer_task_or_unit_say_so(plc: Plc) -> None:
+    echo = _Echo()
+    plc.attach(echo, _Wire())
+    plc.scan()
+    far = plc.due_ns
+    echo.wake_ns = 7 * MS
+    assert plc.due_ns == 7 * MS < far
+    plc.memory.write(DUE, "i64", 5 * MS)
+    assert plc.due_ns == 5 * MS
+    echo.wake_ns = 0
+    assert plc.due_ns == 0
 
 
 def test_units_are_reset_at_power_on(plc: Plc) -> None:

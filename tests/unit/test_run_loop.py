@@ -10,6 +10,7 @@ from collections.abc import Sequence
 import pytest
 from images import counter_image, task
 
+from fbvm.code.compiler import compile_text
 from fbvm.plc import Plc
 from fbvm.run import Running, TimedWrite, loop, run, run_all
 from fbvm.units.unit import AreaMemory
@@ -194,6 +195,20 @@ def test_event_pace_sleeps_until_a_unit_has_work(clock: Clock) -> None:
     plc.watchers.append(lambda plc: setattr(unit, "wake_ns", [0, 7 * MS, 1 << 63][min(plc.scans - 1, 2)]))
     assert scan_times_ms(plc, scans=4, pace="event") == [0, 0, 7, 17]
     assert network.waits_ms == [7, 10]
+
+
+def test_an_idle_plc_with_a_running_timer_is_woken_by_the_timer_only(clock: Clock) -> None:
+    compilation = compile_text("""PROGRAM Main
+VAR t : TON; n : UDINT; END_VAR
+    t(IN := TRUE, PT := T#1s);
+    IF t.Q THEN n := n + 1; t(IN := FALSE); t(IN := TRUE); END_IF;
+END_PROGRAM
+""")
+    assert compilation.image
+    plc, network = Plc(compilation.image, 600_000 * MS, engine="python"), RealNetwork(clock)
+    plc.attach(Idle(), network)
+    run(plc, until=lambda plc: plc.now_ns >= 60_000 * MS, pace="event")
+    assert (plc.read("Main.n"), plc.scans, len(network.waits_ms)) == (60, 61, 60)
 
 
 def test_how_late_scans_begin_is_measured(clock: Clock) -> None:

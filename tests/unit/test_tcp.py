@@ -506,6 +506,18 @@ def test_wait(network: TcpNetwork, device: Device) -> None:
     assert link.events(now_ns()) == [Closed(1)]
 
 
+def test_who_drives_a_network_asks_the_host_once_for_all(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    network.attach("192.168.250.3")
+    network.driven = True
+    line.sendall(b"x")
+    assert network.wait(BOUND_S)
+    assert link.events(now_ns()) == []
+    assert network.serve(now_ns()) == [link]
+    assert link.events(now_ns()) == [Received(1, b"x")]
+    assert network.serve(now_ns()) == []
+
+
 def test_wrong_use(network: TcpNetwork, device: Device) -> None:
     link, _ = opened(network, device)
     with pytest.raises(ValueError, match="channel 1"):
