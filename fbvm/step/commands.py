@@ -75,6 +75,7 @@ COMMANDS = (
     Command("table", "t", "table [NAME...]", "the scan table of the last scans, of what is named or watched", takes="place"),
     Command("why", "y", "why NAME", "why it has its value", takes="place"),
     Command("list", "l", "list [LINES]", "the text around"),
+    Command("rung", "u", "rung [NUMBER]", "the rungs executed last and next, with their power, or one of this POU"),
     Command("calls", "", "calls", "who called whom"),
     Command("net", "", "net [SCANS]", "what passed the network in the scan before, or in the last ones"),
     Command("expect", "", "expect CONDITION", "fails if it does not hold; for scripts", takes="place"),
@@ -276,6 +277,9 @@ class Commands:
 
     def _list(self, rest: str) -> Iterator[str]:
         return self.words.around(_count(rest) if rest else 10)
+
+    def _rung(self, rest: str) -> Iterator[str]:
+        return self.words.rung(_count(rest, least=0) if rest else None)
 
     def _calls(self, rest: str) -> Iterator[str]:
         return self.words.calls()

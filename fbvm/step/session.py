@@ -18,6 +18,7 @@ from fbvm.plc import Phase, Plc, State
 from fbvm.record.history import looking
 from fbvm.record.inside import Statement
 from fbvm.record.names import Names
+from fbvm.record.power import Executed
 from fbvm.record.recorder import HEXADECIMAL_AREAS, Signal
 from fbvm.step.twin import END, Act, Injector, Seen, Stop, Told, Twin, depth
 from fbvm.watch import places
@@ -83,9 +84,10 @@ class Session:
         """What stopped the program here."""
         return self._twin.trap
 
-    def power(self, site: int, base: int) -> bool | None:
-        """Whether an element of a rung conducts in this scan; None if the rung was not executed yet."""
-        return self._twin.power.get((site, base))
+    @property
+    def rungs(self) -> list[Executed]:
+        """The rungs that were executed in this scan, in order, and what was seen in them."""
+        return self._twin.power.executed
 
     @property
     def now_ns(self) -> int:

@@ -14,7 +14,8 @@ from typing import Protocol
 from fbvm.base.memory import Memory
 from fbvm.engine.trap import Trap
 from fbvm.plc import Phase, Plc, State
-from fbvm.record.inside import Contact, Event, Frame, Inside, Statement
+from fbvm.record.inside import Event, Frame, Inside, Statement
+from fbvm.record.power import Power
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value
 
@@ -64,20 +65,19 @@ class Twin:
         self.statement: Statement | None = None
         self.count = 0
         """Statements of the scan that are done."""
-        self.power: dict[tuple[int, int], bool] = {}
-        """Of rungs that were executed in this scan: whether each element conducts, by statement and instance."""
+        self.power = Power(plc.image, lambda scan: True)
+        """What was seen in the rungs of this scan."""
         self._stop: Stop = lambda number, statement: False
         self._acts: Mapping[int, Sequence[Act]] = {}
         self._told: Told | None = None
-        self._last: Event | None = None
 
     def play(self, state: State, acts: Mapping[int, Sequence[Act]], stop: Stop, told: Told | None = None) -> bool:
         """Does the scan after `state` until `stop` says so.  False if the program ended first.
 
         `acts` happen before the statements of their numbers, 0 before the scan."""
         self.plc.restore(state)
-        self.statement, self.count, self._last = None, 0, None
-        self.power.clear()
+        self.statement, self.count = None, 0
+        self.power = Power(self.plc.image, lambda scan: True)
         self._stop, self._acts, self._told = stop, acts, told
         if self.plc.trap:
             return False
@@ -99,10 +99,8 @@ class Twin:
             raise _Still
 
     def _event(self, event: Event) -> None:
-        if isinstance(event, Contact):
-            self.power[event.site, event.frame.base] = event.value
-        again, self._last = self._last == event, event
-        if isinstance(event, Statement) and not again:
+        self.power.event(self.plc, event)
+        if isinstance(event, Statement):
             if self.count:
                 for act in self._acts.get(self.count, ()):
                     act(self.plc)
@@ -119,15 +117,13 @@ class Injector:
 
     def __init__(self, acts: Mapping[int, Sequence[Act]]) -> None:
         self._acts, self._count = acts, 0
-        self._last: Event | None = None
 
     def phase(self, plc: Plc, phase: Phase) -> None:
         """Nothing is done between phases."""
 
     def event(self, plc: Plc, event: Event) -> None:
-        """Counts statements as the twin does; a rung is told twice at its beginning, and is one."""
-        again, self._last = self._last == event, event
-        if isinstance(event, Statement) and not again:
+        """Counts statements as the twin does."""
+        if isinstance(event, Statement):
             if self._count:
                 for act in self._acts.get(self._count, ()):
                     act(plc)

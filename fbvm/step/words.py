@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from fbvm.base.types import StructType, base
 from fbvm.code.image import Site
 from fbvm.record.inside import Frame
+from fbvm.record.ladder_text import ladder_text
 from fbvm.step.session import Session
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import show, show_time
@@ -14,6 +15,7 @@ from fbvm.watch.values import show, show_time
 AROUND = 2
 """Lines before and behind the one that comes next."""
 MOST_CHANGES = 8
+WIDEST_RUNG = 100
 WIDE = 32
 """Columns of a rung's line before it is said whether it conducts."""
 
@@ -66,11 +68,26 @@ class Words:
 
     def _power(self, file: str) -> dict[int, bool]:
         """Of rungs of this instance in this scan, line by line, whether the element conducts."""
-        statement, found = self._session.statement, dict[int, bool]()
-        for number, site in enumerate(self.sites) if statement else ():
-            if site.file == file and statement and (flows := self._session.power(number, statement.frame.base)) is not None:
-                found[site.line] = flows
-        return found
+        statement = self._session.statement
+        return {site.line: seen[-1] for rung in self._session.rungs if statement and rung.base == statement.frame.base
+                for step, seen in rung.states.items()
+                if (site := self.sites[rung.picture.steps[step][0]]).file == file}  # fmt: skip
+
+    def rung(self, number: int | None) -> Iterator[str]:
+        """The drawing of a rung of this POU; without a number, of those executed last and next.  Raises ValueError."""
+        statement, image = self._session.statement, self._session.plc.image
+        mine = [rung for rung in image.rungs if statement and rung.body == statement.frame.body]
+        if not mine or statement is None:
+            raise ValueError("there are no rungs here")
+        place = self.site()
+        before = [rung for rung in mine if place and self.sites[rung.site].line <= place.line] or mine[:1]
+        chosen = before[-2:] if number is None else [rung for rung in mine if rung.number == number]
+        if not chosen:
+            raise ValueError(f"there is no rung {number}; rungs are {mine[0].number} to {mine[-1].number}")
+        for rung in chosen:
+            seen = [made.states for made in self._session.rungs
+                    if made.picture is rung and made.base == statement.frame.base]  # fmt: skip
+            yield from ladder_text(rung, WIDEST_RUNG, seen[-1] if seen and seen[-1] else None)
 
     def changes(self) -> Iterator[str]:
         """What the last move changed."""

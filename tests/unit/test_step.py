@@ -187,7 +187,7 @@ def test_mode_and_power_between_scans_only() -> None:
 @pytest.mark.parametrize("line", [
     "nonsense", "print", "print Nobody", "run 33", "run x.st:1", "step -1", "goto x", "write Main.N", "Main.N = 99999",
     "unbreak 3", "mode x", "power x", "table", "why Main.T", "run", "expect Main.N", "help x", "run Main.N", "D0..D1 = 1",
-    "force D0..D1 = 1,2",
+    "force D0..D1 = 1,2", "rung",
 ])  # fmt: skip
 def test_a_mistake_is_said_and_changes_nothing(line: str) -> None:
     commands = made()
@@ -242,6 +242,9 @@ def test_where_power_flows_in_rungs() -> None:
     text = said(commands, "list 10")
     assert [row.split()[-1] for row in text.splitlines() if " LD " in row or " OR " in row] == ["ON", "off"]
     assert "LDNOT   Motor\n" in text + "\n"
+    assert "Start" in said(commands, "rung 1") and "━" in said(commands, "rung 1")
+    with pytest.raises(CommandError, match="no rung 9"):
+        said(commands, "rung 9")
     said(commands, "run 12")
     assert not [row for row in said(commands, "goto 1", "list 10").splitlines() if row.endswith(("ON", "off"))]
 
