@@ -199,6 +199,8 @@ class Facts:
     """Expressions that mean the same as another one (ADD(a, b) is a + b)."""
     guards: dict[tree.Call, Guard] = field(default_factory=dict)
     labels: dict[tree.CaseBranch, tuple[tuple[int, int], ...]] = field(default_factory=dict)
+    failed: set[tree.Expr] = field(default_factory=set)
+    """Targets of assignment attempts that get NULL."""
     assigned: set[tree.Call] = field(default_factory=set)
     """Calls whose result is the whole value of an assignment."""
     turned: set[tree.Call] = field(default_factory=set)

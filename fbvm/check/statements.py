@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import BOOL, EnumType, StringType, Type, base, fold
+from fbvm.base.types import BOOL, EnumType, RefType, StringType, Type, base, fold
 from fbvm.check import references
 from fbvm.check.facts import Pou, Value
 from fbvm.check.fitting import assignable, conversion_hint
@@ -51,13 +51,16 @@ class Statements:
         if node.op == "REF=" and len(node.targets) == 1:
             references.bind(self.expressions, node)
             return
-        if node.op in ("REF=", "?="):
+        if node.op == "REF=":
             self.error("S0901", node, f"{node.op} is understood but not executed by this version")
             return
         kinds = [self.target(target) for target in node.targets]
         last = kinds[-1]
         if node.op in ("S=", "R="):
             self._set_or_reset(node, kinds)
+            return
+        if node.op == "?=":
+            self._attempt(node, kinds)
             return
         if last is None:
             self.expressions.infer(node.value)
@@ -69,6 +72,18 @@ class Statements:
             if kind is not None and value_kind is not None and not assignable(value_kind, kind):
                 self.error("S0301", value, f"the value is {value_kind}, but {kind} is needed here",
                            conversion_hint(value_kind, kind))
+
+    def _attempt(self, node: tree.Assign, kinds: list[Type | None]) -> None:
+        """`r ?= s`: r takes the reference if it is one to its type, else NULL; without classes that is known now."""
+        kind = self.expressions.infer(node.value, kinds[-1])
+        for target, wanted in zip(node.targets, kinds, strict=True):
+            if wanted is None or kind is None:
+                continue
+            if not isinstance(wanted, RefType) or not isinstance(kind, RefType):
+                wrong, shown = (target, wanted) if not isinstance(wanted, RefType) else (node.value, kind)
+                self.error("S0301", wrong, f"?= tries a reference, this is {shown}", "write := for values")
+            elif not assignable(kind, wanted):
+                self.facts.failed.add(target)
 
     def _set_or_reset(self, node: tree.Assign, kinds: list[Type | None]) -> None:
         for target, kind in zip(node.targets, kinds, strict=True):

@@ -176,7 +176,11 @@ class BodyLowering:
             return
         value = node.value
         for target in reversed(node.targets):
-            self.assign(target, value, site)
+            if target in self.facts.failed:
+                self.discard(self.value(value))
+                self.write(self.places.of(target), ("const", "ref", 0), site)
+            else:
+                self.assign(target, value, site)
             value = target
 
     def _bind(self, node: tree.Assign, site: int) -> None:
