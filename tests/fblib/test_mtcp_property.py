@@ -58,6 +58,7 @@ def works_by_itself(rig: Rig) -> None:
     for name in READS:
         rig.set(f"{name}_EN", True)
         rig.set(f"{name}_Cmd", False)
+        rig.set(f"{name}.Reply_Time", 5_000_000_000)
     rig.set("Connect", True)
     busy = " OR ".join(f"Main.{name}.Exchange.State <> 0" for name in READS)
     rig.scan(200)

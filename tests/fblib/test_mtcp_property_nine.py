@@ -3,7 +3,7 @@ untouched, counters count right replies, and what was written stands at the serv
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import pytest
@@ -38,6 +38,16 @@ JOBS = {
 }
 SOURCES = {130: [0b101010101], 140: list(range(5000, 5040))}
 WRITTEN = [1, 666, bytes(1 - number % 2 for number in range(9)), list(range(5000, 5040))]
+LATE = {"late", "late by one request", "again later", "half, the rest late"}
+CUT = {"two pieces", "byte by byte", "half", "all but one byte", "half, the rest late"}
+
+
+def misdeeds(seed: int, chance: float) -> Callable[[bytes], Actions]:
+    """Misdeeds by chance, but none that completes the frame of another: Modbus TCP has no check sum, so a late frame in
+    the place of the missing end of a reply is data like any other, for every client there is."""
+    return by_seed(seed, chance, [name for name in MISDEEDS if name not in (LATE if seed % 2 else CUT)])
+
+
 TIMINGS = st.sampled_from(["exact", "real"])
 SEEDS = st.integers(0, 10**6)
 ORDERS = st.permutations(["conn", *JOBS])
@@ -51,7 +61,7 @@ class Nine(Rig):
         blocks = {name: job.call for name, job in JOBS.items()}
         super().__init__(peer, timing=timing, seed=seed, order=order, **blocks)  # type: ignore[arg-type]
         self.rude = peer
-        self.misdeed = right
+        self.misdeed: Callable[[bytes], Actions] = right
         self.right_replies = 0
         server = self.server
         server.coils[16:36] = bytes(number % 3 != 0 for number in range(20))
@@ -174,7 +184,7 @@ def test_any_fault_at_any_scan(timing: str, seed: int, faults: list[tuple[int, i
 @settings(max_examples=20, deadline=None)
 def test_any_misdeed_at_any_request(timing: str, seed: int, chance: float) -> None:
     rig = Nine(timing, seed)
-    rig.misdeed = by_seed(seed, chance)  # type: ignore[assignment]
+    rig.misdeed = misdeeds(seed, chance)
     for _ in range(12):
         for name in JOBS:
             rig.set(f"{name}_Cmd", not rig.get(f"{name}_Cmd"))
@@ -190,7 +200,7 @@ def test_everything_together(timing: str, seed: int) -> None:
     """Faults of the network and misdeeds of the server by one seed, for 20 s of the PLC's time."""
     rig = Nine(timing, seed)
     rig.network.faults += random_faults(seed, 2000)
-    rig.misdeed = by_seed(seed, 0.3)  # type: ignore[assignment]
+    rig.misdeed = misdeeds(seed, 0.3)
     for _ in range(50):
         for name in JOBS:
             rig.set(f"{name}_Cmd", not rig.get(f"{name}_Cmd"))
