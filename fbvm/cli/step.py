@@ -8,49 +8,25 @@ from pathlib import Path
 import click
 
 from fbvm.cli import status
+from fbvm.cli.bench import Bench, ProjectBench
 from fbvm.cli.options import Mapping, Setting, mapping, setting, time_ns
+from fbvm.cli.project import project_named
 from fbvm.cli.prompt import prompted
-from fbvm.cli.run import CYCLE_NS, build_network, mailboxes
-from fbvm.cli.sources import compiled, source_arguments
-from fbvm.code.image import Image
-from fbvm.plc import Plc
+from fbvm.cli.run import CYCLE_NS
+from fbvm.cli.sources import compiled, source_options
 from fbvm.record.source_texts import source_texts
-from fbvm.record.traffic import Passed, Reader
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.session import Session
 from fbvm.step.words import Words
-from fbvm.units.backplane import usual_units
 from fbvm.watch.paths import Place
 from fbvm.watch.values import parse_value
-from fbvm.wire.tap import Happening
-
-
-class Bench:
-    """Makes the PLC with its unit and network, each time the same, and notes what passes the network."""
-
-    def __init__(self, image: Image, cycle_ns: int, mappings: tuple[Mapping, ...], timing: str, seed: int) -> None:
-        self._image, self._cycle_ns, self._mappings = image, cycle_ns, mappings
-        self._timing, self._seed = timing, seed
-        self.passed: list[Passed] = []
-
-    def make(self) -> Plc:
-        """A PLC at power-on."""
-        plc = Plc(self._image, self._cycle_ns)
-        network = build_network("loop", self._mappings, self._seed)
-        self.passed, reader = [], Reader()
-
-        def tap(now_ns: int, unit: str, happening: Happening) -> None:
-            self.passed.extend(reader.read(now_ns, happening))
-
-        network.tap = tap
-        for unit in usual_units(mailboxes(self._image), self._timing, self._seed):
-            plc.attach(unit, network)
-        return plc
 
 
 @click.command("step", epilog="At the prompt, `help` lists the commands.  A script: printf 'run Main.Done\\nprint D200\\n' | "
                "fbvm step FILE")
-@source_arguments
+@source_options
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=click.Path(exists=True, path_type=Path))
+@click.option("--plc", "name", metavar="NAME", help="Which PLC of a project; the others scan along.")
 @click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
               help="Cycle of programs without a TASK, and how often the PLC scans.")
 @click.option("--set", "settings", type=setting, multiple=True, metavar="NAME=VALUE", help="Write before the first scan.")
@@ -62,26 +38,31 @@ class Bench:
 @click.option("--seed", type=int, default=0, metavar="N", help="What chance begins with: the same again with the same N.")
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], cycle_ns: int, settings: tuple[Setting, ...],
-    watched: tuple[str, ...], mappings: tuple[Mapping, ...], timing: str, seed: int,
+    watched: tuple[str, ...], mappings: tuple[Mapping, ...], timing: str, seed: int, name: str | None,
 ) -> None:  # fmt: skip
     """Step through a program statement by statement and scan by scan, forth and back, in virtual time.
 
     Going back is real: memory, unit and network are as they were, and what is written there leads to another future.
     From a pipe, each line is a command; the first that fails ends it with status 1 (`expect`) or 2."""
-    image = compiled(files, program, libraries, runnable=True)
     for row in mappings:
         if row.host is not None:
             raise click.UsageError(f"stepping stays in memory: --map {row.said}=peer")
-    bench = Bench(image, cycle_ns, mappings, timing, seed)
+    bench: Bench
+    if project := project_named(files):
+        bench = ProjectBench(project, name)
+        texts = source_texts(bench.image, bench.files, bench.libraries)
+    else:
+        image = compiled(files, program, libraries, runnable=True)
+        bench = Bench(image, cycle_ns, mappings, timing, seed)
+        texts = source_texts(image, {str(path): path for path in files}, libraries)
     session = Session(bench.make)
-    texts = source_texts(image, {str(path): path for path in files}, libraries)
     commands = Commands(session, Words(session, texts), lambda: bench.passed)
     try:
         for given in settings:
             _write(session, given)
-        for name in watched:
-            commands.words.value(name)
-            commands.watches.append(name)
+        for text in watched:
+            commands.words.value(text)
+            commands.watches.append(text)
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
     for line in commands.stop():

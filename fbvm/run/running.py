@@ -53,6 +53,11 @@ class Running:
         self._behind_ns = 0
         self._writes = sorted(writes, key=lambda write: write.at_ns)
 
+    @property
+    def writes(self) -> tuple[TimedWrite, ...]:
+        """What is still to be written, in order of time."""
+        return tuple(self._writes)
+
     def begin(self, start_ns: int) -> None:
         """The loop begins at this time of its own."""
         self._behind_ns = start_ns - self.plc.elapsed_ns

@@ -238,9 +238,9 @@ class Session:
             self._states.pop(old, None)
 
     def _again(self, scan: int) -> None:
-        """Makes the PLC anew and brings it before a scan."""
+        """Brings the PLC before a scan: alone by its state, with units or others that follow it, made anew."""
         state = self._states.get(scan)
-        if not self._live.units and state is not None:
+        if not self._live.units and not self._live.watchers and state is not None:
             self._live.restore(state)
             return
         self._live = self._make()

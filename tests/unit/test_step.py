@@ -312,6 +312,37 @@ def test_a_script_ends_with_what_is_wrong() -> None:
     assert called("", "--watch", "Nobody")[0] == 2
 
 
+TWO = """
+[plc.server]
+sources = ["server.st"]
+[[plc.server.unit]]
+address = "192.168.250.1"
+[plc.client]
+sources = ["given.st"]
+cycle = "20ms"
+set = [{name = "D500", value = 7, at = "30ms"}]
+[[plc.client.unit]]
+address = "192.168.250.2"
+"""
+
+
+def test_one_plc_of_a_project_while_the_others_scan_along(tmp_path: Path) -> None:
+    for name in ("server.st", "given.st"):
+        text = (HOUSE / "lessons" / "12-two-plcs-one-wire" / name).read_text(encoding="utf-8")
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    (tmp_path / "fbvm.toml").write_text(TWO, encoding="utf-8")
+    script = ("run Main.Beat > 60\nexpect Main.Beat < 100\nexpect D500 = 7\ngoto 1\nexpect D500 = 0\nexpect Main.Beat = 0\n"
+              "run 1s\nexpect Main.Alive AND D500 = 7\nnet 100\n")  # fmt: skip
+    result = CliRunner().invoke(main, ["step", str(tmp_path), "--plc", "client"], input=script)
+    assert result.exit_code == 0, result.output
+    assert "03 read holding registers, address 1000, quantity 2" in result.output
+    for arguments in ([], ["--plc", "nobody"]):
+        wrong = CliRunner().invoke(main, ["step", str(tmp_path), *arguments])
+        assert wrong.exit_code == 2 and "there is server, client" in wrong.output
+    (tmp_path / "fbvm.toml").write_text("[plc.x]\n", encoding="utf-8")
+    assert CliRunner().invoke(main, ["step", str(tmp_path)]).exit_code == 3
+
+
 def test_errors_raised_for_scripts_are_told_apart() -> None:
     with pytest.raises(ExpectationError):
         said(made(), "expect Main.N = 1")
