@@ -20,9 +20,11 @@ from fbvm.base.types import (
     Elementary,
     Field,
     RefType,
+    StringType,
     StructType,
     Type,
     base,
+    characters,
 )
 
 
@@ -219,13 +221,14 @@ def member(place: Place, name: str) -> Place:
 
 
 def _element(place: Place, text: str) -> Place:
-    if not isinstance(place.type, ArrayType):
+    kind = characters(place.type) if isinstance(place.type, StringType) else place.type
+    if not isinstance(kind, ArrayType):
         raise UnknownPlace(f"{place.name} is {place.type.name}, not an array")
     try:
         indexes = [int(part) for part in text.split(",")]
     except ValueError:
         raise UnknownPlace(f"{place.name}[{text}]: a subscript is a whole number") from None
-    bounds = place.type.bounds
+    bounds = kind.bounds
     if len(indexes) != len(bounds):
         raise UnknownPlace(f"{place.name} has {len(bounds)} subscripts, {len(indexes)} given")
     at = 0
@@ -235,8 +238,8 @@ def _element(place: Place, text: str) -> Place:
         at = at * (high - low + 1) + index - low
     name = f"{place.name}[{', '.join(map(str, indexes))}]"
     if place.bit is not None:
-        return place.inner(name, place.type.element, (place.bit + at) // 8, (place.bit + at) % 8)
-    return place.inner(name, place.type.element, at * place.type.element.size)
+        return place.inner(name, kind.element, (place.bit + at) // 8, (place.bit + at) % 8)
+    return place.inner(name, kind.element, at * kind.element.size)
 
 
 def _part(place: Place, bit: int) -> Place:
