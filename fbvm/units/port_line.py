@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 
 from fbvm.units import port_map as at
@@ -110,7 +111,7 @@ class Line:
         if size and not self._is_sending:
             self._is_sending = True
             words[at.SENDING] = 0
-            data = b"".join(word.to_bytes(2, "big") for word in words[at.OUTGOING : at.OUTGOING + (size + 1) // 2])
+            data = _swapped(words[at.OUTGOING : at.OUTGOING + (size + 1) // 2].tobytes())
             requests.append(Send(self.channel, data[:size]))
         room = max(0, at.INCOMING_BYTES - words[at.RECEIVED])
         if room != self._granted and words[at.STATE] == State.OPEN:
@@ -123,14 +124,24 @@ class Line:
         held = min(words[at.RECEIVED], at.INCOMING_BYTES)
         data = data[: at.INCOMING_BYTES - held]
         self._granted = max(0, self._granted - len(data))
-        for place, byte in enumerate(data, held):
-            word = at.INCOMING + place // 2
-            words[word] = words[word] & 0xFF00 | byte if place % 2 else byte << 8
+        first = at.INCOMING + held // 2
+        whole = bytes((words[first] >> 8,)) + data if held % 2 else data
+        whole += bytes(len(whole) % 2)
+        words[first : first + len(whole) // 2] = memoryview(_swapped(whole)).cast("H")
         words[at.RECEIVED] = held + len(data)
 
     def _fail(self, error: str, words: memoryview) -> None:
         words[at.STATE] = State.FAILED
         words[at.ERROR] = self._number_of(error)
+
+
+def _swapped(data: bytes) -> bytes:
+    """Bytes of words as the host has them, from or to bytes of which each word's high half is the first."""
+    if sys.byteorder == "big":
+        return data
+    turned = bytearray(data)
+    turned[::2], turned[1::2] = data[1::2], data[::2]
+    return bytes(turned)
 
 
 def _dotted(high: int, low: int) -> str:
