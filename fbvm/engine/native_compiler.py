@@ -18,6 +18,10 @@ _NUMBERS = count(1)
 _LIBRARIES = {"linux": "libm.so.6", "win32": "ucrtbase"}
 """Where the functions of C's math.h are that Python's `math` calls; elsewhere they come with the process."""
 _NAMES = {"ln": "log", "log": "log10"}
+FAULTS = {
+    "-disable-loop-idiom-hashrecognize": (22,),  # 22.1.0: a CRC loop whose counter is used afterwards has a wrong counter
+}
+"""Options that switch off what LLVM is known to do wrongly, and since which of its versions they are understood."""
 _PYTHON = {"double_to_string": "PyOS_double_to_string", "string_to_double": "PyOS_string_to_double",
            "free": "PyMem_Free"}
 """What texts of floats need, so that they are the very texts that Python writes: functions of the interpreter written
@@ -38,8 +42,9 @@ def llvm() -> Any:
         binding.initialize()
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
-    if binding.llvm_version_info >= (22,):  # 22.1.0 miscompiles a CRC loop whose counter is used afterwards
-        binding.set_option("fbvm", "-disable-loop-idiom-hashrecognize")
+    for option, first in FAULTS.items():
+        if binding.llvm_version_info >= first:
+            binding.set_option("fbvm", option)
     return binding
 
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from fbvm.code.operations import Node
 from fbvm.engine.native_context import FIELDS
 from fbvm.engine.stops import ASK, AT_STATEMENT, COUNT, ROW_BYTES, ROWS, STOPPED, TABLE, WATCHING
 
@@ -65,9 +66,18 @@ attributes #6 = {{ nounwind willreturn memory(read, inaccessiblemem: readwrite) 
 assert AT_STATEMENT == 1, "a statement is told from a write by this bit"
 
 
+_KINDS = ("statement", "rung", "write")
+"""The observations at which a run can stop."""
+
+
+def is_seen_later(node: Node, following: Node | None) -> bool:
+    """True for a write behind which nothing happens up to the next look: that finds it as well."""
+    return following is not None and node[:2] == ("observe", "write") and following[0] == "observe" and following[1] in _KINDS
+
+
 def observe(w: Writer, kind: str, site: int) -> None:
     """End the run here if somebody wants it to."""
-    if kind not in ("statement", "rung", "write"):
+    if kind not in _KINDS:
         return
     statement = kind != "write"
     stops = w.new(f"load ptr, ptr {w.field('stops')}, !invariant.load !1")

@@ -11,6 +11,7 @@ import struct
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any, NamedTuple
 
 from fbvm.base.areas import BUDGET
@@ -19,6 +20,7 @@ from fbvm.code.image import Image
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, Address, Block, Node
 from fbvm.engine.native_calls import Range
 from fbvm.engine.native_context import FIELDS, SCRATCH, Point, Shown
+from fbvm.engine.native_guard import is_seen_later
 from fbvm.engine.native_regions import SYSTEM, Regions
 from fbvm.engine.ranges import is_float, span
 
@@ -160,9 +162,11 @@ class Writer:
 
     def write(self, block: Block) -> None:
         """The statements of a block, up to one that leaves it."""
-        for node in block:
+        for node, following in zip_longest(block, block[1:]):
             if self.dead:
                 return
+            if self.module.stops and is_seen_later(node, following):
+                continue
             self.next_scratch = SCRATCH
             self.statements[node[0]](self, *node[1:])
 

@@ -313,17 +313,15 @@ class Oracle:
         place[0][place[1]] = self._place(target, frame)
 
     def _do_run(self, frame: Any, number: int, instance: Node, inputs: Any, outputs: Any) -> None:
+        """An instance takes each input as soon as it is worked out (no rule says so: it shows when the next one traps)."""
         place = self._place(instance, frame)
         inside, pou, passed = place[0][place[1]], self._pous[instance[1]], {}
         kinds = {row.name: row.kind for row in pou.variables}
-        values: dict[str, Any] = {}
         for name, node in inputs:
             if node[0] == "at":
                 passed[name] = self._place(node[2], frame)
             else:
-                values[name] = self._value(node, frame)
-        for name, value in values.items():
-            self._store((inside, name), kinds[name], value)
+                self._store((inside, name), kinds[name], self._value(node, frame))
         self._body(pou, inside, passed)
         self._at(number)
         for name, target in outputs:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import ctypes
 import gc
 import math
+import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -223,6 +226,17 @@ def test_crc_bit_by_bit(level: int) -> None:
     e = engine(CRC, before={0: data}, level=level)
     assert e.run(0) is None
     assert (slot(e, "u16", 104), slot(e, "i16", 100), slot(e, "i16", 102)) == (crc, 64, 8)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(native_compiler.llvm().llvm_version_info[:3] != (22, 1, 0), reason="of LLVM 22.1.0 alone it is known")
+def test_crc_bit_by_bit_shows_the_fault_that_is_switched_off() -> None:
+    program = ("from fbvm.engine import native_compiler; native_compiler.FAULTS.clear(); from fbvm.base import cache\n"
+               "cache.switch(False); import test_native; test_native.test_crc_bit_by_bit(2)")
+    folder = Path(__file__).parent
+    ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True,
+                         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parent.parent)])})
+    assert ran.returncode == 1 and "AssertionError" in ran.stderr
 
 
 @pytest.mark.parametrize("level", LEVELS)
