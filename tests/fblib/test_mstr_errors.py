@@ -7,11 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from mstr_rig import SERVER_IP, Rig
+from mstr_rig import SERVER, SERVER_IP, Rig
 
 from fbvm.base.data import data_folder
 from fbvm.net.faults import Fault
-from fbvm.net.misdeeds import MISDEEDS
+from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS
 from fbvm.net.peers import Action, Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer, Station
 from fbvm.plc import Mode
 from fbvm.units import noc_map
@@ -443,6 +443,25 @@ def test_misdeeds_of_a_server(name: str) -> None:
             break
     assert rig.operate(*READ) == "0000"
     assert rig.databuf(3) == [0x1200, 0x1201, 0x1202]
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if "floods" in name else name
+                                  for name in RUDE_PEERS])
+def test_rude_servers(name: str) -> None:
+    """Right data or a documented code from a server that misbehaves as a whole, time after time; then a good one serves."""
+    server = ModbusServer()
+    for number in range(3):
+        server.holding_registers[number] = 0x1200 + number
+    rig = Rig(RUDE_PEERS[name](server), options="Reply_Time := T#300ms, Open_Time := T#300ms")
+    for _ in range(4):
+        rig.fill([0xEEEE] * 4)
+        code = rig.operate(*READ)
+        assert rig.databuf(4) == ([0x1200, 0x1201, 0x1202] if code == "0000" else [0xEEEE] * 3) + [0xEEEE]
+        assert code in documented() | {"0000"}
+        rig.scan(7)
+    rig.network.place(SERVER, ModbusPeer(server))
+    assert "0000" in [rig.operate(*READ) for _ in range(3)]
+    assert rig.operate(*READ) == "0000"
 
 
 def documented() -> set[str]:

@@ -12,7 +12,7 @@ from test_mstr_errors import documented
 
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
-from fbvm.net.peers import ModbusPeer, Say
+from fbvm.net.peers import ModbusPeer, Reset, Say
 from fbvm.plc import Plc
 from fbvm.units.noc import Noc
 from fbvm.wire.link import Peer
@@ -73,6 +73,31 @@ def test_any_bytes_for_an_answer(data: bytes, control: tuple[int, ...], has_head
         again = rig.operate(2, 0, 3, 1, 0x0700, *SERVER_IP, max_s=5)
     assert again == "0000"
     assert rig.databuf(3) == list(rig.server.holding_registers[:3])
+
+
+@settings(COMMON, max_examples=15)
+@given(st.integers(0, 2**32), st.sampled_from(["good", "late", "silent", "refused", "resets"]))
+def test_pins_at_any_time_and_no_path_is_lost(seed: int, kind: str) -> None:
+    """Blocks that are switched about as it comes: at most one output is TRUE; in the end nobody has a line."""
+    dice = Random(seed)
+    ways = {"good": [Say], "late": [lambda frame: Say(frame, 70_000_000)], "silent": [], "resets": [lambda frame: Reset()]}
+    peer = ModbusPeer(None, lambda frame: [way(frame) for way in ways.get(kind, [])])
+    rig = Rig(peer, blocks=3, refused=kind == "refused", options=FAST + ", Max_Paths := 2")
+    for _ in range(60):
+        name = dice.randint(1, 3)
+        rig.set(f"m{name}_ENABLE", dice.random() < 0.7)
+        rig.set(f"m{name}_ABORT", dice.random() < 0.1)
+        if dice.random() < 0.3:
+            rig.control(dice.choice((1, 2, 3, 4, 7, 8, 10, 23, 99)), 0, 2, 1, 0x0700, *SERVER_IP, 2, 1, block=name)
+        rig.scan(dice.randint(1, 3))
+        for block in (1, 2, 3):
+            assert len(rig.outputs(block)) <= 1
+            assert "S" not in rig.outputs(block) or rig.status(block) == "0000"
+            assert "E" not in rig.outputs(block) or rig.status(block) in documented()
+    for block in (1, 2, 3):
+        rig.set(f"m{block}_ENABLE", False)
+    rig.scan()
+    assert [rig.plc.read(f"MSTR_Lines[{number}].Owner") for number in range(1, 33)] == 32 * [0]
 
 
 @pytest.mark.slow
