@@ -87,7 +87,7 @@ def drawing(plc: Plc, scans: str | None) -> Iterator[None]:
     if not scans:
         yield
         return
-    power = Power(plc.image, scans_named(scans))
+    power = Power(plc.image.rungs, scans_named(scans))
     with looking(plc, power):
         yield
     names = Names(plc.image.symbols, plc.memory.areas)

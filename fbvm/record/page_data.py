@@ -18,6 +18,8 @@ from fbvm.base.memory import WHOLE_BYTES, Snapshot, compare
 from fbvm.base.types import StructType
 from fbvm.plc import Phase
 from fbvm.record.inside import Contact, Event, Frame, Passing, Statement, Write
+from fbvm.record.ladder_text import ladder_text
+from fbvm.record.power import Power
 from fbvm.record.recorder import Signal, signals_at
 from fbvm.record.trace import Moment, Trace
 from fbvm.record.trace_format import PHASES
@@ -28,6 +30,9 @@ from fbvm.watch.paths import UnknownPlace
 
 MOST_ROWS = 200_000
 """Statements and phases that are kept, the latest ones; of earlier scans there are values only."""
+MOST_PICTURES = 5000
+"""Rungs that are drawn, each once for every way in which power went through it."""
+RUNG_WIDTH = 90
 FEW_SIGNALS = 60
 """If there are more, those that stood still are left out unless somebody asks for them."""
 POWER = -1
@@ -47,6 +52,10 @@ class Collector:
         self.rows: OrderedDict[int, list[list[Any]]] = OrderedDict()
         self.passed: list[tuple[int, Passed]] = []
         self.instances: dict[str, int] = {}
+        self.drawings: dict[tuple[object, ...], int] = {}
+        self.pictures: list[str] = []
+        self.ladder: dict[int, list[list[int]]] = {}
+        self._power = Power(trace.rungs, lambda scan: True)
         self._reader = Reader()
         self._known: list[str] = []
         self._ended: list[str] = []
@@ -73,11 +82,15 @@ class Collector:
         self._memory = now
         if moved or phase is Phase.INPUTS:
             self._add(moment.scans, [-1 - PHASES.index(phase), -1, *moved])
+        self._power.phase(moment, phase)
+        if phase is Phase.PROGRAM:
+            self._draw(moment.scans)
         if phase is Phase.REFRESH:
             self._end(moment, now)
 
     def event(self, moment: Moment, event: Event) -> None:
         """Notes a statement, and what it writes."""
+        self._power.event(moment, event)
         if isinstance(event, Passing):
             self.passed += [(moment.scans, passed) for passed in self._reader.read(event.now_ns, event.happening)]
         elif isinstance(event, Contact):
@@ -92,6 +105,18 @@ class Collector:
             assert self._row is not None
             self._row += self._moved(self._written(event), moment)
 
+    def _draw(self, scan: int) -> None:
+        """Draws the rungs of a scan with their power; what looked the same before is drawn once."""
+        for made in self._power.executed:
+            key = made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items())
+            if key not in self.drawings and len(self.pictures) < MOST_PICTURES:
+                self.drawings[key] = len(self.pictures)
+                self.pictures.append("\n".join(ladder_text(made.picture, RUNG_WIDTH, made.states)))
+            if key in self.drawings:
+                instance = self.instances.setdefault(self._trace.names.instance(made.base), len(self.instances))
+                self.ladder.setdefault(scan, []).append([instance, self.drawings[key]])
+        self._power.executed.clear()
+
     def _open(self, moment: Moment, site: int, frame: Frame) -> None:
         self._row = [site, self._instance(frame)]
         self._add(moment.scans, self._row)
@@ -103,7 +128,9 @@ class Collector:
         self.rows.setdefault(scan, []).append(row)
         self._count += 1
         while self._count > MOST_ROWS and len(self.rows) > 1:
-            self._count -= len(self.rows.popitem(last=False)[1])
+            gone, rows = self.rows.popitem(last=False)
+            self._count -= len(rows)
+            self.ladder.pop(gone, None)
 
     # --- values
 
@@ -211,6 +238,7 @@ def _as_data(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
         "rows": {str(scan): [_renumbered(row, new, sites) for row in rows] for scan, rows in made.rows.items()
                  if trace.depth is not Depth.SCANS},
         "frames": frame_rows(made.passed),
+        "pictures": made.pictures, "ladder": {str(scan): rungs for scan, rungs in made.ladder.items()},
     }  # fmt: skip
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from fbvm.code.image import Image, RungPicture
-from fbvm.plc import Phase, Plc
+from fbvm.code.image import RungPicture
+from fbvm.plc import Phase
 from fbvm.record.inside import Contact, Event, Statement
+from fbvm.record.table import Scanned
 
 
 @dataclass(eq=False)
@@ -23,20 +24,20 @@ class Executed:
 class Power:
     """A listener that keeps the executions of rungs in the scans that `wanted` names, in order."""
 
-    def __init__(self, image: Image, wanted: Callable[[int], bool]) -> None:
+    def __init__(self, rungs: Sequence[RungPicture], wanted: Callable[[int], bool]) -> None:
         self.executed: list[Executed] = []
         self._wanted = wanted
-        self._rungs = {rung.site: rung for rung in image.rungs}
-        self._steps = {place: (rung.site, step) for rung in image.rungs
+        self._rungs = {rung.site: rung for rung in rungs}
+        self._steps = {place: (rung.site, step) for rung in rungs
                        for step, (place, _, _, _) in enumerate(rung.steps)}  # fmt: skip
         self._latest: dict[tuple[int, int], Executed] = {}
 
-    def phase(self, plc: Plc, phase: Phase) -> None:
+    def phase(self, plc: Scanned, phase: Phase) -> None:
         """Nothing is left from the scan before."""
         if phase is Phase.INPUTS:
             self._latest.clear()
 
-    def event(self, plc: Plc, event: Event) -> None:
+    def event(self, plc: Scanned, event: Event) -> None:
         """Follow rungs and their contacts."""
         if not self._wanted(plc.scans):
             return

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, Protocol
 
 from fbvm.base.areas import Mailbox
 from fbvm.base.memory import Memory
-from fbvm.code.image import Layout, Site
+from fbvm.code.image import Layout, RungPicture, Site
 from fbvm.plc import Phase
 from fbvm.record import symbols
 from fbvm.record.inside import Began, Contact, Ended, Event, Frame, Passing, Read, Statement, Write
@@ -112,6 +112,8 @@ class Trace:
             self.sites = [Site(head["files"][file], pou, line, column) for file, pou, line, column in head["sites"]]
             self.outer = [int(number) for number in head["outer"]]
             self.bodies = [(str(name), str(kind)) for name, kind in head["bodies"]]
+            self.rungs = tuple(_rung(*row) for row in head["rungs"])
+            self.rung_sites = frozenset(rung.site for rung in self.rungs)
             self.described = dict(head["described"])
             self.meanings: dict[str, dict[int, str]] = {
                 address: {int(value): str(text) for value, text in known.items()}
@@ -264,7 +266,8 @@ class _Player:
         if tag == END:
             return Ended(frame)
         if tag == STATEMENT:
-            return Statement(cursor.number(), frame)
+            number = cursor.number()
+            return Statement(number, frame, number in self._moment.trace.rung_sites)
         if tag == CONTACT:
             site, value, size = (cursor.number() for _ in range(3))
             return Contact(site, frame, json.loads(cursor.bytes(size)), bool(value))
@@ -284,6 +287,12 @@ class _Player:
         else:
             memory.u8[event.offset : end] = event.value
         self._touched.append((event.offset, end))
+
+
+def _rung(body: int, site: int, number: int, comment: str, steps: list[Any]) -> RungPicture:
+    return RungPicture(int(body), int(site), int(number), str(comment),
+                       tuple((int(place), str(prefix), str(mnemonic), tuple(map(str, operands)))
+                             for place, prefix, mnemonic, operands in steps))  # fmt: skip
 
 
 def _passing(text: bytes) -> Passing:

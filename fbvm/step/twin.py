@@ -65,7 +65,7 @@ class Twin:
         self.statement: Statement | None = None
         self.count = 0
         """Statements of the scan that are done."""
-        self.power = Power(plc.image, lambda scan: True)
+        self.power = Power(plc.image.rungs, lambda scan: True)
         """What was seen in the rungs of this scan."""
         self._stop: Stop = lambda number, statement: False
         self._acts: Mapping[int, Sequence[Act]] = {}
@@ -77,7 +77,7 @@ class Twin:
         `acts` happen before the statements of their numbers, 0 before the scan."""
         self.plc.restore(state)
         self.statement, self.count = None, 0
-        self.power = Power(self.plc.image, lambda scan: True)
+        self.power = Power(self.plc.image.rungs, lambda scan: True)
         self._stop, self._acts, self._told = stop, acts, told
         if self.plc.trap:
             return False

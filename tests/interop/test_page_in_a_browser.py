@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from fbvm.code.compiler import compile_files
+from fbvm.code.compiler import compile_files, compile_text
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.plc import Plc
@@ -189,6 +189,7 @@ def test_the_filter_and_only_what_changes(shown: Any) -> None:
     where(shown)
     assert shown.eval_on_selector_all(".label", "rows => rows.map(row => row.title)") == ["Main.Done"]
     shown.fill("#filter", "")
+    where(shown)
     everything = shown.locator(".label").count()
     shown.check("#moving")
     where(shown)
@@ -214,6 +215,47 @@ def test_the_keys_are_listed(shown: Any) -> None:
     assert shown.locator("#help").is_visible()
     shown.keyboard.press("Escape")
     assert not shown.locator("#help").is_visible()
+
+
+LADDER = """
+PROGRAM Main
+LADDER
+RUNG 1 Seal-in
+    LD 0.00
+    OR 100.00
+    OUT 100.00
+RUNG 2
+    LD 0.01
+    OUT 100.01
+END_LADDER
+END_PROGRAM
+"""
+
+
+def test_rungs_are_drawn_with_their_power(browser: Any, tmp_path: Path) -> None:
+    image = compile_text(LADDER).image
+    assert image is not None
+    plc, file = Plc(image), io.BytesIO()
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    plc.run(scans=3)
+    plc.write("CIO 0.00", True)
+    plc.run(scans=3)
+    writer.close()
+    (tmp_path / "rungs.html").write_text(page(page_data(Trace(io.BytesIO(file.getvalue())))), encoding="utf-8")
+    made = opened(browser, (tmp_path / "rungs.html").as_uri())
+    assert made.locator("#ladder pre").count() == 2
+    assert "Seal-in" in made.locator("#ladder pre").first.inner_text()
+    still = made.locator("#ladder .power").all_inner_texts()
+    for _ in range(4):
+        made.keyboard.press("ArrowRight")
+    where(made)
+    flowing = made.locator("#ladder pre").first.locator(".power").all_inner_texts()
+    assert len("".join(flowing)) > len("".join(still))
+    made.uncheck("#power")
+    where(made)
+    assert made.locator("#ladder pre").count() == 0
+    assert made.complaints == []
+    made.context.close()
 
 
 def test_light_and_dark(browser: Any, url: str) -> None:

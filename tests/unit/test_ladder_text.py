@@ -119,7 +119,7 @@ def test_no_line_is_wider_than_asked(width: int) -> None:
 def executed(rungs: str, on: str, declarations: str = "a, b, c, d, e, f : BOOL;") -> list[Executed]:
     """What the first scan saw with these variables ON."""
     plc = Plc(image(rungs, declarations))
-    power = Power(plc.image, lambda scan: scan == 0)
+    power = Power(plc.image.rungs, lambda scan: scan == 0)
     for name in on:
         plc.write(f"Main.{name}", True)
     with looking(plc, power):
@@ -168,7 +168,7 @@ def test_each_instance_has_its_own_power() -> None:
         END_FUNCTION_BLOCK
         PROGRAM Main VAR one, two : Lamp; END_VAR one(on := TRUE); two(on := FALSE); END_PROGRAM
     """).image)
-    power = Power(plc.image, lambda scan: True)
+    power = Power(plc.image.rungs, lambda scan: True)
     with looking(plc, power):
         plc.scan()
     assert [made.states for made in power.executed] == [{0: [True], 1: [True]}, {0: [False], 1: [False]}]

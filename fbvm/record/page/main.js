@@ -55,7 +55,7 @@ function start(data) {
   /** A step inside the scan; behind the last one comes the next scan. */
   function step(direction) {
     const rows = run.rows(state.scan);
-    const wanted = at => rows[at][2] === POWER ? state.power : state.every || rows[at][0] < 0 || rows[at].length > 2;
+    const wanted = at => state.every || rows[at][0] < 0 || rows[at].length > 2 && rows[at][2] !== POWER;
     let row = state.row < 0 && direction < 0 ? rows.length : state.row;
     do row += direction; while (row >= 0 && row < rows.length && !wanted(row));
     if (row >= 0 && row < rows.length) move({row});
@@ -97,7 +97,7 @@ function start(data) {
     const box = document.getElementById(name);
     box.addEventListener("change", () => move({[name]: box.checked}));
   }
-  document.getElementById("flow").hidden = !Object.values(data.rows).some(rows => rows.some(row => row[2] === POWER));
+  document.getElementById("flow").hidden = !data.pictures.length;
   const wanted = parseInt(location.hash.slice(1), 10);
   move({scan: Number.isFinite(wanted) ? wanted : data.pinned.length ? run.last : run.first});
 }

@@ -38,7 +38,21 @@ class ScanPanel {
     }
   }
 
+  /** The rungs of the scan as drawings; what has power is heavy and coloured. */
+  rungs() {
+    const shown = this.state.power ? this.run.data.ladder[this.state.scan] ?? [] : [];
+    return shown.map(([instance, number]) => {
+      const picture = element("pre");
+      const path = this.run.data.instances[instance], [head, ...lines] = this.run.data.pictures[number].split("\n");
+      picture.append(element("b", "", head), element("span", "dim", path ? `  in ${path}\n` : "\n"));
+      const parts = lines.join("\n").split(/([━┃┏┓┗┛┣┫┳┻╋┡┢┩┪┞┟┦┧┠┨┝┥┯┷┰┸┿╂┚┙┎┒┖╺╸╻╹]+)/);
+      picture.append(...parts.map((part, at) => at % 2 ? element("span", "power", part) : part));
+      return picture;
+    });
+  }
+
   fill() {
+    document.getElementById("ladder").replaceChildren(...this.rungs());
     const {run, state} = this, rows = run.rows(state.scan), known = new Map();
     const before = number => known.get(number) ?? run.text(number, state.scan - 1) ?? run.signals[number].track.values[0];
     const heads = ["", ...state.pinned.map(number => run.signals[number].name), "what it changed"];
@@ -47,7 +61,7 @@ class ScanPanel {
     rows.forEach(([where, instance, ...moved], at) => {
       const changes = [];
       if (moved[0] === POWER) {
-        if (state.power) made.push(this.element(at, where, moved[1] === "1"));
+        if (state.every) made.push(this.element(at, where, moved[1] === "1"));
         return;
       }
       for (let place = 0; place < moved.length; place += 2) {
