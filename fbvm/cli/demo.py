@@ -1,20 +1,23 @@
 """`fbvm demo`: registers of a real Modbus TCP server arrive in D memory, over real sockets, and why.
 
-The server runs in a process of its own (`fbvm peer`); what it holds afterwards is asked by a client that has nothing
-to do with fbvm.
+The server runs in a process of its own: a PLC with the server program (`fbvm serve`), whose memory image says afterwards
+what it holds; or pymodbus's (`fbvm peer`), which a client that has nothing to do with fbvm asks for that.
 """
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 import click
 from rich.console import Console, Group
@@ -64,32 +67,48 @@ class Comparison:
         return self.words == self.registers and bool(self.words)
 
 
+class Server(Protocol):
+    """A Modbus TCP server on this computer."""
+
+    @property
+    def port(self) -> int:
+        """Where it listens."""
+
+    def registers(self, first: int, count: int) -> list[int]:
+        """What it holds when the program is done."""
+
+
 @click.command("demo")
-def command() -> None:
+@click.option("--server", "kind", type=click.Choice(["own", "pymodbus"]), default="own" if os.name == "posix" else "pymodbus",
+              show_default=True, help="own: another PLC, with the server program for an ETN21.  pymodbus: other people's.")
+def command(kind: str) -> None:
     """Run a client program against a real Modbus TCP server on this computer.
 
     Needs no hardware, no root, no configuration.  Ends with 0 only if the data is equal on both sides."""
-    try:
-        import pymodbus.client  # noqa: F401
-    except ImportError:
-        raise click.UsageError("the demo's server needs pymodbus: pip install 'fbvm[peer]'") from None
+    if kind == "pymodbus":
+        try:
+            import pymodbus.client  # noqa: F401
+        except ImportError:
+            raise click.UsageError("this server needs pymodbus: pip install 'fbvm[peer]'") from None
     console = Console(highlight=False)
     program = data_folder("examples") / "demo.st"
+    whose = "of another PLC, with a program of its own," if kind == "own" else "of pymodbus"
     try:
-        with modbus_server() as port:
-            console.print(f"A Modbus TCP server listens on 127.0.0.1:{port}; what the program calls {SERVER} is there.")
-            sys.exit(_show(console, program, port))
+        with own_server() if kind == "own" else foreign_server() as server:
+            console.print(f"A Modbus TCP server {whose} listens on 127.0.0.1:{server.port}; what the program calls\n{SERVER} "
+                          "is there.", soft_wrap=True)  # fmt: skip
+            sys.exit(_show(console, program, server))
     except OSError as error:
         console.print(f"The network cannot be used: {error}", style="red")
         sys.exit(status.NETWORK)
 
 
-def _show(console: Console, program: Path, port: int) -> int:
+def _show(console: Console, program: Path, server: Server) -> int:
     """Runs the program and prints everything; returns the exit status."""
     image = compile_files([program], runnable=True, lint=False).image
     assert image is not None, "the demo's own program compiles"
     plc = Plc(image, CYCLE_NS)
-    network = TcpNetwork({SERVER: ("127.0.0.1", port)})
+    network = TcpNetwork({SERVER: ("127.0.0.1", server.port)})
     try:
         plc.attach(Etn21(0, ETN21_ADDRESS), network)
         recorder = Recorder(plc, SIGNALS)
@@ -103,13 +122,13 @@ def _show(console: Console, program: Path, port: int) -> int:
     if reason != "until" or plc.read("Main.Done") is not True:
         console.print(_failure(plc, reason), style="red")
         return {"trap": status.STOPPED, "interrupted": status.INTERRUPTED}.get(reason, status.FAILED)
-    comparisons = compare(plc, port)
+    comparisons = compare(plc, server)
     console.print(_table(comparisons))
     if not all(comparison.equal for comparison in comparisons):
         console.print("The data differs.", style="bold red")
         return status.FAILED
     console.print("Equal on both sides.", style="bold green")
-    console.print(_next(program, port), markup=False, soft_wrap=True)
+    console.print(_next(program), markup=False, soft_wrap=True)
     return status.GOOD
 
 
@@ -120,40 +139,88 @@ def _failure(plc: Plc, reason: str) -> str:
     return f"The program did not get through ({reason}); error code {code:04X}"
 
 
-# --- the server -------------------------------------------------------------------------------------------------------
+# --- the servers ------------------------------------------------------------------------------------------------------
 
 
 @contextmanager
-def modbus_server() -> Iterator[int]:
-    """A Modbus TCP server in a process of its own; its port.  Raises OSError if it does not start."""
-    arguments = [sys.executable, "-m", "fbvm", "peer", "--port", "0"]
-    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+def _process(*arguments: str) -> Iterator[tuple[subprocess.Popen[str], int]]:
+    """A command of fbvm that listens, in a process of its own; its port.  Raises OSError if it does not start."""
+    command = [sys.executable, "-m", "fbvm", *arguments]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None
             line = process.stdout.readline()
             if not line.startswith(LISTENING):
                 process.kill()
                 raise OSError(f"the server did not start: {process.communicate()[1].strip()}")
-            yield int(line.rpartition(":")[2])
+            yield process, int(line.rpartition(":")[2])
         finally:
             process.terminate()
             process.communicate()
 
 
-def compare(plc: Plc, port: int) -> list[Comparison]:
-    """What is in D memory beside what the server holds, which pymodbus's client asks over a connection of its own."""
-    from pymodbus.client import ModbusTcpClient
+@contextmanager
+def modbus_server() -> Iterator[int]:
+    """pymodbus's server in a process of its own; its port."""
+    with _process("peer", "--port", "0") as (_, port):
+        yield port
 
+
+@dataclass(frozen=True)
+class Foreign:
+    """pymodbus's server; its client asks over a connection of its own."""
+
+    port: int
+
+    def registers(self, first: int, count: int) -> list[int]:
+        from pymodbus.client import ModbusTcpClient
+
+        client: Any = ModbusTcpClient("127.0.0.1", port=self.port)
+        try:
+            client.connect()
+            found: list[int] = client.read_holding_registers(first, count=count).registers
+            return found
+        finally:
+            client.close()
+
+
+@contextmanager
+def foreign_server() -> Iterator[Server]:
+    with modbus_server() as port:
+        yield Foreign(port)
+
+
+@dataclass(frozen=True)
+class Own:
+    """A PLC with the server program, which saves its memory when it ends."""
+
+    port: int
+    process: subprocess.Popen[str]
+    image: Path
+
+    def registers(self, first: int, count: int) -> list[int]:
+        if self.process.poll() is None:
+            self.process.terminate()
+            self.process.wait()
+        words: list[int] = json.loads(self.image.read_text(encoding="utf-8"))["spaces"]["D"]
+        return words[first : first + count]
+
+
+@contextmanager
+def own_server() -> Iterator[Server]:
+    with tempfile.TemporaryDirectory() as folder:
+        image = Path(folder) / "memory.json"
+        image.write_text(json.dumps({"spaces": {"D": list(range(1000, 1125))}}), encoding="utf-8")
+        with _process("serve", "--port", "0", "--image", str(image)) as (process, port):
+            yield Own(port, process, image)
+
+
+def compare(plc: Plc, server: Server) -> list[Comparison]:
+    """What is in D memory beside what the server holds."""
     quantity, written, source, target, signature = (
         int(str(plc.read(f"Main.{name}"))) for name in ("Quantity", "Written", "Source", "Target", "Signature")
     )
-    client: Any = ModbusTcpClient("127.0.0.1", port=port)
-    try:
-        client.connect()
-        answers = [client.read_holding_registers(first, count=count).registers
-                   for first, count in ((source, quantity), (target, written), (signature, 1))]  # fmt: skip
-    finally:
-        client.close()
+    answers = [server.registers(first, count) for first, count in ((source, quantity), (target, written), (signature, 1))]
     return [
         Comparison("read by function 03", *_words(plc, 200, quantity), source, answers[0]),
         Comparison("written by function 10", *_words(plc, 400, written), target, answers[1]),
@@ -226,7 +293,7 @@ def called() -> str:
     return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
 
 
-def _next(program: Path, port: int) -> str:
+def _next(program: Path) -> str:
     here = program.relative_to(Path.cwd()) if program.is_relative_to(Path.cwd()) else program
     fbvm = called()
     return f"""

@@ -64,3 +64,14 @@ def test_the_row_over_real_tcp() -> None:
     values = scene("row", net="tcp", max_s=15)
     assert values["panel"] == {"Main.Level": 704}
     assert values["gateway"]["Main.Failures"] == 0
+
+
+def test_two_omron_plcs() -> None:
+    project = read_project(SCENES / "pair" / "fbvm.toml")
+    assert isinstance(project, Project)
+    plant = Plant(project, for_ns=30 * SECOND_NS)
+    run_all(plant.runs)
+    server, client = ({**kind.values(kind.runs[0])} for kind in plant.kinds)
+    assert server == {"D4999..D5003": [10, 11, 21, 31, 41], "W491..W495": [0, 3, 3, 0, 0]}
+    assert (client["D200..D203"], client["Main.Error_Code"]) == ([10, 20, 30, 40], 0)
+    plant.close()

@@ -41,9 +41,10 @@ def test_the_example_moves_the_right_words(make: str, quantity: int, tmp_path: P
 
 
 @pytest.mark.slow
-def test_the_demo_ends_well() -> None:
-    result = subprocess.run([sys.executable, "-W", "error", "-m", "fbvm", "demo"], capture_output=True, text=True,
-                            cwd=HOUSE, check=False, timeout=60)  # fmt: skip
+@pytest.mark.parametrize("kind", ["own", "pymodbus"])
+def test_the_demo_ends_well(kind: str) -> None:
+    result = subprocess.run([sys.executable, "-W", "error", "-m", "fbvm", "demo", "--server", kind], capture_output=True,
+                            text=True, cwd=HOUSE, check=False, timeout=60)  # fmt: skip
     assert result.returncode == 0, result.stderr
     assert "Equal on both sides." in result.stdout
     assert result.stdout.count("  =  ") == 21
