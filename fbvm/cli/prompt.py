@@ -15,7 +15,9 @@ from fbvm.step.commands import Commands
 HISTORY = "step_history"
 
 
-class _Completer(Completer):
+class Completions(Completer):
+    """What a word may become, as the commands say it."""
+
     def __init__(self, commands: Commands) -> None:
         self._commands = commands
 
@@ -28,7 +30,7 @@ class _Completer(Completer):
 
 def prompted(commands: Commands) -> Iterator[str]:
     """Lines that somebody types, until the end of input.  Ctrl-C takes back the line."""
-    asking: PromptSession[str] = PromptSession(history=_history(), completer=_Completer(commands), complete_while_typing=False)
+    asking: PromptSession[str] = PromptSession(history=_history(), completer=Completions(commands), complete_while_typing=False)
     while True:
         here = commands.session.here
         try:
