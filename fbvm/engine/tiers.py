@@ -61,13 +61,13 @@ def choice_of(engine: object) -> str:
 def native_of(engine: object) -> native.NativeEngine | None:
     """The machine code that an engine runs now, if it does."""
     if isinstance(engine, Tiers):
-        engine = engine._engine if engine.native and not engine.python.substitutes else None
+        engine = engine._engine if engine.native and not engine.substitutes else None
     return engine if isinstance(engine, native.NativeEngine) else None
 
 
 def substitutes_of(engine: object) -> Mapping[int, Callable[[int], None]]:
     """What stands in place of bodies, by their numbers."""
-    return python_of(engine).substitutes if isinstance(engine, PythonEngine | Tiers) else {}
+    return engine.substitutes if isinstance(engine, PythonEngine | Tiers) else {}
 
 
 def python_of(engine: object) -> PythonEngine:
@@ -102,10 +102,15 @@ class Tiers:
             self._python = PythonEngine(self._image, self._memory)
         return self._python
 
+    @property
+    def substitutes(self) -> Mapping[int, Callable[[int], None]]:
+        """What stands in place of bodies; a run that has any stays in Python."""
+        return self._python.substitutes if self._python else {}
+
     def run(self, task_index: int) -> Trap | None:
         """Execute the programs of a task once, in whatever tier the run is."""
-        if self._python is not None and self._python.substitutes:
-            self._engine, self.native = self._python, False
+        if self.substitutes:
+            self._engine, self.native = self.python, False
         if self.native:
             return self._engine.run(task_index)
         if self._asked:
@@ -120,6 +125,6 @@ class Tiers:
 
     def _change(self) -> None:
         """Go over to machine code if it is there."""
-        if self._code.ready and not (self._python and self._python.substitutes):
+        if self._code.ready and not self.substitutes:
             self._engine = native.NativeEngine(self._image, self._memory, level=2)
             self.native = True

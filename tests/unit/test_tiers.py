@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from fbvm.base.memory import Memory
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.engine import native, tiers
@@ -83,3 +84,35 @@ def test_without_llvmlite_auto_is_python_and_native_says_what_is_missing(monkeyp
     assert isinstance(engine_for(code, memory), PythonEngine)
     with pytest.raises(ValueError, match="llvmlite, which is not installed"):
         engine_for(code, memory, "native")
+
+
+@needs_native
+def test_a_large_program_begins_as_machine_code_and_makes_python_when_it_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tiers, "LARGE", 1)
+    monkeypatch.setattr(tiers, "PAYS", 500)
+    made: list[Image] = []
+    code = image()
+    kept = code_of(code)
+    kept.prepare(2)
+    auto, python = Plc(code), Plc(code, engine="python")
+
+    class Counted(PythonEngine):
+        def __init__(self, image: Image, memory: Memory) -> None:
+            made.append(image)
+            super().__init__(image, memory)
+
+    monkeypatch.setattr(tiers, "PythonEngine", Counted)
+    assert isinstance(auto.engine, Tiers)
+    assert not auto.engine.native
+    for _ in range(30):
+        auto.scan()
+        python.scan()
+        assert bytes(auto.memory.u8) == bytes(python.memory.u8)
+    assert auto.engine.native
+    auto.run(scans=30)
+    assert (made, auto.scans) == ([], 60)
+    main = [body.name for body in code.bodies].index("Main")
+    auto.engine.python.substitute(main, lambda base: None)
+    before = auto.read("Main.sum")
+    auto.scan()
+    assert (made, auto.read("Main.sum"), auto.engine.native) == ([code], before, False)
