@@ -75,6 +75,7 @@ CODES: dict[str, Code] = {
         "S0801": "task or resource declared wrongly",
         "S0901": "understood, but not executed by this version",
         "S0902": "object-oriented text is refused",
+        "S0903": "not in this dialect",
         "P0101": "project file is not TOML",
         "P0102": "unknown key in a project file",
         "P0103": "value in a project file does not fit",

@@ -9,7 +9,7 @@ from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, StringType, StructTyp
 from fbvm.check import qualified
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
-from fbvm.check.fitting import assignable, holds, same
+from fbvm.check.fitting import assignable, holds, lent, same
 from fbvm.check.generics import Generics, is_generic
 from fbvm.check.standard import StandardCalls
 from fbvm.check.writes import note_count, writable
@@ -250,7 +250,7 @@ class Calls:
         if argument.negated and base(kind) != BOOL:
             self.error("S0405", value, f"NOT needs a BOOL output; {name} is {kind}")
             return False
-        if not assignable(kind, target) and not holds(target, kind):
+        if not assignable(kind, target) and not holds(target, kind) and not lent(kind, target, self.project.dialect):
             self.error("S0405", value, f"the output {name} is {kind} and does not fit {target}",
                        f"let a variable of {base(kind)} take it, and convert that afterwards")
             return False

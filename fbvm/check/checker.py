@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import Dialect
 from fbvm.base.types import StructType, Type, fold
 from fbvm.check.calls import Calls
 from fbvm.check.configurations import Configurations
@@ -22,7 +23,7 @@ from fbvm.check.statements import Statements, assigns_to
 from fbvm.check.values import Values
 from fbvm.syntax import tree
 
-Evaluate = Callable[[StandardCall, Sequence[Value]], Value | None]
+Evaluate = Callable[[StandardCall, Sequence[Value], Dialect], Value | None]
 
 
 class Checker:

@@ -35,7 +35,7 @@ from fbvm.base.types import (
 from fbvm.check import anything, qualified
 from fbvm.check.constants import convert, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
-from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, is_untyped, literal_hint
+from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, is_untyped, lent, literal_hint
 from fbvm.check.operators import Operators
 from fbvm.check.subscripts import Subscripts
 from fbvm.check.values import is_any
@@ -107,6 +107,8 @@ class Expressions:
         if assignable(kind, target):
             value = self.facts.constants.get(expr)
             return value is None or self._in_range(expr, value, target, code)
+        if lent(kind, target, self.project.dialect):
+            return True
         known = code in _KNOWN and not is_block(kind)
         self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
                    literal_hint(self.facts.constants.get(expr), base(target)) if known else fitting_hint(expr, kind, target))
@@ -144,6 +146,8 @@ class Expressions:
         if isinstance(kind, RefType) and value == 0:  # CODESYS writes 0 for NULL
             self.facts.types[expr] = target
             return target
+        if isinstance(kind, EnumType) and self.project.dialect.numbers_of_enumerations:
+            kind = kind.base
         if untyped is UNTYPED_REAL and not is_any(kind, "ANY_REAL") or \
                 not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_REAL"):
             self.error(code, expr, f"{untyped} does not fit {target}", literal_hint(value, kind))

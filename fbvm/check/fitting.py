@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from fbvm.base.dialects import Dialect
 from fbvm.base.types import (
     BOOL,
+    ELEMENTARY,
     AnyType,
     ArrayType,
     Elementary,
@@ -37,6 +39,38 @@ def assignable(kind: Type, target: Type) -> bool:
     if isinstance(target, StructType) or isinstance(kind, StructType):
         return kind == target and not (isinstance(target, StructType) and target.block)
     return converts(kind, target)
+
+
+def lent(kind: Type, target: Type, dialect: Dialect) -> bool:
+    """True if a dialect converts a value where the standard wants to see the conversion."""
+    if isinstance(kind, EnumType) and dialect.numbers_of_enumerations:
+        kind = kind.base
+        if kind == target or converts(kind, target):
+            return True
+    if isinstance(target, EnumType) and dialect.numbers_of_enumerations:
+        target = target.base
+        if kind == target or converts(kind, target):
+            return True
+    kind, target = base(kind), base(target)
+    if not dialect.integers_and_bits or not isinstance(kind, Elementary) or not isinstance(target, Elementary) or \
+            BOOL in (kind, target):
+        return False
+    whole = is_any(kind, "ANY_INT", "ANY_BIT")
+    if is_any(target, "ANY_REAL"):
+        return whole and is_any(kind, "ANY_INT") or is_any(kind, "ANY_REAL")
+    return whole and is_any(target, "ANY_INT", "ANY_BIT") and kind.bits <= target.bits
+
+
+def as_number(kind: Type, dialect: Dialect) -> Type:
+    """The type in which a dialect computes with a value: a bit string as an unsigned number, an enumeration as its base."""
+    if isinstance(kind, EnumType) and dialect.numbers_of_enumerations:
+        return kind.base
+    if dialect.arithmetic_of_bits and is_any(kind, "ANY_BIT") and kind != BOOL:
+        return ELEMENTARY[_UNSIGNED[kind.name]]
+    return kind
+
+
+_UNSIGNED = {"BYTE": "USINT", "WORD": "UINT", "DWORD": "UDINT", "LWORD": "ULINT"}
 
 
 def holds(target: Type, kind: Type) -> bool:

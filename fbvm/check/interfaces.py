@@ -136,6 +136,7 @@ class Interfaces:
         with self.checker.scope(pou):
             spec = declared.spec
             if isinstance(spec, tree.RefSpec) and spec.kind == "REFERENCE TO" and pou is not None:
+                self.checker.specs.allowed(spec, source)
                 spec = spec.target  # the variable stands for what it is bound to
             specs = self.checker.specs
             resolved = specs.resolve(spec, source) if pou is None else specs.parameter(spec, source)

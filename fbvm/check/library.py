@@ -8,6 +8,8 @@ A library for a unit that has no words of its own in the PLC's areas declares th
     slots = 32
     slot = 400          # words of a slot
 
+`by_dialect = true` hides a library from all but the dialects that name it (base.dialects).
+
 Names that programs put in front of its own, with a point, are its `spaces = ["Standard"]`.
 
 Pins that other tools call otherwise have their other names there too:
@@ -49,6 +51,8 @@ class Library:
     """Folded names under which programs know the library: `Standard` in Standard.TON."""
     writes: tuple[str, ...] = ()
     """Areas that programs may only read, and this library writes."""
+    by_dialect: bool = False
+    """True for blocks in place of others, which only a dialect brings in."""
     loaded: set[str] = field(default_factory=set)
 
 
@@ -74,7 +78,7 @@ def _libraries_below(root: Path) -> Iterator[Library]:
         files = {fold(p.stem): p for p in sorted(folder.glob("*.st"))}
         yield Library(name, folder, files, tuple(listed), _mailbox(table, described), _pins(table, described),
                       frozenset(fold(str(space)) for space in spaces) if isinstance(spaces, list) else frozenset(),
-                      _written(table, described))
+                      _written(table, described), table.get("by_dialect") is True)
 
 
 def _pins(table: dict[str, object], described: Path) -> dict[str, dict[str, str]]:
@@ -114,12 +118,14 @@ def _mailbox(table: dict[str, object], described: Path) -> Mailbox | None:
 class Libraries:
     """The shipped libraries and the user's own; own ones are asked first."""
 
-    def __init__(self, own: Sequence[Path] = (), shipped: bool = True) -> None:
+    def __init__(self, own: Sequence[Path] = (), shipped: bool = True, preferred: Sequence[str] = ()) -> None:
         roots: Iterable[Path] = [*own, *([data_folder("fblib")] if shipped else [])]
         self._libraries: dict[str, Library] = {}
         for root in roots:
-            for library in _libraries_below(Path(root)):
-                self._libraries.setdefault(library.name, library)
+            below = list(_libraries_below(Path(root)))
+            for library in sorted(below, key=lambda library: library.name not in preferred):
+                if not library.by_dialect or library.name in preferred:
+                    self._libraries.setdefault(library.name, library)
         self.mailboxes: dict[str, Mailbox] = {}
         """What the libraries' units bring, by area."""
         for library in self._libraries.values():
@@ -143,6 +149,10 @@ class Libraries:
         """Areas that a library writes though programs only read them."""
         library = self._libraries.get(owner)
         return library.writes if library else ()
+
+    def is_by_dialect(self, name: str) -> bool:
+        """True for a library whose blocks stand in place of others in what users write, and not in libraries."""
+        return self._libraries[name].by_dialect
 
     def block_names(self) -> list[str]:
         """The names under which files are found, as their files are named."""

@@ -26,10 +26,11 @@ from fbvm.base.types import (
     base,
     common,
     converts,
+    machine,
 )
 from fbvm.check import constants
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
-from fbvm.check.fitting import conversion_hint, convertible
+from fbvm.check.fitting import as_number, conversion_hint, convertible
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
@@ -110,6 +111,9 @@ class Operators:
             return self._folded(expr, timed, timed)
         kind = self._operand_type(expr, left, right, want)
         if kind is None or not self._defined(expr, kind):
+            lent = self._lent(expr, left, right, want)
+            if lent is not None:
+                return lent
             self._undefined(expr, left, right, want)
             return None
         if kind not in (UNTYPED_INT, UNTYPED_REAL):
@@ -138,6 +142,27 @@ class Operators:
             return None
         self.facts.operands[expr] = NULL
         return result
+
+    def _lent(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
+        """What an operator yields in a dialect that takes bit strings and enumerations as numbers; None if it does not."""
+        dialect = self.expressions.project.dialect
+        number = left in (UNTYPED_INT, UNTYPED_REAL) or is_any(left, "ANY_NUM")
+        if expr.op == "*" and dialect.number_times_duration and is_any(right, "ANY_DURATION") and number:
+            turned = tree.Binary(expr.start, expr.end, "*", expr.right, expr.left, expr.op_start)
+            self.facts.rewritten[expr] = turned
+            return self.expressions.infer(turned)
+        a, b = as_number(left, dialect), as_number(right, dialect)
+        if (a, b) == (left, right):
+            return None
+        kind = self._operand_type(expr, a, b, want)
+        if kind is None or not self._defined(expr, kind):
+            return None
+        for side, side_kind in ((expr.left, a), (expr.right, b)):
+            if side_kind in (UNTYPED_INT, UNTYPED_REAL) and self.expressions.adopt(side, kind) is None:
+                return None
+        keeps = left != a and right in (left, UNTYPED_INT) and machine(kind) == machine(left)
+        result = left if keeps else kind
+        return self._folded(expr, kind, BOOL if expr.op in COMPARISONS else result)
 
     def _beside_reference(self, expr: tree.Binary, side: tree.Expr) -> Type:
         """The type of an operand of an operator on references; a literal 0 that is compared is NULL."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import STANDARD, Dialect
 from fbvm.base.types import EnumType, RefType, Type, fold
 from fbvm.check.facts import Facts, Pou, Report, Variable, list_name
 from fbvm.check.library import Libraries
@@ -41,7 +42,8 @@ T = TypeVar("T")
 class Project:
     """Names of all POUs, types and global variables."""
 
-    def __init__(self, libraries: Libraries, report: Report) -> None:
+    def __init__(self, libraries: Libraries, report: Report, dialect: Dialect = STANDARD) -> None:
+        self.dialect = dialect
         self.libraries = libraries
         self.report = report
         self.facts = Facts()
@@ -137,7 +139,8 @@ class Project:
     def owners(self, source: Source) -> Iterable[str]:
         """Whose names `source` sees, nearest first; a library never sees the user's own."""
         yield source.library
-        yield from (name for name in self.libraries.names if name != source.library)
+        yield from (name for name in self.libraries.names
+                    if name != source.library and not (source.library and self.libraries.is_by_dialect(name)))
 
     def _load(self, name: str, owner: str) -> None:
         for source, text in self.libraries.load(name, owner, self.report):

@@ -75,6 +75,7 @@ class Specs:
 
     def resolve(self, spec: tree.TypeSpec, source: Source, name: str = "") -> Resolved | None:
         """Type and initial bytes, or None after a diagnostic.  `name` names a type declared with this spec."""
+        self.allowed(spec, source, name)
         if isinstance(spec, tree.NamedType):
             return self._named(spec, source)
         if isinstance(spec, tree.StringSpec):
@@ -91,6 +92,19 @@ class Specs:
             return self._reference(spec, source)
         self.report.add("S0901", source, spec, "REFERENCE TO here is understood but not executed by this version")
         return None
+
+    def allowed(self, spec: tree.TypeSpec, source: Source, name: str = "") -> None:
+        """Complain about a form that the dialect does not take."""
+        dialect = self.project.dialect
+        if isinstance(spec, tree.RefSpec):
+            form = spec.kind
+        elif isinstance(spec, tree.StringSpec):
+            form = "WSTRING" if spec.wide else "STRING"
+        else:
+            form = "alias" if name and isinstance(spec, tree.NamedType) else ""
+        if form in dialect.refused and not source.library:
+            what = f"another name for {spec.text}" if isinstance(spec, tree.NamedType) else form
+            self.report.add("S0903", source, spec, f"{what} is not taken by the dialect {dialect.name}: {dialect.for_whom}")
 
     def _reference(self, spec: tree.RefSpec, source: Source) -> Resolved | None:
         """REF_TO and POINTER TO.  The target may be what is being resolved just now: a list's node names itself."""

@@ -26,7 +26,7 @@ from fbvm.base.types import (
 from fbvm.check import functions, references
 from fbvm.check.arguments import Arguments, callee
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
-from fbvm.check.fitting import convertible, same
+from fbvm.check.fitting import as_number, convertible, same
 from fbvm.check.functions import Conversion, Signature
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
@@ -48,6 +48,7 @@ ELSEWHERE = {
     "IIF": "write SEL(condition, if_false, if_true)"}
 """Functions of other languages, and what to write here."""
 UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
+_NUMBERS = ("ANY_NUM", "ANY_BIT")
 
 
 class StandardCalls:
@@ -73,7 +74,7 @@ class StandardCalls:
         if len(values) < len(called.arguments):
             return
         try:
-            value = self.expressions.checker.evaluate(called, values)
+            value = self.expressions.checker.evaluate(called, values, self.expressions.project.dialect)
         except Undefined as undefined:
             self.facts.undefined[call] = self.expressions.source, undefined.code
             return
@@ -244,7 +245,7 @@ class StandardCalls:
         if name not in GENERIC:
             return ELEMENTARY[name]
         kind = self.expressions.settle(value)
-        if kind is not None and name not in families(kind):
+        if kind is not None and name not in families(as_number(kind, self.expressions.project.dialect)):
             self.error("S0405", value, f"{name[4:]} is needed here, this is {kind}")
             return None
         return base(kind) if kind is not None else None
@@ -325,7 +326,9 @@ class StandardCalls:
             return None
         if isinstance(source, StringType):
             source = string(functions.RESULT_STRING, source.wide)
-        if not convertible(row.form, base(source), target):
+        by_value = self.expressions.project.dialect.real_bits_by_value and row.form == "TO" and is_any(source, *_NUMBERS) and \
+            is_any(target, *_NUMBERS)
+        if not convertible(row.form, base(source), target) and not by_value:
             self.error("S0405", call, f"{callee(call)} is not defined for {source}", "")
             return None
         self.facts.calls[call] = StandardCall(row.form, [(value, base(source))], (base(source), target))

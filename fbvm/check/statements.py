@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import BOOL, EnumType, RefType, StringType, Type, base, fold
 from fbvm.check import references
 from fbvm.check.facts import Pou, Value
-from fbvm.check.fitting import assignable, conversion_hint
+from fbvm.check.fitting import as_number, assignable, conversion_hint
 from fbvm.check.values import is_any
 from fbvm.check.writes import note_count, place, writable
 from fbvm.syntax import ladder, tree
@@ -178,7 +178,7 @@ class Statements:
 
     def _for(self, node: tree.For) -> None:
         kind = self.target(node.variable, "count a loop")
-        if kind is not None and not is_any(kind, "ANY_INT"):
+        if kind is not None and not is_any(as_number(kind, self.expressions.project.dialect), "ANY_INT"):
             self.error("S0504", node.variable, f"FOR counts with an integer, not with {kind}")
             kind = None
         for part, role in ((node.first, "the first value"), (node.last, "the last value"), (node.step, "the step")):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, RefType, StringType, Type, characters
-from fbvm.check.fitting import fitting_hint
+from fbvm.check.fitting import as_number, fitting_hint
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
@@ -81,7 +81,8 @@ class Subscripts:
 
     def _fits(self, expr: tree.Expr, kind: Type | None, low: int, high: int, whole: Type) -> bool:
         assert kind is not None
-        if not is_any(kind, "ANY_INT") and not isinstance(kind, EnumType):
+        counted = as_number(kind, self.expressions.project.dialect)
+        if not is_any(counted, "ANY_INT") and not isinstance(kind, EnumType):
             self.error("S0301", expr, f"a subscript is an integer, not {kind}", fitting_hint(expr, kind, DINT))
             return False
         value = self.facts.constants.get(expr)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import click
 
+from fbvm.base import dialects
 from fbvm.base.codes import CODES
 from fbvm.base.pages import UnknownCode, page
 
@@ -11,10 +12,15 @@ from fbvm.base.pages import UnknownCode, page
 @click.command("explain")
 @click.argument("code", metavar="CODE", required=False)
 def command(code: str | None) -> None:
-    """Print the page of a diagnostic: a wrong program, the reason, the mend.  Without CODE: the list of all codes."""
+    """Print the page of a diagnostic: a wrong program, the reason, the mend.  Without CODE: the list of all codes.
+
+    `fbvm explain dialects` says what compilers disagree about, and which answers --dialect chooses."""
     if code is None:
         for row in CODES.values():
             click.echo(f"{row.code}  {row.severity:<7}  {row.title}")
+        return
+    if code.strip().lower() == "dialects":
+        click.echo(dialects.page())
         return
     try:
         click.echo(page(code))

@@ -79,7 +79,8 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
     for folder in folders:
         if not folder.is_dir():
             raise JournalError(f"the program needs the library folder {folder}; say where it is now with --library")
-    compilation = compile_sources(sources, program, folders, runnable=True, lint=False, resource=choice.get("resource"))
+    compilation = compile_sources(sources, program, folders, runnable=True, lint=False, resource=choice.get("resource"),
+                                  dialect=choice.get("dialect", "standard"))
     if compilation.image is None:
         report(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)

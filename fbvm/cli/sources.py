@@ -12,13 +12,14 @@ import click
 
 from fbvm.base import cache
 from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.base.dialects import DIALECTS
 from fbvm.cli import status
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 
 
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
-    """FILE..., --program, --resource, --library and --no-cache, which all verbs on programs share."""
+    """FILE..., --program, --resource, --dialect, --library and --no-cache, which all verbs on programs share."""
     files = click.argument("files", nargs=-1, required=True, metavar="FILE...",
                            type=click.Path(exists=True, dir_okay=False, path_type=Path))  # fmt: skip
     return source_options(files(function))
@@ -37,11 +38,11 @@ def _kept(context: click.Context, parameter: click.Parameter, value: str | None)
 def chosen() -> dict[str, Any]:
     """What the options of the present command say about how to compile, as arguments of the compiler."""
     meta = click.get_current_context().meta
-    return {name: meta[f"fbvm.{name}"] for name in ("resource",) if meta.get(f"fbvm.{name}") is not None}
+    return {name: meta[f"fbvm.{name}"] for name in ("resource", "dialect") if meta.get(f"fbvm.{name}") is not None}
 
 
 def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
-    """--program, --resource, --library and --no-cache."""
+    """--program, --resource, --dialect, --library and --no-cache."""
     for decorate in (
         click.option("--library", "libraries", multiple=True, metavar="DIR",
                      type=click.Path(exists=True, file_okay=False, path_type=Path),
@@ -50,6 +51,8 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
                      help="Compile anew, and keep nothing of it on disk."),
         click.option("--resource", metavar="NAME", expose_value=False, callback=_kept,
                      help="The RESOURCE that the PLC is, where a CONFIGURATION has several."),
+        click.option("--dialect", type=click.Choice(list(DIALECTS)), expose_value=False, callback=_kept,
+                     help="How to answer what compilers disagree about; `fbvm explain dialects` says which answers."),
         click.option("--program", metavar="NAME", help="The PROGRAM to run where no CONFIGURATION says it."),
     ):  # fmt: skip
         function = decorate(function)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from fbvm.base.areas import Area
 from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.base.dialects import dialect as named_dialect
 from fbvm.base.types import Field, StructType, Type, fold
 from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, Report, TaskFact
@@ -84,7 +85,8 @@ class Program:
 
 
 def compile_files(paths: Sequence[Path | str], program: str | None = None, libraries: Sequence[Path | str] = (),
-                  runnable: bool = False, *, resource: str | None = None, lint: bool = True, no_warn: Iterable[str] = (),
+                  runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
+                  lint: bool = True, no_warn: Iterable[str] = (),
                   warnings_as_errors: bool = False, cache: bool = True) -> Compilation:
     """Compile source files, or with `cache` read what became of the same ones the last time.
 
@@ -93,7 +95,8 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
 
     With `runnable` it is an error if there is not exactly one thing to run.  `lint` looks for what is allowed and hardly
     meant; `no_warn` are codes of warnings that are not wanted, or "all".  Never raises for what files contain; a file that
-    cannot be read gives a diagnostic.  Raises ValueError for a code that is none of a warning."""
+    cannot be read gives a diagnostic.  `dialect` says how to answer what compilers disagree about (`base.dialects`).  Raises
+    ValueError for a dialect that there is not, or a code that is none of a warning."""
     sources: list[Source] = []
     unreadable: list[Diagnostic] = []
     for path in paths:
@@ -104,31 +107,35 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
             unreadable.append(source)
     silenced = sorted(no_warn)
     kept = None if unreadable or not cache else image_cache.name(
-        sources, [Path(folder) for folder in libraries], (program, runnable, resource, lint, silenced, warnings_as_errors))
+        sources, [Path(folder) for folder in libraries],
+        (program, runnable, resource, dialect, lint, silenced, warnings_as_errors))
     if kept and (known := image_cache.read(kept, sources)):
         return Compilation(*known)
-    made = compile_sources(sources, program, libraries, runnable, resource=resource, lint=lint, no_warn=silenced,
-                           warnings_as_errors=warnings_as_errors)
+    made = compile_sources(sources, program, libraries, runnable, resource=resource, dialect=dialect, lint=lint,
+                           no_warn=silenced, warnings_as_errors=warnings_as_errors)
     if kept and made.image:
         image_cache.write(kept, sources, made.image, made.diagnostics)
     return Compilation(None, unreadable + made.diagnostics) if unreadable else made
 
 
 def compile_text(text: str, name: str = "text.st", program: str | None = None, libraries: Sequence[Path | str] = (), *,
-                 resource: str | None = None, lint: bool = True, no_warn: Iterable[str] = (),
+                 resource: str | None = None, dialect: str = "standard",
+                  lint: bool = True, no_warn: Iterable[str] = (),
                  warnings_as_errors: bool = False) -> Compilation:
     """Compile one text; see `compile_files`."""
-    return compile_sources([Source(name, text)], program, libraries, resource=resource, lint=lint, no_warn=no_warn,
-                           warnings_as_errors=warnings_as_errors)
+    return compile_sources([Source(name, text)], program, libraries, resource=resource, dialect=dialect, lint=lint,
+                           no_warn=no_warn, warnings_as_errors=warnings_as_errors)
 
 
 def compile_sources(sources: Sequence[Source], program: str | None = None, libraries: Sequence[Path | str] = (),
-                    runnable: bool = False, *, resource: str | None = None, lint: bool = True, no_warn: Iterable[str] = (),
+                    runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
+                  lint: bool = True, no_warn: Iterable[str] = (),
                     warnings_as_errors: bool = False) -> Compilation:
     """Compile texts; see `compile_files`."""
     wanted, silence, report = Wanted.of(no_warn, warnings_as_errors), Silence(), Report()
+    spoken = named_dialect(dialect)
     with _deep():
-        project = Project(Libraries([Path(folder) for folder in libraries]), report)
+        project = Project(Libraries([Path(folder) for folder in libraries], preferred=spoken.libraries), report, spoken)
         damage = Damage()
         for source in sources:
             text, diagnostics = parse(source)

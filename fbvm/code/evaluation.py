@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, cast
 
 from fbvm.base import arithmetic, strings
+from fbvm.base.dialects import Dialect
 from fbvm.base.types import base, machine
 from fbvm.check.constants import convert
 from fbvm.check.facts import StandardCall, Value
@@ -22,19 +23,22 @@ VARYING = frozenset(("TIME", "__DUE"))
 class _Body:
     """The place in a body for calls that need none: what is kept is what it was."""
 
+    def __init__(self, dialect: Dialect) -> None:
+        self.dialect = dialect
+
     def keep(self, node: Node) -> Node:
         return node
 
     measured = keep
 
 
-def evaluate(call: StandardCall, arguments: Sequence[Value]) -> Value | None:
+def evaluate(call: StandardCall, arguments: Sequence[Value], dialect: Dialect) -> Value | None:
     """The value of a call of constants, or None if it has none before the program runs.  Raises Undefined for a trap."""
     kinds = [base(kind) for _, kind in call.arguments]
     if call.key not in FUNCTIONS or call.key in VARYING or not all(map(machine, kinds)):
         return None
     nodes = [constant(kind, convert(value, kind)) for kind, value in zip(kinds, arguments, strict=True)]
-    node = FUNCTIONS[call.key](cast("Any", _Body()), nodes, call, 0)
+    node = FUNCTIONS[call.key](cast("Any", _Body(dialect)), nodes, call, 0)
     value = _value(node)
     return bool(value) if node[1] == "b" else cast("Value", value)
 

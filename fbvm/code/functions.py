@@ -88,13 +88,25 @@ def _select(body: BodyLowering, a: list[Node], call: StandardCall, site: int) ->
 
 
 def _mux(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
-    return ("mux", _form(call), as_count(a[0], call.arguments[0][1]), tuple(a[1:]), site)
+    chooser = as_count(a[0], call.arguments[0][1])
+    if body.dialect.last_of_mux:
+        last = ("min", "u64", ("convert", "u64", "i64", chooser), ("const", "u64", len(a) - 2))
+        chooser = ("convert", "i64", "u64", last)
+    return ("mux", _form(call), chooser, tuple(a[1:]), site)
+
+
+_LEAST = {"left": (0,), "right": (0,), "mid": (0, 1), "insert": (0,), "delete": (0, 1), "replace": (0, 1)}
+"""The least length and position that a function of texts takes, in the order of its parameters."""
 
 
 def _text(name: str) -> Lowering:
     def lower(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
         operands = [node if isinstance(kind, StringType) else as_count(node, kind)
                     for node, (_, kind) in zip(a, call.arguments, strict=True)]
+        if body.dialect.lenient_positions:
+            at_least = iter(_LEAST[name])
+            operands = [node if isinstance(kind, StringType) else ("max", "i64", node, ("const", "i64", next(at_least)))
+                        for node, (_, kind) in zip(operands, call.arguments, strict=True)]
         return (name, _form(call), *operands, site)
     return lower
 
@@ -153,7 +165,7 @@ def _convert(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -
     source, target = call.detail[0], base(call.detail[1])
     node = a[0]
     if isinstance(target, StringType):
-        return in_width(to_text(source, node), machine(target))
+        return in_width(to_text(source, node, body), machine(target))
     if isinstance(source, StringType):
         if is_any(target, "ANY_CHAR"):
             return ("first", machine(target), in_width(node, "s16" if target.name == "WCHAR" else "s8"))
@@ -165,14 +177,16 @@ def _convert(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -
     if all(timed):
         return _date_part(body, node, source, target)
     if timed[0]:
-        return _from_time(node, source, target, site)
+        return _from_time(node, source, target, site, _tick(body, source))
     if timed[1]:
-        return _to_time(node, source, target, site)
-    return number(node, source, target, site)
+        return _to_time(node, source, target, site, _tick(body, target))
+    return number(node, source, target, site, body.dialect.real_bits_by_value)
 
 
-def to_text(source: Type, node: Node) -> Node:
+def to_text(source: Type, node: Node, body: BodyLowering) -> Node:
     """A value as text, of the width that comes first to it."""
+    if body.dialect.hexadecimal_bits and is_any(source, "ANY_BIT") and machine(source) != "b":
+        return _hexadecimal(body, node)
     if isinstance(source, StringType):
         return node
     if is_any(source, "ANY_CHAR"):
@@ -180,6 +194,25 @@ def to_text(source: Type, node: Node) -> Node:
     if isinstance(source, EnumType):
         return ("enum_text", "s8", tuple(sorted(source.shown.items())), ("convert", "i64", source.base.machine, node))
     return ("to_text", "s8", source.name, node)
+
+
+def _hexadecimal(body: BodyLowering, node: Node) -> Node:
+    """`16#FF`: a digit for each four bits, without zeros in front."""
+    form = node[1]
+    kept = body.keep(node if form == "u64" else ("convert", "u64", form, node))
+    digits: list[Node] = []
+    significant: Node = ("const", "i64", 1)
+    for shift in range(SIZES[form] * 8 - 4, -1, -4):
+        nibble = ("and", "u64", ("shr", "u64", kept, ("const", "i64", shift), 0), ("const", "u64", 15))
+        place = ("add", "i64", ("convert", "i64", "u64", nibble), ("const", "i64", 1))
+        digits.append(("mid", "s8", ("const", "s8", b"0123456789ABCDEF"), ("const", "i64", 1), place, 0))
+        if shift:
+            more = ("convert", "i64", "b", ("ge", "b", "u64", kept, ("const", "u64", 1 << shift)))
+            significant = ("add", "i64", significant, more)
+    text = digits[0]
+    for digit in digits[1:]:
+        text = body.measured(("concat", "s8", text, digit))
+    return ("concat", "s8", ("const", "s8", b"16#"), ("right", "s8", text, significant, 0))
 
 
 def in_width(node: Node, form: str) -> Node:
@@ -194,24 +227,29 @@ def _narrow(body: BodyLowering, node: Node) -> Node:
             ("const", "u8", ord("?")))
 
 
-def number(node: Node, source: Type, target: Type, site: int) -> Node:
-    """Among BOOL, integers, bit strings, enumerations and reals."""
+def number(node: Node, source: Type, target: Type, site: int, by_value: bool = False) -> Node:
+    """Among BOOL, integers, bit strings, enumerations and reals; the latter give bit strings their bits or their value."""
     a, b = machine(source), machine(target)
     if a == b:
         return node
     if b == "b":
         return ("is_set", "b", a, node)
     if a in FLOATS and b not in FLOATS:
-        if is_any(target, "ANY_BIT"):
+        if is_any(target, "ANY_BIT") and not by_value:
             return ("bits", b, a, node)
         return ("nearest", b, a, node, site)
-    if b in FLOATS and is_any(source, "ANY_BIT") and a != "b":
+    if b in FLOATS and is_any(source, "ANY_BIT") and a != "b" and not by_value:
         return ("bits", b, a, node)
     return ("convert", b, a, node)
 
 
-def _from_time(node: Node, source: Type, target: Type, site: int) -> Node:
-    form, tick = machine(target), _TICKS.get(source.name, 1)
+def _tick(body: BodyLowering, kind: Type) -> int:
+    """Nanoseconds of the unit in which a time meets numbers."""
+    return 1_000_000_000 if body.dialect.seconds and kind.name == "TIME" else _TICKS.get(kind.name, 1)
+
+
+def _from_time(node: Node, source: Type, target: Type, site: int, tick: int) -> Node:
+    form = machine(target)
     if form == "b":
         return ("is_set", "b", "i64", node)
     if form in FLOATS:
@@ -222,8 +260,8 @@ def _from_time(node: Node, source: Type, target: Type, site: int) -> Node:
     return node if form == "i64" else ("convert", form, "i64", node)
 
 
-def _to_time(node: Node, source: Type, target: Type, site: int) -> Node:
-    form, tick = machine(source), _TICKS.get(target.name, 1)
+def _to_time(node: Node, source: Type, target: Type, site: int, tick: int) -> Node:
+    form = machine(source)
     if form in FLOATS:
         wide = node if form == "f64" else ("convert", "f64", "f32", node)
         return ("nearest", "i64", "f64", ("mul", "f64", wide, ("const", "f64", float(tick))), site)

@@ -59,6 +59,9 @@ class LoopLowering:
             step = int(known) if known is not None else None
             if step is None:
                 wanted.append((node.step, kind))
+        if body.dialect.loop_ends_each_pass and (step is None or node.last not in body.facts.constants):
+            self._each_pass(node, place, wanted, step, site)
+            return
         first, last, *computed = body.values.operands(*wanted)
         last = body.keep(last)
         by = body.keep(computed[0]) if computed else None
@@ -69,6 +72,21 @@ class LoopLowering:
         head, tail = self._known_step(place, last, step, site) if step is not None else \
             self._computed_step(place, last, by or last, site)
         head = (self._charge(node.body, site), *head)
+        body.out.append(("loop", head, body.inner(node.body), (*tail, *self._observed(place, site))))
+
+    def _each_pass(self, node: tree.For, place: Place, wanted: list[tuple[tree.Expr, Type | None]], step: int | None,
+                   site: int) -> None:
+        """The loop of a dialect in which end and step are worked out on every pass."""
+        body = self.body
+        body.write(place, body.value(*wanted[0]), site)
+        with body.block() as begin:
+            last, *computed = (body.keep(value, always=True) for value in body.values.operands(*wanted[1:]))
+            if computed:
+                zero = ("const", computed[0][1], 0)
+                body.out.append(("if", ((("eq", "b", computed[0][1], computed[0], zero), (("stop", "R0109", site),)),), ()))
+        head, tail = self._known_step(place, last, step, site) if step is not None else \
+            self._computed_step(place, last, computed[0], site)
+        head = (self._charge(node.body, site), *begin, *head)
         body.out.append(("loop", head, body.inner(node.body), (*tail, *self._observed(place, site))))
 
     def _observed(self, place: Place, site: int) -> Block:

@@ -33,6 +33,7 @@ class BodyLowering:
         self.program = program
         self.checker = checker
         self.facts = checker.project.facts
+        self.dialect = checker.project.dialect
         self.pou = pou
         self.out: list[Node] = []
         self.reads: list[Place] = []

@@ -88,7 +88,8 @@ class Plant:
             if not folder.is_dir():
                 self._report(("plc", row.name, "libraries"), f"there is no folder {folder}")
                 return None
-        compilation = compile_files(row.sources, program=row.program, libraries=row.libraries, runnable=True)
+        compilation = compile_files(row.sources, program=row.program, libraries=row.libraries, runnable=True,
+                                    resource=row.resource, dialect=row.dialect)
         self.diagnostics += compilation.diagnostics
         return compilation.image
 

@@ -26,6 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.base.dialects import DIALECTS
 from fbvm.engine.tiers import CHOICES
 from fbvm.net.faults import FOREVER, KINDS, NO_FAULT, Fault
 from fbvm.run.project_reader import (
@@ -75,7 +76,8 @@ UNIT: Keys = {
 """All of these; which a unit has is said by its type."""
 SET: Keys = {"name": Key(text), "value": Key(anything), "at": Key(moment_ns, 0)}
 PLC: Keys = {
-    "sources": Key(texts), "program": Key(text, None), "libraries": Key(texts, ()), "cycle": Key(time_ns, 10_000_000),
+    "sources": Key(texts), "program": Key(text, None), "resource": Key(text, None),
+    "dialect": Key(one_of(tuple(DIALECTS)), "standard"), "libraries": Key(texts, ()), "cycle": Key(time_ns, 10_000_000),
     "pace": Key(one_of(PACES), PACES[0]), "engine": Key(one_of(CHOICES), "auto"), "count": Key(whole(1, MOST), None),
     "until": Key(text, None), "watch": Key(texts, ()), "unit": Key(UNIT, (), many=True), "set": Key(SET, (), many=True),
 }  # fmt: skip
@@ -111,6 +113,8 @@ class PlcRow:
     name: str
     sources: tuple[Path, ...]
     program: str | None
+    resource: str | None
+    dialect: str
     libraries: tuple[Path, ...]
     cycle_ns: int
     pace: str
@@ -198,7 +202,7 @@ def _check_units(reading: Reading, plcs: Mapping[str, Any]) -> None:
 
 def _plc(name: str, row: Mapping[str, Any], folder: Path) -> PlcRow:
     return PlcRow(
-        name, tuple(folder / source for source in row["sources"]), row["program"],
+        name, tuple(folder / source for source in row["sources"]), row["program"], row["resource"], row["dialect"],
         tuple(folder / library for library in row["libraries"]), row["cycle"], row["pace"], row["engine"], row["count"],
         row["until"], row["watch"],
         tuple(UnitRow(unit["type"], unit["address"], _options(unit)) for unit in row["unit"]),

@@ -31,7 +31,8 @@ BUILDS: dict[str, Callable[[Image, int], Plc]] = {
 
 def check(program: Program) -> None:
     """Compiles and runs a program of the corpus and compares with its expectations."""
-    compilation = compile_sources([Source(program.name, program.text)], runnable=True, lint=program.path.parent.name == LINTED)
+    compilation = compile_sources([Source(program.name, program.text)], runnable=True, dialect=program.dialect,
+                                  lint=program.path.parent.name == LINTED)
     _check_diagnostics(program, compilation.diagnostics)
     if program.runs:
         assert compilation.image is not None, "no errors, and no image"

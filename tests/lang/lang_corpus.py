@@ -8,6 +8,7 @@ A file holds programs one after the other, each begun by a line `// ---- what it
     // expect scan 3: a[2].b = 7                     values after another one
     // set scan 2: start = TRUE                      values written before a scan
     // cycle 10ms                                    how far a scan advances the time
+    // dialect codesys                               whose answers are taken
 
 A name is looked for in the program Main first, then among programs, globals and addresses.  A value is written as in a
 program; INF, -INF and NAN are reals, the member of an enumeration is its name.
@@ -21,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 HERE = Path(__file__).parent
-WORDS = ("error", "warning", "trap", "expect", "set", "cycle")
+WORDS = ("error", "warning", "trap", "expect", "set", "cycle", "dialect")
 _TEXT = r"""'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*\""""
 _COMMENT = re.compile(rf"//\s*({'|'.join(WORDS)})\b((?:{_TEXT}|(?!//).)*)")
 _CODE = re.compile(r"\s*([SR]\d{4})\s*(?::\s*(.*?))?\s*")
@@ -65,6 +66,7 @@ class Program:
     expected: list[Item] = field(default_factory=list)
     written: list[Item] = field(default_factory=list)
     cycle_ns: int = 10_000_000
+    dialect: str = "standard"
 
     @property
     def name(self) -> str:
@@ -103,7 +105,9 @@ def read(path: Path) -> Iterator[Program]:
 
 def _take(program: Program, word: str, rest: str, line: int) -> None:
     """Adds what one comment expects."""
-    if word == "cycle":
+    if word == "dialect":
+        program.dialect = rest.strip()
+    elif word == "cycle":
         match = re.fullmatch(r"\s*(\d+)\s*(ms|us|s)\s*", rest)
         if not match:
             raise ValueError(f"{program.path}:{line}: cycle takes a time such as 10ms")

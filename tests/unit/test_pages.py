@@ -48,7 +48,9 @@ def parts(code: str) -> dict[str, str]:
 
 
 def compiled(text: str) -> Compilation:
-    return compile_sources([Source("page.st", text)], runnable=True)
+    """A program of a page, in the dialect that a comment names."""
+    dialect = re.search(r"// --dialect (\w+)", text)
+    return compile_sources([Source("page.st", text)], runnable=True, dialect=dialect[1] if dialect else "standard")
 
 
 def shown(compilation: Compilation) -> str:

@@ -1,0 +1,98 @@
+"""Dialects: where compilers of the field disagree, which answer is taken.  Data only; whoever decides asks a switch.
+
+The default is the third edition where it speaks, and what CODESYS users see where it is silent.  A dialect never makes a
+correct program of the standard mean something else but where its switches say so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """One set of answers."""
+
+    name: str
+    for_whom: str
+    libraries: tuple[str, ...] = ()
+    """Libraries whose blocks stand in place of the standard ones."""
+    refused: frozenset[str] = frozenset()
+    """Forms that the tool does not take: POINTER TO, REFERENCE TO, REF_TO, WSTRING, alias."""
+    last_of_mux: bool = False
+    lenient_positions: bool = False
+    seconds: bool = False
+    hexadecimal_bits: bool = False
+    real_bits_by_value: bool = False
+    loop_ends_each_pass: bool = False
+    arithmetic_of_bits: bool = False
+    integers_and_bits: bool = False
+    numbers_of_enumerations: bool = False
+    number_times_duration: bool = False
+
+
+QUESTIONS = {
+    "last_of_mux": ("MUX with K out of range", "stops the program (R0107)", "the last input"),
+    "lenient_positions": ("a length below 0 or a position below 1 in LEFT, MID, DELETE ...", "stops the program (R0108)",
+                          "0, and position 1"),
+    "seconds": ("TIME_TO_REAL(T#5s), INT_TO_TIME(5000): the unit", "milliseconds", "seconds"),
+    "hexadecimal_bits": ("DWORD_TO_STRING(255)", "'255'", "'16#FF'"),
+    "real_bits_by_value": ("REAL_TO_DWORD(1.5), DWORD_TO_REAL", "the bits, of one width", "the value, rounded"),
+    "loop_ends_each_pass": ("end and step of FOR", "worked out once, in front of the loop", "worked out on every pass"),
+    "arithmetic_of_bits": ("+ - * / MOD of BYTE, WORD, DWORD, LWORD", "an error", "as unsigned numbers"),
+    "integers_and_bits": ("WORD where INT is needed, INT where UINT is, LREAL where REAL is, DINT where REAL is",
+                          "an error that names the conversion", "converted as it stands if the width suffices"),
+    "numbers_of_enumerations": ("an enumeration as a number, < and > between its members", "an error", "its value"),
+    "number_times_duration": ("2 * T#5s", "an error: the TIME stands in front", "T#10s"),
+    "libraries": ("blocks that begin or end another way", "as the standard's bodies compute it", "blocks of its own"),
+    "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
+}
+"""For each switch: what compilers disagree about, the answer without it, and with it."""
+
+STANDARD = Dialect("standard", "the third edition, and CODESYS's answer where it is silent")
+_ROWS = (
+    STANDARD,
+    Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
+            lenient_positions=True, real_bits_by_value=True, arithmetic_of_bits=True, integers_and_bits=True,
+            numbers_of_enumerations=True, number_times_duration=True),
+    Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True),
+    Dialect("rusty", "programs for RuSTy", loop_ends_each_pass=True, arithmetic_of_bits=True, integers_and_bits=True,
+            numbers_of_enumerations=True),
+    Dialect("omron", "programs that shall run in Sysmac Studio",
+            refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
+)
+DIALECTS: dict[str, Dialect] = {row.name: row for row in _ROWS}
+SWITCHES = tuple(f.name for f in fields(Dialect) if f.name not in ("name", "for_whom"))
+
+
+def dialect(name: str) -> Dialect:
+    """The dialect of that name.  Raises ValueError if there is none."""
+    if name.lower() not in DIALECTS:
+        raise ValueError(f"there is no dialect {name}; there are {', '.join(DIALECTS)}")
+    return DIALECTS[name.lower()]
+
+
+def page() -> str:
+    """All dialects for people: who needs which, and how each answers what others disagree about."""
+    lines = ["# Dialects", "", "Where compilers disagree, a dialect says which answer is taken: `--dialect NAME`, `dialect = "
+             '"NAME"` under a', "[plc] of fbvm.toml, or `dialect=` of the compile functions.", ""]
+    lines += [f"- {row.name}: {row.for_whom}." for row in DIALECTS.values()]
+    for switch in SWITCHES:
+        what, without, with_it = QUESTIONS[switch]
+        names = [row.name for row in DIALECTS.values() if getattr(row, switch)]
+        lines += ["", f"## {what}", "", f"- {without}", f"- {' and '.join(names)}: {with_it}"]
+    lines += ["", *(f"## {what}\n\n{answer}\n" for what, answer in ALIKE)]
+    return "\n".join(lines).rstrip()
+
+
+ALIKE = (
+    ("REAL_TO_INT(50.5)", "50 in every dialect: to the nearest, ties to even; TRUNC cuts."),
+    ("Division by zero, a subscript outside, a null or ended pointer", "The program stops with its line and values."),
+    ("Integer overflow, ABS(-32768), -(-32768)", "Wraps, in every dialect."),
+    ("AND and OR whose right side has effects", "Both sides are worked out; AND_THEN and OR_ELSE leave out what cannot matter."),
+    ("FOR whose limit is the last value of its type", "Ends."),
+    ("TIME_TO_DWORD, DWORD_TO_TIME", "Milliseconds modulo 2**32; in seconds under matiec."),
+    ("SIZEOF of ten INT", "20: the bytes that they fill."),
+    ("TON, TOF, TP when ET = PT exactly", "The time is over."),
+)
+"""What users ask about, and every dialect answers alike."""
