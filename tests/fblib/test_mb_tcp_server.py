@@ -11,7 +11,7 @@ from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopNetwork
 from fbvm.plc import Plc
 from fbvm.units.tianxing import Tianxing
-from fbvm.wire.link import Close, Connect, Send
+from fbvm.wire.link import Close, Connect, Grant, Send
 from fbvm.wire.modbus import Adu
 
 SHEET = """
@@ -180,6 +180,22 @@ def test_requests_that_come_together_are_served_one_in_a_call() -> None:
     told = rig.statuses(client, 8)
     assert [status for status in told if status not in ("7006", "7005")] == ["7005 NDR", "7005 DR", "8383 ERROR"]
     assert len(client.data) == 12 + 11 + 9
+
+
+def test_a_client_that_does_not_take_its_replies() -> None:
+    """7005 until the network takes the reply; the requests behind it wait, and are served when the client reads again."""
+    rig = Rig()
+    client = rig.client()
+    rig.scan(2)
+    client.submit(Connect(1, client.server))
+    client.step(3)
+    frames = [Adu(number, 1, bytes.fromhex("03 0000 007D")).to_bytes() for number in range(400)]
+    client.submit(Send(1, b"".join(frames)))
+    told = rig.statuses(client, 400)
+    assert told[-30:] == ["7005"] * 30
+    client.submit(Grant(1, 1 << 20))
+    client.step(600)
+    assert len(client.data) == 400 * 259
 
 
 def test_a_frame_in_pieces() -> None:

@@ -173,6 +173,15 @@ def test_a_client_that_leaves_gets_its_replies_first() -> None:
     assert len(client.data) == 5 * 11
 
 
+def test_a_client_that_breaks_its_connection() -> None:
+    station = Station(pins="Sessions := 1")
+    client = station.client().connect()
+    client.submit(Close(1, reset=True))
+    client.step(4)
+    assert station.plc.read("Main.Server.Clients") == 0
+    assert client.connect().ask("03 0000 0001") == "03 02 00 00"
+
+
 def test_a_client_that_asks_nothing_is_left() -> None:
     station = Station(pins="Idle_Time := T#1s")
     client = station.client().connect()
