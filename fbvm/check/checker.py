@@ -53,6 +53,8 @@ class Checker:
         self.globals = Globals(self)
         self.bodies: list[Pou] = []
         """POUs with checked bodies; their `number` is the position here."""
+        self.progress: Callable[[int, int], None] = lambda done, known: None
+        """Told how many POUs have been checked, and of how many."""
         self._scope: Pou | None = None
         self._blocks: dict[int, Pou] = {}
 
@@ -66,7 +68,8 @@ class Checker:
                 self.specs.declared(entry.tree.name.text, entry.source)
         self.globals.declare()
         while self.project.new_pous:
-            pou = self.project.new_pous.pop(0)
+            self.progress(len(self.bodies), len(self.bodies) + len(self.project.new_pous))
+            pou = self.project.new_pous.popleft()
             if not pou.source.library and not is_generic(pou):
                 self._body(pou)
         configurations.resolve(program)
@@ -169,7 +172,7 @@ class Checker:
         self._body(pou)
 
     def _body(self, pou: Pou) -> None:
-        if pou in self.bodies or not self.interface(pou, pou.source, pou.tree.name) or pou in self.bodies:
+        if pou.number >= 0 or not self.interface(pou, pou.source, pou.tree.name) or pou.number >= 0:
             return
         pou.number = len(self.bodies)
         self.bodies.append(pou)

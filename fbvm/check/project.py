@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -34,6 +35,8 @@ class TypeEntry:
     """References to the type that were met while it was being resolved."""
 
 
+COMPARISONS = 50_000
+"""Pairs of names that are compared at most: about a second."""
 LISTED = 8
 """How many names a hint lists."""
 T = TypeVar("T")
@@ -64,13 +67,17 @@ class Project:
         self.late_global: Callable[[tuple[str, str]], None] = lambda key: None
         """Declares a global variable whose turn has not come yet (set by the checker)."""
         self._loaded: set[str] = set()
+        self._absent: set[tuple[bool, str, str]] = set()
+        """Names of types (True) and POUs that were looked for and are nowhere, and the library that asked."""
+        self._compared = 0
         self.made: dict[tuple[Pou, tuple[tuple[str, str], ...]], Pou] = {}
         """Functions made of generic ones, by the types that these stand for."""
-        self.new_pous: list[Pou] = []
+        self.new_pous: deque[Pou] = deque()
         """POUs that have been named but not checked yet."""
 
     def collect(self, text: tree.SourceText, source: Source) -> None:
         """Take the declarations of one text; complain about names declared twice."""
+        self._absent.clear()
         last: Pou | None = None
         for declaration in text.declarations:
             if isinstance(declaration, tree.Refused):
@@ -150,18 +157,21 @@ class Project:
 
     def pou(self, name: str, source: Source) -> Pou | None:
         """The POU of that name as seen from `source`."""
-        return self._find(self.pous, name, source)
+        return self._find(self.pous, name, source, types=False)
 
     def type_entry(self, name: str, source: Source) -> TypeEntry | None:
-        return self._find(self.types, name, source)
+        return self._find(self.types, name, source, types=True)
 
-    def _find(self, table: dict[tuple[str, str], T], name: str, source: Source) -> T | None:
+    def _find(self, table: dict[tuple[str, str], T], name: str, source: Source, types: bool) -> T | None:
         folded = fold(name)
+        if (types, source.library, folded) in self._absent:
+            return None
         for owner in self.owners(source):
             if owner and (owner, folded) not in table:
                 self._load(folded, owner)
             if (owner, folded) in table:
                 return table[owner, folded]
+        self._absent.add((types, source.library, folded))
         return None
 
     def global_variable(self, name: str, source: Source) -> Variable | None:
@@ -201,8 +211,13 @@ class Project:
         return self.nearest(name, known) or (f"it has {', '.join(known[:LISTED])}{more}" if known else "it has none")
 
     def nearest(self, name: str, candidates: Iterable[str]) -> str:
-        """A hint that names the candidates most like a misspelt name, "" if none is."""
+        """A hint that names the candidates most like a misspelt name, "" if none is.
+
+        Where thousands of names are unknown, they have one cause, and it is none of spelling."""
         shown = {fold(c): c for c in candidates}
+        self._compared += len(shown)
+        if self._compared > COMPARISONS:
+            return ""
         close = difflib.get_close_matches(fold(name), list(shown), n=3, cutoff=0.7)
         return "did you mean " + " or ".join(shown[c] for c in close) + "?" if close else ""
 

@@ -195,4 +195,4 @@ def initialisable(kind: StructType, member: Field) -> bool:
 
 def is_any(kind: Type, *names: str) -> bool:
     """True if one of the generic types `names` holds `kind`."""
-    return any(name in families(kind) for name in names)
+    return not families(kind).isdisjoint(names)

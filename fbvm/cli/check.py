@@ -32,9 +32,10 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         Wanted.of(codes, warnings_as_errors)
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--no-warn") from None
-    with patience(f"checking {', '.join(path.name for path in files)}"):
+    with patience(f"checking {', '.join(path.name for path in files)}") as progress:
         compilation = compile_files(files, program=program, libraries=libraries, no_warn=codes,
-                                    warnings_as_errors=warnings_as_errors, **chosen())
+                                    warnings_as_errors=warnings_as_errors, progress=progress,
+                                    **chosen())
     if compilation.diagnostics or as_json:
         report(compilation.diagnostics, as_json)
     if errors(compilation.diagnostics):

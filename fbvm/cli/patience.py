@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from rich.console import Console, ConsoleOptions, RenderResult
@@ -19,8 +19,13 @@ class _Late:
 
     def __init__(self, console: Console, text: str) -> None:
         self._console = console
+        self._text = text
         self._spinner = Spinner("line", text)
         self._began_s = console.get_time()
+
+    def reached(self, what: str, done: int, known: int) -> None:
+        """Say how far the work is."""
+        self._spinner.update(text=f"{self._text}: {what} {100 * done // max(known, 1)} %")
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         if self._console.get_time() - self._began_s >= QUICK_S:
@@ -28,11 +33,12 @@ class _Late:
 
 
 @contextmanager
-def patience(text: str, console: Console | None = None) -> Iterator[None]:
-    """Shows `text` on stderr from two seconds on until the block is over.  Nothing in a pipe."""
+def patience(text: str, console: Console | None = None) -> Iterator[Callable[[str, int, int], None]]:
+    """Shows `text` on stderr from two seconds on until the block is over, and how far it is.  Nothing in a pipe."""
     console = console or Console(stderr=True)
+    late = _Late(console, text)
     if not console.is_terminal:
-        yield
+        yield late.reached
         return
-    with Live(_Late(console, text), console=console, transient=True, refresh_per_second=PER_SECOND):
-        yield
+    with Live(late, console=console, transient=True, refresh_per_second=PER_SECOND):
+        yield late.reached

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from fbvm.base.areas import Area
@@ -31,6 +33,14 @@ from fbvm.syntax.text import read
 
 _FRAMES = 20_000
 """Python frames that checking and lowering may use for the deepest tree that the parser lets through."""
+
+
+Progress = Callable[[str, int, int], None]
+"""Told what has been done ("read", "checked", "compiled"), how much of it, and of how much: characters, then POUs."""
+
+
+def _nobody(what: str, done: int, known: int) -> None:
+    """Nobody waits."""
 
 
 @dataclass(frozen=True)
@@ -86,17 +96,18 @@ class Program:
 
 def compile_files(paths: Sequence[Path | str], program: str | None = None, libraries: Sequence[Path | str] = (),
                   runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
-                  lint: bool = True, no_warn: Iterable[str] = (),
-                  warnings_as_errors: bool = False, cache: bool = True) -> Compilation:
+                  lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False, cache: bool = True,
+                  progress: Progress = _nobody) -> Compilation:
     """Compile source files, or with `cache` read what became of the same ones the last time.
 
     `program` names the PROGRAM to run, `resource` the RESOURCE of a CONFIGURATION that has several; `libraries` are folders
     asked before the shipped ones.
 
     With `runnable` it is an error if there is not exactly one thing to run.  `lint` looks for what is allowed and hardly
-    meant; `no_warn` are codes of warnings that are not wanted, or "all".  Never raises for what files contain; a file that
-    cannot be read gives a diagnostic.  `dialect` says how to answer what compilers disagree about (`base.dialects`).  Raises
-    ValueError for a dialect that there is not, or a code that is none of a warning."""
+    meant; `no_warn` are codes of warnings that are not wanted, or "all".  `dialect` says how to answer what compilers
+    disagree about (`base.dialects`).  `progress` is told how far the work is.  Never raises for what files contain; a file
+    that cannot be read gives a diagnostic.  Raises ValueError for a dialect that there is not, or a code that is none of a
+    warning."""
     sources: list[Source] = []
     unreadable: list[Diagnostic] = []
     for path in paths:
@@ -112,7 +123,7 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
     if kept and (known := image_cache.read(kept, sources)):
         return Compilation(*known)
     made = compile_sources(sources, program, libraries, runnable, resource=resource, dialect=dialect, lint=lint,
-                           no_warn=silenced, warnings_as_errors=warnings_as_errors)
+                           no_warn=silenced, warnings_as_errors=warnings_as_errors, progress=progress)
     if kept and made.image:
         image_cache.write(kept, sources, made.image, made.diagnostics)
     return Compilation(None, unreadable + made.diagnostics) if unreadable else made
@@ -129,8 +140,8 @@ def compile_text(text: str, name: str = "text.st", program: str | None = None, l
 
 def compile_sources(sources: Sequence[Source], program: str | None = None, libraries: Sequence[Path | str] = (),
                     runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
-                  lint: bool = True, no_warn: Iterable[str] = (),
-                    warnings_as_errors: bool = False) -> Compilation:
+                    lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False,
+                    progress: Progress = _nobody) -> Compilation:
     """Compile texts; see `compile_files`."""
     wanted, silence, report = Wanted.of(no_warn, warnings_as_errors), Silence(), Report()
     spoken = named_dialect(dialect)
@@ -138,12 +149,13 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         project = Project(Libraries([Path(folder) for folder in libraries], preferred=spoken.libraries), report, spoken)
         damage = Damage()
         for source in sources:
-            text, diagnostics = parse(source)
+            text, diagnostics = parse(source, partial(_read_so_far, progress, source))
             report.diagnostics += diagnostics + silence.note(source, text)
             damage.note(source, text, errors(diagnostics))
             project.collect(text, source)
         unread = len(report.diagnostics)
         checker = Checker(project, evaluate)
+        checker.progress = partial(progress, "checked")
         checker.check(program, resource)
         if runnable and not errors(report.diagnostics):
             _demand_program(checker, program, sources, report)
@@ -151,8 +163,12 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
             look_for_slips(checker, program)
         found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not damage.explains(d)]
         diagnostics = sorted(silence.heard(found, wanted), key=Diagnostic.order)
-        image = None if errors(diagnostics) else _image(checker)
+        image = None if errors(diagnostics) else _image(checker, progress)
     return Compilation(image, diagnostics)
+
+
+def _read_so_far(progress: Progress, source: Source, reached: int) -> None:
+    progress("read", reached, len(source.text))
 
 
 def _demand_program(checker: Checker, program: str | None, sources: Sequence[Source], report: Report) -> None:
@@ -174,19 +190,26 @@ def _demand_program(checker: Checker, program: str | None, sources: Sequence[Sou
 
 @contextmanager
 def _deep() -> Iterator[None]:
-    """Room for deep trees; the parser limits how deep they get."""
-    before = sys.getrecursionlimit()
+    """Room for deep trees; the parser limits how deep they get.
+
+    Nobody looks for garbage meanwhile: nodes and facts live until the end, and to visit them all again and again takes a
+    third of the time."""
+    before, collects = sys.getrecursionlimit(), gc.isenabled()
     sys.setrecursionlimit(max(before, _FRAMES))
+    gc.disable()
     try:
         yield
     finally:
         sys.setrecursionlimit(before)
+        if collects:
+            gc.enable()
 
 
-def _image(checker: Checker) -> Image:
+def _image(checker: Checker, progress: Progress) -> Image:
     placed = place(checker)
     program = Program(placed)
-    bodies = tuple(BodyLowering(program, checker, pou).body() for pou in checker.bodies)
+    bodies = tuple(BodyLowering(program, checker, pou).body()
+                   for pou in _told(checker.bodies, partial(progress, "compiled")))
     tasks = sorted((_task(task) for task in checker.tasks), key=lambda row: row.priority)
     types: dict[str, Type] = {fold(p.type.name): p.type for p in checker.bodies if p.type is not None}
     for (_, name), entry in checker.project.types.items():
@@ -194,6 +217,13 @@ def _image(checker: Checker) -> Image:
             types.setdefault(name, entry.resolved[0])
     return Image(placed.layout, bodies, tuple(tasks), placed.symbols, tuple(placed.initial), tuple(placed.retained),
                  tuple(program.sites), types, program.objects, tuple(program.rungs))
+
+
+def _told(pous: Sequence[Pou], reached: Callable[[int, int], None]) -> Iterator[Pou]:
+    """The POUs, and a word to the caller at each."""
+    for number, pou in enumerate(pous):
+        reached(number, len(pous))
+        yield pou
 
 
 def _task(task: TaskFact) -> TaskRow:

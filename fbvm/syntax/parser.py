@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.automaton import Automaton, Mender
 from fbvm.syntax.builder import Stop
-from fbvm.syntax.lexer import Lexer
+from fbvm.syntax.lexer import Lexer, Token
 from fbvm.syntax.tree import SourceText
 from fbvm.syntax.types import Types
 
 
-def parse(source: Source) -> tuple[SourceText, list[Diagnostic]]:
+def parse(source: Source, reached: Callable[[int], None] | None = None) -> tuple[SourceText, list[Diagnostic]]:
     """The tree of a text and what is wrong with it, in the order of the text.
 
-    Never raises for any text: what cannot be understood is left out of the tree and has a diagnostic."""
+    Never raises for any text: what cannot be understood is left out of the tree and has a diagnostic.  Tells now and then
+    which character it has `reached`."""
     builder = Types(source)
     lexer = Lexer(source.text, builder.report)
-    automaton = Automaton(builder, lexer.tokens(), source.text)
+    tokens = lexer.tokens()
+    automaton = Automaton(builder, _counted(tokens, reached) if reached else tokens, source.text)
     try:
         tree: SourceText = automaton.run(lambda stuck: _recovery(stuck, builder))
     except Stop:
@@ -24,6 +28,18 @@ def parse(source: Source) -> tuple[SourceText, list[Diagnostic]]:
         tree = SourceText(0, len(source.text), tuple(read))
     tree.pragmas = tuple(lexer.pragmas)
     return tree, sorted(builder.diagnostics, key=Diagnostic.order)
+
+
+def _counted(tokens: Iterator[Token], reached: Callable[[int], None]) -> Iterator[Token]:
+    """The tokens, and a word to the caller at some of them."""
+    for number, token in enumerate(tokens):
+        if number % OFTEN == 0:
+            reached(token.start)
+        yield token
+
+
+OFTEN = 5000
+"""Tokens between two words to the caller: a tenth of a second."""
 
 
 def _recovery(automaton: Automaton, builder: Types) -> Mender:
