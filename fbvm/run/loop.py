@@ -46,7 +46,7 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
     start_ns = max((run.plc.elapsed_ns for run in runs), default=0)
     for run in runs:
-        run.begin(start_ns)
+        run.begin(start_ns + run.phase_ns if networks else start_ns)
         if not networks:  # nothing happens between two periods of virtual time
             run.pace = CYCLIC
     clock = _Real(cast(list[RealNetwork], list(networks.values())), runs, start_ns) if networks else _Virtual()

@@ -25,6 +25,10 @@ from fbvm.wire.registers import server
 MANY = 10
 """So many equal PLCs execute enough together for machine code from the first scan on."""
 ENDLESS = 1 << 62
+"""So many nanoseconds or scans nobody waits for."""
+MOMENT_NS = 1_000_000
+"""Equal PLCs are spread over their cycle in such steps, in real time: who scans at the same moment waits for the others,
+and waking up for each alone would cost more than the scan."""
 
 
 @dataclass
@@ -108,7 +112,7 @@ class Plant:
                 writes = list(self._writes(plc, row.sets, where))
             if not self._attach(plc, row, number):
                 return
-            running = self._running(plc, row, writes)
+            running = self._running(plc, row, writes, number)
             if running is None:
                 return
             kind.runs.append(running)
@@ -126,16 +130,17 @@ class Plant:
                 return False
         return True
 
-    def _running(self, plc: Plc, row: PlcRow, writes: Iterable[TimedWrite]) -> Running | None:
+    def _running(self, plc: Plc, row: PlcRow, writes: Iterable[TimedWrite], number: int) -> Running | None:
+        phase_ns = row.cycle_ns * number // (row.count or 1) // MOMENT_NS * MOMENT_NS
         try:
             if row.until is not None:
-                return Running(plc, until=row.until, max_ns=self.for_ns, writes=writes, pace=row.pace)
+                return Running(plc, until=row.until, max_ns=self.for_ns, writes=writes, pace=row.pace, phase_ns=phase_ns)
         except (LookupError, TypeError, ValueError) as error:
             self._report(("plc", row.name, "until"), str(error))
             return None
         if self.for_ns is None and self.scans is None:
-            return Running(plc, until=self._others_ended, writes=writes, pace=row.pace)
-        return Running(plc, for_ns=self.for_ns, scans=self.scans, writes=writes, pace=row.pace)
+            return Running(plc, until=self._others_ended, writes=writes, pace=row.pace, phase_ns=phase_ns)
+        return Running(plc, for_ns=self.for_ns, scans=self.scans, writes=writes, pace=row.pace, phase_ns=phase_ns)
 
     def _others_ended(self, plc: Plc) -> bool:
         """The end of a PLC that has none: that of all which have one."""

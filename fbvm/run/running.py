@@ -40,11 +40,14 @@ class Running:
         max_ns: int | None = None,
         writes: Iterable[TimedWrite] = (),
         pace: str = CYCLIC,
+        phase_ns: int = 0,
     ) -> None:
         if pace not in PACES:
             raise ValueError(f"pace is {CYCLIC} or {EVENT}, not {pace!r}")
         self.plc = plc
         self.pace = pace
+        self.phase_ns = phase_ns
+        """How much later than the loop it is switched on, in real time: many PLCs need not scan at the same moment."""
         self._goal = Goal(plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
         self.reason = self._goal.reached()
         """What ended the run, by the names of `Plc.run`; "" while it goes on."""

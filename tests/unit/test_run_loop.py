@@ -246,6 +246,18 @@ def test_each_plc_has_its_own_end() -> None:
     assert [(run.reason, run.plc.scans) for run in runs] == [("scans", 2), ("until", 5), ("max", 1)]
 
 
+def test_plcs_need_not_scan_at_the_same_moment(clock: Clock) -> None:
+    times: list[tuple[int, int, int]] = []
+    runs = []
+    for number in range(2):
+        plc, _ = real_plc(clock)
+        plc.watchers.append(lambda plc, number=number: times.append(  # type: ignore[misc]
+            (number, clock.now_ns // MS % 100, plc.now_ns // MS)))
+        runs.append(Running(plc, scans=2, phase_ns=4 * MS * number))
+    run_all(runs)
+    assert times == [(0, 0, 0), (1, 4, 0), (0, 10, 10), (1, 14, 10)]
+
+
 def test_news_wake_only_whose_they_are(clock: Clock) -> None:
     scans: list[tuple[str, int]] = []
     network, runs = RealNetwork(clock, 3, 4), []
