@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, StringType, StructType, Type, base, fold
-from fbvm.check import qualified
+from fbvm.check import functions, qualified
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
 from fbvm.check.fitting import assignable, holds, lent, same
@@ -104,7 +104,10 @@ class Calls:
             self._arguments_alone(call)
             return None
         if not isinstance(kind, StructType) or not kind.block:
-            self.error("S0401", call.callee, f"{_shown(call.callee)} is {kind} and cannot be called")
+            name = _shown(call.callee)
+            hidden = fold(name) in functions.names() or self.project.pou(name, self.expressions.source) is not None
+            self.error("S0401", call.callee, f"{name} is {kind} and cannot be called",
+                       f"the variable hides the function {fold(name)}: rename it" if hidden else "")
             return None
         pou = self.checker.block_of(kind)
         if as_value:
