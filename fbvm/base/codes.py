@@ -80,6 +80,7 @@ CODES: dict[str, Code] = {
         "P0102": "unknown key in a project file",
         "P0103": "value in a project file does not fit",
         "P0104": "key missing from a project file",
+        "P0201": "library.toml does not describe a library",
     }),
     **_table("warning", {
         "S0190": "pragma is not known and has no effect",

@@ -57,7 +57,17 @@ class Library:
 
 
 class LibraryError(ValueError):
-    """A library folder is damaged; the message says where and how."""
+    """The `library.toml` of a library is damaged; the message says where and how."""
+
+    def __init__(self, described: Path, why: str) -> None:
+        super().__init__(f"{described}: {why}")
+        self.described, self.why = described, why
+
+    @property
+    def diagnostic(self) -> Diagnostic:
+        """The same for those who compile."""
+        text = self.described.read_text(encoding="utf-8", errors="replace") if self.described.is_file() else ""
+        return Diagnostic("P0201", Source(str(self.described), text), 0, len(text.partition("\n")[0]), self.why)
 
 
 def _libraries_below(root: Path) -> Iterator[Library]:
@@ -69,10 +79,10 @@ def _libraries_below(root: Path) -> Iterator[Library]:
             try:
                 table = tomllib.loads(described.read_text(encoding="utf-8"))
             except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-                raise LibraryError(f"{described}: {error}") from error
+                raise LibraryError(described, str(error)) from error
         listed = table.get("globals", [])
         if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
-            raise LibraryError(f"{described}: globals must be a list of file names")
+            raise LibraryError(described, "globals must be a list of file names")
         spaces = table.get("spaces", [])
         name = folder.relative_to(root).as_posix() if folder != root else root.name
         files = {fold(p.stem): p for p in sorted(folder.glob("*.st"))}
@@ -87,7 +97,7 @@ def _pins(table: dict[str, object], described: Path) -> dict[str, dict[str, str]
     pins: dict[str, dict[str, str]] = {}
     for pou, row in written.items() if isinstance(written, dict) else [("", None)]:
         if not isinstance(row, dict) or not all(isinstance(own, str) for own in row.values()):
-            raise LibraryError(f"{described}: pins has for each POU a table of names and what the POU calls them")
+            raise LibraryError(described, "pins has for each POU a table of names and what the POU calls them")
         pins[fold(pou)] = {fold(other): fold(own) for other, own in row.items()}
     return pins
 
@@ -96,7 +106,7 @@ def _written(table: dict[str, object], described: Path) -> tuple[str, ...]:
     """The areas that the library writes though programs only read them."""
     areas = table.get("writes", [])
     if not isinstance(areas, list) or not all(area in AREAS for area in areas):
-        raise LibraryError(f"{described}: writes must be a list of areas")
+        raise LibraryError(described, "writes must be a list of areas")
     return tuple(areas)
 
 
@@ -108,10 +118,10 @@ def _mailbox(table: dict[str, object], described: Path) -> Mailbox | None:
     row = written if isinstance(written, dict) else {}
     sizes = [size for key in ("head", "slots", "slot") if type(size := row.get(key)) is int]
     if set(row) != {"area", "head", "slots", "slot"} or len(sizes) != 3:
-        raise LibraryError(f"{described}: a mailbox has an area and whole numbers for head, slots and slot")
+        raise LibraryError(described, "a mailbox has an area and whole numbers for head, slots and slot")
     mailbox = Mailbox(str(row["area"]), *sizes)
     if why := refusal(mailbox):
-        raise LibraryError(f"{described}: {why}")
+        raise LibraryError(described, why)
     return mailbox
 
 
@@ -130,7 +140,8 @@ class Libraries:
         """What the libraries' units bring, by area."""
         for library in self._libraries.values():
             if library.mailbox and self.mailboxes.setdefault(library.mailbox.name, library.mailbox) != library.mailbox:
-                raise LibraryError(f"{library.folder}: {library.mailbox.name} is another library's mailbox, too")
+                described = library.folder / "library.toml"
+                raise LibraryError(described, f"{library.mailbox.name} is another library's mailbox, too")
 
     @property
     def names(self) -> tuple[str, ...]:

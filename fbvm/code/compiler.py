@@ -16,7 +16,7 @@ from fbvm.base.dialects import dialect as named_dialect
 from fbvm.base.types import Field, StructType, Type, fold
 from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, Report, TaskFact
-from fbvm.check.library import Libraries
+from fbvm.check.library import Libraries, LibraryError
 from fbvm.check.lint import lint as look_for_slips
 from fbvm.check.project import Project
 from fbvm.check.silence import Silence, Wanted
@@ -145,8 +145,12 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
     """Compile texts; see `compile_files`."""
     wanted, silence, report = Wanted.of(no_warn, warnings_as_errors), Silence(), Report()
     spoken = named_dialect(dialect)
+    try:
+        shelves = Libraries([Path(folder) for folder in libraries], preferred=spoken.libraries)
+    except LibraryError as error:
+        return Compilation(None, [error.diagnostic])
     with _deep():
-        project = Project(Libraries([Path(folder) for folder in libraries], preferred=spoken.libraries), report, spoken)
+        project = Project(shelves, report, spoken)
         damage = Damage()
         for source in sources:
             text, diagnostics = parse(source, partial(_read_so_far, progress, source))

@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 
 from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, AddressError, Mailbox, parse_address
-from fbvm.check.library import LibraryError
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image, Layout
 from fbvm.code.listing import listing
@@ -173,13 +172,16 @@ def test_what_runs_past_its_end_is_refused(library: Path) -> None:
 def test_a_mailbox_that_cannot_be(tmp_path: Path, area: str, sizes: tuple[object, ...], why: str) -> None:
     head, slots, slot = sizes
     (tmp_path / "library.toml").write_text(f"[mailbox]\narea = {area}\nhead = {head}\nslots = {slots}\nslot = {slot}\n")
-    with pytest.raises(LibraryError, match=why):
-        compile_text("PROGRAM Main END_PROGRAM", libraries=[tmp_path])
+    made = compile_text("PROGRAM Main END_PROGRAM", libraries=[tmp_path])
+    [found] = made.diagnostics
+    assert made.image is None
+    assert found.code == "P0201"
+    assert why in found.message
 
 
 def test_two_libraries_cannot_mean_different_mailboxes(library: Path) -> None:
     other = library / "other"
     other.mkdir()
     (other / "library.toml").write_text(TOML.replace("slots = 2", "slots = 3"))
-    with pytest.raises(LibraryError, match="another library's mailbox"):
-        compile_text("PROGRAM Main END_PROGRAM", libraries=[library])
+    [found] = compile_text("PROGRAM Main END_PROGRAM", libraries=[library]).diagnostics
+    assert (found.code, found.message) == ("P0201", "PBX is another library's mailbox, too")

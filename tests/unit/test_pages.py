@@ -32,8 +32,9 @@ PAGE = re.compile(
 )
 
 every_code = pytest.mark.parametrize("code", CODES)
-project_codes = [code for code in CODES if code.startswith("P")]
-program_codes = [code for code in CODES if code != "S0107" and code not in project_codes]
+project_codes = [code for code in CODES if code.startswith("P01")]
+library_codes = [code for code in CODES if code.startswith("P02")]
+program_codes = [code for code in CODES if code != "S0107" and code not in project_codes + library_codes]
 """All of programs but that of a file which is no text, and which a page cannot show."""
 source_codes = [code for code in program_codes if code.startswith("S")]
 trap_codes = [code for code in program_codes if code.startswith("R")]
@@ -142,6 +143,15 @@ def test_the_wrong_project_gives_this_diagnostic_and_the_right_one_none(code: st
     assert [diagnostic.code for diagnostic in found] == [code]
     file.write_text(parts(code)["right"], encoding="utf-8")
     assert isinstance(read_project(file), Project)
+
+
+@pytest.mark.parametrize("code", library_codes)
+def test_the_wrong_library_gives_this_diagnostic_and_the_right_one_none(code: str, tmp_path: Path) -> None:
+    program = Source("page.st", "PROGRAM Main VAR x : INT; END_VAR x := x + 1; END_PROGRAM")
+    for half, expected in (("wrong", [code]), ("right", [])):
+        (tmp_path / "library.toml").write_text(parts(code)[half], encoding="utf-8")
+        found = compile_sources([program], libraries=[tmp_path]).diagnostics
+        assert [diagnostic.code for diagnostic in found] == expected
 
 
 def test_a_file_that_is_no_text_has_a_page_for_the_shell() -> None:
