@@ -16,6 +16,8 @@ from fbvm.wire.link import RealNetwork
 
 PROGRESS_NS = 100_000_000
 """How often progress is told, at most."""
+PATIENCE_NS = 1_000_000
+"""How long nobody looks at a network that has something only for PLCs which keep their period and fetch it then."""
 
 
 def run(
@@ -175,7 +177,14 @@ class _Real:
             if not self._waits:
                 time.sleep(left_ns / 1e9)
             elif self._networks[0].wait(left_ns / 1e9):
-                break
+                now_ns = self._serve()
+                if self.woken:
+                    return now_ns
+                time.sleep(min(left_ns, PATIENCE_NS) / 1e9)
+        return self._serve()
+
+    def _serve(self) -> int:
+        """Asks the networks what happened, and notes whom it wakes; the time."""
         now_ns = time.monotonic_ns() - self._zero_ns
         self.woken.clear()
         for network in self._networks:

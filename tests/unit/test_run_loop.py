@@ -271,3 +271,23 @@ def test_news_wake_only_whose_they_are(clock: Clock) -> None:
     assert scans[3:5] == [("with", 3), ("with", 4)]
     for other in ("without", "cyclic"):
         assert [at_ms for name, at_ms in scans if name == other] == [0, 10, 20]
+
+
+class Unread(RealNetwork):
+    """A network that always has something, and only for its first unit."""
+
+    def wait(self, timeout_s: float) -> bool:
+        self.waits_ms.append(round(timeout_s * 1e3))
+        self._happened = True
+        return True
+
+
+def test_what_waits_for_a_cyclic_plc_keeps_nobody_busy(clock: Clock) -> None:
+    network, runs = Unread(clock), []
+    for pace in ("cyclic", "event"):
+        plc = Plc(counter_image())
+        plc.attach(Idle(), network)
+        runs.append(Running(plc, scans=3, pace=pace))
+    run_all(runs)
+    assert [run.plc.scans for run in runs] == [3, 3]
+    assert 15 < len(network.waits_ms) < 25  # about each millisecond
