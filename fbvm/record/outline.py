@@ -10,20 +10,22 @@ NONE = -1
 
 def outer_statements(image: Image) -> list[int]:
     """For each site the site of the IF, CASE or loop around it, NONE for statements of a body itself."""
-    outer = [NONE] * len(image.sites)
+    outer: dict[int, int] = {}
     for body in image.bodies:
         _walk(body.code, NONE, outer)
-    return outer
+    return [outer.get(site, NONE) for site in range(len(image.sites))]
 
 
-def _walk(block: Block, around: int, outer: list[int]) -> None:
-    """Notes what stands around each statement of a block."""
+def _walk(block: Block, around: int, outer: dict[int, int]) -> None:
+    """Notes what stands around each statement of a block.
+
+    Of statements that begin at one place, as those of a rung and of its first step, the outermost counts."""
     here = around
     for node in block:
         name, *operands = node
         if name == "observe" and operands[0] in ("statement", "rung"):
             here = operands[1]
-            outer[here] = around
+            outer.setdefault(here, around)
         elif name == "if":
             for _, inner in operands[0]:
                 _walk(inner, here, outer)

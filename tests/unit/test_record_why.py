@@ -7,8 +7,10 @@ import io
 import pytest
 from trace_rig import image, press, traced
 
+from fbvm.code.compiler import compile_text
 from fbvm.net.loop import LoopNetwork
 from fbvm.plc import Phase, Plc
+from fbvm.record.outline import outer_statements
 from fbvm.record.trace import Trace
 from fbvm.record.trace_writer import Depth, TraceWriter
 from fbvm.record.why import Cause, told, why
@@ -103,3 +105,16 @@ def test_a_bit_of_a_word_that_was_written_whole() -> None:
 def test_a_scan_that_is_not_there(trace: Trace) -> None:
     with pytest.raises(ValueError, match="scan 300 is not in the trace"):
         ask(trace, "D200", 300)
+
+
+def test_rungs_whose_statements_begin_at_one_place_come_to_an_end() -> None:
+    """A rung, its first step, a jump back and the loop that it makes all begin at the same characters."""
+    rungs = "LD 0.00\nTIM 1 #0001\nJME 7\nLD T0001\nOUT W0.00\nLD P_Off\nCJP 7"
+    made = compile_text(f"PROGRAM Main\nLADDER\n{rungs}\nEND_LADDER\nEND_PROGRAM").image
+    assert made is not None
+    outer = outer_statements(made)
+    for site in range(len(outer)):
+        steps = 0
+        while site >= 0:
+            site, steps = outer[site], steps + 1
+            assert steps < 10
