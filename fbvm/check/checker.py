@@ -9,6 +9,7 @@ from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import StructType, Type, fold
+from fbvm.check import references
 from fbvm.check.calls import Calls
 from fbvm.check.configurations import Configurations
 from fbvm.check.expressions import Expressions
@@ -77,6 +78,7 @@ class Checker:
         self.settings = Settings(self, named)
         if program is None:
             self.settings.resolve()
+        self._check_initial_references()
         self._complain_of_recursion()
 
     @property
@@ -166,6 +168,16 @@ class Checker:
         return Expressions(self, source, self._scope)
 
     # --- the run of the check ---------------------------------------------------------------------------------------
+
+    def _check_initial_references(self) -> None:
+        """What variables refer to from the start; all names are known by now."""
+        for variable in self.global_order:
+            if variable.refers is not None:
+                references.start(self.expressions(variable.source, None), variable)
+        for pou in list(self.bodies):
+            for variable in pou.order:
+                if variable.refers is not None:
+                    references.start(self.expressions(pou.source, pou), variable)
 
     def check_body(self, pou: Pou) -> None:
         """Check a body that stands in no source: the run of a program with its connections."""

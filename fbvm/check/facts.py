@@ -42,6 +42,8 @@ class Variable:
     """True if the declaration itself gives an initial value."""
     value: Value | None = None
     """The value of a CONSTANT of elementary type."""
+    refers: tree.Call | None = None
+    """REF(x) or ADR(x), to which the variable refers from the start."""
     wrong: bool = False
     """True for a CONSTANT whose value is wrong, which was said."""
     constant: bool = False

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, AnyType, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold
+from fbvm.check import references
 from fbvm.check.facts import Edge, Pou, Variable, holds_block, is_block, is_open
 from fbvm.check.names import refuse_reserved
 from fbvm.check.specs import MAX_SIZE
@@ -143,7 +144,7 @@ class Interfaces:
             if resolved is None:
                 return None
             kind, initial = resolved
-            if declared.initial is not None:
+            if declared.initial is not None and not references.starts(kind, declared.initial):
                 initial = self.checker.values.initial(kind, declared.initial, source, initial)
         return kind, initial
 
@@ -155,6 +156,9 @@ class Interfaces:
         words = {fold(q.text) for q in section.qualifiers}
         made = Variable(name.text, kind, section.kind, source, name, initial=initial, constant="CONSTANT" in words,
                         retain=bool({"RETAIN", "PERSISTENT"} & words), explicit=declared.initial is not None)
+        if references.starts(kind, declared.initial):
+            assert isinstance(declared.initial, tree.Call)
+            made.refers = declared.initial
         if made.constant and is_block(kind):
             self.report.add("S0206", source, name, "an instance cannot be CONSTANT")
         elif made.constant:

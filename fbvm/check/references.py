@@ -16,6 +16,7 @@ from fbvm.base.types import (
     AnyType,
     ArrayType,
     OpenArrayType,
+    RefType,
     StructType,
     Type,
     fold,
@@ -115,6 +116,33 @@ def make(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr)
     made = reference(kind) if name == "REF" else pointer(kind)
     expressions.facts.calls[call] = StandardCall("REF", [(value, kind)], (made,))
     return made
+
+
+def starts(kind: Type, initial: tree.Node | None) -> bool:
+    """True for `REF(x)` and `ADR(x)` as the initial value of a reference."""
+    return isinstance(kind, RefType) and isinstance(initial, tree.Call) and isinstance(initial.callee, tree.NameRef) and \
+        fold(initial.callee.text) in MAKERS
+
+
+def start(expressions: Expressions, variable: Variable) -> None:
+    """Check what a variable refers to from the start: a place that is known by then."""
+    call = variable.refers
+    assert call is not None
+    if not expressions.fit(call, variable.type, "S0705", "the initial value"):
+        return
+    place = call.arguments[0].value
+    assert place is not None
+    root = expressions.facts.root(place)
+    owner = expressions.facts.variables.get(root)
+    known = variable.place in ("self", "abs") and (root in expressions.facts.directs or owner is not None and
+                                                   owner.place != "frame" and not owner.reference)
+    while expressions.facts.is_part(place):
+        subscripts = place.subscripts if isinstance(place, tree.Index) else ()
+        known &= all(subscript in expressions.facts.constants for subscript in subscripts)
+        place = place.of
+    if not known:
+        expressions.error("S0701", call, "an initial value must be known before the program runs",
+                          "assign it in the body instead")
 
 
 def bound(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr, dimension: tree.Expr) -> Type | None:

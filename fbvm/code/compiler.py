@@ -24,6 +24,7 @@ from fbvm.code import image_cache
 from fbvm.code.damage import Damage
 from fbvm.code.evaluation import evaluate
 from fbvm.code.image import Image, Objects, ProgramRun, RungPicture, Site, TaskRow
+from fbvm.code.initial_references import InitialReferences
 from fbvm.code.layout import Placed, place
 from fbvm.code.lower import BodyLowering
 from fbvm.code.operations import FIRST_OBJECT
@@ -214,12 +215,13 @@ def _image(checker: Checker, progress: Progress) -> Image:
     program = Program(placed)
     bodies = tuple(BodyLowering(program, checker, pou).body()
                    for pou in _told(checker.bodies, partial(progress, "compiled")))
+    held = InitialReferences(program, checker, placed.initial).all()
     tasks = sorted((_task(task) for task in checker.tasks), key=lambda row: row.priority)
     types: dict[str, Type] = {fold(p.type.name): p.type for p in checker.bodies if p.type is not None}
     for (_, name), entry in checker.project.types.items():
         if entry.resolved is not None:
             types.setdefault(name, entry.resolved[0])
-    return Image(placed.layout, bodies, tuple(tasks), placed.symbols, tuple(placed.initial), tuple(placed.retained),
+    return Image(placed.layout, bodies, tuple(tasks), placed.symbols, (*placed.initial, *held), tuple(placed.retained),
                  tuple(program.sites), types, program.objects, tuple(program.rungs))
 
 

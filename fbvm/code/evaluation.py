@@ -39,23 +39,23 @@ def evaluate(call: StandardCall, arguments: Sequence[Value], dialect: Dialect) -
         return None
     nodes = [constant(kind, convert(value, kind)) for kind, value in zip(kinds, arguments, strict=True)]
     node = FUNCTIONS[call.key](cast("Any", _Body(dialect)), nodes, call, 0)
-    value = _value(node)
+    value = value_of(node)
     return bool(value) if node[1] == "b" else cast("Value", value)
 
 
-def _value(node: Node) -> Any:
+def value_of(node: Node) -> Any:
     """What an expression of constants yields."""
     name, form, *operands = node
     if name == "const":
         return operands[0]
     if name == "mux":
-        number = _value(operands[0])
+        number = value_of(operands[0])
         if not 0 <= number < len(operands[1]):
             raise arithmetic.Undefined("R0107", number, len(operands[1]) - 1)
-        return _value(operands[1][number])
-    values = [_value(operand) if isinstance(operand, tuple) and name != "enum_text" else operand for operand in operands]
+        return value_of(operands[1][number])
+    values = [value_of(operand) if isinstance(operand, tuple) and name != "enum_text" else operand for operand in operands]
     if name == "enum_text":
-        return texts.enum_text(dict(operands[0]), _value(operands[1]))
+        return texts.enum_text(dict(operands[0]), value_of(operands[1]))
     return _ROWS[name](form, *values)
 
 
