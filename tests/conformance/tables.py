@@ -75,6 +75,7 @@ def choices() -> list[tuple[str, str, Path]]:
 
 def _choices() -> Iterator[str]:
     yield "## What the standard leaves to the maker\n"
+    yield "In the dialect `standard`; `fbvm explain dialects` says what the others change.\n"
     yield "| question | here | shown in |\n|---|---|---|"
     for question, answer, path in choices():
         yield f"| {question} | {answer} | `tests/{path.relative_to(HERE.parent).as_posix()}` |"
