@@ -5,6 +5,7 @@ A round gives its results by name.  A refusal is "exception 1"; a client that ca
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
 import shutil
@@ -127,15 +128,14 @@ def by_modbus_tk(port: int) -> Results:
             return f"exception {error.get_exception_code()}"
         return True if code > 4 else [bool(bit) for bit in answer] if code < 3 else list(answer)
 
-    found = {
-        "write_registers": said(16, REGISTER, 3, [11, 22, 33]), "read_registers": said(3, REGISTER, 3),
-        "write_register": said(6, REGISTER + 1, 1, 44), "read_again": said(3, REGISTER, 3),
-        "write_coil": said(5, COIL + 1, 1, 1), "read_coils": said(1, COIL, 3),
-        "write_coils": said(15, COIL + 5, 3, [1, 0, 1]), "read_inputs": said(2, 20, 3),
-        "read_input_registers": said(4, 150, 3),
-    }  # fmt: skip
-    master.close()
-    return found
+    with contextlib.closing(master):
+        return {
+            "write_registers": said(16, REGISTER, 3, [11, 22, 33]), "read_registers": said(3, REGISTER, 3),
+            "write_register": said(6, REGISTER + 1, 1, 44), "read_again": said(3, REGISTER, 3),
+            "write_coil": said(5, COIL + 1, 1, 1), "read_coils": said(1, COIL, 3),
+            "write_coils": said(15, COIL + 5, 3, [1, 0, 1]), "read_inputs": said(2, 20, 3),
+            "read_input_registers": said(4, 150, 3),
+        }  # fmt: skip
 
 
 def by_mbpoll(port: int) -> Results:

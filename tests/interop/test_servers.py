@@ -148,21 +148,27 @@ def heard(sock: socket.socket, count: int) -> bytes:
 # --- other people's clients -------------------------------------------------------------------------------------------
 
 
-@every_kind
-@pytest.mark.parametrize("name", CLIENTS)
-def test_a_client_of_other_people(kind: str, name: str, tmp_path: Path) -> None:
-    with serving(kind, tmp_path, capture=True) as server:
-        end_s = time.monotonic() + BOUND_S
-        while True:
-            try:
-                found = CLIENTS[name](server.port)
-                break
-            except (OSError, AssertionError):  # the socket is just being opened again
-                assert time.monotonic() < end_s
+@pytest.fixture(scope="module", params=KINDS)
+def watched(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, int]]:
+    """A server for all clients, its kind and port; in the end tshark looks at all that they said."""
+    folder = tmp_path_factory.mktemp("watched")
+    with serving(request.param, folder, capture=True) as server:
+        yield request.param, server.port
         server.end()
-    assert found == {step: value for step, value in expected(set(KINDS[kind].functions)).items() if step in found}
-    assert len(found) == 9
-    nothing_malformed(tmp_path / "server.pcapng")
+    nothing_malformed(folder / "server.pcapng")
+
+
+@pytest.mark.parametrize("name", CLIENTS)
+def test_a_client_of_other_people(watched: tuple[str, int], name: str) -> None:
+    kind, port = watched
+    end_s = time.monotonic() + BOUND_S
+    while True:
+        try:
+            found = CLIENTS[name](port)
+            break
+        except (OSError, AssertionError):  # the socket is just being opened again
+            assert time.monotonic() < end_s
+    assert found == expected(set(KINDS[kind].functions))
 
 
 def nothing_malformed(capture: Path) -> None:
