@@ -24,7 +24,8 @@ def recording(trace: Trace, names: Sequence[str] = (), scans: range | None = Non
             track.add(moment.scans, moment.read(track.signal.place))
         made.times_ns.append(moment.now_ns)
     if not names:
-        made.tracks = [track for track in made.tracks if len(track.changes) > 1] or made.tracks
+        written = [track for track in made.tracks if not track.signal.place.unwritten]
+        made.tracks = [track for track in written if len(track.changes) > 1] or written
     return made
 
 

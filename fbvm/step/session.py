@@ -284,7 +284,7 @@ class Session:
         seen: set[Place] = set()
         for offset, size in compare(self._mark.snapshot(), self.plc.memory.snapshot()):
             for place in self._places(offset, size):
-                if place in seen or place.area in QUIET_AREAS:
+                if place in seen or place.unwritten or place.area in QUIET_AREAS:
                     continue
                 seen.add(place)
                 signal = Signal(place, place.name)

@@ -49,6 +49,11 @@ class Place:
     hexadecimal: bool = False
     """Declared to be read so."""
 
+    @property
+    def unwritten(self) -> bool:
+        """True for what rungs remember: nobody has written its name, and nobody can."""
+        return "$" in self.name
+
     def inner(self, name: str, type_: Type, distance: int, bit: int | None = None) -> Place:
         """The part of this place that begins `distance` bytes behind its start."""
         if self.hops:

@@ -184,3 +184,13 @@ def test_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     shown = next(text for kind, text in blocks if kind == "console" and "fbvm why" in text)
     for command, said in re.findall(r"^\$ fbvm (.*)\n((?:(?!\$ ).*\n)*)", shown, re.M):
         assert CliRunner().invoke(main, shlex.split(command)).output == said, command
+
+
+def test_what_rungs_remember_is_not_drawn_unasked(tmp_path: Path) -> None:
+    program = tmp_path / "edge.st"
+    rungs = "LD P_On\nTIM 1 #0001\nLD T0001\n@SET Over\n"
+    program.write_text(f"PROGRAM Main\nVAR Over : BOOL; END_VAR\nLADDER\n{rungs}END_LADDER\nEND_PROGRAM\n", encoding="utf-8")
+    trace = str(tmp_path / "edge.trace")
+    assert CliRunner().invoke(main, ["run", str(program), "--scans", "20", "--trace", trace]).exit_code == 0
+    drawn = CliRunner().invoke(main, ["chart", trace]).output
+    assert "Main.Over  .........." in drawn and "$" not in drawn
