@@ -159,6 +159,8 @@ class Noc:
 
     def _count(self, head: memoryview, events: Sequence[Event], requests: Sequence[Request]) -> None:
         """What came over the wire and what goes out, by the counters of the table."""
+        if not events and not requests:
+            return
         received = sum(isinstance(event, Opened | Received | PeerClosed) for event in events)
         sent = sum(isinstance(request, Connect | Send | Close) for request in requests)
         errors = [event.error for event in events if isinstance(event, Failed | Broken)]

@@ -30,6 +30,8 @@ class Port:
         self.number = number
         self._head_words = head_words
         self._lines = [Line(channel, number_of) for channel in range(slots)]
+        self._active: set[int] = set()
+        """Slots with a connection, or a close that is not confirmed, also when they carry another number by now."""
         self._modules_at = slice(head_words + at.MODULE, head_words + slots * at.SLOT_WORDS, at.SLOT_WORDS)
 
     def take(self, words: memoryview, events: Iterable[Event]) -> None:
@@ -41,11 +43,11 @@ class Port:
     def exchange(self, words: memoryview) -> list[Request]:
         """What the network has to do for the wishes of the program."""
         requests: list[Request] = []
-        for channel, module in enumerate(words[self._modules_at].tolist()):
+        modules = words[self._modules_at].tolist()
+        for channel in [slot for slot, module in enumerate(modules) if module == self.number or slot in self._active]:
             line = self._lines[channel]
-            if module == self.number or not line.is_idle:
-                slot = self._slot(words, channel)
-                requests += line.exchange(slot, module == self.number)
+            requests += line.exchange(self._slot(words, channel), modules[channel] == self.number)
+            (self._active.discard if line.is_idle else self._active.add)(channel)
         return requests
 
     def reset(self, words: memoryview | None) -> list[Request]:
