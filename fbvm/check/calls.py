@@ -165,7 +165,7 @@ class Calls:
             given[fold(variable.name)] = argument
             if variable.kind != "VAR_INPUT" or not is_block(variable.type):
                 self._pass(argument, variable, bound)
-        open_inputs = [v.name for v in parameters[len(arguments):] if v.kind == "VAR_INPUT"]
+        open_inputs = [v.name for v in parameters[len(arguments):] if v.kind == "VAR_INPUT" and not v.explicit]
         if open_inputs:
             self.error("S0404", call, f"{pou.name} needs {' and '.join(open_inputs)} too",
                        "a call without names gives all inputs; name the parameters to leave some out")

@@ -132,6 +132,8 @@ def conversion(name: str) -> Conversion | None:
     if not match:
         return None
     source, form, target = match["source"] or "", match["form"], match["target"]
+    if source == "ANY":  # as TwinCAT spells the overloaded form
+        source = ""
     if (source == "BCD" or source.endswith("_BCD")) and form == "TO":
         source, form = source.removesuffix("BCD").rstrip("_"), "BCD_TO"
     if target not in _CONVERTIBLE or (source and source not in _CONVERTIBLE):

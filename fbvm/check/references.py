@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import (
+    BOOL,
     BYTE,
     DINT,
     UDINT,
@@ -22,7 +23,9 @@ from fbvm.base.types import (
     fold,
     pointer,
     reference,
+    string,
 )
+from fbvm.check.arguments import Arguments
 from fbvm.check.facts import UNTYPED_INT, Holder, StandardCall, Variable
 from fbvm.check.writes import writable
 from fbvm.syntax import tree
@@ -143,6 +146,30 @@ def start(expressions: Expressions, variable: Variable) -> None:
     if not known:
         expressions.error("S0701", call, "an initial value must be known before the program runs",
                           "assign it in the body instead")
+
+
+ASKED = ("__ISVALIDREF", "__POUNAME")
+"""Questions of CODESYS's compiler that look like functions."""
+
+
+def asked(expressions: Expressions, call: tree.Call, name: str) -> Type | None:
+    """__ISVALIDREF(r): whether a REFERENCE TO is bound; __POUNAME(): the name of the POU that asks."""
+    values = Arguments(expressions, call, ["REF"] if name == "__ISVALIDREF" else []).in_order()
+    if values is None:
+        return None
+    if name == "__POUNAME":
+        shown = expressions.pou.name.encode("latin-1", "replace") if expressions.pou is not None else b""
+        expressions.facts.constants[call] = shown
+        return string(max(1, len(shown)))
+    kind = expressions.infer(values[0])
+    variable = expressions.facts.variables.get(values[0])
+    if kind is None:
+        return None
+    if variable is None or not variable.reference:
+        expressions.error("S0405", values[0], "this is no variable that is declared REFERENCE TO", "compare a REF_TO with NULL")
+        return None
+    expressions.facts.calls[call] = StandardCall(name, [(values[0], kind)])
+    return BOOL
 
 
 def bound(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr, dimension: tree.Expr) -> Type | None:

@@ -82,6 +82,8 @@ class StandardCalls:
             self.facts.constants[call] = value
 
     def _typed(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
+        if name in references.ASKED:
+            return references.asked(self.expressions, call, name)
         if name in references.MAKERS or name == "SIZEOF":
             values = Arguments(self.expressions, call, ["IN"]).in_order()
             if values is None:

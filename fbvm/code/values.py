@@ -168,6 +168,9 @@ class ValueLowering:
         """A call of a standard function."""
         if called.key == "REF":
             return self.body.pointers.to(called.arguments[0][0])
+        if called.key == "__ISVALIDREF":
+            slot = self.body.places.slot(self.facts.variables[called.arguments[0][0]])
+            return ("ne", "b", "ref", ("load", "ref", slot.address), ("const", "ref", 0))
         if called.key == "SIZEOF":
             return ("convert", "u32", "i64", self.body.places.any_number(called.arguments[0][0], ANY_SIZE))
         if called.key in ("LOWER_BOUND", "UPPER_BOUND"):
