@@ -342,7 +342,7 @@ def _nearest(w: Writer, machine: str, source: str, a: Node, site: int) -> str:
     low, high = limits(machine)
     _must_fit(w, source, value, (_exactly(source, low, -0.5), True), _exactly(source, high, 0.5), machine, site)
     if machine == "u64":
-        return w.new(f"fptoui {kind} {w.new(f'call {kind} @llvm.rint.{source}({kind} {value})')} to i64")
+        return _whole(w, machine, kind, w.new(f"call {kind} @llvm.rint.{source}({kind} {value})"))
     form = "i32" if high < 1 << 31 else "i64"
     number = w.new(f"call {form} @llvm.lrint.{form}.{source}({kind} {value})")
     return number if form == ir(machine) else w.new(f"trunc {form} {number} to {ir(machine)}")
@@ -352,7 +352,22 @@ def _truncate(w: Writer, machine: str, source: str, a: Node, site: int) -> str:
     value, (low, high) = w.value(a), limits(machine)
     least = _exactly(source, low, -1.0)
     _must_fit(w, source, value, (least, least == low), float(high + 1), machine, site)
-    return w.new(f"fpto{'s' if signed(machine) else 'u'}i {ir(source)} {value} to {ir(machine)}")
+    return _whole(w, machine, ir(source), value)
+
+
+def _whole(w: Writer, machine: str, kind: str, value: str) -> str:
+    """A float that fits, toward zero.
+
+    Never by `fptoui`: up to 22.1.0 at least, LLVM aborts the process on the lesser of its result and 0 at level 0."""
+    if signed(machine):
+        return w.new(f"fptosi {kind} {value} to {ir(machine)}")
+    if machine != "u64":
+        return w.new(f"trunc i64 {w.new(f'fptosi {kind} {value} to i64')} to {ir(machine)}")
+    half = literal("f64", float(1 << 63))
+    large = w.new(f"fcmp oge {kind} {value}, {half}")
+    rest = w.new(f"select i1 {large}, {kind} {w.new(f'fsub {kind} {value}, {half}')}, {kind} {value}")
+    top = w.new(f"shl i64 {w.new(f'zext i1 {large} to i64')}, 63")
+    return w.new(f"xor i64 {w.new(f'fptosi {kind} {rest} to i64')}, {top}")
 
 
 def _exactly(source: str, limit: int, more: float) -> float:

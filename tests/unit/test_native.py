@@ -228,6 +228,30 @@ def test_crc_bit_by_bit(level: int) -> None:
     assert (slot(e, "u16", 104), slot(e, "i16", 100), slot(e, "i16", 102)) == (crc, 64, 8)
 
 
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("machine", ["u8", "u16", "u32", "u64"])
+@pytest.mark.parametrize("operation", ["truncate", "nearest"])
+def test_the_lesser_of_a_converted_float_and_0(level: int, machine: str, operation: str) -> None:
+    """On `fptoui` and `umin` with 0 LLVM aborts at level 0."""
+    made = (operation, machine, "f32", ("load", "f32", at(0)), 1)
+    least = ("min", machine, made, const(machine, 0))
+    rows = tuple((((label, label),), (store("u8", 24, const("u8", label + 1)),)) for label in (0, 14, 19))
+    e = engine((("store", machine, at(8), made), ("case", machine, least, rows, ())),
+               before={0: STRUCTS["f32"].pack(200.0)}, level=level)
+    assert e.run(0) is None
+    assert (slot(e, machine, 8), slot(e, "u8", 24)) == (200, 1)
+
+
+@pytest.mark.parametrize("level", LEVELS)
+@pytest.mark.parametrize("number", [0.0, 0.9, 2.0**62, 2.0**63, 2.0**63 + 2.0**11, 2.0**64 - 2.0**11, -0.4])
+@pytest.mark.parametrize("operation", ["truncate", "nearest"])
+def test_large_floats_become_ulint(level: int, number: float, operation: str) -> None:
+    e = engine((("store", "u64", at(8), (operation, "u64", "f64", ("load", "f64", at(0)), 1)),),
+               before={0: STRUCTS["f64"].pack(number)}, level=level)
+    assert e.run(0) is None
+    assert slot(e, "u64", 8) == (int(number) if operation == "truncate" else round(number))
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(native_compiler.llvm().llvm_version_info[:3] != (22, 1, 0), reason="of LLVM 22.1.0 alone it is known")
 def test_crc_bit_by_bit_shows_the_fault_that_is_switched_off() -> None:
