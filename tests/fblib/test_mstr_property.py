@@ -25,7 +25,7 @@ WORDS = st.one_of(st.integers(0, 130), st.sampled_from([0x0700, 0x07FF, 0xFE00, 
 OPERATIONS = st.sampled_from([1, 2, 3, 4, 7, 8, 10, 23, 0xFFF0])
 
 
-@settings(COMMON, max_examples=60)
+@settings(COMMON, max_examples=25)
 @given(st.lists(st.tuples(OPERATIONS, st.lists(WORDS, min_size=10, max_size=10), st.booleans()), min_size=1, max_size=4))
 def test_any_control_ends_with_a_documented_code(operations: list[tuple[int, list[int], bool]]) -> None:
     rig = Rig(options=FAST, databuf="ARRAY[1..60] OF WORD")
@@ -37,7 +37,7 @@ def test_any_control_ends_with_a_documented_code(operations: list[tuple[int, lis
             assert code == "0000"
 
 
-@settings(COMMON, max_examples=60)
+@settings(COMMON, max_examples=25)
 @given(st.integers(0, 2**32), st.integers(1, 30), st.sampled_from([1, 2, 23]), st.booleans())
 def test_registers_arrive_right_however_frames_are_cut(seed: int, cut: int, operation: int, random_cut: bool) -> None:
     dice = Random(seed)
@@ -58,7 +58,7 @@ def test_registers_arrive_right_however_frames_are_cut(seed: int, cut: int, oper
         assert rig.databuf(other) == held[:other]
 
 
-@settings(COMMON, max_examples=80)
+@settings(COMMON, max_examples=30)
 @given(st.binary(max_size=300), st.sampled_from([(2, 0, 3, 1), (1, 0, 3, 1), (7, 0, 38, 0), (8, 0, 0, 0)]), st.booleans())
 def test_any_bytes_for_an_answer(data: bytes, control: tuple[int, ...], has_header: bool) -> None:
     """Never data that were not asked for, never stuck, and the next operation works."""

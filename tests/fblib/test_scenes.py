@@ -46,6 +46,7 @@ def test_three_plcs_in_a_row() -> None:
     assert values["gateway"] == {"Main.Wanted": 700, "Main.Level": 704, "Main.Failures": 0}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["slow", "cut", "joined", "unsteady"])
 def test_the_row_on_a_bad_network(kind: str) -> None:
     assert scene("row", fault=KINDS[kind])["gateway"]["Main.Level"] == 704
