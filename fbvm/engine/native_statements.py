@@ -7,10 +7,10 @@ from typing import Any
 
 from fbvm.base.areas import BUDGET, DUE
 from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
-from fbvm.engine.native_expressions import flag_mask, signed
+from fbvm.engine.native_expressions import flag_mask
 from fbvm.engine.native_guard import observe
 from fbvm.engine.native_texts import in_bytes, keep
-from fbvm.engine.native_writer import TRAPPED, Writer, ir, stored
+from fbvm.engine.native_writer import TRAPPED, Writer, ir, signed, stored
 from fbvm.engine.ranges import is_float
 from fbvm.engine.statements import case_table
 

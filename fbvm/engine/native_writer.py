@@ -46,6 +46,10 @@ def stored(machine: str) -> str:
     return "i8" if machine == "b" else ir(machine)
 
 
+def signed(machine: str) -> bool:
+    return machine[0] == "i"
+
+
 def literal(machine: str, value: Any) -> str:
     """A constant of a machine type."""
     if machine == "b":
