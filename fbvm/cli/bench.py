@@ -41,7 +41,7 @@ class Bench:
         return plc
 
     def _listen(self, network: LoopNetwork) -> None:
-        self.passed, reader = [], Reader()
+        self.passed, reader = [], Reader(once=True)
 
         def tap(now_ns: int, unit: str, happening: Happening) -> None:
             self.passed.extend(reader.read(now_ns, happening))

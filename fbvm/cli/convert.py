@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -53,7 +54,7 @@ def _pcapng(trace: Trace, names: Names, scans: range | None, path: Path) -> None
         capture = Capture(file, comment=lambda address: said)
         for scan, event in happenings(trace, scans):
             said = f"scan {scan}"
-            capture.tap(event.now_ns, event.happening.local.host, event.happening)
+            capture.tap(event.now_ns, event.happening.local.host, replace(event.happening, mirrored=False))
 
 
 FORMATS: dict[str, Callable[[Trace, Names, range | None, Path], None]] = {

@@ -48,14 +48,13 @@ def command(number: int | None, checked: bool, solved: bool, folder: Path, learn
         return
     try:
         target = found.begin(folder)
-        if not checked:
-            click.echo(found.text)
-            click.echo(f"Your files are in {target}.  When you are ready: fbvm learn {number} --check")
-            return
-        wrong = check(found, folder)
     except OSError as error:
         raise click.UsageError(f"{folder} cannot be written: {error.strerror}") from None
-    if wrong:
+    if not checked:
+        click.echo(found.text)
+        click.echo(f"Your files are in {target}.  When you are ready: fbvm learn {number} --check")
+        return
+    if check(found, folder):
         sys.exit(status.FAILED)
     following = f"; the next one: fbvm learn {number + 1}" if number < len(lessons()) else "; that was the last one"
     click.secho(f"lesson {number} is done{following}", fg="green")

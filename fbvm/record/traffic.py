@@ -50,15 +50,18 @@ def listen(network: object, tap: Tap) -> Tap | None:
 
 
 class Reader:
-    """Reads a network's tap.  Knows a Modbus server by who was asked for the connection, else by its port."""
+    """Reads a network's tap.  Knows a Modbus server by who was asked for the connection, else by its port.
 
-    def __init__(self) -> None:
+    `once` is for somebody who hears all units of a network: what two of them say to each other is told by both."""
+
+    def __init__(self, once: bool = False) -> None:
+        self._once = once
         self._streams: dict[tuple[Peer, Peer], Splitter] = {}
         self._servers: dict[frozenset[Peer], Peer] = {}
 
     def read(self, now_ns: int, happening: Happening) -> Iterator[Passed]:
-        """What a happening is; none for what a unit of the same network tells from its side, too."""
-        if happening.mirrored and not happening.out:
+        """What a happening is."""
+        if self._once and happening.mirrored and not happening.out:
             return
         pair = happening.local, happening.remote
         sender, receiver = pair if happening.out else pair[::-1]

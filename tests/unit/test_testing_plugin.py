@@ -536,3 +536,18 @@ def test_a_failure_with_a_unit_shows_the_network_and_the_units_words(project: py
     assert data["described"]["CIO 1519.03"] == "Send Request Switch"
     assert data["meanings"]["D30009"]["4"] == "ESTABLISHED"
     assert data["frames"][0][4] == "asks for a connection"
+
+
+def test_a_plc_hears_what_another_one_answers(project: pytest.Pytester) -> None:
+    lesson = Path(__file__).resolve().parents[2] / "lessons" / "12-two-plcs-one-wire"
+    for name in ("server.st", "given.st", "given.toml"):
+        (project.path / name).write_text((lesson / name).read_text(encoding="utf-8"), encoding="utf-8")
+    project.makepyfile("""
+        def test_wrong(plant):
+            made = plant("given.toml").run("500ms")
+            assert made.client.Beat == 0
+    """)
+    run(project).stdout.fnmatch_lines([
+        "  scan * 192.168.250.2:49152 -> 192.168.250.1:502  Modbus 1, unit 1: 03 read holding registers, address 1000, *",
+        "  scan * 192.168.250.1:502 -> 192.168.250.2:49152  Modbus 1, unit 1: 03 read holding registers, data *",
+    ])  # fmt: skip

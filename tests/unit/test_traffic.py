@@ -59,7 +59,9 @@ def test_what_is_no_modbus_is_counted() -> None:
     assert said(data(True, b"\0\0\0\0\xff\xff!"), data(True, b"more")) == [
         "7 bytes, no Modbus: length 65535 outside 2..254", "4 bytes"]
     assert said(Happening(What.UDP, UNIT, SERVER, True, b"x")) == ["datagram of 1 byte"]
-    assert said(Happening(What.DATA, UNIT, SERVER, False, b"told twice", True)) == []
+    twice = Happening(What.DATA, UNIT, SERVER, False, b"told twice", True)
+    assert said(twice)[0].startswith("10 bytes")
+    assert list(Reader(once=True).read(0, twice)) == []
 
 
 class Noted:
