@@ -20,10 +20,11 @@ Pins that other tools call otherwise have their other names there too:
 
 from __future__ import annotations
 
+import os
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import lru_cache
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, lru_cache
 from pathlib import Path
 
 from fbvm.base.areas import AREAS, Mailbox, refusal
@@ -71,8 +72,10 @@ class LibraryError(ValueError):
 
 
 def _libraries_below(root: Path) -> Iterator[Library]:
-    folders = {path.parent for path in root.rglob("*.st")} | {path.parent for path in root.rglob("library.toml")}
-    for folder in sorted(folders):
+    for folder, names in sorted((Path(at), sorted(names)) for at, _, names in os.walk(root)):
+        sources = [name for name in names if name.endswith(".st")]
+        if not sources and "library.toml" not in names:
+            continue
         described = folder / "library.toml"
         table: dict[str, object] = {}
         if described.is_file():
@@ -85,10 +88,16 @@ def _libraries_below(root: Path) -> Iterator[Library]:
             raise LibraryError(described, "globals must be a list of file names")
         spaces = table.get("spaces", [])
         name = folder.relative_to(root).as_posix() if folder != root else root.name
-        files = {fold(p.stem): p for p in sorted(folder.glob("*.st"))}
+        files = {fold(source[:-len(".st")]): folder / source for source in sources}
         yield Library(name, folder, files, tuple(listed), _mailbox(table, described), _pins(table, described),
                       frozenset(fold(str(space)) for space in spaces) if isinstance(spaces, list) else frozenset(),
                       _written(table, described), table.get("by_dialect") is True)
+
+
+@cache
+def _shipped() -> tuple[Library, ...]:
+    """The libraries that come with fbvm, which stay as they are while it runs."""
+    return tuple(_libraries_below(data_folder("fblib")))
 
 
 def _pins(table: dict[str, object], described: Path) -> dict[str, dict[str, str]]:
@@ -129,10 +138,10 @@ class Libraries:
     """The shipped libraries and the user's own; own ones are asked first."""
 
     def __init__(self, own: Sequence[Path] = (), shipped: bool = True, preferred: Sequence[str] = ()) -> None:
-        roots: Iterable[Path] = [*own, *([data_folder("fblib")] if shipped else [])]
+        shelves = [list(_libraries_below(Path(root))) for root in own]
+        shelves += [[replace(library, loaded=set()) for library in _shipped()]] if shipped else []
         self._libraries: dict[str, Library] = {}
-        for root in roots:
-            below = list(_libraries_below(Path(root)))
+        for below in shelves:
             for library in sorted(below, key=lambda library: library.name not in preferred):
                 if not library.by_dialect or library.name in preferred:
                     self._libraries.setdefault(library.name, library)
