@@ -156,7 +156,7 @@ def check_class(folder: Path, out: Path) -> dict[str, dict[str, Result]]:
                 shutil.rmtree(out / name / lesson.slug, ignore_errors=True)
                 lesson.gather(begun[lesson.slug], out / name / lesson.slug)
                 results[name][lesson.slug] = Result()
-    working = [name for name, begun in results.items() if begun]
+    working = [f"./{name}" for name, begun in results.items() if begun]
     if working:
         run_pytest([*QUIET, "-c", str(_ini(out)), "--rootdir", str(out), f"--junitxml={listing}", "-o", "junit_family=xunit1",
                     "--fbvm-traces", str(out / "traces"), "--fbvm-pages", "1000000", *working], cwd=out, quiet=True)  # fmt: skip
