@@ -324,23 +324,6 @@ def text_order(w: Writer, left: Text, right: Text) -> str:
     return w.call(routine, w.integer(left.at), left.length, w.integer(right.at), right.length)
 
 
-def _length(w: Writer, machine: str, a: Node) -> str:
-    return cut(w, w.text(a).length, machine)
-
-
-def _find(w: Writer, machine: str, a: Node, b: Node) -> str:
-    text, wanted = w.text(a), w.text(b)
-    routine = "text_find" if text.unit == 1 else "wide_find"
-    return cut(w, w.call(routine, w.integer(text.at), text.length, w.integer(wanted.at), wanted.length), machine)
-
-
-def _first(w: Writer, machine: str, a: Node) -> str:
-    text, kind = w.text(a), ir(machine)
-    empty = w.new(f"icmp eq i64 {text.length}, 0")
-    at = w.new(f"select i1 {empty}, ptr %c, ptr {text.at}")  # behind an empty text nothing may be read
-    return w.new(f"select i1 {empty}, {kind} 0, {kind} {w.new(f'load {kind}, ptr {at}, align 1')}")
-
-
 VALUES: dict[str, Row] = {
     "const": lambda w, machine, value: literal(machine, value),
     "tmp": lambda w, machine, number: from_memory(w, machine, w.temporary(number, machine), SIZES[machine], ""),
@@ -355,7 +338,7 @@ VALUES: dict[str, Row] = {
     "is_set": _is_set, "select": _select, "mux": _mux, "min": _extreme("min"), "max": _extreme("max"),
     "check": _check, "within": _within, "math": _math, "atan2": _arctangent, "floor_div": _floor_divide,
     "now": lambda w, machine: w.system(NOW),
-    "from_bcd": _bcd_number, "to_bcd": _bcd_digits, "length": _length, "find": _find, "first": _first,
+    "from_bcd": _bcd_number, "to_bcd": _bcd_digits,
     "reference": _reference, "bit_behind": _bit_behind,
 }
 """How each operation is written but those that yield or read a text: called with the operands of its row."""

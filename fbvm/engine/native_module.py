@@ -11,6 +11,7 @@ from types import MappingProxyType
 
 from fbvm.base.areas import BUDGET
 from fbvm.code.image import Image
+from fbvm.engine import native_texts
 from fbvm.engine.bases import fixed_bases
 from fbvm.engine.native_calls import call_graph, heights, instance_places
 from fbvm.engine.native_compiler import MATH
@@ -21,7 +22,6 @@ from fbvm.engine.native_library import declaration, definitions
 from fbvm.engine.native_objects import objects
 from fbvm.engine.native_regions import FIRST_NUMBER, METADATA
 from fbvm.engine.native_statements import EMITTERS
-from fbvm.engine.native_texts import TEXTS, from_text
 from fbvm.engine.native_writer import RARE, TRAPPED, Module, Writer
 from fbvm.engine.python import height
 from fbvm.engine.stops import STOPPED
@@ -77,8 +77,8 @@ class Translation:
 class BodyWriter(Writer):
     """A Writer that knows all rows."""
 
-    values: Mapping[str, Callable[..., str]] = MappingProxyType({**VALUES, "from_text": from_text})
-    texts = TEXTS
+    values: Mapping[str, Callable[..., str]] = MappingProxyType({**VALUES, **native_texts.VALUES})
+    texts = native_texts.TEXTS
     statements = EMITTERS
 
 

@@ -14,7 +14,7 @@ from fbvm.code.operations import TEXT_UNITS, Address, Block, Node
 from fbvm.code.shapes import statements
 from fbvm.engine.native_expressions import as_double, chooser, cut, text_order
 from fbvm.engine.native_reading import KINDS
-from fbvm.engine.native_writer import Text, Unsupported, Writer
+from fbvm.engine.native_writer import Text, Unsupported, Writer, ir
 from fbvm.engine.ranges import is_float
 
 LONGEST_NUMBER = 48
@@ -284,7 +284,24 @@ def _enum_text(w: Writer, form: str, names: tuple[tuple[int, str], ...], a: Node
                 w.new("phi i64 " + ", ".join(f"[ {text.length}, %{label} ]" for text, label in texts)))
 
 
-def from_text(w: Writer, machine: str, data_type: str, a: Node, site: int) -> str:
+def _length(w: Writer, machine: str, a: Node) -> str:
+    return cut(w, w.text(a).length, machine)
+
+
+def _find(w: Writer, machine: str, a: Node, b: Node) -> str:
+    text, wanted = w.text(a), w.text(b)
+    routine = "text_find" if text.unit == 1 else "wide_find"
+    return cut(w, w.call(routine, w.integer(text.at), text.length, w.integer(wanted.at), wanted.length), machine)
+
+
+def _first(w: Writer, machine: str, a: Node) -> str:
+    text, kind = w.text(a), ir(machine)
+    empty = w.new(f"icmp eq i64 {text.length}, 0")
+    at = w.new(f"select i1 {empty}, ptr %c, ptr {text.at}")  # behind an empty text nothing may be read
+    return w.new(f"select i1 {empty}, {kind} 0, {kind} {w.new(f'load {kind}, ptr {at}, align 1')}")
+
+
+def _from_text(w: Writer, machine: str, data_type: str, a: Node, site: int) -> str:
     """`from_text`: the routine tells whether the text is a literal and whether its value fits."""
     text, result = w.text(a), w.field("result")
     at = w.integer(text.at)
@@ -309,3 +326,6 @@ TEXTS: dict[str, Callable[..., Text]] = {
     "character": _character, "recode": _recode,
 }
 """How each operation is written that yields a text: called with the operands of its row."""
+
+VALUES: dict[str, Callable[..., str]] = {"length": _length, "find": _find, "first": _first, "from_text": _from_text}
+"""The same for those that read a text and yield a number."""
