@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, StringType, StructType, Type, base, fold
+from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, ArrayType, StringType, StructType, Type, base, fold
 from fbvm.check import functions, qualified
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
@@ -107,7 +107,8 @@ class Calls:
             name = _shown(call.callee)
             hidden = fold(name) in functions.names() or self.project.pou(name, self.expressions.source) is not None
             self.error("S0401", call.callee, f"{name} is {kind} and cannot be called",
-                       f"the variable hides the function {fold(name)}: rename it" if hidden else "")
+                       f"the variable hides the function {fold(name)}: rename it" if hidden else
+                       f"an element is written {name}[...]" if isinstance(kind, ArrayType) else "")
             return None
         pou = self.checker.block_of(kind)
         if as_value:
@@ -140,6 +141,11 @@ class Calls:
         if other is not None:
             self.error("S0406", other, MIXED, MIXED_HINT)
             return
+        for argument in call.arguments:
+            if (name := self._compared(argument, pou)):
+                self.error("S0402", argument, f"this compares {name}, and passes the result",
+                           f"`:=` passes an argument: {name} := ...")
+                return
         named = [a for a in call.arguments if a.kind]
         positional = [a for a in call.arguments if not a.kind]
         given: dict[str, tree.Node] = {}
@@ -169,6 +175,15 @@ class Calls:
         if open_inputs:
             self.error("S0404", call, f"{pou.name} needs {' and '.join(open_inputs)} too",
                        "a call without names gives all inputs; name the parameters to leave some out")
+
+    def _compared(self, argument: tree.Argument, pou: Pou) -> str:
+        """The parameter that `IN = x` names for `IN := x`; "" if it is none of that."""
+        value = argument.value
+        if argument.kind or not isinstance(value, tree.Binary) or value.op != "=" or not isinstance(value.left, tree.NameRef):
+            return ""
+        name = fold(value.left.text)
+        known = next((v.name for v in pou.order if fold(v.name) == name and v.kind in PARAMETER_KINDS), "")
+        return known if self.expressions.variable(name) is None else ""
 
     def _named(self, argument: tree.Argument, pou: Pou, bound: PouCall, given: dict[str, tree.Node]) -> None:
         assert argument.name is not None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import AddressError, parse_address
@@ -293,12 +293,17 @@ class Expressions:
         except AddressError:
             known = [v.name for v in self.pou.order] if self.pou else []
             hint = ELSEWHERE.get(fold(name)) or self.project.nearest(
-                name, [*known, *(v.name for v in self.project.globals.values())])
+                name, [*known, *(v.name for v in self.project.globals.values()), *self._members()])
         pou = self.project.pou(name, self.source)
         if pou is None:
             self.error("S0201", expr, f"{name} is not declared", hint)
         else:
             self.error("S0201", expr, f"{name} is a {pou.kind} and has no value", _USES[pou.kind].format(pou.name))
+
+    def _members(self) -> Iterator[str]:
+        """The members of all enumerations of the user's own."""
+        for rows in self.project.enum_members.values():
+            yield from (kind.shown[value] for kind, value, library in rows if not library)
 
     def _direct(self, expr: tree.Direct, want: Type | None) -> Type | None:
         try:
@@ -423,7 +428,8 @@ _USES = {
 """What to do with a POU of each kind that is named where a value is needed."""
 ELSEWHERE = dict.fromkeys(("DEFAULT", "OTHERS", "OTHERWISE"), "the rest of a CASE stands behind ELSE, without a colon") | {
     "NIL": "write NULL", "NULLPTR": "write NULL", "PI": "write 3.14159265358979, or declare a constant",
-    "THEN": "THEN belongs to IF", "BREAK": "EXIT leaves a loop"}
+    "THEN": "THEN belongs to IF", "NEXT": "a loop ends with END_FOR", "WEND": "a loop ends with END_WHILE",
+    "BREAK": "EXIT leaves a loop"}
 """Names of other languages, and what to write here."""
 READABLE = ("", "VAR_INPUT", "VAR_OUTPUT")
 """Kinds of members that may be named from outside."""

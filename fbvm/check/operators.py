@@ -100,6 +100,8 @@ class Operators:
         if left is None or right is None:
             return None
         left, right = base(left), base(right)
+        if self._chained(expr, right):
+            return None
         left = self.expressions.as_character(expr.left, right) or left
         right = self.expressions.as_character(expr.right, left) or right
         if expr.op == "**":
@@ -171,6 +173,18 @@ class Operators:
             null = expr.op in COMPARISONS and self.facts.constants[side] == 0
             kind = self.expressions.adopt(side, NULL if null else LINT) or kind
         return kind
+
+    def _chained(self, expr: tree.Binary, right: Type) -> bool:
+        """Complain about `a < b < c`, which compares a BOOL with a number."""
+        first = expr.left
+        if expr.op not in COMPARISONS[2:] or not isinstance(first, tree.Binary) or first.op not in COMPARISONS or right == BOOL:
+            return False
+        text = self.expressions.text
+        if self.expressions.source.text[first.start:first.start + 1] != "(":
+            self.expressions.error("S0302", expr, f"{expr.op} is not defined for BOOL and {right}",
+                                   f"write {text(first)} AND {text(first.right)} {expr.op} {text(expr.right)}")
+            return True
+        return False
 
     def _operand_type(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
         """The type in which both operands meet."""

@@ -55,5 +55,5 @@ def _in_body(declaration: tree.Declaration, at: int) -> bool:
     """True if a place lies behind all declarations of variables of a POU."""
     if not isinstance(declaration, tree.Pou):
         return False
-    heads = [section.end for section in declaration.sections]
-    return at >= max(heads, default=declaration.name.end)
+    first = declaration.body[0].start if declaration.body else declaration.name.end
+    return at >= max((section.end for section in declaration.sections), default=first)

@@ -115,6 +115,8 @@ def hint(token: Token, kinds: set[str]) -> str:
         return "VAR sections stand in front of the first statement"
     if token.type in lexis().reserved and "NAME" in kinds and "IF" not in kinds and token.type[:4] != "END_":
         return f"{token.text} is a reserved word and cannot be a name"
+    if (token.type == "RSQB" and "RANGE" in kinds and "COMMA" not in kinds) or (token.type == "LPAR" and kinds == {"LSQB"}):
+        return "an array is written ARRAY [0..9] OF INT"
     if token.type == "PART" and "NUMBER" in kinds:
         return "a number has digits in front of its point, as 0.5"
     return ""

@@ -132,7 +132,13 @@ def _parameters_in_head(automaton: Automaton, token: Token, following: list[Toke
         return None
     while token.type not in ("RPAR", "SEMICOLON", "$END"):
         token = automaton.next()
-    return Mend([] if token.type != "$END" else [token], opener.start, opener.end,
+    rest = [token] if token.type == "$END" else []
+    if token.type == "RPAR":
+        rest = [automaton.next()]
+        if rest[0].type == "COLON":  # the type of the result goes with them
+            automaton.next()
+            rest = []
+    return Mend(rest, opener.start, opener.end,
                 f"`(` behind the name `{head.text}` of a POU", "parameters are declared in VAR_INPUT .. END_VAR", cut=True)
 
 
