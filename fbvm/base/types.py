@@ -49,10 +49,11 @@ class StringType(Type):
 
 @dataclass(frozen=True)
 class ArrayType(Type):
-    """ARRAY with constant bounds; the rightmost subscript varies fastest."""
+    """ARRAY with constant bounds; the rightmost subscript varies fastest.  Of a `packed` one each BOOL is a bit."""
 
     bounds: tuple[tuple[int, int], ...]
     element: Type
+    packed: bool = False
 
     @property
     def count(self) -> int:
@@ -237,6 +238,11 @@ def array(bounds: tuple[tuple[int, int], ...], element: Type) -> ArrayType:
 def characters(text: StringType) -> ArrayType:
     """A string as subscripts see it: bytes or words from 0 on, the one that ends the longest text among them."""
     return array(((0, text.capacity),), WORD if text.wide else BYTE)
+
+
+def on_bits(kind: ArrayType) -> ArrayType:
+    """An ARRAY OF BOOL that is located on bits of an area."""
+    return ArrayType(f"{kind.name} on bits", (kind.count + 7) // 8, 1, kind.bounds, kind.element, True)
 
 
 def open_array(dimensions: int, element: Type) -> OpenArrayType:

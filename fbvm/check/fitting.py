@@ -35,7 +35,7 @@ def assignable(kind: Type, target: Type) -> bool:
     if isinstance(target, OpenArrayType | AnyType) or isinstance(kind, OpenArrayType | AnyType):
         return False
     if isinstance(target, ArrayType) and isinstance(kind, ArrayType):
-        return kind.bounds == target.bounds and same(kind.element, target.element)
+        return kind.bounds == target.bounds and same(kind.element, target.element) and not (kind.packed or target.packed)
     if isinstance(target, StructType) or isinstance(kind, StructType):
         return kind == target and not (isinstance(target, StructType) and target.block)
     return converts(kind, target)
@@ -88,9 +88,9 @@ def same(kind: Type, other: Type) -> bool:
     if isinstance(other, OpenArrayType):
         dimensions = len(kind.bounds) if isinstance(kind, ArrayType) else getattr(kind, "dimensions", 0)
         return isinstance(kind, ArrayType | OpenArrayType) and dimensions == other.dimensions and \
-            same(kind.element, other.element)
+            same(kind.element, other.element) and not (isinstance(kind, ArrayType) and kind.packed)
     if isinstance(kind, ArrayType) and isinstance(other, ArrayType):
-        return kind.bounds == other.bounds and same(kind.element, other.element)
+        return kind.bounds == other.bounds and same(kind.element, other.element) and kind.packed == other.packed
     return kind == other
 
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
-from fbvm.base.types import BOOL, AnyType, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold
+from fbvm.base.types import BOOL, AnyType, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold, on_bits
 from fbvm.check import references
 from fbvm.check.facts import Edge, Pou, Variable, holds_block, is_block, is_open
 from fbvm.check.names import refuse_reserved
@@ -171,6 +171,9 @@ class Interfaces:
                 made.value = None if made.wrong else self.project.facts.constants.get(declared.initial)
         if declared.location is not None:
             made.location = self.location(declared, kind, source)
+            place = made.location
+            if isinstance(kind, ArrayType) and place is not None and (place.bit is not None or place.area in FLAG_AREAS):
+                made.type = on_bits(kind)
         return made
 
     def location(self, declared: tree.VarDecl, kind: Type, source: Source) -> Address | None:
@@ -193,6 +196,13 @@ class Interfaces:
 
     def _fits(self, address: Address, kind: Type, source: Source, node: tree.Node) -> bool:
         is_bit = address.bit is not None or address.area in FLAG_AREAS
+        if is_bit and isinstance(kind, ArrayType) and kind.element == BOOL:
+            self.checker.use_area(address.area)
+            end = address.byte_offset() * 8 + address.bit_in_byte() + kind.count
+            if end > self.checker.areas[address.area].size_bytes * 8:
+                self.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
+                return False
+            return True
         if is_bit != (base(kind) == BOOL):
             self.report.add("S0602", source, node,
                             f"{address} is one bit and {kind} is not BOOL" if is_bit else

@@ -46,6 +46,9 @@ def refer(expressions: Expressions, expr: tree.Expr, lasting: bool) -> Type | No
     if not expressions.is_variable(expr):
         expressions.error("S0407", expr, "a reference can be made to a variable only, not to a value")
         return None
+    if isinstance(kind, ArrayType) and kind.packed:
+        expressions.error("S0407", expr, f"{kind} fills no bytes that a reference could name", "refer to one of its elements")
+        return None
     root = expressions.facts.root(expr)
     variable = expressions.facts.variables.get(root)
     if lasting and variable is not None and (reason := _short_lived(variable)):

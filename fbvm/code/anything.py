@@ -34,10 +34,15 @@ def described(body: BodyLowering, expr: tree.Expr) -> list[tuple[int, Node]]:
     if isinstance(kind, AnyType):
         return [(offset, _narrow(body.places.any_number(expr, offset))) for offset in NUMBERS]
     size = size_of(body, expr, kind)
+    if isinstance(kind, ArrayType) and kind.packed:
+        whole = kind.count // 8 if not body.places.of(expr).bit else 0
+        size = ("const", "i64", whole)
     rows: tuple[Node, Node, Node]
     if base(kind) == BOOL:
         fills = _fills_bytes(body.places.of(expr))
         rows = (fills, ("const", "i64", 1), ("const", "i64", 8))
+    elif isinstance(kind, ArrayType) and kind.packed:
+        rows = (size, ("const", "i64", kind.count), ("const", "i64", 1))
     elif _leaf(kind) == BOOL:
         rows = (size, size, ("const", "i64", 8))
     else:

@@ -135,6 +135,11 @@ def _place_located(variables: list[Variable], placed: Placed) -> None:
             continue
         if variable_bit(variable) is None:
             placed.initial.append((variable.offset, variable.initial))
+        elif isinstance(variable.type, ArrayType):
+            start = variable.location.bit_in_byte()
+            for number in (start + index for index, value in enumerate(variable.initial) if value):
+                at = variable.offset + number // 8
+                bits[at] = bits.get(at, 0) | 1 << number % 8
         elif variable.initial != b"\0":
             bits[variable.offset] = bits.get(variable.offset, 0) | 1 << variable.location.bit_in_byte()
     placed.initial += [(offset, bytes((value,))) for offset, value in bits.items()]

@@ -123,6 +123,8 @@ class Places:
 
     def _index(self, expr: tree.Index, kind: Type) -> Place:
         place = self.of(expr.of)
+        if isinstance(place.type, ArrayType) and place.type.packed:
+            return self._bit_of_array(place, place.type, expr)
         start, offset, terms = place.address
         element = characters(place.type) if isinstance(place.type, StringType) else place.type
         rest = list(expr.subscripts)
@@ -142,6 +144,26 @@ class Places:
                     terms = (*terms, (stride, checked))
             element = element.element
         return Place((start, offset, terms), kind)
+
+    def _bit_of_array(self, place: Place, kind: ArrayType, expr: tree.Index) -> Place:
+        """An element of an array that is located on bits."""
+        number, stride = 0, kind.count
+        distance: Node | None = None
+        for (low, high), subscript in zip(kind.bounds, expr.subscripts, strict=True):
+            stride //= high - low + 1
+            known = self.facts.constants.get(subscript)
+            if known is not None:
+                number += (int(known) - low) * stride
+                continue
+            checked = ("check", "i64", self.body.as_i64(subscript), low, high, "R0102", self.body.site(subscript))
+            step: Node = ("mul", "i64", ("sub", "i64", checked, ("const", "i64", low)), ("const", "i64", stride))
+            distance = step if distance is None else ("add", "i64", distance, step)
+        start, offset, terms = place.address
+        if distance is None:
+            number += place.bit or 0
+            return Place((start, offset + number // 8, terms), BOOL, number % 8)
+        bit = ("bit_behind", "ref", self.reference(place), ("add", "i64", distance, ("const", "i64", number)))
+        return Place((("ref", bit, self.body.site(expr)), 0, ()), BOOL)
 
     def _open_index(self, expr: tree.Index, kind: OpenArrayType) -> Place:
         """An element of ARRAY [*]; the bounds lie beside the reference."""
