@@ -11,7 +11,7 @@ from fbvm.base.areas import SLOTS_OFFSET, Area
 from fbvm.base.areas import Address as AreaAddress
 from fbvm.base.types import Field, StructType
 from fbvm.code.image import Body, Image, TaskRow
-from fbvm.code.operations import WHOLE_BYTES, Address, Block, Node
+from fbvm.code.operations import FIRST_OBJECT, WHOLE_BYTES, Address, Block, Node
 from fbvm.code.shapes import is_address, is_expression, operand_words
 
 MARGIN = 10
@@ -22,7 +22,7 @@ LONGEST_BYTES = 32
 
 def listing(image: Image, observations: bool = False) -> str:
     """The whole image; `observations` shows what an observed build would report as statements of their own."""
-    lines = [*_layout(image), *_tasks(image), *_symbols(image), *_initial(image), *_retained(image)]
+    lines = [*_layout(image), *_tasks(image), *_symbols(image), *_initial(image), *_retained(image), *_objects(image)]
     for number, body in enumerate(image.bodies):
         lines += ["", *_Writer(image, observations).body(number, body)]
     return "\n".join(lines)
@@ -75,6 +75,15 @@ def _initial(image: Image) -> Iterator[str]:
 def _retained(image: Image) -> Iterator[str]:
     for row in image.retained:
         yield f"retained  {_absolute(row.offset, image.layout.areas):12} {row.name}, {row.size} bytes"
+
+
+def _objects(image: Image) -> Iterator[str]:
+    """What pointers may be moved in."""
+    areas = image.layout.areas
+    for number, (start, end) in enumerate(image.objects.extents, FIRST_OBJECT):
+        yield f"object    {_absolute(start, areas):12} number {number}, {end - start} bytes"
+    if image.objects.leases:
+        yield f"leases    {_absolute(image.objects.leases_at, areas):12} {image.objects.leases} of what ends while pointers are kept"
 
 
 def _absolute(offset: int, areas: dict[str, Area], bit: int | None = None) -> str:

@@ -11,6 +11,7 @@ from test_engine_expressions import NUMBERS, RUNS, STRINGS
 from test_engine_statements import OBSERVED, PROGRAMS
 
 from fbvm.base.areas import AREAS
+from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image, Layout
 from fbvm.code.listing import listing
 from fbvm.code.operations import EXPRESSIONS, Block
@@ -138,3 +139,12 @@ def test_every_expression_can_be_listed() -> None:
     for node in nodes:
         shown = code_of(image((store(node[1], 0, node),)))
         assert f"<- {node[0]} {node[1]}" in shown
+
+
+def test_objects_that_pointers_are_moved_in() -> None:
+    text = """FUNCTION F : INT VAR x : INT; p : POINTER TO INT; END_VAR p := ADR(x); F := p^; END_FUNCTION
+PROGRAM Main VAR a : ARRAY [0..4] OF INT; p : POINTER TO INT; x : INT; END_VAR p := ADR(a); x := F(); END_PROGRAM"""
+    made = compile_text(text).image
+    assert made is not None
+    shown = listing(made)
+    assert "number 2, 10 bytes" in shown and "1 of what ends while pointers are kept" in shown
