@@ -217,6 +217,25 @@ def _caret(automaton: Automaton, token: Token, following: list[Token]) -> Mend |
                 "`^` stands behind a reference and leads to what it refers to", "write XOR for exclusive or, a ** b for powers")
 
 
+def _begin(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`BEGIN` of other languages in front of the statements."""
+    word, place = automaton.before, anchor(automaton.states)
+    if word.text.upper() != "BEGIN" or place.symbol != "ended_list" or len(automaton.states) != place.size + 1:
+        return None
+    if token.type not in ("NAME", "VAR", *STATEMENT_WORDS):
+        return None
+    return Mend([token], word.start, word.end, f"{found(word)} is no word of Structured Text",
+                "leave it out: statements follow the VAR sections", cut=True, lossless=True)
+
+
+def _quotient(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`a DIV b` of Pascal."""
+    if token.text.upper() != "DIV" or token.type != "NAME" or advance(automaton.states, "SLASH") is None:
+        return None
+    return Mend([Token("SLASH", "/", token.start, token.end)], token.start, token.end,
+                f"{found(token)} is no operator of Structured Text", "write `/`, which drops the fraction between integers")
+
+
 def _c_loop(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
     """`for (i = 0; i < 10; i++)`"""
     opener = open_bracket(automaton, "LPAR")
@@ -295,5 +314,5 @@ def _instruction_list(automaton: Automaton, token: Token, following: list[Token]
 SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
     _ladder, _misspelt, _statement_word, _nameless, _reserved_name, _end_of_section,
     _colon_behind_else, _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end,
-    _location_behind_type, _caret, _c_loop, _declared_in_body, _instruction_list)
+    _location_behind_type, _caret, _begin, _quotient, _c_loop, _declared_in_body, _instruction_list)
 """Asked one after the other; the first that knows the mistake mends it."""
