@@ -72,6 +72,11 @@ def dialect(name: str) -> Dialect:
     return DIALECTS[name.lower()]
 
 
+def takers(switch: str) -> str:
+    """How to ask for a dialect that answers another way, for hints."""
+    return "--dialect " + " or ".join(row.name for row in DIALECTS.values() if getattr(row, switch))
+
+
 def page() -> str:
     """All dialects for people: who needs which, and how each answers what others disagree about."""
     lines = ["# Dialects", "", "Where compilers disagree, a dialect says which answer is taken: `--dialect NAME`, `dialect = "

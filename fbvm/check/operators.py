@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BOOL,
     DATE,
@@ -251,7 +252,7 @@ class Operators:
             hint = "compare or combine the members"
         elif expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
             number = {"BYTE": "USINT", "WORD": "UINT", "DWORD": "UDINT", "LWORD": "ULINT"}.get(left.name, "INT")
-            hint = f"{left} has no arithmetic: convert with {left}_TO_{number}(...)"
+            hint = f"{left} has no arithmetic: convert with {left}_TO_{number}(...), or take {takers('arithmetic_of_bits')}"
         elif common(left, right) is None:
             hint = _meeting_hint(left, right)
         self.expressions.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)

@@ -83,7 +83,8 @@ def _objects(image: Image) -> Iterator[str]:
     for number, (start, end) in enumerate(image.objects.extents, FIRST_OBJECT):
         yield f"object    {_absolute(start, areas):12} number {number}, {end - start} bytes"
     if image.objects.leases:
-        yield f"leases    {_absolute(image.objects.leases_at, areas):12} {image.objects.leases} of what ends while pointers are kept"
+        where = _absolute(image.objects.leases_at, areas)
+        yield f"leases    {where:12} {image.objects.leases} of what ends while pointers are kept"
 
 
 def _absolute(offset: int, areas: dict[str, Area], bit: int | None = None) -> str:
