@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 
 import pytest
+from feature_tables import GRAPHIC, HERE, LIST, choices, listing, numbers, titles
 from lang_check import BUDGET, BUILDS, check
 from lang_corpus import Program, programs, read
-from tables import GRAPHIC, HERE, LIST, choices, listing, numbers, titles
 
 from fbvm.code.image import Image
 from fbvm.engine import native
