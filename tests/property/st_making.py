@@ -1,8 +1,8 @@
 """Programs in Structured Text made at random, well typed, as trees of tuples, and their text.
 
 A type is a name.  Expressions are `(operation, type, ...)`, places `(kind, type, ...)`, statements `(kind, number, ...)`, where
-the number is the statement's own.  At most one operation that can trap stands in a statement's target or in its call,
-since no rule says whether targets or values are worked out first."""
+the number is the statement's own.  At most one operation that can trap stands in a statement, and none in a call or in a
+function: no rule says whether targets or values, inputs or the bounds and the step of FOR are worked out first."""
 
 from __future__ import annotations
 
@@ -76,6 +76,8 @@ class Maker:
     writable: list[Node] = field(default_factory=list)
     counters: list[str] = field(default_factory=list)
     numbers: int = 0
+    traps: bool = True
+    """Whether statements may trap."""
     risks: int = 0
     """How many operations that can trap may still come in this statement."""
 
@@ -102,6 +104,7 @@ class Maker:
     # --- POUs
 
     def pou(self, kind: str, name: str, result: str) -> None:
+        self.traps = kind != "FUNCTION"  # no rule says whether a function is called before a target's place is found
         rows = [*self.pins(kind), *self.locals(kind)]
         self.places = [place for row in rows for place in self.parts(("name", row.kind, row.name))]
         written = [row for row in rows if row.section != "VAR_INPUT" and not row.name.startswith(("i", "k"))]
@@ -218,7 +221,7 @@ class Maker:
         return tuple(self.statement(depth, loop) for _ in range(count))
 
     def statement(self, depth: int, loop: bool) -> Node:
-        self.risks = 2 if self.one_in(4) else 0
+        self.risks = 1 if self.traps and self.one_in(4) else 0
         what = self.random.randrange(20)
         if depth > 0 and what < 3:
             rows = tuple((self.value("BOOL", 3), self.inner(depth, loop)) for _ in range(self.random.randrange(1, 3)))
@@ -313,6 +316,7 @@ class Maker:
         if not instances:
             return None
         instance = self.pick(sorted(instances))
+        self.risks = 0  # no rule says whether an input is stored before the next one traps
         pou = next(pou for pou in self.pous if pou.name == instance[1])
         inputs: list[tuple[str, Node]] = []
         outputs: list[tuple[str, Node]] = []

@@ -313,7 +313,6 @@ class Oracle:
         place[0][place[1]] = self._place(target, frame)
 
     def _do_run(self, frame: Any, number: int, instance: Node, inputs: Any, outputs: Any) -> None:
-        """An instance takes each input as soon as it is worked out (no rule says so: it shows when the next one traps)."""
         place = self._place(instance, frame)
         inside, pou, passed = place[0][place[1]], self._pous[instance[1]], {}
         kinds = {row.name: row.kind for row in pou.variables}

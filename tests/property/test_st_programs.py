@@ -41,7 +41,7 @@ def test_every_engine_and_the_tree_walker_agree(seed: int) -> None:
 @pytest.mark.slow
 def test_programs_have_what_the_language_has() -> None:
     made_operations: set[str] = set()
-    for seed in range(60):
+    for seed in range(120):
         image = compile_text(text_of(made(seed))[0]).image
         if image:
             for body in image.bodies:
