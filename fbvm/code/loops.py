@@ -63,6 +63,7 @@ class LoopLowering:
             self._each_pass(node, place, wanted, step, site)
             return
         first, last, *computed = body.values.operands(*wanted)
+        first = body.keep(first)
         last = body.keep(last)
         by = body.keep(computed[0]) if computed else None
         if by is not None:
