@@ -25,14 +25,16 @@ def mixed(call: tree.Call) -> tree.Argument | None:
 
 
 class Arguments:
-    """The arguments of one call; `names` are its parameters, of which the last may repeat."""
+    """The arguments of one call; `names` are its parameters, of which the last may repeat; `others` name the first ones too."""
 
-    def __init__(self, expressions: Expressions, call: tree.Call, names: Sequence[str], repeats: bool = False) -> None:
+    def __init__(self, expressions: Expressions, call: tree.Call, names: Sequence[str], repeats: bool = False,
+                 others: Sequence[str] = ()) -> None:
         self.expressions = expressions
         self.error = expressions.error
         self.call = call
         self.names = names
         self.repeats = repeats
+        self.others = others
 
     def in_order(self) -> list[tree.Expr] | None:
         """Values in the order of the parameters, or None after a diagnostic."""
@@ -90,6 +92,8 @@ class Arguments:
         if argument.kind == ":=":
             if name in self.names:
                 return self.names.index(name)
+            if name in self.others:
+                return self.others.index(name)
             stem = self.names[-1].rstrip("0123456789") if self.names else ""
             number = name[len(stem):]
             if self.repeats and name.startswith(stem) and number.isdecimal() and len(number) < 10:

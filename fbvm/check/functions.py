@@ -57,6 +57,11 @@ FROM_BIG_ENDIAN FROM_LITTLE_ENDIAN     IN:T                         -> T      AN
 __DUE                                  AT:TIME                      ->
 """
 
+OTHER_NAMES = {
+    "LEN": ("STR",), "LEFT": ("STR", "SIZE"), "RIGHT": ("STR", "SIZE"), "MID": ("STR", "LEN", "POS"), "CONCAT": ("STR1", "STR2"),
+    "INSERT": ("STR1", "STR2", "POS"), "DELETE": ("STR", "LEN", "POS"), "REPLACE": ("STR1", "STR2"), "FIND": ("STR1", "STR2"),
+}
+"""What CODESYS calls the inputs of string functions; both ways of naming them are taken."""
 OPERATORS = {"ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/", "MOD": "MOD", "EXPT": "**", "AND": "AND", "OR": "OR",
              "XOR": "XOR", "NOT": "NOT"}
 """Functions that mean an operator; ADD, MUL, AND, OR and XOR take more than two inputs."""

@@ -176,7 +176,8 @@ class StandardCalls:
 
     def _signature(self, call: tree.Call, row: Signature, fixed: Elementary | StringType | None,
                    want: Type | None) -> Type | str | None:
-        values = Arguments(self.expressions, call, [name for name, _ in row.parameters], row.repeats).in_order()
+        values = Arguments(self.expressions, call, [name for name, _ in row.parameters], row.repeats,
+                           functions.OTHER_NAMES.get(row.key, ())).in_order()
         if values is None:
             return None
         wanted = [kind for _, kind in row.parameters]

@@ -9,7 +9,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.ladder import Ladder
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
-from fbvm.syntax.tree import Expr, Name, Refused
+from fbvm.syntax.tree import Expr, Name, Refused, Statement
 
 CHAIN_LIMIT = 1000
 """Deepest tree of one expression, in nodes; those who walk trees rely on it."""
@@ -50,6 +50,10 @@ class Builder:
         """THIS and SUPER seen since the last statement."""
         self.ladders: list[Ladder] = []
         """LADDERs of the POU that is being read."""
+        self.targets: dict[Statement, str] = {}
+        """Its JMPs, each with the label that it names."""
+        self.labels: dict[Statement, str] = {}
+        """Its labels for JMP."""
         self.depths: dict[Expr, int] = {}
         """Depth of the expressions under construction, where it is not 1."""
 

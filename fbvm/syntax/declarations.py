@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fbvm.syntax.jumps import Jumps, Tangled
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
 from fbvm.syntax.statements import Items, Statements
@@ -14,6 +15,7 @@ from fbvm.syntax.tree import (
     Actions,
     Argument,
     ArrayInit,
+    Block,
     Configuration,
     ConfigVar,
     ConfigVars,
@@ -84,8 +86,25 @@ class Declarations(Statements):
         if self.ladders:
             own += [subroutine for ladder in self.ladders for subroutine in ladder.subroutines]
             declared += self.ladder_sections(declared)
+        body = self.without_jumps(body, declared)
         return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused), tuple(own),
                    tuple(accesses))
+
+    def without_jumps(self, body: Block, declared: list[VarSection]) -> Block:
+        """The body of a POU with conditions and loops for its jumps; as it is where these cannot say the same."""
+        jumps = Jumps(self.targets, self.labels)
+        for jump in jumps.astray():
+            self.report("S0201", jump.start, jump.end, f"there is no label {self.targets[jump]} here",
+                        "write `name:` in front of the statement to go on with")
+        try:
+            made = jumps.body(body) if self.targets else body
+        except Tangled:
+            made = body
+        else:
+            declared += [jumps.section(body)] if jumps.flags else []
+        self.targets.clear()
+        self.labels.clear()
+        return made
 
     def ladder_sections(self, sections: list[VarSection]) -> list[VarSection]:
         """What the LADDERs of a POU need: memory of their steps, and instances that the POU has not declared itself."""

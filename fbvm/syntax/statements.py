@@ -70,7 +70,9 @@ class Statements(Expressions):
     def _outside_case(self, label: Label) -> Statement:
         value, high = label.values[0]
         if len(label.values) == 1 and high is None and isinstance(value, NameRef):
-            return RefusedStatement(label.start, label.end, f"label `{value.text}`")
+            made = RefusedStatement(label.start, label.end, f"label `{value.text}`")
+            self.labels[made] = value.text
+            return made
         if not any(odd <= label.start and "\n" not in self.source.text[odd:label.start] for odd in self.odd):
             self.report("S0101", label.start, label.end, "label of CASE outside of a CASE statement", "")
         return Empty(label.start, label.end)
@@ -111,7 +113,9 @@ class Statements(Expressions):
         return self.checked(Return(word.start, value.end if value else word.end, value))
 
     def jump(self, word: Token, target: Token) -> RefusedStatement:
-        return RefusedStatement(word.start, target.end, "JMP")
+        made = RefusedStatement(word.start, target.end, "JMP")
+        self.targets[made] = target.text
+        return made
 
     def refused_statement(self, token: Token) -> RefusedStatement:
         """A METHOD, STEP ... among statements; directly in a body its POU takes it."""

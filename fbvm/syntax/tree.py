@@ -233,7 +233,7 @@ class Empty(Statement):
 
 @_node
 class RefusedStatement(Statement):
-    """Understood but never executed (JMP, a label, SUPER() ...): `what` names it, `code` is S0901 or S0902."""
+    """Understood but never executed (a JMP into a block, SUPER() ...): `what` names it, `code` is S0901 or S0902."""
 
     what: str
     code: str = "S0901"

@@ -1,0 +1,178 @@
+"""JMP and labels of Structured Text, written with what the standard has: conditions, and a loop for a jump back.
+
+A jump sets a variable; what it passes over is executed only while that is FALSE, and loops in between are left.
+A label takes the jump, and so sets the variable back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from fbvm.base.types import fold
+from fbvm.syntax import tree
+from fbvm.syntax.tree import Block, Expr, NameRef, Statement
+
+LOOPS = tree.For | tree.While | tree.Repeat
+
+
+class Tangled(Exception):
+    """Conditions and loops cannot say what these jumps do: one leads into a block, or two jumps back cross each other."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A statement of a list with the jumps that leave it, or a label."""
+
+    statement: Statement
+    leaving: tuple[str, ...] = ()
+    label: str = ""
+
+
+class Jumps:
+    """The jumps of one body; `targets` and `labels` say which statements are jumps and labels, and of what name."""
+
+    def __init__(self, targets: Mapping[Statement, str], labels: Mapping[Statement, str]) -> None:
+        self.targets = targets
+        self.labels = labels
+        self.flags: dict[str, str] = {}
+        """Names of the variables that jumps set, by folded label."""
+
+    def body(self, body: Block) -> Block:
+        """The same body without jumps.  Raises Tangled if there is no such body."""
+        made, leaving = self._block(body, None)
+        if leaving:
+            raise Tangled
+        return made
+
+    def astray(self) -> list[Statement]:
+        """Jumps to labels that there are not."""
+        known = {fold(label) for label in self.labels.values()}
+        return [jump for jump, label in self.targets.items() if fold(label) not in known]
+
+    def section(self, body: Block) -> tree.VarSection:
+        """The variables that jumps need."""
+        start, end = body[0].start, body[-1].end
+        variables = [tree.VarDecl(start, end, (tree.Name(start, end, name),), None, tree.NamedType(start, end, "BOOL"), None)
+                     for name in self.flags.values()]
+        return tree.VarSection(start, end, "VAR_TEMP", (), tuple(variables), True)
+
+    def _block(self, block: Block, loop: str | None) -> tuple[Block, tuple[str, ...]]:
+        """A list of statements and the jumps that leave it; `loop` is None where the list is no body of a loop."""
+        return self._sequence([self._row(each) for each in block], loop)
+
+    def _row(self, statement: Statement) -> Row:
+        if statement in self.labels:
+            return Row(statement, label=fold(self.labels[statement]))
+        if statement in self.targets:
+            name = fold(self.targets[statement])
+            if statement in self.astray():
+                return Row(tree.Empty(statement.start, statement.end))
+            return Row(self._set(statement, name, True), (name,))
+        leaving: list[str] = []
+
+        def inner(block: Block) -> Block:
+            made, more = self._block(block, "" if isinstance(statement, LOOPS) else None)
+            leaving.extend(name for name in more if name not in leaving)
+            return made
+
+        return Row(_rebuilt(statement, inner), tuple(leaving))
+
+    def _sequence(self, rows: list[Row], loop: str | None) -> tuple[Block, tuple[str, ...]]:
+        """Statements behind a jump are executed if it has not been taken.  `loop` names the label of a jump back, if any."""
+        rows = self._with_loops(rows)
+        made: list[Statement] = []
+        group: list[Statement] = []
+        passing: list[str] = []
+        gone: list[str] = []
+        for at, row in enumerate(rows):
+            if not row.label:
+                group.append(row.statement)
+                if not row.leaving:
+                    continue
+            made += self._guarded(group, passing)
+            group = []
+            if row.label in passing:
+                passing.remove(row.label)
+                made.append(self._set(row.statement, row.label, False))
+            ahead = {later.label for later in rows[at + 1:]}
+            out = [name for name in row.leaving if name not in ahead]
+            gone += [name for name in out if name not in gone]
+            stays = row.leaving if loop is None else [name for name in row.leaving if name in ahead]
+            passing += [name for name in stays if name not in passing]
+            if loop is not None:
+                made += self._leaves(row.statement, out, loop)
+        return (*made, *self._guarded(group, passing)), tuple(gone)
+
+    def _leaves(self, at: Statement, names: list[str], loop: str) -> Iterator[Statement]:
+        """Leave the loop around for labels behind it; go on with it for its own."""
+        for name in names:
+            leave = (tree.Continue if name == loop else tree.Exit)(at.start, at.end)
+            yield tree.If(at.start, at.end, ((self._flag(at, name), (leave,)),), None)
+
+    def _with_loops(self, rows: list[Row]) -> list[Row]:
+        """A label that is jumped back to begins a loop, up to the last of these jumps."""
+        for first, row in enumerate(rows):
+            last = max((at for at, later in enumerate(rows) if at > first and row.label in later.leaving), default=None) \
+                if row.label else None
+            if last is None:
+                continue
+            inside = rows[first + 1:last + 1]
+            known = {each.label for each in inside if each.label}
+            if any(known & set(each.leaving) for each in (*rows[:first], *rows[last + 1:])) or \
+                    any(_leaves_loop(each.statement) for each in inside):
+                raise Tangled
+            body, leaving = self._sequence(inside, row.label)
+            start, end = inside[0].statement.start, inside[-1].statement.end
+            taken = self._set(inside[0].statement, row.label, False)
+            again = tree.Unary(start, end, "NOT", NameRef(start, end, self._name(row.label)))
+            loop = Row(tree.Repeat(start, end, (taken, *body), again), tuple(n for n in leaving if n != row.label))
+            return [*rows[:first + 1], loop, *self._with_loops(rows[last + 1:])]
+        return rows
+
+    def _guarded(self, group: list[Statement], passing: list[str]) -> list[Statement]:
+        if not group or not passing:
+            return group
+        start, end = group[0].start, group[-1].end
+        over: Expr = NameRef(start, end, self._name(passing[0]))
+        for name in passing[1:]:
+            over = tree.Binary(start, end, "OR", over, NameRef(start, end, self._name(name)), start)
+        return [tree.If(start, end, ((tree.Unary(start, end, "NOT", over), tuple(group)),), None)]
+
+    def _set(self, at: Statement, label: str, value: bool) -> Statement:
+        truth = tree.Literal(at.start, at.end, "bool", value, None, "TRUE" if value else "FALSE")
+        return tree.Assign(at.start, at.end, (self._flag(at, label),), ":=", truth)
+
+    def _flag(self, at: Statement, label: str) -> NameRef:
+        return NameRef(at.start, at.end, self._name(label))
+
+    def _name(self, label: str) -> str:
+        return self.flags.setdefault(label, f"$JMP {label}")
+
+
+def _leaves_loop(statement: Statement) -> bool:
+    """Whether it has an EXIT or CONTINUE of a loop around it."""
+    if isinstance(statement, tree.Exit | tree.Continue):
+        return True
+    found: list[bool] = []
+
+    def look(block: Block) -> Block:
+        found.extend(_leaves_loop(each) for each in block)
+        return block
+
+    if not isinstance(statement, LOOPS):
+        _rebuilt(statement, look)
+    return any(found)
+
+
+def _rebuilt(node: Statement, inner: Callable[[Block], Block]) -> Statement:
+    """A statement with other blocks in it."""
+    if isinstance(node, tree.If):
+        branches = tuple((condition, inner(block)) for condition, block in node.branches)
+        return replace(node, branches=branches, otherwise=None if node.otherwise is None else inner(node.otherwise))
+    if isinstance(node, tree.Case):
+        cases = tuple(replace(branch, body=inner(branch.body)) for branch in node.branches)
+        return replace(node, branches=cases, otherwise=None if node.otherwise is None else inner(node.otherwise))
+    if isinstance(node, tree.For | tree.While | tree.Repeat):
+        return replace(node, body=inner(node.body))
+    return node
