@@ -1,0 +1,9 @@
+"""What all tests rely on."""
+
+from __future__ import annotations
+
+import signal
+
+# A shell's background jobs ignore Ctrl-C, and so would every program that a test starts and ends by it.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
