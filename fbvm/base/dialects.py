@@ -29,6 +29,7 @@ class Dialect:
     integers_and_bits: bool = False
     numbers_of_enumerations: bool = False
     number_times_duration: bool = False
+    mixed_arguments: bool = False
 
 
 QUESTIONS = {
@@ -44,6 +45,8 @@ QUESTIONS = {
                           "an error that names the conversion", "converted as it stands if the width suffices"),
     "numbers_of_enumerations": ("an enumeration as a number, < and > between its members", "an error", "its value"),
     "number_times_duration": ("2 * T#5s", "an error: the TIME stands in front", "T#10s"),
+    "mixed_arguments": ("F(1, b := 2): some arguments named, some not", "an error",
+                        "those without a name are for the parameters that none names, in order"),
     "libraries": ("blocks that begin or end another way", "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
 }
@@ -54,10 +57,10 @@ _ROWS = (
     STANDARD,
     Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
             lenient_positions=True, real_bits_by_value=True, arithmetic_of_bits=True, integers_and_bits=True,
-            numbers_of_enumerations=True, number_times_duration=True),
+            numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True),
     Dialect("rusty", "programs for RuSTy", loop_ends_each_pass=True, arithmetic_of_bits=True, integers_and_bits=True,
-            numbers_of_enumerations=True),
+            numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True),
     Dialect("omron", "programs that shall run in Sysmac Studio",
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

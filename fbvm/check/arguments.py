@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import islice
+from itertools import count, islice
 from typing import TYPE_CHECKING
 
+from fbvm.base.dialects import Dialect, takers
 from fbvm.base.types import BOOL, fold
 from fbvm.check.facts import Guard
 from fbvm.syntax import tree
@@ -14,13 +15,15 @@ if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
 
 MIXED = "a call names all of its parameters or none"
-MIXED_HINT = "name them: parameter := value"
+MIXED_HINT = f"name them: parameter := value, or take {takers('mixed_arguments')}"
 NAMED = 3
 """How many of the missing parameters a message names."""
 
 
-def mixed(call: tree.Call) -> tree.Argument | None:
-    """The first argument that is given another way than the first one of its call; None if all are given alike."""
+def mixed(call: tree.Call, dialect: Dialect) -> tree.Argument | None:
+    """The first argument given another way than the first one of its call; None if all are alike, or a dialect takes both."""
+    if dialect.mixed_arguments:
+        return None
     return next((a for a in call.arguments if bool(a.kind) != bool(call.arguments[0].kind)), None)
 
 
@@ -38,14 +41,16 @@ class Arguments:
 
     def in_order(self) -> list[tree.Expr] | None:
         """Values in the order of the parameters, or None after a diagnostic."""
-        other = mixed(self.call)
+        other = mixed(self.call, self.expressions.project.dialect)
         if other is not None:
             self.error("S0406", other, MIXED, MIXED_HINT)
             return None
         values: dict[int, tree.Expr] = {}
         given: set[int] = set()
-        for position, argument in enumerate(a for a in self.call.arguments if not self._guard(a)):
-            index = position if argument.name is None else self._index(argument)
+        arguments = [a for a in self.call.arguments if not self._guard(a)]
+        free = (i for i in count() if i not in given)
+        for argument in sorted(arguments, key=lambda a: a.name is None):
+            index = next(free) if argument.name is None else self._index(argument)
             if index is None:
                 return None
             if index in given:

@@ -137,7 +137,7 @@ class Calls:
     def _bind(self, call: tree.Call, pou: Pou, bound: PouCall) -> None:
         """Match arguments with parameters, complain about what does not fit or is missing."""
         self.expressions.note_call(pou, call)
-        other = mixed(call)
+        other = mixed(call, self.project.dialect)
         if other is not None:
             self.error("S0406", other, MIXED, MIXED_HINT)
             return
@@ -150,7 +150,7 @@ class Calls:
         positional = [a for a in call.arguments if not a.kind]
         given: dict[str, tree.Node] = {}
         if positional:
-            self._positional(call, positional, pou, bound, given)
+            self._positional(call, positional, named, pou, bound, given)
         for argument in named:
             self._named(argument, pou, bound, given)
         empty = {name for name, node in given.items() if isinstance(node, tree.Argument) and node.value is None}
@@ -159,9 +159,11 @@ class Calls:
             self.error("S0404", call, f"the in-out {' and '.join(missing)} of {pou.name} is missing",
                        f"pass a variable: {missing[0]} := ...")
 
-    def _positional(self, call: tree.Call, arguments: Sequence[tree.Argument], pou: Pou, bound: PouCall,
-                    given: dict[str, tree.Node]) -> None:
-        parameters = [v for v in pou.order if v.kind in PARAMETER_KINDS and fold(v.name) not in ("EN", "ENO")]
+    def _positional(self, call: tree.Call, arguments: Sequence[tree.Argument], named: Sequence[tree.Argument], pou: Pou,
+                    bound: PouCall, given: dict[str, tree.Node]) -> None:
+        names = {fold(a.name.text) for a in named if a.name is not None}
+        names = {pou.other_names.get(name, name) for name in names} | {"EN", "ENO"}
+        parameters = [v for v in pou.order if v.kind in PARAMETER_KINDS and fold(v.name) not in names]
         if len(arguments) > len(parameters) and not pou.damaged:
             plural = "" if len(parameters) == 1 else "s"
             self.error("S0402", arguments[len(parameters)],
@@ -172,7 +174,7 @@ class Calls:
             if variable.kind != "VAR_INPUT" or not is_block(variable.type):
                 self._pass(argument, variable, bound)
         open_inputs = [v.name for v in parameters[len(arguments):] if v.kind == "VAR_INPUT" and not v.explicit]
-        if open_inputs:
+        if open_inputs and not named:
             self.error("S0404", call, f"{pou.name} needs {' and '.join(open_inputs)} too",
                        "a call without names gives all inputs; name the parameters to leave some out")
 

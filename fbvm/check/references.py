@@ -27,6 +27,7 @@ from fbvm.base.types import (
 )
 from fbvm.check.arguments import Arguments
 from fbvm.check.facts import UNTYPED_INT, Holder, StandardCall, Variable
+from fbvm.check.values import is_any
 from fbvm.check.writes import writable
 from fbvm.syntax import tree
 
@@ -178,8 +179,13 @@ def asked(expressions: Expressions, call: tree.Call, name: str) -> Type | None:
 def bound(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr, dimension: tree.Expr) -> Type | None:
     """LOWER_BOUND(array, dimension) and UPPER_BOUND, as DINT; a constant but for ARRAY [*]."""
     kind = expressions.infer(value)
-    number = expressions.checker.values.integer(dimension, expressions.source)
-    if kind is None or number is None:
+    counted = expressions.settle(dimension)
+    if kind is None or counted is None:
+        return None
+    number = expressions.facts.constants.get(dimension)
+    if isinstance(number, bool) or not isinstance(number, int) or not is_any(counted, "ANY_INT"):
+        expressions.error("S0701", dimension, f"{name} needs its dimension as a constant integer",
+                          "write a number, or declare the name in a VAR CONSTANT section")
         return None
     if not isinstance(kind, ArrayType | OpenArrayType):
         expressions.error("S0405", value, f"{name} needs an array, this is {kind}")

@@ -124,9 +124,9 @@ class Declarations(Statements):
         self.refuse_selves()
         return Action(word.start, end.end, self.name(owner) if owner else None, self.declared(token), body)
 
-    def actions_of(self, word: Token, owner: Token, actions: list[Action | Refused], end: Token) -> Actions:
-        return Actions(word.start, end.end, self.name(owner), tuple(a for a in actions if isinstance(a, Action)),
-                       tuple(a for a in actions if isinstance(a, Refused)))
+    def actions_of(self, word: Token, owner: Token | None, actions: list[Action | Refused], end: Token) -> Actions:
+        return Actions(word.start, end.end, self.name(owner) if owner else None,
+                       tuple(a for a in actions if isinstance(a, Action)), tuple(a for a in actions if isinstance(a, Refused)))
 
     def is_block(self, statement: RefusedStatement) -> bool:
         """Whether a refused statement is a METHOD or the like, which belongs to the POU and not to its body."""

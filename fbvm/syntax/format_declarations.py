@@ -66,8 +66,9 @@ class DeclarationLayout(TypeLayout):
         phrase.parts += (self.block(items, end), HARD, self.leaf(end))
         return phrase
 
-    def actions_of(self, word: Token, owner: Token, actions: list[Phrase], end: Token) -> Phrase:
-        return Phrase(word.start, self.leaf(word), " ", self.leaf(owner), self.block(actions, end), HARD, self.leaf(end))
+    def actions_of(self, word: Token, owner: Token | None, actions: list[Phrase], end: Token) -> Phrase:
+        named = (" ", self.leaf(owner)) if owner else ()
+        return Phrase(word.start, self.leaf(word), named, self.block(actions, end), HARD, self.leaf(end))
 
     def pass_over(self, items: list[Phrase], semicolon: Token) -> list[Phrase]:
         if items:

@@ -287,9 +287,9 @@ class Action(Declaration):
 
 @_node
 class Actions(Declaration):
-    """`ACTIONS pou .. END_ACTIONS` around the actions of a POU."""
+    """`ACTIONS pou .. END_ACTIONS` around the actions of a POU; without its name, of the one in front."""
 
-    owner: Name
+    owner: Name | None
     actions: tuple[Action, ...]
     refused: tuple[Refused, ...] = ()
 
