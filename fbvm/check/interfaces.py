@@ -136,7 +136,7 @@ class Interfaces:
         """Type and initial bytes of a declaration in `pou`, or of a global one; None after a diagnostic."""
         with self.checker.scope(pou):
             spec = declared.spec
-            if isinstance(spec, tree.RefSpec) and spec.kind == "REFERENCE TO" and pou is not None:
+            if isinstance(spec, tree.RefSpec) and spec.kind == "REFERENCE TO":
                 self.checker.specs.allowed(spec, source)
                 spec = spec.target  # the variable stands for what it is bound to
             specs = self.checker.specs
@@ -226,8 +226,7 @@ class Interfaces:
     def _place(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"
         self._open(variable, declared, pou)
-        if isinstance(declared.spec, tree.RefSpec) and declared.spec.kind == "REFERENCE TO" and not variable.reference:
-            self._bound(variable, declared, pou)
+        self.bound(variable, declared)
         variable.any_length = variable.reference and isinstance(declared.spec, tree.StringSpec) and declared.spec.length is None
         if variable.kind == "VAR_STAT":
             variable.place = "abs"  # one for all instances and calls
@@ -261,13 +260,16 @@ class Interfaces:
             self.report.add("S0205", pou.source, declared.spec, f"{what} cannot be {variable.kind}",
                             "declare it in VAR_IN_OUT")
 
-    def _bound(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
+    def bound(self, variable: Variable, declared: tree.VarDecl) -> None:
         """REFERENCE TO: a variable that another one stands behind."""
+        if not isinstance(declared.spec, tree.RefSpec) or declared.spec.kind != "REFERENCE TO" or variable.reference:
+            return
         variable.reference = True
-        if variable.kind != "VAR" or declared.location is not None or declared.initial is not None or variable.constant:
-            self.report.add("S0901", pou.source, declared.spec, f"REFERENCE TO as {variable.kind}, with a location or an "
+        begun = declared.location is not None or declared.initial is not None
+        if begun or variable.constant or variable.kind not in ("VAR", "VAR_GLOBAL"):
+            self.report.add("S0901", variable.source, declared.spec, f"REFERENCE TO as {variable.kind}, with a location or an "
                             "initial value is understood but not executed by this version",
-                            "declare it in a VAR section and bind it with REF=")
+                            "declare it in a VAR or VAR_GLOBAL section and bind it with REF=")
 
     def _edge(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         if variable.kind != "VAR_INPUT" or base(variable.type) != BOOL or pou.is_function:
@@ -301,15 +303,19 @@ class Interfaces:
         pou.edges.append(Edge(raw, hidden, memory, raw.edge == "F_EDGE"))
 
     def _external(self, declared: tree.VarDecl, section: tree.VarSection, pou: Pou) -> None:
-        resolved = self.checker.specs.resolve(declared.spec, pou.source)
+        spec = declared.spec
+        referring = isinstance(spec, tree.RefSpec) and spec.kind == "REFERENCE TO"
+        resolved = self.checker.specs.resolve(spec.target if isinstance(spec, tree.RefSpec) and referring else spec, pou.source)
         for name in declared.names:
             pou.damaged.add(fold(name.text))
             variable = self.project.global_variable(name.text, pou.source)
             if variable is None:
                 self.report.add("S0208", pou.source, name, f"there is no VAR_GLOBAL {name.text}",
                                 self.project.nearest(name.text, (v.name for v in self.project.globals.values())))
-            elif resolved is not None and resolved[0] != variable.type:
-                self.report.add("S0208", pou.source, name, f"{name.text} is {resolved[0]} here and {variable.type} as global",
+            elif resolved is not None and (resolved[0], referring) != (variable.type, variable.reference):
+                here, there = ("REFERENCE TO " * referring, "REFERENCE TO " * variable.reference)
+                self.report.add("S0208", pou.source, name,
+                                f"{name.text} is {here}{resolved[0]} here and {there}{variable.type} as global",
                                 "", (variable.source, variable.node.start, "the VAR_GLOBAL"))
             elif variable.constant and not any(fold(q.text) == "CONSTANT" for q in section.qualifiers):
                 self.report.add("S0208", pou.source, name, f"the VAR_GLOBAL {name.text} is CONSTANT",

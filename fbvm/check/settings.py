@@ -114,7 +114,7 @@ class Settings:
 
     def _root(self, name: str, node: tree.Node, source: Source) -> Spot | None:
         variable = self.checker.project.globals.get(("", fold(name)))
-        if variable is not None:
+        if variable is not None and not variable.reference:
             return Spot(variable, (), variable.type)
         known = [v.name for v in self.checker.project.globals.values()]
         self.report.add("S0801", source, node, f"there is no program, global variable or resource {name} here",
@@ -169,7 +169,7 @@ class Settings:
         """Each instance needs a place for each of its variables that some VAR_CONFIG completes."""
         done = {(row.spot.root, _key(row.spot)) for row in self.completed if row.address is not None}
         for root in self.checker.global_order:
-            for path, key, variable in self._open_in(root.type, root.name, ()):
+            for path, key, variable in () if root.reference else self._open_in(root.type, root.name, ()):
                 if (root, key) not in done:
                     self.report.add("S0801", variable.source, variable.node, f"no VAR_CONFIG says where {path} lies",
                                     f"write  {path} AT %IX0.0 : {variable.type};  or the whole address here")

@@ -30,7 +30,7 @@ class InitialReferences:
     def all(self) -> Iterator[tuple[int, bytes]]:
         """Where each of them lies, and its bytes."""
         for variable in self.checker.global_order:
-            if variable.place != "abs":
+            if variable.place != "abs" or variable.reference:
                 continue
             if variable.refers is not None:
                 yield variable.offset, self._made(variable, self.checker.bodies[0], 0)

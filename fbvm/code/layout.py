@@ -36,7 +36,7 @@ def place(checker: Checker) -> Placed:
         if variable.place == "abs":
             slots += bytes(-len(slots) % 8)
             variable.offset = SLOTS_OFFSET + len(slots)
-            slots += variable.initial
+            slots += bytes(8) if variable.reference else variable.initial
     frames = len(slots)
     for pou in checker.bodies:
         frames += -frames % 8
@@ -114,7 +114,7 @@ def _numbered(checker: Checker, slots: bytearray) -> tuple[tuple[int, int], ...]
     numbering = Numbering(checker)
     numbering.single()
     for variable in checker.global_order:
-        if variable.place == "abs":
+        if variable.place == "abs" and not variable.reference:
             numbering.instances(slots, variable.type, variable.offset)
     for pou in checker.bodies:
         frame = bytearray(pou.frame_initial)
@@ -169,7 +169,7 @@ def _path(variable: Variable) -> str:
 
 def _symbol(variable: Variable) -> Field:
     return Field(variable.name, variable.type, variable.offset, variable.kind, variable_bit(variable), absolute=True,
-                 constant=variable.constant, hexadecimal=variable.hexadecimal)
+                 reference=variable.reference, constant=variable.constant, hexadecimal=variable.hexadecimal)
 
 
 def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:
@@ -185,7 +185,7 @@ def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:
 
 
 def _retained(variable: Variable, checker: Checker) -> Iterator[Retained]:
-    if variable.place == "abs":
+    if variable.place == "abs" and not variable.reference:
         yield from _retained_in(variable.type, variable.offset, _path(variable), checker, variable.retain)
 
 

@@ -22,7 +22,8 @@ class Names:
 
     def __init__(self, symbols: Mapping[str, Field], areas: Mapping[str, Area]) -> None:
         self._symbols, self._areas = symbols, areas
-        tops = [Place(field.name, field.type, field.offset, field.bit) for field in symbols.values()]
+        tops = [Place(field.name, REFERENCE if field.reference else field.type, field.offset, field.bit)
+                for field in symbols.values()]
         self._slots = sorted((place for place in tops if self._in_slots(place)), key=lambda place: place.offset)
         self._starts = [place.offset for place in self._slots]
         self._located = [place for place in tops if not self._in_slots(place)]

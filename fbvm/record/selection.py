@@ -63,8 +63,7 @@ def _fitting(symbols: Mapping[str, Field], areas: Mapping[str, Area], pattern: s
         yield from found.places if isinstance(found, Span) else (found,)
         return
     fits = re.compile(".*".join(re.escape(part.strip()) for part in pattern.split("*")), re.I).fullmatch
-    chosen = [place for field in symbols.values()
-              for place in _matching(Place(field.name, field.type, field.offset, field.bit), fits)]  # fmt: skip
+    chosen = [place for top in tops(symbols) for place in _matching(top, fits)]
     if not chosen:
         raise UnknownPlace(f"no variable is called like {pattern}")
     yield from chosen
@@ -86,6 +85,11 @@ def _matching(place: Place, fits: object) -> Iterator[Place]:
         for number in range(min(place.type.count, MOST_ELEMENTS)):
             element = place.inner(f"{place.name}[{low + number}]", place.type.element, number * place.type.element.size)
             yield from _matching(element, fits)
+
+
+def tops(symbols: Mapping[str, Field]) -> Iterator[Place]:
+    """The places of all symbols; those behind references are places of others."""
+    return (Place(field.name, field.type, field.offset, field.bit) for field in symbols.values() if not field.reference)
 
 
 def _members(place: Place) -> Iterator[Place]:

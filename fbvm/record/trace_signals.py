@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fbvm.plc import Phase
 from fbvm.record.inside import Event, Passing
 from fbvm.record.recorder import Recording, Signal, Track, signals_at
-from fbvm.record.selection import select, singles
+from fbvm.record.selection import select, singles, tops
 from fbvm.record.trace import Moment, Trace
 from fbvm.record.traffic import Passed, Reader
 from fbvm.watch.paths import Place
@@ -64,8 +64,7 @@ def chosen_signals(trace: Trace, names: Sequence[str]) -> list[Signal]:
 def _every(trace: Trace) -> list[Signal]:
     """All single values in the program that were selected, and what units describe."""
     selection = select(trace.symbols, trace.areas, trace.selected)
-    chosen = selection.places if trace.selected else tuple(
-        Place(field.name, field.type, field.offset, field.bit) for field in trace.symbols.values())  # fmt: skip
+    chosen = selection.places if trace.selected else tuple(tops(trace.symbols))
     found: dict[Place, None] = {}
     for place in chosen:
         for single in singles(place):
