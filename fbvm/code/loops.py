@@ -71,24 +71,36 @@ class LoopLowering:
             body.out.append(("if", ((("eq", "b", by[1], by, zero), (("stop", "R0109", site),)),), ()))
         body.write(place, first, site)
         head, tail = self._known_step(place, last, step, site) if step is not None else \
-            self._computed_step(place, last, by or last, site)
+            self._computed_step(place, last, by or last, by or last, site)
         head = (self._charge(node.body, site), *head)
         body.out.append(("loop", head, body.inner(node.body), (*tail, *self._observed(place, site))))
 
     def _each_pass(self, node: tree.For, place: Place, wanted: list[tuple[tree.Expr, Type | None]], step: int | None,
                    site: int) -> None:
-        """The loop of a dialect in which end and step are worked out on every pass."""
+        """The loop of a dialect that works out the end in front of every pass, and the step behind it; which way it counts
+        is settled by the step in front of the first pass."""
         body = self.body
         body.write(place, body.value(*wanted[0]), site)
+        behind: Block = ()
+        begun = self._step(*wanted[2], site) if step is None else None
         with body.block() as begin:
-            last, *computed = (body.keep(value, always=True) for value in body.values.operands(*wanted[1:]))
-            if computed:
-                zero = ("const", computed[0][1], 0)
-                body.out.append(("if", ((("eq", "b", computed[0][1], computed[0], zero), (("stop", "R0109", site),)),), ()))
-        head, tail = self._known_step(place, last, step, site) if step is not None else \
-            self._computed_step(place, last, computed[0], site)
+            last = body.keep(body.value(*wanted[1]), always=True)
+        if begun is None:
+            assert step is not None
+            head, tail = self._known_step(place, last, step, site)
+        else:
+            with body.block() as stepped:
+                following = self._step(*wanted[2], site)
+            behind = tuple(stepped)
+            head, tail = self._computed_step(place, last, begun, following, site)
         head = (self._charge(node.body, site), *begin, *head)
-        body.out.append(("loop", head, body.inner(node.body), (*tail, *self._observed(place, site))))
+        body.out.append(("loop", head, body.inner(node.body), (*behind, *tail, *self._observed(place, site))))
+
+    def _step(self, expr: tree.Expr, kind: Type | None, site: int) -> Node:
+        """A step worked out now, which stops the program if it is 0."""
+        by = self.body.keep(self.body.value(expr, kind), always=True)
+        self.body.out.append(("if", ((("eq", "b", by[1], by, ("const", by[1], 0)), (("stop", "R0109", site),)),), ()))
+        return by
 
     def _observed(self, place: Place, site: int) -> Block:
         with self.body.block() as inner:
@@ -113,16 +125,17 @@ class LoopLowering:
         tail.append(self.body.places.store(place, following, site))
         return head, tuple(tail)
 
-    def _computed_step(self, place: Place, last: Node, step: Node, site: int) -> tuple[Block, Block]:
-        """The same for a step that is known only when the loop begins."""
+    def _computed_step(self, place: Place, last: Node, begun: Node, step: Node, site: int) -> tuple[Block, Block]:
+        """The same for a step that is known only when the program runs; the first one, `begun`, says which way it counts."""
         form = machine(place.type)
         low, high = _span(place.type)
         now = self.body.places.load(place)
-        forward = ("gt", "b", form, step, ("const", form, 0))
+        forward = ("gt", "b", form, begun, ("const", form, 0))
         head = (("if", ((forward, (_leave_if("gt", form, now, last),)),), (_leave_if("lt", form, now, last),)),)
         room_up = ("sub", form, ("const", form, high), step)
         room_down = ("sub", form, ("const", form, low), step)
-        ends = ("if", ((forward, (_leave_if("gt", form, now, room_up),)),), (_leave_if("lt", form, now, room_down),))
+        upward = ("gt", "b", form, step, ("const", form, 0))
+        ends = ("if", ((upward, (_leave_if("gt", form, now, room_up),)),), (_leave_if("lt", form, now, room_down),))
         return head, (ends, self.body.places.store(place, ("add", form, now, step), site))
 
 
