@@ -50,6 +50,7 @@ REPLACE                                IN1:T IN2:T L:ANY_INT P:ANY_INT -> T   AN
 FIND                                   IN1:T IN2:T                  -> INT    ANY_STRING
 TRUNC                                  IN:T                         -> DINT   ANY_REAL
 TIME                                                                -> TIME
+LTIME                                                               -> LTIME
 IS_VALID                               IN:T                         -> BOOL   ANY_REAL
 IS_VALID_BCD                           IN:T                         -> BOOL   ANY_BIT
 TO_BIG_ENDIAN TO_LITTLE_ENDIAN         IN:T                         -> T      ANY

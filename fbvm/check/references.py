@@ -35,6 +35,8 @@ if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
 
 MAKERS = ("REF", "ADR")
+SIZES = ("SIZEOF", "XSIZEOF")
+"""CODESYS has the second one for sizes of 64 bits; here both are as wide as they need to be."""
 
 
 def refer(expressions: Expressions, expr: tree.Expr, lasting: bool) -> Type | None:

@@ -84,11 +84,11 @@ class StandardCalls:
     def _typed(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
         if name in references.ASKED:
             return references.asked(self.expressions, call, name)
-        if name in references.MAKERS or name == "SIZEOF":
+        if name in references.MAKERS or name in references.SIZES:
             values = Arguments(self.expressions, call, ["IN"]).in_order()
             if values is None:
                 return None
-            if name == "SIZEOF":
+            if name in references.SIZES:
                 return references.size(self.expressions, call, values[0])
             return references.make(self.expressions, call, name, values[0])
         if name in ("LOWER_BOUND", "UPPER_BOUND"):

@@ -16,7 +16,7 @@ from fbvm.code.operations import FLOATS, INTEGERS, TEXT_UNITS, Node
 from fbvm.code.values import constant
 from fbvm.syntax import texts
 
-VARYING = frozenset(("TIME", "__DUE"))
+VARYING = frozenset(("TIME", "LTIME", "__DUE"))
 """Functions whose value is another one each time."""
 
 

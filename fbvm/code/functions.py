@@ -293,7 +293,7 @@ FUNCTIONS: dict[str, Lowering] = {
     "MAX": _chain("max"), "MIN": _chain("min"), "CONCAT": _chain("concat"),
     "LEN": lambda body, a, call, site: ("length", "i16", a[0]),
     "FIND": lambda body, a, call, site: ("find", "i16", a[0], a[1]),
-    "TIME": lambda body, a, call, site: ("now", "i64"), "__DUE": _due,
+    **dict.fromkeys(("TIME", "LTIME"), lambda body, a, call, site: ("now", "i64")), "__DUE": _due,
     "IS_VALID": lambda body, a, call, site: _finite(body, a[0], _form(call)),
     "IS_VALID_BCD": _valid_bcd,
     "TO_BIG_ENDIAN": _swapped, "FROM_BIG_ENDIAN": _swapped,
