@@ -70,7 +70,7 @@ class Span:
 
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<name>[^\W\d]\w*)|(?P<bit>\.\s*%?X?\d+)|(?P<dot>\.)|\[(?P<index>[^\]]*)\]|(?P<hat>\^))", re.I
+    r"\s*(?:(?P<name>[^\W\d]\w*)|(?P<bit>\.\s*%?X?\d+(?!\w))|(?P<dot>\.)|\[(?P<index>[^\]]*)\]|(?P<hat>\^))", re.I
 )
 _FIRST = re.compile(r"\s*([^\W\d]\w*)")
 _SPACED = re.compile(r"\s*[A-Z]\w*\s+\d+(\.\d+)?\s*", re.I)
@@ -200,7 +200,10 @@ def _step(place: Place, match: re.Match[str]) -> Place:
         if not isinstance(place.type, RefType) or place.type.target is None:
             raise UnknownPlace(f"{place.name} is no reference")
         return replace(place, name=f"{place.name}^", type=place.type.target, hops=(*place.hops, 0))
-    return _part(place, int(re.sub(r"\D", "", match["bit"])))
+    bit = match["bit"][1:].strip()
+    if isinstance(place.type, StructType) and bit[0] in "Xx":
+        return member(place, bit)  # a member that is called as a bit is written
+    return _part(place, int(bit.lstrip("%Xx")))
 
 
 def _of(parent: Place, field: Field, name: str, distance: int) -> Place:

@@ -17,6 +17,8 @@ MAIN = StructType("Main", 200, 8, {
     "SWITCH": Field("switch", t.BOOL, AREAS["CIO"].offset + 3038, bit=2, absolute=True),
     "SHARED": Field("shared", POINT, 88, "VAR_IN_OUT", reference=True),
     "LIMIT": Field("limit", t.INT, 96, constant=True),
+    "X2": Field("x2", t.WORD, 100),
+    "X2_POS": Field("x2_pos", t.INT, 102),
 }, block=True)
 SYMBOLS = {"MAIN": Field("Main", MAIN, 180224), "D200": Field("d200", t.INT, 181000)}
 
@@ -32,6 +34,10 @@ def place(text: str) -> Place:
     ("Main.a[3,1].x", "Main.a[3, 1].x", "INT", 180224 + 24 + 40, None),
     ("Main.flags.9", "Main.flags.9", "BOOL", 180224 + 81, 1),
     ("Main.flags.%X0", "Main.flags.0", "BOOL", 180224 + 80, 0),
+    ("Main.flags.X1", "Main.flags.1", "BOOL", 180224 + 80, 1),
+    ("Main.X2", "Main.x2", "WORD", 180224 + 100, None),
+    ("Main. x2_pos", "Main.x2_pos", "INT", 180224 + 102, None),
+    ("Main.x2.x3", "Main.x2.3", "BOOL", 180224 + 100, 3),
     ("Main.switch", "Main.switch", "BOOL", AREAS["CIO"].offset + 3038, 2),
     ("D200", "d200", "INT", 181000, None),
     ("%D200", "D200", "WORD", AREAS["D"].offset + 400, None),
@@ -81,6 +87,8 @@ def test_a_range_is_its_places(text: str, names: list[str]) -> None:
     ("Main.flags.16", "Main.flags has bits 0..15; 16 does not exist"),
     ("Main.flags.bit", "Main.flags is WORD and has no member bit"),
     ("Main.conn.ENO.0", "has no bits"),
+    ("Main.conn.x1", "Main.conn has no x1; it has ENO"),
+    ("Main.conn.%X1", "has no bits"),
     ("Main.", "ends too early"),
     ("Main conn", "is not a path"),
     ("Main.conn^", "is no reference"),
