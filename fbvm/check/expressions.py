@@ -337,6 +337,8 @@ class Expressions:
         if isinstance(whole, AnyType):
             return anything.member(self, expr, whole)
         if not isinstance(whole, StructType):
+            if qualified.is_bit(self, expr, whole):
+                return self._part(self.facts.bits[expr], want)
             self.error("S0304", expr.of, f"this is {whole} and has no members",
                        f"what it points to has: write {self.text(expr.of)}^.{expr.name.text}"
                        if isinstance(whole, RefType) and isinstance(whole.target, StructType) else "")

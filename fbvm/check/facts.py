@@ -193,6 +193,8 @@ class Facts:
     """Calls of constants that have no value, where they stand, and the code of the trap that they become."""
     variables: dict[tree.Expr, Variable] = field(default_factory=dict)
     fields: dict[tree.Expr, Field] = field(default_factory=dict)
+    bits: dict[tree.Expr, tree.Part] = field(default_factory=dict)
+    """What looks like a member and is a bit, named by a constant."""
     directs: dict[tree.Expr, Address] = field(default_factory=dict)
     operands: dict[tree.Expr, Type] = field(default_factory=dict)
     """The type in which a binary operator works on its operands."""

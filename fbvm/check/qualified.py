@@ -3,6 +3,7 @@
     GVL.pressure        the VAR_GLOBAL that the file GVL.st declares
     Standard.TON        a name of a library, which says by itself what is meant
     PLC_PRG.step        a variable of a program, of which there is one instance then
+    word.READY          the bit of that number, where READY is a constant
 
 What stands in front never decides between two declarations of a library: it only has to be known.
 """
@@ -11,8 +12,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import EnumType, Type, fold
+from fbvm.base.types import Elementary, EnumType, Type, base, fold
 from fbvm.check.facts import Variable
+from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -44,3 +46,18 @@ def member(expressions: Expressions, expr: tree.Member) -> Type | Variable | Non
     if isinstance(expr.of, tree.NameRef) and is_space(expressions, expr.of):
         return expressions.project.listed(fold(expr.of.text), fold(expr.name.text), expressions.source)
     return None
+
+
+def is_bit(expressions: Expressions, expr: tree.Member, whole: Type) -> bool:
+    """True for `word.READY` with an integer constant READY, which CODESYS takes as the bit of that number."""
+    variable = expressions.variable(expr.name.text)
+    kind = base(whole)
+    if variable is None or not variable.constant or not isinstance(kind, Elementary) or not is_any(kind, "ANY_BIT", "ANY_INT"):
+        return False
+    name = tree.NameRef(expr.name.start, expr.name.end, expr.name.text)
+    expressions.infer(name)
+    number = expressions.facts.constants.get(name)
+    if isinstance(number, bool) or not isinstance(number, int) or number < 0:
+        return False
+    expressions.facts.bits[expr] = tree.Part(expr.start, expr.end, expr.of, "X", number)
+    return True

@@ -77,6 +77,8 @@ class Places:
             return Place(("abs", offset, ()), kind, address.bit_in_byte() if is_bit else None)
         if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
             return self._of_any(expr, kind)
+        if expr in self.facts.bits:
+            return self._part(self.facts.bits[expr], kind)
         if isinstance(expr, tree.Member):
             member = self.facts.fields[expr]
             if member.absolute:
