@@ -115,7 +115,7 @@ class Spelling:
     def _name(self, name: Name | NamedType | NameRef, scope: Scope) -> bool:
         """Note the spelling of a name that the text declares; whether it does."""
         entry = scope.get(fold(name.text)) or self.globals.get(fold(name.text))
-        if entry:
+        if entry and not entry.text.startswith("$"):  # that is what jumps remember, where the text has something else
             self.at[name.start] = entry.text
         return entry is not None
 

@@ -109,6 +109,8 @@ class Nine(Rig):
         for name in JOBS:
             self.set(f"{name}_EN", True)
             self.set(f"{name}_Cmd", False)
+            # in real timing half a second is not enough to take a stray frame and the reply behind it
+            self.set(f"{name}.Reply_Time", 5_000_000_000)
         self.set("Connect", True)
         for _ in range(2):
             self.scan(150)

@@ -128,7 +128,8 @@ def by_modbus_tk(port: int) -> Results:
             return f"exception {error.get_exception_code()}"
         return True if code > 4 else [bool(bit) for bit in answer] if code < 3 else list(answer)
 
-    with contextlib.closing(master):
+    with contextlib.ExitStack() as stack:
+        stack.callback(master._do_close)  # `close` forgets a connection that could not be opened
         return {
             "write_registers": said(16, REGISTER, 3, [11, 22, 33]), "read_registers": said(3, REGISTER, 3),
             "write_register": said(6, REGISTER + 1, 1, 44), "read_again": said(3, REGISTER, 3),

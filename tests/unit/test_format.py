@@ -275,3 +275,10 @@ def test_an_instruction_list_stays_as_it_is() -> None:
     text = "PROGRAM Main\nVAR a, b : BOOL; END_VAR\n  LD a\n  AND b\n  ST a\nEND_PROGRAM\n"
     written, wrong = formatted(Source("x.st", text))
     assert written == text and [d.code for d in wrong] == ["S0901"]
+
+
+def test_labels_stay_as_they_are_written() -> None:
+    body = "    IF n > 0 THEN\n        JMP Next;\n    END_IF;\n    n := 1;\n    next: n := 2;\n"
+    text = f"PROGRAM Main\nVAR\n    n : INT;\nEND_VAR\n{body}END_PROGRAM\n"
+    written, wrong = formatted(Source("x.st", text))
+    assert wrong == [] and "JMP Next;" in written and "$" not in written
