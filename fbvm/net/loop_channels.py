@@ -103,7 +103,7 @@ class Line(_Here):
 
     def fetch(self, now_ns: int) -> None:
         end, told = self._end, self.link.told
-        if end is None:
+        if end is None or self._break_told:
             return
         if end.inbox and self.granted > 0:
             data = end.take(self.granted, now_ns)

@@ -75,7 +75,7 @@ class Line:
         """What the network has to do for the program's wish."""
         wish = words[at.WISH] if is_mine else Wish.CLOSED
         if wish in (Wish.CONNECT, Wish.LISTEN):
-            if self.is_idle and words[at.STATE] in (State.CLOSED, State.CLOSING):
+            if self.is_idle and words[at.STATE] not in (*_AT_WORK, State.FAILED):
                 return [self._open(wish, words)]
             return self._work(words) if words[at.STATE] in _AT_WORK else []
         if self._in_use:

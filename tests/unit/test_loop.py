@@ -400,3 +400,18 @@ def test_closing_the_network_forgets_everything() -> None:
     network.close()
     assert link.events(100) == [Sent(1, 1)]
     assert network.next_due_ns() is None
+
+
+def test_nothing_is_told_behind_a_break() -> None:
+    """The server's last byte and its FIN wait unfetched when our own sending breaks the connection."""
+    network = LoopNetwork(latency_ns=2)
+    network.place(Peer("10.0.0.9", 502), ScriptedPeer([Say(b"x", 0), Leave(1)]))
+    link = network.attach("10.0.0.1")
+    link.submit([Connect(1, Peer("10.0.0.9", 502))], 0)
+    told = list(link.events(20))
+    for now_ns in (20, 40, 60):
+        link.submit([Send(1, b"y")], now_ns)
+        told += link.events(now_ns + 15)
+    told += link.events(10**9)
+    kinds = [type(event).__name__ for event in told]
+    assert kinds.count("Broken") == 1 and {"PeerClosed", "Received"}.isdisjoint(kinds[kinds.index("Broken"):])
