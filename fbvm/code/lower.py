@@ -157,7 +157,7 @@ class BodyLowering:
             if isinstance(statement, tree.Empty):
                 continue
             site = self.site(statement)
-            if not isinstance(statement, ladder.Ladder | ladder.Rung):
+            if not isinstance(statement, ladder.Ladder | ladder.Rung) and statement.end > statement.start:
                 self.out.append(("observe", "statement", site, None))
             mark = len(self.out)
             _LOWER[type(statement)](self, statement, site)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from fbvm.syntax import tree
 from fbvm.syntax.ladder import Rung
 from fbvm.syntax.mnemonics import RungText
-from fbvm.syntax.tree import Action, Block, Continue, Exit, Expr, For, NameRef, Repeat, Return, Statement
+from fbvm.syntax.tree import Action, Block, Continue, Exit, Expr, For, If, NameRef, Repeat, Return, Statement
 
 if TYPE_CHECKING:
     from fbvm.syntax.rungs import Rungs
@@ -70,8 +70,8 @@ class Spans:
         rungs, whole = self.rungs, list(statements)
         if self.interlocked:
             here = rungs.temporary(INTERLOCK)
-            whole = [rungs.when(here, *inhibited, otherwise=statements) if inhibited else
-                     rungs.when(rungs.negated(here), *statements)]
+            whole = [self._guard(here, inhibited, statements) if inhibited else
+                     self._guard(rungs.negated(here), statements)]
         return self._passed_over(whole)
 
     def _passed_over(self, statements: list[Statement]) -> list[Statement]:
@@ -82,7 +82,11 @@ class Spans:
         passing: Expr = first
         for jump in more:
             passing = rungs.binary("OR", passing, jump)
-        return [rungs.when(rungs.negated(passing), *statements)]
+        return [self._guard(rungs.negated(passing), tuple(statements))]
+
+    def _guard(self, condition: Expr, statements: Block, otherwise: Block | None = None) -> Statement:
+        """A condition that nobody has written: of no length, so that it is not seen as a statement of its own."""
+        return If(self.rungs.start, self.rungs.start, ((condition, statements),), otherwise)
 
     def place(self, rung: Rung) -> None:
         """Put a rung where it belongs, and open or close the loops that it begins or ends."""

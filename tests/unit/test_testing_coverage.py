@@ -86,6 +86,21 @@ def test_ways_that_were_never_taken(file: Path) -> None:
     assert only(counted(file, 1, 2, 3, 4)).partial == {}
 
 
+def test_rungs_that_were_jumped_over_are_missing(tmp_path: Path) -> None:
+    """Line 1 is that of the PROGRAM; the guard that a jump is made of is no statement."""
+    file = tmp_path / "rungs.st"
+    rungs = "LD W0.00\nJMP 1\nLD P_On\nSET W0.01\nJME 1\n"
+    file.write_text(f"PROGRAM Main\nLADDER\n{rungs}END_LADDER\nEND_PROGRAM\n", encoding="utf-8")
+    coverage, what = Coverage(), subject([file], "")
+    plc = Plc(what.image)
+    with looking(plc, coverage.listener(what)):
+        plc.scan()
+        assert only(coverage).missing == [6]
+        plc.write("W0.00", True)
+        plc.scan()
+    assert only(coverage).missing == []
+
+
 def test_what_was_never_executed_is_not_partial(file: Path) -> None:
     each = only(counted(file))
     assert each.partial == {}
