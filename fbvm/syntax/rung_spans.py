@@ -157,15 +157,10 @@ class Spans:
     def interlock(self) -> None:
         """IL: from here to ILC outputs are inhibited unless the condition is ON."""
         rungs = self.rungs
-        here = rungs.temporary(INTERLOCK)
-        condition = rungs.power()
-        if not self.interlocked:
-            rungs.emit(rungs.assign(here, rungs.negated(condition)))
-            self.interlocked = True
-        else:
-            rungs.emit(rungs.assign(here, rungs.negated(condition)))
         if self.jumps:
             raise self._refused("IL stands between a JMP and its JME", "interlock and jump may not overlap")
+        rungs.emit(rungs.assign(rungs.temporary(INTERLOCK), rungs.negated(rungs.power())))
+        self.interlocked = True
 
     def clear(self) -> None:
         """ILC ends all interlocks."""
