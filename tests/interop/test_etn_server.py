@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from received import heard
 
 from fbvm.wire.modbus import Adu
 
@@ -76,17 +77,6 @@ def connected(port: int) -> socket.socket:
             pass
         sock.close()
         assert time.monotonic() < end_s, "it does not serve any more"
-
-
-def heard(sock: socket.socket, count: int) -> bytes:
-    """So many bytes, or what came before the end."""
-    data = b""
-    while len(data) < count:
-        part = sock.recv(count - len(data))
-        if not part:
-            break
-        data += part
-    return data
 
 
 def settled(port: int) -> None:

@@ -13,7 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from test_etn_server import BOUND_S, HOUSE, connected, heard
+from received import heard
+from test_etn_server import BOUND_S, HOUSE, connected
 
 from fbvm.wire import modbus
 from fbvm.wire.modbus import Adu

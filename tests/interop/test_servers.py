@@ -20,6 +20,7 @@ from typing import Any
 
 import pytest
 from foreign_clients import BOUND_S, CLIENTS, expected
+from received import heard
 from wireshark import TSHARK
 
 from fbvm.wire.modbus import Adu
@@ -132,17 +133,6 @@ def connected(kind: str, port: int) -> socket.socket:
 def settled(kind: str, port: int) -> None:
     """Wait until the server answers, and leave politely."""
     connected(kind, port).close()
-
-
-def heard(sock: socket.socket, count: int) -> bytes:
-    """So many bytes, or what came before the end."""
-    data = b""
-    while len(data) < count:
-        part = sock.recv(count - len(data))
-        if not part:
-            break
-        data += part
-    return data
 
 
 # --- other people's clients -------------------------------------------------------------------------------------------
