@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import platform
+
 from fbvm.base.arithmetic import limits, width
 from fbvm.code.operations import Node
 from fbvm.engine.native_writer import Writer, ir, literal, signed
 from fbvm.engine.ranges import is_float
+
+ONE_STEP = platform.machine() in ("x86_64", "AMD64")
+"""Whether the processor has an instruction that rounds and tells what does not fit (CVTSS2SI and its like)."""
 
 
 def convert(w: Writer, machine: str, source: str, a: Node) -> str:
@@ -26,6 +31,8 @@ def convert(w: Writer, machine: str, source: str, a: Node) -> str:
 def nearest(w: Writer, machine: str, source: str, a: Node, site: int) -> str:
     """A tie goes to the even number: below the least one it fits, above the greatest one not."""
     value, kind = w.value(a), ir(source)
+    if ONE_STEP and width(machine) < 64:
+        return _in_one_step(w, machine, source, value, "cvt", site)
     low, high = limits(machine)
     _must_fit(w, source, value, (_exactly(source, low, -0.5), True), _exactly(source, high, 0.5), machine, site)
     if machine == "u64":
@@ -37,9 +44,26 @@ def nearest(w: Writer, machine: str, source: str, a: Node, site: int) -> str:
 
 def truncate(w: Writer, machine: str, source: str, a: Node, site: int) -> str:
     value, (low, high) = w.value(a), limits(machine)
+    if ONE_STEP and width(machine) < 64:
+        return _in_one_step(w, machine, source, value, "cvtt", site)
     least = _exactly(source, low, -1.0)
     _must_fit(w, source, value, (least, least == low), float(high + 1), machine, site)
     return _whole(w, machine, ir(source), value)
+
+
+def _in_one_step(w: Writer, machine: str, source: str, value: str, how: str, site: int) -> str:
+    """What the processor makes of a float: its least number of NaN and of what does not fit, which is none of ours."""
+    form = "i32" if width(machine) < 32 else "i64"
+    count, extension, letter = {"f32": (4, "sse", "s"), "f64": (2, "sse2", "d")}[source]
+    lanes = f"<{count} x {ir(source)}>"
+    lane = w.new(f"insertelement {lanes} poison, {ir(source)} {value}, i64 0")
+    suffix = "64" if form == "i64" else ""
+    number = w.new(f"call {form} @llvm.x86.{extension}.{how}s{letter}2si{suffix}({lanes} {lane})")
+    cut = w.new(f"trunc {form} {number} to {ir(machine)}")
+    again = w.new(f"{'sext' if signed(machine) else 'zext'} {ir(machine)} {cut} to {form}")
+    low, high = limits(machine)
+    w.trap_if(w.new(f"icmp ne {form} {again}, {number}"), "R0105", site, (source, value), ("const", low), ("const", high))
+    return cut
 
 
 def _whole(w: Writer, machine: str, kind: str, value: str) -> str:

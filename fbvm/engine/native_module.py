@@ -16,6 +16,7 @@ from fbvm.engine.bases import fixed_bases
 from fbvm.engine.native_calls import call_graph, heights, instance_places
 from fbvm.engine.native_compiler import MATH
 from fbvm.engine.native_context import Point
+from fbvm.engine.native_conversions import ONE_STEP
 from fbvm.engine.native_expressions import VALUES
 from fbvm.engine.native_guard import GUARD, at_end
 from fbvm.engine.native_library import declaration, definitions
@@ -108,6 +109,9 @@ def _declarations() -> tuple[str, ...]:
               for name in ("umin", "umax", "smin", "smax") for kind in _WIDTHS]
     lines += [f"declare {kind} @llvm.{name}.{kind}({kind}, {kind}, {kind})"
               for name in ("fshl", "fshr") for kind in _WIDTHS[1:]]
+    lines += [f"declare {kind} @llvm.x86.{extension}.{how}s{letter}2si{suffix}({lanes})" for how in ("cvt", "cvtt")
+              for extension, letter, lanes in (("sse", "s", "<4 x float>"), ("sse2", "d", "<2 x double>"))
+              for kind, suffix in (("i32", ""), ("i64", "64")) if ONE_STEP]
     lines += [f"declare {kind} @llvm.abs.{kind}({kind}, i1)" for kind in _WIDTHS[1:]]
     lines += [f"declare double @fbvm_{name}({', '.join(['double'] * count)}) #2" for name, count in MATH.items()]
     return tuple(lines)

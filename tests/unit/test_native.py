@@ -15,7 +15,7 @@ import pytest
 from hand_image import at, behind, const, image, load, own, power_on, store
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS, SLOTS_OFFSET
-from fbvm.base.arithmetic import FUNCTIONS, NAN, power
+from fbvm.base.arithmetic import FUNCTIONS, NAN, limits, power, single
 from fbvm.base.memory import STRUCTS
 from fbvm.code.operations import EXPRESSIONS, STATEMENTS, Node
 from fbvm.engine import native
@@ -25,7 +25,7 @@ if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
 from fbvm.base import cache
-from fbvm.engine import native_compiler, native_entries
+from fbvm.engine import native_compiler, native_conversions, native_entries
 from fbvm.engine.native_module import BodyWriter, translate
 from fbvm.engine.native_scans import Turn
 from fbvm.engine.native_worker import worker
@@ -250,6 +250,38 @@ def test_large_floats_become_ulint(level: int, number: float, operation: str) ->
                before={0: STRUCTS["f64"].pack(number)}, level=level)
     assert e.run(0) is None
     assert slot(e, "u64", 8) == (int(number) if operation == "truncate" else round(number))
+
+
+@pytest.mark.parametrize("one_step", [False, True])
+@pytest.mark.parametrize("operation", ["truncate", "nearest"])
+def test_what_does_not_fit_an_integer_with_the_instruction_of_a_processor_and_without(
+        monkeypatch: pytest.MonkeyPatch, operation: str, one_step: bool) -> None:
+    if one_step and not native_conversions.ONE_STEP:
+        pytest.skip("this processor has no such instruction")
+    monkeypatch.setattr(native_conversions, "ONE_STEP", one_step)
+    cache.switch(False)
+    try:
+        for source in ("f32", "f64"):
+            for machine in ("i8", "i16", "i32", "u8", "u16", "u32"):
+                code = (store(machine, 8, (operation, machine, source, load(source, 0), 1)),)
+                e = engine(code, level=0)
+                _bounds(e, operation, machine, source)
+    finally:
+        cache.switch(True)
+
+
+def _bounds(e: NativeEngine, operation: str, machine: str, source: str) -> None:
+    numbers = [sign * (limit + more) for limit in (0, *limits(machine), 1 << 31, 1 << 32, 1 << 63, 1 << 64)
+               for more in (-1.5, -1, -0.75, -0.5, 0, 0.25, 0.5, 0.75, 1, 1.5) for sign in (1.0, -1.0)]
+    for number in [*numbers, math.inf, -math.inf, math.nan]:
+        e.memory.write(SLOTS_OFFSET, source, single(number) if source == "f32" else number)
+        number = e.memory.read(SLOTS_OFFSET, source)
+        wanted = (math.trunc if operation == "truncate" else round)(number) if math.isfinite(number) else 1 << 99
+        trap = e.run(0)
+        if limits(machine)[0] <= wanted <= limits(machine)[1]:
+            assert (trap, slot(e, machine, 8)) == (None, wanted), (machine, number)
+        else:
+            assert trap and (trap.code, repr(trap.values[0])) == ("R0105", repr(number)), (machine, number)
 
 
 @pytest.mark.slow
