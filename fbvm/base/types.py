@@ -142,10 +142,13 @@ class SubrangeType(Type):
 
 @dataclass(frozen=True)
 class RefType(Type):
-    """REF_TO target, or POINTER TO target, which `moves` by arithmetic; `target` None is the type of NULL."""
+    """REF_TO target, or POINTER TO target, which `moves` by arithmetic; `target` None is the type of NULL.
+
+    What is declared REFERENCE TO target `follows`: wherever it is named, what it is bound to is meant."""
 
     target: Type | None
     moves: bool = False
+    follows: bool = False
 
 
 _PARENTS = {
@@ -216,6 +219,16 @@ def character(kind: StringType) -> Elementary:
 def pointer(target: Type) -> RefType:
     """POINTER TO target."""
     return RefType(f"POINTER TO {target.name}", 8, 8, target, True)
+
+
+def bound(target: Type) -> RefType:
+    """REFERENCE TO target."""
+    return RefType(f"REFERENCE TO {target.name}", 8, 8, target, follows=True)
+
+
+def followed(kind: Type) -> Type:
+    """The type of what is meant where a variable of `kind` is named."""
+    return kind.target if isinstance(kind, RefType) and kind.follows and kind.target is not None else kind
 
 
 @cache
@@ -301,7 +314,8 @@ def converts(source: Type, target: Type) -> bool:
     if isinstance(target, StringType):
         return source is character(target)
     if isinstance(source, RefType) and isinstance(target, RefType):
-        return source.target is None or source.target == target.target or source.moves and target.moves
+        return source.follows == target.follows and (
+            source.target is None or source.target == target.target or source.moves and target.moves)
     return isinstance(source, Elementary) and target.name in IMPLICIT.get(source.name, ()) \
         and isinstance(target, Elementary)
 

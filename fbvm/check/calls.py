@@ -5,8 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, ArrayType, StringType, StructType, Type, base, fold
-from fbvm.check import functions, qualified
+from fbvm.base.types import (
+    BOOL,
+    DEFAULT_STRING,
+    AnyType,
+    ArrayType,
+    RefType,
+    StringType,
+    StructType,
+    Type,
+    base,
+    fold,
+    followed,
+)
+from fbvm.check import functions, qualified, references
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
 from fbvm.check.fitting import assignable, holds, lent, same
@@ -229,12 +241,15 @@ class Calls:
             if fold(variable.name) == "EN":
                 if self.expressions.fit(value, BOOL, "S0405", "EN"):
                     bound.enable = value
+            elif isinstance(variable.type, RefType) and variable.type.follows:
+                if references.lend(self.expressions, value, followed(variable.type), "S0405", f"the input {variable.name}"):
+                    bound.inputs.append((variable, value))
             elif self.expressions.fit(value, variable.type, "S0405", variable.name):
                 bound.inputs.append((variable, value))
         elif variable.kind == "VAR_IN_OUT":
             if self._in_out(value, variable):
                 bound.in_outs.append((variable, value))
-        elif self.output(argument, variable.type, variable.name):
+        elif self.output(argument, followed(variable.type), variable.name):
             bound.outputs.append((variable, value, argument.negated))
 
     def _in_out(self, value: tree.Expr, variable: Variable) -> bool:

@@ -8,12 +8,12 @@ from contextlib import contextmanager
 from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
-from fbvm.base.types import StructType, Type, fold
+from fbvm.base.types import RefType, StructType, Type, fold
 from fbvm.check import references
 from fbvm.check.calls import Calls
 from fbvm.check.configurations import Configurations
 from fbvm.check.expressions import Expressions
-from fbvm.check.facts import Pou, StandardCall, TaskFact, Value, Variable
+from fbvm.check.facts import Pou, StandardCall, Start, TaskFact, Value, Variable
 from fbvm.check.generics import is_generic
 from fbvm.check.globals import Globals
 from fbvm.check.interfaces import Interfaces
@@ -36,7 +36,7 @@ class Checker:
         """What a call of a standard function gives for constants, None if that is not known now; raises Undefined."""
         self.report = project.report
         self.specs = Specs(project)
-        self.values = Values(project, self._fit, self._infer, self._variable, self.interface)
+        self.values = Values(project, self._fit, self._infer, self._variable, self.interface, self._start)
         self.specs.values = self.values
         self.specs.scope = self.scope
         self.interfaces = Interfaces(self)
@@ -57,6 +57,7 @@ class Checker:
         self.progress: Callable[[int, int], None] = lambda done, known: None
         """Told how many POUs have been checked, and of how many."""
         self._scope: Pou | None = None
+        self._late = False
         self._blocks: dict[int, Pou] = {}
 
     def check(self, program: str | None = None, resource: str | None = None) -> None:
@@ -146,12 +147,13 @@ class Checker:
         return instance
 
     @contextmanager
-    def scope(self, pou: Pou | None) -> Iterator[None]:
-        """Constants of `pou` are visible while its declarations are worked out."""
+    def scope(self, pou: Pou | None, late: bool = False) -> Iterator[None]:
+        """Constants of `pou` are visible while its declarations are worked out, `late` ones of its frame among them."""
         before, self._scope = self._scope, pou
+        was_late, self._late = self._late, late
         self.specs.types = pou.types if pou is not None else {}
         yield
-        self._scope = before
+        self._scope, self._late = before, was_late
         self.specs.types = before.types if before is not None else {}
 
     def _fit(self, expr: tree.Expr, source: Source, kind: Type) -> bool:
@@ -159,6 +161,10 @@ class Checker:
 
     def _variable(self, name: str, source: Source) -> Variable | None:
         return self.expressions(source, self._scope).variable(name)
+
+    def _start(self, init: tree.Expr, kind: RefType, source: Source) -> bytes:
+        """The bytes of a reference that is made before anything runs; its place is looked for when all names are known."""
+        return references.noted(self.project.facts, Start(references.named(init), init, kind, source, self._scope, self._late))
 
     def _infer(self, expr: tree.Expr, source: Source) -> Type | None:
         return self._constants(source).settle(expr)
@@ -170,14 +176,9 @@ class Checker:
     # --- the run of the check ---------------------------------------------------------------------------------------
 
     def _check_initial_references(self) -> None:
-        """What variables refer to from the start; all names are known by now."""
-        for variable in self.global_order:
-            if variable.refers is not None:
-                references.start(self.expressions(variable.source, None), variable)
-        for pou in list(self.bodies):
-            for variable in pou.order:
-                if variable.refers is not None:
-                    references.start(self.expressions(pou.source, pou), variable)
+        """What references are made to before anything runs; all names are known by now."""
+        for start in self.project.facts.starts:
+            references.start(self.expressions(start.source, start.pou), start)
 
     def check_body(self, pou: Pou) -> None:
         """Check a body that stands in no source: the run of a program with its connections."""

@@ -78,6 +78,9 @@ class Expressions:
         if expr in self.facts.types or expr in self.facts.wrong:
             return self.facts.types.get(expr)
         kind = _INFER[type(expr)](self, expr, want)
+        if isinstance(kind, RefType) and kind.follows:
+            self.facts.followed[expr] = kind
+            kind = kind.target
         if kind is not None:
             self.facts.types[expr] = kind
         else:
@@ -380,14 +383,16 @@ class Expressions:
 
     def _is_variable(self, expr: tree.Expr) -> bool:
         expr = self.facts.root(expr)
-        return isinstance(expr, tree.Deref | tree.Index) or expr in self.facts.variables or expr in self.facts.directs
+        return isinstance(expr, tree.Deref | tree.Index) or expr in self.facts.variables or expr in self.facts.directs or \
+            expr in self.facts.followed
 
     def is_variable(self, expr: tree.Expr) -> bool:
         """True for an expression that names a place in memory."""
         if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
             return anything.is_array(expr)
         return expr not in self.facts.rewritten and self._is_variable(expr) and \
-            isinstance(expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part | tree.Deref)
+            (expr in self.facts.followed or
+             isinstance(expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part | tree.Deref))
 
     def _deref(self, expr: tree.Deref, want: Type | None) -> Type | None:
         kind = self.infer(expr.of)

@@ -42,8 +42,6 @@ class Variable:
     """True if the declaration itself gives an initial value."""
     value: Value | None = None
     """The value of a CONSTANT of elementary type."""
-    refers: tree.Call | None = None
-    """REF(x) or ADR(x), to which the variable refers from the start."""
     wrong: bool = False
     """True for a CONSTANT whose value is wrong, which was said."""
     constant: bool = False
@@ -181,6 +179,21 @@ class Holder:
     lease: int | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class Start:
+    """What a reference is made to before anything runs: `place` is the variable that REF(x) or ADR(x) names.
+
+    `pou` is whose variables the place is looked for in, None for types and global variables.  A `late` one is made at
+    each start of its body, since the variable that holds it lives in the frame."""
+
+    place: tree.Expr
+    whole: tree.Expr
+    kind: RefType
+    source: Source
+    pou: Pou | None
+    late: bool
+
+
 @dataclass
 class Facts:
     """Side tables by node."""
@@ -212,6 +225,10 @@ class Facts:
     text_cases: set[tree.Case] = field(default_factory=set)
     """CASE statements that choose by a STRING."""
     sources: dict[tree.Node, Source] = field(default_factory=dict)
+    followed: dict[tree.Expr, RefType] = field(default_factory=dict)
+    """Expressions that name a REFERENCE TO, and its type; they stand for what it is bound to."""
+    starts: list[Start] = field(default_factory=list)
+    """References of initial values, in which each stands as its number here (see `initial_references`)."""
     holders: dict[tree.Expr, Holder] = field(default_factory=dict)
     """For each place that a reference is made to, what the reference can be moved in."""
     leases: dict[Variable, int] = field(default_factory=dict)
@@ -219,9 +236,10 @@ class Facts:
     """Variables with one place that something refers to."""
 
     def is_part(self, expr: tree.Expr) -> TypeGuard[tree.Member | tree.Index | tree.Part]:
-        """True for a member, element or bit, which lies in what it is of; not for an element behind a pointer."""
+        """True for a member, element or bit, which lies in what it is of; not for an element behind a pointer, nor for
+        what a member that is declared REFERENCE TO is bound to."""
         return isinstance(expr, tree.Member | tree.Index | tree.Part) and expr not in self.variables and \
-            not isinstance(self.types.get(expr.of), RefType)
+            expr not in self.followed and not isinstance(self.types.get(expr.of), RefType)
 
     def root(self, expr: tree.Expr) -> tree.Expr:
         """The variable, address, dereference or element behind a pointer that a place begins with."""

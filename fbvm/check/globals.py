@@ -95,7 +95,6 @@ class Globals:
         for name, key in zip(turn.declared.names, keys, strict=True):
             variable = self.checker.interfaces.variable(turn.declared, name, turn.section, turn.source, resolved)
             variable.place = "area" if turn.declared.location is not None and not is_open(turn.declared.location) else "abs"
-            self.checker.interfaces.bound(variable, turn.declared)
             other = self.project.globals.setdefault(key, variable)
             if other is variable:
                 self.order.append(variable)

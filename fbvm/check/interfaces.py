@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, AnyType, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold, on_bits
-from fbvm.check import references
 from fbvm.check.facts import Edge, Pou, Variable, holds_block, is_block, is_open
 from fbvm.check.names import refuse_reserved
 from fbvm.check.specs import MAX_SIZE
@@ -112,9 +111,9 @@ class Interfaces:
             if section.kind == "VAR_EXTERNAL":
                 self._external(declared, section, pou)
                 continue
-            resolved = self.typed(declared, pou.source, pou)
-            referring = isinstance(declared.spec, tree.RefSpec) and declared.spec.kind == "REFERENCE TO"
-            borrowed = resolved is not None and section.kind == "VAR_INPUT" and (referring or isinstance(resolved[0], AnyType))
+            inner = section.kind in ("VAR", "VAR_OUTPUT") and pou.is_function
+            resolved = self.typed(declared, pou.source, pou, late=inner or section.kind == "VAR_TEMP")
+            borrowed = resolved is not None and section.kind == "VAR_INPUT" and isinstance(resolved[0], AnyType)
             for name in declared.names:
                 pou.later.discard(fold(name.text))
                 if resolved is None:
@@ -123,7 +122,7 @@ class Interfaces:
                 variable = self.variable(declared, name, section, pou.source, resolved)
                 variable.owner = pou
                 if borrowed:
-                    variable.kind = "VAR_IN_OUT"  # CODESYS passes an input of type ANY or REFERENCE TO by its place
+                    variable.kind = "VAR_IN_OUT"  # CODESYS passes an input of type ANY by its place
                 if is_block(variable.type) and variable.kind in ("VAR_INPUT", "VAR_OUTPUT"):
                     self.report.add("S0901", pou.source, name, f"an instance as {section.kind} is understood but not "
                                     "executed by this version", "pass it as VAR_IN_OUT")
@@ -132,20 +131,19 @@ class Interfaces:
                 if variable.kind == "VAR_STAT":
                     self.checker.global_order.append(variable)
 
-    def typed(self, declared: tree.VarDecl, source: Source, pou: Pou | None) -> tuple[Type, bytes] | None:
-        """Type and initial bytes of a declaration in `pou`, or of a global one; None after a diagnostic."""
+    def typed(self, declared: tree.VarDecl, source: Source, pou: Pou | None, late: bool = False) -> tuple[Type, bytes] | None:
+        """Type and initial bytes of a declaration in `pou`, or of a global one; None after a diagnostic.
+
+        A `late` variable gets its value whenever its body starts."""
         with self.checker.scope(pou):
-            spec = declared.spec
-            if isinstance(spec, tree.RefSpec) and spec.kind == "REFERENCE TO":
-                self.checker.specs.allowed(spec, source)
-                spec = spec.target  # the variable stands for what it is bound to
             specs = self.checker.specs
-            resolved = specs.resolve(spec, source) if pou is None else specs.parameter(spec, source)
+            resolved = specs.resolve(declared.spec, source) if pou is None else specs.parameter(declared.spec, source)
             if resolved is None:
                 return None
             kind, initial = resolved
-            if declared.initial is not None and not references.starts(kind, declared.initial):
-                initial = self.checker.values.initial(kind, declared.initial, source, initial)
+            if declared.initial is not None:
+                with self.checker.scope(pou, late):
+                    initial = self.checker.values.initial(kind, declared.initial, source, initial)
         return kind, initial
 
     def variable(self, declared: tree.VarDecl, name: tree.Name, section: tree.VarSection, source: Source,
@@ -156,9 +154,6 @@ class Interfaces:
         words = {fold(q.text) for q in section.qualifiers}
         made = Variable(name.text, kind, section.kind, source, name, initial=initial, constant="CONSTANT" in words,
                         retain=bool({"RETAIN", "PERSISTENT"} & words), explicit=declared.initial is not None)
-        if references.starts(kind, declared.initial):
-            assert isinstance(declared.initial, tree.Call)
-            made.refers = declared.initial
         if made.constant and is_block(kind):
             self.report.add("S0206", source, name, "an instance cannot be CONSTANT")
         elif made.constant:
@@ -226,7 +221,6 @@ class Interfaces:
     def _place(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"
         self._open(variable, declared, pou)
-        self.bound(variable, declared)
         variable.any_length = variable.reference and isinstance(declared.spec, tree.StringSpec) and declared.spec.length is None
         if variable.kind == "VAR_STAT":
             variable.place = "abs"  # one for all instances and calls
@@ -260,17 +254,6 @@ class Interfaces:
             self.report.add("S0205", pou.source, declared.spec, f"{what} cannot be {variable.kind}",
                             "declare it in VAR_IN_OUT")
 
-    def bound(self, variable: Variable, declared: tree.VarDecl) -> None:
-        """REFERENCE TO: a variable that another one stands behind."""
-        if not isinstance(declared.spec, tree.RefSpec) or declared.spec.kind != "REFERENCE TO" or variable.reference:
-            return
-        variable.reference = True
-        begun = declared.location is not None or declared.initial is not None
-        if begun or variable.constant or variable.kind not in ("VAR", "VAR_GLOBAL"):
-            self.report.add("S0901", variable.source, declared.spec, f"REFERENCE TO as {variable.kind}, with a location or an "
-                            "initial value is understood but not executed by this version",
-                            "declare it in a VAR or VAR_GLOBAL section and bind it with REF=")
-
     def _edge(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         if variable.kind != "VAR_INPUT" or base(variable.type) != BOOL or pou.is_function:
             self.report.add("S0206", pou.source, variable.node,
@@ -303,19 +286,16 @@ class Interfaces:
         pou.edges.append(Edge(raw, hidden, memory, raw.edge == "F_EDGE"))
 
     def _external(self, declared: tree.VarDecl, section: tree.VarSection, pou: Pou) -> None:
-        spec = declared.spec
-        referring = isinstance(spec, tree.RefSpec) and spec.kind == "REFERENCE TO"
-        resolved = self.checker.specs.resolve(spec.target if isinstance(spec, tree.RefSpec) and referring else spec, pou.source)
+        resolved = self.checker.specs.resolve(declared.spec, pou.source)
         for name in declared.names:
             pou.damaged.add(fold(name.text))
             variable = self.project.global_variable(name.text, pou.source)
             if variable is None:
                 self.report.add("S0208", pou.source, name, f"there is no VAR_GLOBAL {name.text}",
                                 self.project.nearest(name.text, (v.name for v in self.project.globals.values())))
-            elif resolved is not None and (resolved[0], referring) != (variable.type, variable.reference):
-                here, there = ("REFERENCE TO " * referring, "REFERENCE TO " * variable.reference)
+            elif resolved is not None and resolved[0] != variable.type:
                 self.report.add("S0208", pou.source, name,
-                                f"{name.text} is {here}{resolved[0]} here and {there}{variable.type} as global",
+                                f"{name.text} is {resolved[0]} here and {variable.type} as global",
                                 "", (variable.source, variable.node.start, "the VAR_GLOBAL"))
             elif variable.constant and not any(fold(q.text) == "CONSTANT" for q in section.qualifiers):
                 self.report.add("S0208", pou.source, name, f"the VAR_GLOBAL {name.text} is CONSTANT",

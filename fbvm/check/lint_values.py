@@ -142,7 +142,8 @@ def _silent(body: Body, pou: Pou, path: list[Pou]) -> bool:
         targets = node.targets if isinstance(node, tree.Assign) else (node.variable,) if isinstance(node, tree.For) else ()
         if isinstance(called, PouCall):
             targets = tuple(value for _, value, _ in called.outputs)
-        if not all(_own(body.facts.variables.get(body.facts.root(target)), pou) for target in targets):
+        roots = [body.facts.root(target) for target in targets]
+        if not all(root not in body.facts.followed and _own(body.facts.variables.get(root), pou) for root in roots):
             return False
     return True
 

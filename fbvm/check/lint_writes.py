@@ -202,7 +202,7 @@ class _Order:
 
     def forget(self, node: tree.NameRef | tree.Direct) -> None:
         variable = self.facts.variables.get(node)
-        if variable is not None and variable.reference:
+        if node in self.facts.followed or variable is not None and variable.reference:
             self.stores.clear()
         address = variable.location if variable is not None else self.facts.directs.get(node)
         if address is None:

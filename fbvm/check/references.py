@@ -17,7 +17,6 @@ from fbvm.base.types import (
     AnyType,
     ArrayType,
     OpenArrayType,
-    RefType,
     StructType,
     Type,
     fold,
@@ -26,15 +25,14 @@ from fbvm.base.types import (
     string,
 )
 from fbvm.check.arguments import Arguments
-from fbvm.check.facts import UNTYPED_INT, Holder, StandardCall, Variable
-from fbvm.check.values import is_any
+from fbvm.check.facts import UNTYPED_INT, Facts, Holder, StandardCall, Start, Variable
+from fbvm.check.values import MAKERS, is_any, is_null
 from fbvm.check.writes import writable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
 
-MAKERS = ("REF", "ADR")
 SIZES = ("SIZEOF", "XSIZEOF")
 """CODESYS has the second one for sizes of 64 bits; here both are as wide as they need to be."""
 
@@ -53,7 +51,7 @@ def refer(expressions: Expressions, expr: tree.Expr, lasting: bool) -> Type | No
         expressions.error("S0407", expr, f"{kind} fills no bytes that a reference could name", "refer to one of its elements")
         return None
     root = expressions.facts.root(expr)
-    variable = expressions.facts.variables.get(root)
+    variable = expressions.facts.variables.get(root) if root not in expressions.facts.followed else None
     if lasting and variable is not None and (reason := _short_lived(variable)):
         expressions.error("S0407", expr, f"{variable.name} is {reason}, which may end before the reference is followed",
                           "ADR gives a pointer to it that holds until then")
@@ -77,7 +75,7 @@ def _holder(expressions: Expressions, expr: tree.Expr) -> Holder:
         expr = expr.of
     if isinstance(expr, tree.Direct):
         return Holder(expr)
-    variable = facts.variables.get(expr)
+    variable = facts.variables.get(expr) if expr not in facts.followed else None
     return Holder() if variable is None else _held(expressions, expr, variable)
 
 
@@ -127,31 +125,51 @@ def make(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr)
     return made
 
 
-def starts(kind: Type, initial: tree.Node | None) -> bool:
-    """True for `REF(x)` and `ADR(x)` as the initial value of a reference."""
-    return isinstance(kind, RefType) and isinstance(initial, tree.Call) and isinstance(initial.callee, tree.NameRef) and \
-        fold(initial.callee.text) in MAKERS
+MARK = 0xFFFFFF << 40
+"""In initial bytes, the references that are still to be made have this object number, which no object has."""
 
 
-def start(expressions: Expressions, variable: Variable) -> None:
-    """Check what a variable refers to from the start: a place that is known by then."""
-    call = variable.refers
-    assert call is not None
-    if not expressions.fit(call, variable.type, "S0705", "the initial value"):
+def named(init: tree.Expr) -> tree.Expr:
+    """The variable that the initial value of a reference names: x of REF(x), ADR(x) or x itself."""
+    if isinstance(init, tree.Call) and isinstance(init.callee, tree.NameRef) and fold(init.callee.text) in MAKERS:
+        assert init.arguments[0].value is not None
+        return init.arguments[0].value
+    return init
+
+
+def noted(facts: Facts, start: Start) -> bytes:
+    """The bytes that stand for a reference until everything has its place."""
+    facts.starts.append(start)
+    return (MARK | len(facts.starts) - 1).to_bytes(8, "little")
+
+
+def start(expressions: Expressions, start: Start) -> None:
+    """Check what a reference is made to before anything runs: a place that is known by then."""
+    if not _fits(expressions, start):
         return
-    place = call.arguments[0].value
-    assert place is not None
-    root = expressions.facts.root(place)
-    owner = expressions.facts.variables.get(root)
-    known = variable.place in ("self", "abs") and (root in expressions.facts.directs or owner is not None and
-                                                   owner.place != "frame" and not owner.reference)
-    while expressions.facts.is_part(place):
+    place, facts = start.place, expressions.facts
+    root = facts.root(place)
+    owner = facts.variables.get(root)
+    known = root in facts.directs or owner is not None and (
+        start.late or owner.place != "frame" and not owner.reference and root not in facts.followed)
+    while facts.is_part(place):
         subscripts = place.subscripts if isinstance(place, tree.Index) else ()
-        known &= all(subscript in expressions.facts.constants for subscript in subscripts)
+        known &= start.late or all(subscript in facts.constants for subscript in subscripts)
         place = place.of
     if not known:
-        expressions.error("S0701", call, "an initial value must be known before the program runs",
+        expressions.error("S0701", start.whole, "an initial value must be known before the program runs",
                           "assign it in the body instead")
+
+
+def _fits(expressions: Expressions, start: Start) -> bool:
+    """True if the reference is one to the right type; else a diagnostic."""
+    if not start.kind.follows:
+        return expressions.fit(start.whole, start.kind, "S0705", "the initial value")
+    kind = refer(expressions, start.place, lasting=False)
+    if kind is None or kind == start.kind.target:
+        return kind is not None
+    expressions.error("S0705", start.place, f"a {start.kind} is needed here, this is {kind}")
+    return False
 
 
 ASKED = ("__ISVALIDREF", "__POUNAME")
@@ -168,10 +186,9 @@ def asked(expressions: Expressions, call: tree.Call, name: str) -> Type | None:
         expressions.facts.constants[call] = shown
         return string(max(1, len(shown)))
     kind = expressions.infer(values[0])
-    variable = expressions.facts.variables.get(values[0])
     if kind is None:
         return None
-    if variable is None or not variable.reference:
+    if values[0] not in expressions.facts.followed:
         expressions.error("S0405", values[0], "this is no variable that is declared REFERENCE TO", "compare a REF_TO with NULL")
         return None
     expressions.facts.calls[call] = StandardCall(name, [(values[0], kind)])
@@ -223,19 +240,26 @@ def size(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | 
 
 
 def bind(expressions: Expressions, node: tree.Assign) -> None:
-    """`r REF= x` for a variable declared REFERENCE TO."""
+    """`r REF= x` for what is declared REFERENCE TO."""
     target = node.targets[0]
     kind = expressions.infer(target)
-    variable = expressions.facts.variables.get(target)
     if kind is None:
         expressions.infer(node.value)
         return
-    if variable is None or not variable.reference or variable.kind == "VAR_IN_OUT":
+    if target not in expressions.facts.followed:
         expressions.error("S0301", target, "REF= binds a variable that is declared REFERENCE TO",
                           "assign REF(...) to a REF_TO")
         return
-    if isinstance(node.value, tree.NullLiteral):
-        return
-    bound = refer(expressions, node.value, lasting=False)
-    if bound is not None and bound != kind:
-        expressions.error("S0301", node.value, f"{variable.name} refers to {kind}, this is {bound}")
+    if writable(expressions, target, "be bound", bound=True):
+        lend(expressions, node.value, kind, "S0301", expressions.text(target))
+
+
+def lend(expressions: Expressions, value: tree.Expr, kind: Type, code: str, name: str) -> bool:
+    """True if a REFERENCE TO `kind` that is called `name` can be bound to a value; else a diagnostic."""
+    if is_null(value):
+        return True
+    found = refer(expressions, value, lasting=False)
+    if found is None or found == kind:
+        return found is not None
+    expressions.error(code, value, f"{name} refers to {kind}, this is {found}")
+    return False

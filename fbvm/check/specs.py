@@ -20,7 +20,9 @@ from fbvm.base.types import (
     SubrangeType,
     Type,
     array,
+    bound,
     fold,
+    followed,
     open_array,
     pointer,
     reference,
@@ -88,10 +90,8 @@ class Specs:
             return self._enumeration(spec, source, name)
         if isinstance(spec, tree.UnionSpec | tree.StructSpec):
             return self._structure(spec, source, name)
-        if isinstance(spec, tree.RefSpec) and spec.kind != "REFERENCE TO":
-            return self._reference(spec, source)
-        self.report.add("S0901", source, spec, "REFERENCE TO here is understood but not executed by this version")
-        return None
+        assert isinstance(spec, tree.RefSpec)
+        return self._reference(spec, source)
 
     def allowed(self, spec: tree.TypeSpec, source: Source, name: str = "") -> None:
         """Complain about a form that the dialect does not take."""
@@ -107,7 +107,7 @@ class Specs:
             self.report.add("S0903", source, spec, f"{what} is not taken by the dialect {dialect.name}: {dialect.for_whom}")
 
     def _reference(self, spec: tree.RefSpec, source: Source) -> Resolved | None:
-        """REF_TO and POINTER TO.  The target may be what is being resolved just now: a list's node names itself."""
+        """REF_TO, POINTER TO and REFERENCE TO.  The target may be what is being resolved just now: a list's node names itself."""
         target = spec.target
         if isinstance(target, tree.NamedType):
             entry = self.project.type_entry(target.text, source)
@@ -115,12 +115,16 @@ class Specs:
             awaiting = entry if entry is not None and entry.busy else pou if pou is not None and pou.busy else None
             if awaiting is not None:
                 name = awaiting.tree.name.text
-                made = RefType(f"{spec.kind} {name}", 8, 8, None, spec.kind == "POINTER TO")
+                made = RefType(f"{spec.kind} {name}", 8, 8, None, spec.kind == "POINTER TO", spec.kind == "REFERENCE TO")
                 awaiting.awaited.append(made)
                 return made, bytes(8)
         resolved = self.resolve(target, source)
-        make = pointer if spec.kind == "POINTER TO" else reference
-        return (make(resolved[0]), bytes(8)) if resolved is not None else None
+        if resolved is None:
+            return None
+        kind = resolved[0]
+        if spec.kind == "REFERENCE TO":
+            return bound(followed(kind)), bytes(8)
+        return (pointer if spec.kind == "POINTER TO" else reference)(kind), bytes(8)
 
     # --- names ------------------------------------------------------------------------------------------------------
 

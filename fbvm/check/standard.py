@@ -28,7 +28,7 @@ from fbvm.check.arguments import Arguments, callee
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
 from fbvm.check.fitting import as_number, convertible, same
 from fbvm.check.functions import Conversion, Signature
-from fbvm.check.values import is_any
+from fbvm.check.values import MAKERS, is_any
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ class StandardCalls:
     def _typed(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
         if name in references.ASKED:
             return references.asked(self.expressions, call, name)
-        if name in references.MAKERS or name in references.SIZES:
+        if name in MAKERS or name in references.SIZES:
             values = Arguments(self.expressions, call, ["IN"]).in_order()
             if values is None:
                 return None

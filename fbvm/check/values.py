@@ -22,7 +22,8 @@ class Values:
     def __init__(self, project: Project, fit: Callable[[tree.Expr, Source, Type], bool],
                  infer: Callable[[tree.Expr, Source], Type | None],
                  variable: Callable[[str, Source], Variable | None],
-                 interface: Callable[[Pou, Source, tree.Node], bool]) -> None:
+                 interface: Callable[[Pou, Source, tree.Node], bool],
+                 start: Callable[[tree.Expr, RefType, Source], bytes]) -> None:
         self.project = project
         self.facts: Facts = project.facts
         self.report = project.report
@@ -30,6 +31,7 @@ class Values:
         self._infer = infer
         self._variable = variable
         self.interface = interface
+        self._start = start
 
     def integer(self, expr: tree.Expr, source: Source, known: Mapping[str, int] | None = None) -> int | None:
         """The value of a constant integer expression, or None after a diagnostic.
@@ -80,8 +82,10 @@ class Values:
             return self._array(kind, init, source, default)
         if isinstance(init, tree.StructInit):
             return self._structure(kind, init, source, default)
-        if isinstance(init, tree.NullLiteral) and isinstance(kind, RefType):
+        if isinstance(kind, RefType) and is_null(init):
             return bytes(8)
+        if isinstance(kind, RefType) and starts(kind, init):
+            return self._start(init, kind, source)
         if isinstance(kind, ArrayType | StructType):
             form = "[...]" if isinstance(kind, ArrayType) else "(name := value, ...)"
             self.report.add("S0705", source, init, f"an initial value of {kind} is written {form}")
@@ -191,6 +195,22 @@ def initialisable(kind: StructType, member: Field) -> bool:
     """True for what an initialiser of a structure or of a block's instance may name."""
     return not (member.reference or member.absolute or member.constant and member.kind != "VAR_INPUT") and \
         (not kind.block or member.kind in ("VAR_INPUT", "VAR_OUTPUT", "VAR"))
+
+
+MAKERS = ("REF", "ADR")
+"""Functions that make a reference to a variable."""
+
+
+def starts(kind: RefType, init: tree.Expr) -> bool:
+    """True for an initial value that is made of a place: REF(x), ADR(x), and of a REFERENCE TO the variable itself."""
+    made = isinstance(init, tree.Call) and isinstance(init.callee, tree.NameRef) and fold(init.callee.text) in MAKERS and \
+        len(init.arguments) == 1 and init.arguments[0].value is not None
+    return made or kind.follows and not isinstance(init, tree.Literal)
+
+
+def is_null(value: tree.Expr) -> bool:
+    """True for NULL, and for 0, which CODESYS writes for it."""
+    return isinstance(value, tree.NullLiteral) or isinstance(value, tree.Literal) and value.kind == "int" and value.value == 0
 
 
 def is_any(kind: Type, *names: str) -> bool:

@@ -18,17 +18,21 @@ Path = tuple[object, ...]
 """A variable or address, and the steps from it to a part."""
 
 
-def writable(expressions: Expressions, expr: tree.Expr, purpose: str) -> bool:
-    """True if the place may be written here; else a diagnostic that says why not."""
+def writable(expressions: Expressions, expr: tree.Expr, purpose: str, bound: bool = False) -> bool:
+    """True if the place may be written here; else a diagnostic that says why not.
+
+    What a REFERENCE TO is bound to may be written by everybody who sees it; `bound` asks whether it can be bound anew."""
     facts = expressions.facts
     inner = expr
     while True:
+        if inner in facts.followed and not (bound and inner is expr):
+            return True
         member = facts.fields.get(inner)
         if member is not None and (member.constant or member.kind in ("VAR", "VAR_OUTPUT")):
             what = "a constant" if member.constant else _OWN[member.kind]
             expressions.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here")
             return False
-        if not facts.is_part(inner):
+        if not (facts.is_part(inner) or inner is expr and bound and isinstance(inner, tree.Member | tree.Index)):
             break
         inner = inner.of
     address = facts.directs.get(inner)
@@ -66,7 +70,9 @@ def _note_input(expressions: Expressions, expr: tree.Expr, variable: Variable) -
 
 
 def place(facts: Facts, expr: tree.Expr) -> Path | None:
-    """The path of a variable or a part of one; None if a subscript is not known."""
+    """The path of a variable or a part of one; None if a subscript is not known, or what a reference is bound to."""
+    if expr in facts.followed:
+        return None
     if not facts.is_part(expr):
         root = facts.variables.get(expr) or facts.directs.get(expr)
         return (root,) if root is not None else None

@@ -15,7 +15,7 @@ from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.dialects import dialect as named_dialect
 from fbvm.base.types import Field, StructType, Type, fold
 from fbvm.check.checker import Checker
-from fbvm.check.facts import Pou, Report, TaskFact
+from fbvm.check.facts import Pou, Report, Start, TaskFact
 from fbvm.check.library import Libraries, LibraryError
 from fbvm.check.lint import lint as look_for_slips
 from fbvm.check.project import Project
@@ -63,6 +63,8 @@ class Program:
         self.areas: dict[str, Area] = placed.layout.areas
         self.sites: list[Site] = []
         self.rungs: list[RungPicture] = []
+        self.late_starts: dict[Pou, list[tuple[int, Start]]] = {}
+        """References in frames that bodies make when they start, by POU, and where in the buffer they lie."""
         self.leases_at, self.held_bits = placed.objects.leases_at, placed.objects.held_bits
         self._objects = placed.objects
         self._area_objects: dict[str, tuple[int, int]] = {}
@@ -213,15 +215,16 @@ def _deep() -> Iterator[None]:
 def _image(checker: Checker, progress: Progress) -> Image:
     placed = place(checker)
     program = Program(placed)
+    held = InitialReferences(program, checker, placed.initial)
+    held.in_frames()
     bodies = tuple(BodyLowering(program, checker, pou).body()
                    for pou in _told(checker.bodies, partial(progress, "compiled")))
-    held = InitialReferences(program, checker, placed.initial).all()
     tasks = sorted((_task(task) for task in checker.tasks), key=lambda row: row.priority)
     types: dict[str, Type] = {fold(p.type.name): p.type for p in checker.bodies if p.type is not None}
     for (_, name), entry in checker.project.types.items():
         if entry.resolved is not None:
             types.setdefault(name, entry.resolved[0])
-    return Image(placed.layout, bodies, tuple(tasks), placed.symbols, (*placed.initial, *held), tuple(placed.retained),
+    return Image(placed.layout, bodies, tuple(tasks), placed.symbols, (*placed.initial, *held.in_slots()), tuple(placed.retained),
                  tuple(program.sites), types, program.objects, tuple(program.rungs))
 
 

@@ -1,16 +1,19 @@
-"""References that variables hold from the start: `r : REF_TO INT := REF(x)`, worked out once everything has its place.
+"""References that are made before anything runs: `r : REF_TO INT := REF(x)`, worked out once everything has its place.
 
-Each instance of a block refers to variables of its own (IEC 61131-3 ed. 3, table 12)."""
+Each instance of a block refers to variables of its own (IEC 61131-3 ed. 3, table 12).  Until then initial bytes hold a
+mark with the number of what is to be referred to, so that such values stand wherever others do: in structures and
+arrays, in values of a type, in initial values of an instance."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from fbvm.base.memory import STRUCTS
-from fbvm.base.types import ArrayType, StructType, Type
+from fbvm.base.types import ArrayType, RefType, StructType, Type
 from fbvm.check.checker import Checker
-from fbvm.check.facts import Pou, Variable
+from fbvm.check.facts import Pou, Start
+from fbvm.check.references import MARK
 from fbvm.code.evaluation import value_of
 from fbvm.code.lower import BodyLowering
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_SHIFT, Address, Node
@@ -19,45 +22,72 @@ from fbvm.code.shapes import is_expression
 if TYPE_CHECKING:
     from fbvm.code.compiler import Program
 
+Instances = Mapping[Pou, int]
+"""Where the instances around a value begin."""
+Marked = tuple[int, Start, Instances]
+
 
 class InitialReferences:
     """The references of one program; `initial` is what the buffer holds at power-on without them."""
 
     def __init__(self, program: Program, checker: Checker, initial: Sequence[tuple[int, bytes]]) -> None:
-        self.program, self.checker, self.initial = program, checker, initial
-        self.blocks = any(v.refers is not None for pou in checker.bodies for v in pou.order)
+        self.program, self.checker = program, checker
+        self.starts = checker.project.facts.starts
+        frames = [(pou.frame_offset, pou.frame_initial) for pou in checker.bodies] if self.starts else []
+        self.initial = [*initial, *frames]
 
-    def all(self) -> Iterator[tuple[int, bytes]]:
-        """Where each of them lies, and its bytes."""
-        for variable in self.checker.global_order:
-            if variable.place != "abs" or variable.reference:
-                continue
-            if variable.refers is not None:
-                yield variable.offset, self._made(variable, self.checker.bodies[0], 0)
-            if self.blocks:
-                yield from self._inside(variable.type, variable.offset)
+    def in_slots(self) -> Iterator[tuple[int, bytes]]:
+        """Where each of those lies that live as long as the program, and its bytes."""
+        for variable in self.checker.global_order if self.starts else ():
+            if variable.place == "abs" and not variable.reference:
+                for at, start, around in self._marked(variable.type, variable.initial, 0, variable.offset, {}):
+                    yield variable.offset + at, self._made(start, around)
 
-    def _inside(self, kind: Type, at: int) -> Iterator[tuple[int, bytes]]:
-        """Those of the instances in a value."""
-        if isinstance(kind, ArrayType) and isinstance(kind.element, ArrayType | StructType):
+    def in_frames(self) -> None:
+        """Put those into the values at the start of functions that are known now; the others are made when a body starts."""
+        for pou in self.checker.bodies if self.starts else ():
+            content = bytearray(pou.frame_initial)
+            for variable in pou.order:
+                if variable.place != "frame" or variable.reference:
+                    continue
+                value = bytearray(variable.initial)
+                begin = pou.frame_offset + variable.offset
+                for at, start, around in self._marked(variable.type, variable.initial, 0, begin, {}):
+                    if start.late and start.pou is pou:
+                        value[at:at + 8] = bytes(8)
+                        self.program.late_starts.setdefault(pou, []).append((begin + at, start))
+                    else:
+                        value[at:at + 8] = self._made(start, around)
+                    content[variable.offset + at:variable.offset + at + 8] = value[at:at + 8]
+                variable.initial = bytes(value)
+            pou.frame_initial = bytes(content)
+
+    def _marked(self, kind: Type, content: bytes, at: int, begin: int, around: Instances) -> Iterator[Marked]:
+        """The marks in a value of `kind`, which lies `at` bytes into `content`; that begins at `begin` of the buffer."""
+        if not any(content[at + 5:at + kind.size]):
+            return
+        if isinstance(kind, RefType):
+            number = int.from_bytes(content[at:at + 8], "little") - MARK
+            if 0 <= number < len(self.starts):
+                yield at, self.starts[number], around
+        elif isinstance(kind, ArrayType) and isinstance(kind.element, ArrayType | StructType | RefType):
             for index in range(kind.count):
-                yield from self._inside(kind.element, at + index * kind.element.size)
+                yield from self._marked(kind.element, content, at + index * kind.element.size, begin, around)
         elif isinstance(kind, StructType) and kind.block:
             pou = self.checker.block_of(kind)
+            inside = {**around, pou: begin + at}
             for variable in pou.order:
-                if variable.place != "self" or variable.reference:
-                    continue
-                if variable.refers is not None:
-                    yield at + variable.offset, self._made(variable, pou, at)
-                yield from self._inside(variable.type, at + variable.offset)
+                if variable.place == "self" and not variable.reference:
+                    yield from self._marked(variable.type, content, at + variable.offset, begin, inside)
         elif isinstance(kind, StructType):
             for member in kind.fields.values():
-                yield from self._inside(member.type, at + member.offset)
+                if member.bit is None:
+                    yield from self._marked(member.type, content, at + member.offset, begin, around)
 
-    def _made(self, variable: Variable, pou: Pou, instance: int) -> bytes:
-        assert variable.refers is not None
-        node = BodyLowering(self.program, self.checker, pou).value(variable.refers)
-        return STRUCTS["ref"].pack(value_of(self._placed(node, instance)))
+    def _made(self, start: Start, around: Instances) -> bytes:
+        pou = start.pou if start.pou is not None and start.pou.number >= 0 else self.checker.bodies[0]
+        node = BodyLowering(self.program, self.checker, pou).pointers.to(start.place)
+        return STRUCTS["ref"].pack(value_of(self._placed(node, around.get(pou, 0))))
 
     def _placed(self, node: Node, instance: int) -> Node:
         """The same expression with constants for references and for what instances hold at power-on."""

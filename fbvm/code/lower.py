@@ -63,6 +63,8 @@ class BodyLowering:
         fresh = self.pou.frame_initial[start:]
         if fresh:
             self.out.append(("fill", ("abs", self.pou.frame_offset + start, ()), fresh))
+        for offset, made in self.program.late_starts.get(self.pou, ()):
+            self.out.append(("store", "ref", ("abs", offset, ()), self.pointers.to(made.place)))
         for edge in self.pou.edges:
             raw, memory = self.places.slot(edge.raw), self.places.slot(edge.memory)
             pin = self.places.load(raw)
@@ -186,10 +188,8 @@ class BodyLowering:
 
     def _bind(self, node: tree.Assign, site: int) -> None:
         """`r REF= x`: the slot of r takes a reference to x."""
-        slot = self.places.slot(self.facts.variables[node.targets[0]])
-        null = isinstance(node.value, tree.NullLiteral)
-        pointer: Node = ("const", "ref", 0) if null else self.pointers.to(node.value)
-        self.out.append(("store", "ref", slot.address, pointer))
+        slot = self.places.fixed(self.places.binding(node.targets[0]))
+        self.out.append(self.places.store(slot, self.pointers.lent(node.value), site))
 
     def assign(self, target: tree.Expr, value: tree.Expr, site: int) -> None:
         """`target := value`: the subscripts of the target first, then the value."""
@@ -212,7 +212,7 @@ class BodyLowering:
 
     def aggregate(self, expr: tree.Expr) -> Place:
         """The place of an array or structure, also when it is a function's result."""
-        if isinstance(expr, tree.Call):
+        if isinstance(expr, tree.Call) and expr not in self.facts.followed:
             called = self.facts.calls[expr]
             if isinstance(called, PouCall):
                 return self.calls.aggregate(expr, called)

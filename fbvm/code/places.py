@@ -16,6 +16,7 @@ from fbvm.base.types import (
     AnyType,
     ArrayType,
     OpenArrayType,
+    RefType,
     StringType,
     SubrangeType,
     Type,
@@ -66,8 +67,18 @@ class Places:
         self.facts = body.facts
 
     def of(self, expr: tree.Expr) -> Place:
-        """The place that an expression names."""
-        kind = self.facts.types[expr]
+        """The place that an expression names; of a REFERENCE TO what it is bound to."""
+        reference = self.facts.followed.get(expr)
+        if reference is None:
+            return self._named(expr, self.facts.types[expr])
+        bound = self.body.values.call(expr) if isinstance(expr, tree.Call) else self.load(self.binding(expr))
+        return Place((("ref", bound, self.body.site(expr)), 0, ()), self.facts.types[expr])
+
+    def binding(self, expr: tree.Expr) -> Place:
+        """Where a REFERENCE TO itself lies."""
+        return self._named(expr, self.facts.followed[expr])
+
+    def _named(self, expr: tree.Expr, kind: Type) -> Place:
         if expr in self.facts.variables:
             return self.variable(self.facts.variables[expr], expr)
         if isinstance(expr, tree.Direct):
@@ -89,8 +100,8 @@ class Places:
             return self._part(expr, kind)
         if isinstance(expr, tree.Call):
             return self.body.aggregate(expr)
-        if isinstance(expr, tree.Index) and not self.facts.is_part(expr):
-            return self.body.pointers.element(expr)
+        if isinstance(expr, tree.Index) and isinstance(self.facts.types.get(expr.of), RefType):
+            return self.body.pointers.element(expr, kind)
         if isinstance(expr, tree.Deref):
             return Place((("ref", self.body.value(expr.of), self.body.site(expr)), 0, ()), kind)
         assert isinstance(expr, tree.Index)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import ANY_SIZE, UDINT, AnyType, OpenArrayType, RefType, Type, machine
 from fbvm.check.facts import Holder, Variable
 from fbvm.check.interfaces import OBJECTS_AT
+from fbvm.check.values import is_null
 from fbvm.code.anything import size_of
 from fbvm.code.operations import (
     BUFFER_OBJECT,
@@ -65,6 +66,16 @@ class PointerLowering:
             return _reference(("add", "u64", _number(reference), _word((number[2] - BUFFER_OBJECT) << OBJECT_SHIFT)))
         moved = ("mul", "u64", ("sub", "u64", number, _word(BUFFER_OBJECT)), _word(1 << OBJECT_SHIFT))
         return _reference(("add", "u64", _number(reference), moved))
+
+    def lent(self, expr: tree.Expr) -> Node:
+        """What a REFERENCE TO is bound to."""
+        return ("const", "ref", 0) if is_null(expr) else self.to(expr)
+
+    def bound(self, expr: tree.Expr) -> Node:
+        """The reference that a REFERENCE TO holds."""
+        places = self.body.places
+        pointer: Node = places.of(expr).address[0][1] if isinstance(expr, tree.Call) else places.load(places.binding(expr))
+        return pointer
 
     def to_parameter(self, expr: tree.Member) -> Node:
         """`x.pValue` of an ANY."""
@@ -161,9 +172,8 @@ class PointerLowering:
         return ("and", "u64", ("shr", "u64", number, ("const", "i64", OFFSET_SHIFT), self.body.entry_site),
                 _word(OFFSET_MASK))
 
-    def element(self, expr: tree.Index) -> Place:
-        """What `p[i]` names."""
-        kind = self.facts.types[expr]
+    def element(self, expr: tree.Index, kind: Type) -> Place:
+        """What `p[i]` names, which is `kind`."""
         pointer, = self.body.values.operands((expr.of, None))
         subscript, = expr.subscripts
         start = ("ref", pointer, self.body.site(expr))

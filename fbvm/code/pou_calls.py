@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, machine
+from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, RefType, followed, machine
 from fbvm.check.constants import default
 from fbvm.check.facts import PouCall, Variable
 from fbvm.code.anything import described
@@ -159,6 +159,8 @@ class CallLowering:
     def _argument(self, variable: Variable, expr: tree.Expr) -> Node:
         if variable.kind == "VAR_IN_OUT":
             return self.body.places.reference(self.body.places.of(expr))
+        if isinstance(variable.type, RefType) and variable.type.follows:
+            return self.body.pointers.lent(expr)
         return self.body.value(expr, variable.type)
 
     def _outputs(self, outputs: list[tuple[Variable, tree.Expr, bool]], called: PouCall, instance: Place | None,
@@ -166,14 +168,16 @@ class CallLowering:
         body = self.body
         for variable, target, negated in outputs:
             source = self._place(called, variable, instance)
+            if source.type is not (kind := followed(source.type)):
+                source = Place((("ref", body.places.load(source), site), 0, ()), kind)
             place = body.places.of(target)
-            if is_aggregate(variable.type):
+            if is_aggregate(source.type):
                 body.copy(place, source, site)
                 continue
             node = body.places.load(source)
             if negated:
                 node = ("not", "b", node)
-            body.write(place, body.converted(node, variable.type, place.type), site)
+            body.write(place, body.converted(node, source.type, place.type), site)
 
     def _parameter(self, called: PouCall, name: str, kind: str) -> Variable | None:
         return next((v for v in called.pou.parameters(kind) if v.name.upper() == name), None)

@@ -122,8 +122,8 @@ class ValueLowering:
             return self._binary(expr)
         if isinstance(expr, tree.Unary):
             return self._unary(expr)
-        if isinstance(expr, tree.Call):
-            return self._call(expr)
+        if isinstance(expr, tree.Call) and expr not in self.facts.followed:
+            return self.call(expr)
         if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType) and \
                 expr in self.facts.holders:
             return self.body.pointers.to_parameter(expr)
@@ -158,7 +158,8 @@ class ValueLowering:
             return node
         return ("not" if expr.op == "NOT" else "neg", form, node)
 
-    def _call(self, expr: tree.Call) -> Node:
+    def call(self, expr: tree.Call) -> Node:
+        """The result of a call."""
         called = self.facts.calls[expr]
         if isinstance(called, PouCall):
             return self.body.calls.value(expr, called)
@@ -169,8 +170,7 @@ class ValueLowering:
         if called.key == "REF":
             return self.body.pointers.to(called.arguments[0][0])
         if called.key == "__ISVALIDREF":
-            slot = self.body.places.slot(self.facts.variables[called.arguments[0][0]])
-            return ("ne", "b", "ref", ("load", "ref", slot.address), ("const", "ref", 0))
+            return ("ne", "b", "ref", self.body.pointers.bound(called.arguments[0][0]), ("const", "ref", 0))
         if called.key == "SIZEOF":
             return ("convert", "u32", "i64", self.body.places.any_number(called.arguments[0][0], ANY_SIZE))
         if called.key in ("LOWER_BOUND", "UPPER_BOUND"):

@@ -121,7 +121,7 @@ def _located_in(place: Place) -> Iterator[Place]:
             inner = member(place, field.name)
             if field.absolute and inner.offset >= PAGE_BYTES:
                 yield inner
-            elif not field.absolute and not field.reference:
+            elif not field.absolute and not inner.hops:
                 yield from _located_in(inner)
 
 
@@ -138,7 +138,7 @@ def _part(place: Place, offset: int) -> Place | None:
         size = 8 if field.reference else field.type.size
         if not field.absolute and place.offset + field.offset <= offset < place.offset + field.offset + size:
             inner = member(place, field.name)
-            return replace(inner, type=REFERENCE, hops=()) if field.reference else inner
+            return replace(inner, type=REFERENCE, hops=()) if inner.hops else inner
     return None
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from fbvm.base.areas import Area
 from fbvm.base.memory import WHOLE_BYTES
-from fbvm.base.types import ArrayType, Field, StructType
+from fbvm.base.types import ArrayType, Field, StructType, followed
 from fbvm.watch.paths import Place, Span, UnknownPlace, find, member
 
 MOST_ELEMENTS = 4096
@@ -89,7 +89,8 @@ def _matching(place: Place, fits: object) -> Iterator[Place]:
 
 def tops(symbols: Mapping[str, Field]) -> Iterator[Place]:
     """The places of all symbols; those behind references are places of others."""
-    return (Place(field.name, field.type, field.offset, field.bit) for field in symbols.values() if not field.reference)
+    return (Place(field.name, field.type, field.offset, field.bit) for field in symbols.values()
+            if not field.reference and followed(field.type) is field.type)
 
 
 def _members(place: Place) -> Iterator[Place]:

@@ -150,6 +150,8 @@ class Declarations(Statements):
     def var_decl(self, names: list[Name], at: Token | None, location: Token | None, colon: Token, spec: TypeSpec,
                  edge: Token | None, sign: Token | None, initial: Initial | None, end: Token) -> VarDecl:
         place = self.location(location) if location else None
+        if sign and sign.text.upper() in ("S=", "R="):
+            self.report("S0101", sign.start, sign.end, f"`{sign.text}` gives no initial value", "write `:=`")
         return VarDecl(names[0].start, end.end, tuple(names), place, spec, initial, edge.text.upper() if edge else "")
 
     def var_decl_nameless(self, at: Token, location: Token, colon: Token, spec: TypeSpec, sign: Token | None,

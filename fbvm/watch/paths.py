@@ -214,7 +214,15 @@ def _of(parent: Place, field: Field, name: str, distance: int) -> Place:
         place = parent.inner(name, field.type, distance, field.bit)
     if field.reference:
         place = replace(place, hops=(*place.hops, 0))
+    place = _followed(place)
     return replace(place, constant=field.constant or parent.constant, hexadecimal=field.hexadecimal)
+
+
+def _followed(place: Place) -> Place:
+    """What a REFERENCE TO is bound to; any other place as it is."""
+    if isinstance(place.type, RefType) and place.type.follows and place.type.target is not None:
+        return replace(place, type=place.type.target, hops=(*place.hops, 0))
+    return place
 
 
 def member(place: Place, name: str) -> Place:
@@ -247,7 +255,7 @@ def _element(place: Place, text: str) -> Place:
     name = f"{place.name}[{', '.join(map(str, indexes))}]"
     if place.bit is not None:
         return place.inner(name, kind.element, (place.bit + at) // 8, (place.bit + at) % 8)
-    return place.inner(name, kind.element, at * kind.element.size)
+    return _followed(place.inner(name, kind.element, at * kind.element.size))
 
 
 def _part(place: Place, bit: int) -> Place:

@@ -7,9 +7,19 @@ from dataclasses import replace
 
 from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
 from fbvm.base.strings import packed, units
-from fbvm.base.types import AnyType, ArrayType, OpenArrayType, StringType, StructType, Type, base, families, machine
+from fbvm.base.types import (
+    AnyType,
+    ArrayType,
+    OpenArrayType,
+    StringType,
+    StructType,
+    Type,
+    base,
+    families,
+    machine,
+)
 from fbvm.watch.paths import Place, member
-from fbvm.watch.values import Value, conform
+from fbvm.watch.values import Value, as_read, conform
 
 POINTED_AT = 8
 """Bits of a reference below its byte offset; above the offset is the object's number (see code.operations)."""
@@ -65,6 +75,8 @@ def _read(memory: Memory, kind: Type, offset: int, bit: int | None) -> Value:
         return members
     if isinstance(plain, StringType):
         return _text(memory, plain, offset)
+    if (kind := as_read(plain)) is not plain:
+        return read(memory, Place("", kind, offset, bit, (0,)))
     form = machine(plain)
     value = memory.read(offset, form, WHOLE_BYTES if bit is None else bit)
     if form == "b":

@@ -30,6 +30,8 @@ from fbvm.base.types import (
     base,
     families,
     fold,
+    followed,
+    machine,
 )
 from fbvm.syntax import literals
 
@@ -323,6 +325,14 @@ def in_hexadecimal(kind: Type, value: int) -> str:
     return f"16#{value & (1 << 8 * size) - 1:0{2 * size}X}"
 
 
+def as_read(kind: Type) -> Type:
+    """The type of what is read where a value of `kind` stands in a larger one: of a REFERENCE TO a single value that value.
+
+    Structures behind references are read by their own names, since they may lead back."""
+    target = followed(kind)
+    return target if machine(target) else kind
+
+
 def _member(field: Field, value: Value, hexadecimal: bool) -> str:
     if field.hexadecimal and isinstance(value, int):
         return in_hexadecimal(field.type, value)
@@ -331,7 +341,7 @@ def _member(field: Field, value: Value, hexadecimal: bool) -> str:
 
 def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
     """A value for people: TRUE, 12, 16#00FF, T#1s500ms, 'text', [1, 2], (a := 1); of an instance the pins first."""
-    plain = base(kind)
+    plain = base(as_read(kind))
     if value is None:
         return "NULL"
     if isinstance(plain, ArrayType) and isinstance(value, list):
