@@ -12,16 +12,19 @@ from functools import cached_property
 from typing import Any
 
 from fbvm.units import etn21_map as at
-from fbvm.units.etn21_dispatch import NEVER_NS, Choices, Dispatch, Fault
+from fbvm.units.etn21_dispatch import Choices, Dispatch, Fault
 from fbvm.units.etn21_map import Layout
 from fbvm.units.etn21_names import descriptions, meanings
+from fbvm.units.etn21_service import NEVER_NS
 from fbvm.units.etn21_timing import timing_of
+from fbvm.units.etn21_words import Words
 from fbvm.units.unit import AreaMemory
 from fbvm.wire.link import Event, Request
 
 __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
 
 TIME_WAIT_NS = 60_000_000_000  # W421 6-9-3 p156
+NO_SWITCHES = bytes(2 * (at.FINS_TCP_STATUS - at.SWITCHES))
 
 
 class Etn21:
@@ -59,8 +62,9 @@ class Etn21:
         self._dispatch = Dispatch(self.layout, address, self._timing, choices, self.faults)
         self._starting: tuple[int, int] | None = None
         """Cycle and time at which a restart ends; None if none is going on."""
-        self._switches_at = slice(self.layout.n + at.SWITCHES, self.layout.n + at.FINS_TCP_STATUS)
-        self._seen = [0, 0, 0, 0]
+        self._words: Words | None = None
+        self._seen = NO_SWITCHES
+        """The request switches, as they were when the last refresh ended."""
         self.wake_ns = self._next_ns = NEVER_NS
 
     @cached_property
@@ -92,63 +96,55 @@ class Etn21:
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on: the unit's own words and all switches 0, connections broken by RST."""
-        a = memory.words("A")
+        words = self._words = Words(self.layout, memory)
         for word in (at.INITIALIZING, at.RESTART):
-            a[word] &= ~(1 << self.layout.bit)
+            words.a[word] &= ~(1 << self.layout.bit)
         self._starting = None
-        return self._begin_anew(memory)
+        return self._begin_anew(words)
 
-    def _begin_anew(self, memory: AreaMemory) -> list[Request]:
+    def _begin_anew(self, words: Words) -> list[Request]:
         self._dispatch.forget()
-        self._seen = [0, 0, 0, 0]
+        self._seen = NO_SWITCHES
         self.wake_ns, self._next_ns = 0, NEVER_NS
-        cio, d = memory.words("CIO"), memory.words("D")
+        cio, d = words.cio, words.d
         n, m = self.layout.n, self.layout.m
         for word in range(n + 1, n + at.FINS_TCP_STATUS + 1):
             cio[word] = 0
         cio[n] &= ~at.FORCE_CLOSE
         for word in range(m + 1, m + at.MAIL_STATUS + 1):
             d[word] = 0
-        self._show_unit_status(cio)
+        cio[n + at.SERVICE_STATUS], cio[n + at.ERROR_STATUS] = at.LINK_UP if self.link_up else 0, self.error_status
         return self._dispatch.reset_sockets()
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
         """One I/O refresh: take the network's events and new switches, end what is ready, show what changed."""
-        dispatch = self._dispatch
+        words = self._words
+        if words is None or words.memory is not memory:
+            words = self._words = Words(self.layout, memory)
+        dispatch, n = self._dispatch, self.layout.n
         dispatch.cycle += 1
-        if self._starting or memory.words("A")[at.RESTART] >> self.layout.bit & 1:
-            return self._restart(memory, events, now_ns)
-        cio = memory.words("CIO")
-        self._show_unit_status(cio)
-        switches = cio[self._switches_at].tolist()
-        force = cio[self.layout.n] & at.FORCE_CLOSE
+        if self._starting or words.a[at.RESTART] >> self.layout.bit & 1:
+            return self._restart(words, events, now_ns)
+        cio = words.cio
+        cio[n + at.SERVICE_STATUS] = at.LINK_UP if self.link_up else 0
+        cio[n + at.ERROR_STATUS] = self.error_status
+        switches, force = words.switches.tobytes(), cio[n] & at.FORCE_CLOSE
         if not events and not force and switches == self._seen and now_ns < self._next_ns:
             self.wake_ns = self._next_ns
             return []
-        start_force = force and not dispatch.is_force_closing
-        found = dispatch.find(switches) if switches != self._seen else ()
-        requests: list[Request] = []
-        for event in events:
-            requests += dispatch.take(event)
-        requests += dispatch.expire(now_ns)
-        dispatch.conclude(memory, now_ns)
-        for new in found:
-            dispatch.notice(new)
-        requests += dispatch.accept(memory, now_ns)
-        if start_force:
-            requests += dispatch.force_close(now_ns)
-        changed = dispatch.show(memory)
-        self._seen = cio[self._switches_at].tolist() if changed else switches
+        requests = dispatch.refresh(words, events, switches != self._seen, force, now_ns)
+        changed = dispatch.show()
+        self._seen = words.switches.tobytes() if changed else switches
         self._next_ns = dispatch.wake_ns(now_ns)
         self.wake_ns = 0 if changed else self._next_ns
         return requests
 
-    def _restart(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
+    def _restart(self, words: Words, events: Sequence[Event], now_ns: int) -> list[Request]:
         """One I/O refresh of a restart, from the restart bit ON to the initializing flag OFF: requests are not seen."""
-        a, mask = memory.words("A"), 1 << self.layout.bit
+        a, mask = words.a, 1 << self.layout.bit
         requests: list[Request] = []
         if self._starting is None:
-            requests = self._begin_anew(memory)
+            requests = self._begin_anew(words)
             delay = self._timing.start_up()
             self._starting = self._dispatch.cycle + delay.refreshes, now_ns + delay.time_ns
             a[at.INITIALIZING] |= mask
@@ -160,8 +156,3 @@ class Etn21:
             requests += self._dispatch.take(event)
         self.wake_ns = self._starting[1] if self._starting and self._dispatch.cycle >= self._starting[0] else 0
         return requests
-
-    def _show_unit_status(self, cio: memoryview) -> None:
-        n = self.layout.n
-        cio[n + at.SERVICE_STATUS] = at.LINK_UP if self.link_up else 0
-        cio[n + at.ERROR_STATUS] = self.error_status

@@ -36,19 +36,20 @@ def check_address(memory: AreaMemory, parameters: Parameters) -> int:
         length = len(memory.words(area))
     except KeyError:
         return codes.AREA_CODE
-    end = parameters.word + max(1, (parameters.size_bytes + 1) // 2)
-    if parameters.word < first or end > min(last + 1, length):
+    begin = parameters.word
+    end = begin + ((parameters.size_bytes + 1) // 2 or 1)
+    if begin < first or end > last + 1 or end > length:
         return codes.AREA_CODE
     return codes.BIT_NUMBER if parameters.bit else codes.NORMAL_END
 
 
 def fetch(memory: AreaMemory, parameters: Parameters) -> bytes:
     """The `count` bytes to send, from an address that `check_address` has passed."""
-    words = memory.words(AREA_OF_CODE[parameters.area_code][0])
-    data = array("H", words[parameters.word : parameters.word + (parameters.size_bytes + 1) // 2].tolist())
+    words, begin, size_bytes = memory.words(AREA_OF_CODE[parameters.area_code][0]), parameters.word, parameters.size_bytes
+    data = array("H", words[begin : begin + (size_bytes + 1) // 2].tobytes())
     if byteorder == "little":
         data.byteswap()
-    return data.tobytes()[: parameters.size_bytes]
+    return data.tobytes()[:size_bytes]
 
 
 def store(memory: AreaMemory, parameters: Parameters, data: bytes, odd_filler: int | None) -> None:
@@ -57,11 +58,11 @@ def store(memory: AreaMemory, parameters: Parameters, data: bytes, odd_filler: i
     The low byte beside an odd last byte becomes `odd_filler`, or stays if that is None."""
     if not data:
         return
-    there = memory.words(AREA_OF_CODE[parameters.area_code][0])
-    end = parameters.word + (len(data) + 1) // 2
+    there, begin = memory.words(AREA_OF_CODE[parameters.area_code][0]), parameters.word
+    end = begin + (len(data) + 1) // 2
     if len(data) % 2:
         data += bytes([there[end - 1] & 0xFF if odd_filler is None else odd_filler])
     words = array("H", data)
     if byteorder == "little":
         words.byteswap()
-    there[parameters.word : end] = memoryview(words)
+    there[begin:end] = memoryview(words)

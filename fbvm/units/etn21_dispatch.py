@@ -16,16 +16,15 @@ from fbvm.units import etn21_map as at
 from fbvm.units.etn21_checks import check_request
 from fbvm.units.etn21_data import store
 from fbvm.units.etn21_display import Display
-from fbvm.units.etn21_map import Layout, Parameters, Switch
-from fbvm.units.etn21_service import Area, Service
-from fbvm.units.etn21_socket import Phase, Socket
+from fbvm.units.etn21_map import CLOSE, TRANSFERS, Layout, Parameters, Switch
+from fbvm.units.etn21_service import NEVER_NS, Area, Service
+from fbvm.units.etn21_socket import OPEN, OPENING, Socket
 from fbvm.units.etn21_start import Surroundings, start
-from fbvm.units.etn21_timing import TOGETHER, Delay, Skew, Timing
+from fbvm.units.etn21_timing import NEXT, TOGETHER, Delay, Skew, Timing
+from fbvm.units.etn21_words import Words
 from fbvm.units.unit import AreaMemory
 from fbvm.wire.link import Event, Request
 
-NEVER_NS = 1 << 63
-TRANSFERS = at.SENDING | at.RECEIVING
 BY_RANK = attrgetter("rank")
 CHECKED_FIRST = frozenset({codes.CPU_UNIT_ERROR, codes.LOCAL_ADDRESS_ERROR})
 
@@ -79,6 +78,8 @@ class Dispatch:
         self.cycle = 0
         self._areas = [Area(number, self._layout.parameters(number), self._layout.switches(number)) for number in at.AREAS]
         self._services: list[Service] = []
+        self._noticed: list[Service] = []
+        """Those that have not been accepted yet."""
         self._forced: list[Service] | None = None
         self._held_ports: dict[int, int] = {}
         self._display = Display(self._layout)
@@ -88,15 +89,39 @@ class Dispatch:
         """Requests that end every connection."""
         return [request for socket in self._sockets.values() for request in socket.reset()]
 
+    def refresh(self, words: Words, events: Sequence[Event], news: bool, force: int, now_ns: int) -> list[Request]:
+        """One I/O refresh, phase by phase; `news` says that switches have changed, `force` that a force-close is asked."""
+        self._display.begin(words, self.cycle)
+        start_force = force and self._forced is None
+        found = self._find(words.switches.tolist()) if news else ()
+        requests: list[Request] = []
+        for event in events:
+            requests += self.take(event)
+        if self._services:
+            requests += self._expire(now_ns)
+            self._conclude_all(words.memory, now_ns)
+        if self._forced is not None:
+            self._conclude_force_close(self._forced)
+        for new in found:
+            self._notice(new)
+        if self._noticed:
+            requests += self._accept_all(words, now_ns)
+        if start_force:
+            requests += self._force_close(now_ns)
+        return requests
+
     # --- 1. switches that are new ------------------------------------------------------------------------------------
 
-    def find(self, words: Sequence[int]) -> list[Found]:
+    def _find(self, switches: Sequence[int]) -> list[Found]:
         """New switches in n+19..n+22, judged before this refresh ends anything."""
         found = []
-        for pair, word in enumerate(words):
-            for half in (0, 1) if word else ():
-                area = self._areas[2 * pair + half]
-                new = word >> 8 * half & at.ALL_SWITCHES & ~area.owned()
+        for pair, word in enumerate(switches):
+            if not word:
+                continue
+            for area, byte in ((self._areas[2 * pair], word), (self._areas[2 * pair + 1], word >> 8)):
+                new = byte & at.ALL_SWITCHES
+                if new and area.services:
+                    new &= ~area.owned()
                 if new:
                     busy = any(service.code != codes.OTHER_PROCESSING for service in area.services)
                     found.append(Found(area, at.SWITCHES_IN[new], busy))
@@ -109,15 +134,14 @@ class Dispatch:
         socket = self._sockets.get(event.channel)
         if socket is None:
             return []
-        self._touch(socket, TOGETHER)
+        self._touched.setdefault(event.channel, TOGETHER)
         return socket.take(event)
 
-    def expire(self, now_ns: int) -> list[Request]:
+    def _expire(self, now_ns: int) -> list[Request]:
         """End services whose time has run out; an open is withdrawn from the network."""
         requests: list[Request] = []
         for service in self._services:
-            late = service.code is None and service.deadline_ns is not None and now_ns >= service.deadline_ns
-            if late and service.socket is not None:
+            if now_ns >= service.deadline_ns and service.code is None and service.socket is not None:
                 service.code = service.deadline_code
                 self._touch(service.socket, TOGETHER)
                 if service.switch in at.OPENS:
@@ -126,35 +150,29 @@ class Dispatch:
 
     # --- 3. services that are ready ----------------------------------------------------------------------------------
 
-    def conclude(self, memory: AreaMemory, now_ns: int) -> None:
+    def _conclude_all(self, memory: AreaMemory, now_ns: int) -> None:
         """Write the results of what has ended: refusals first, closes last, one result an area and refresh."""
         ended = [service for service in self._services if service.code is not None]
-        if not ended and self._forced is None:
-            return
-        for service in sorted(ended, key=BY_RANK) if len(ended) > 1 else ended:
-            if service.concluded_cycle is None and self._is_ready(service, now_ns):
+        if len(ended) > 1:
+            ended.sort(key=BY_RANK)
+        for service in ended:
+            if service.concluded_cycle == NEVER_NS and self._is_ready(service, now_ns):
                 self._conclude(service, memory, now_ns)
-        for service in [service for service in ended if self._is_over(service, self.cycle)]:
-            self._services.remove(service)
-            if service.area is not None:
-                service.area.services.remove(service)
-        self._conclude_force_close()
+            if service.concluded_cycle <= self.cycle:
+                self._services.remove(service)
+                if service.area is not None:
+                    service.area.services.remove(service)
 
     def _is_ready(self, service: Service, now_ns: int) -> bool:
-        return (
-            self.cycle >= service.earliest_cycle
-            and now_ns >= service.earliest_ns
-            and (service.area is None or service.area.result_cycle < self.cycle)
-            and all(self._is_over(other, self.cycle - 1) for other in service.interrupts)
-        )
-
-    @staticmethod
-    def _is_over(service: Service, cycle: int) -> bool:
-        return service.concluded_cycle is not None and service.concluded_cycle <= cycle
+        if self.cycle < service.earliest_cycle or now_ns < service.earliest_ns:
+            return False
+        if service.area is not None and service.area.result_cycle >= self.cycle:
+            return False
+        return not service.interrupts or all(other.concluded_cycle < self.cycle for other in service.interrupts)
 
     def _conclude(self, service: Service, memory: AreaMemory, now_ns: int) -> None:
         skew = self._timing.skew()
-        service.concluded_cycle = self.cycle + skew.switch
+        due = service.concluded_cycle = self.cycle + skew.switch
         socket = service.socket
         if socket is not None:
             if service.flag & TRANSFERS:
@@ -166,77 +184,70 @@ class Dispatch:
                 socket.settled_cycle = self.cycle + (skew.open if socket.connected != was_connected else 0)
             self._touched[socket.number] = skew
         if service.area is not None:
-            self._write_result(service, service.area, memory)
-
-    def _write_result(self, service: Service, area: Area, memory: AreaMemory) -> None:
-        due = self.cycle if service.concluded_cycle is None else service.concluded_cycle
-        if service.socket is not None and service.parameters is not None and service.flag & TRANSFERS:
-            store(memory, service.parameters, service.data, self._choices.odd_filler)
-            service.results[at.COUNT] = service.count
-        put, first = self._display.put, area.first
-        for offset, value in service.results.items():
-            put(("D", first + offset), value, due)
-        put(("D", first + at.RESPONSE), service.code or codes.NORMAL_END, due)
-        word, first_bit = area.switches
-        self._display.clear_bit(("CIO", word), first_bit + service.switch, due)
-        area.result_cycle = due
+            if service.flag & TRANSFERS and socket is not None and service.parameters is not None:
+                if service.data:
+                    store(memory, service.parameters, service.data, self._choices.odd_filler)
+                service.results[at.COUNT] = service.count
+            self._display.show_result(service, service.area, due)
+            service.area.result_cycle = due
 
     def _hold_port(self, service: Service, socket: Socket, now_ns: int) -> None:
         """A fixed local port stays taken after a close from this side, unless it was by RST (W421 6-9-3 p156)."""
-        if service.switch is Switch.CLOSE and socket.holds_port:
+        if service.switch is CLOSE and socket.holds_port:
             self._held_ports[socket.local_port] = now_ns + self._choices.time_wait_ns
 
     # --- 4. new requests ---------------------------------------------------------------------------------------------
 
-    def notice(self, found: Found) -> None:
+    def _notice(self, found: Found) -> None:
         """Latch new switches of an area: a close always, else the lowest (assumed), and 110C for the others."""
-        close = Switch.CLOSE in found.switches
-        chosen = Switch.CLOSE if close else None if found.busy else found.switches[0]
+        close = CLOSE in found.switches
+        chosen = CLOSE if close else None if found.busy else found.switches[0]
         for switch in found.switches:
             service = Service(switch, found.area, self.cycle + self._timing.accept_refreshes)
             if switch is not chosen:
                 service.code = codes.OTHER_PROCESSING
                 service.earliest_cycle = self.cycle + 1
+            else:
+                self._noticed.append(service)
             found.area.services.append(service)
             self._services.append(service)
 
-    def accept(self, memory: AreaMemory, now_ns: int) -> list[Request]:
+    def _accept_all(self, words: Words, now_ns: int) -> list[Request]:
         """Check and start what was noticed."""
+        noticed, self._noticed = self._noticed, []
         requests: list[Request] = []
-        for service in self._services:
-            waiting = service.code is None and service.parameters is None and service.accept_cycle <= self.cycle
-            if waiting and service.area is not None:
-                requests += self._accept(service, service.area, memory, now_ns)
+        for service in noticed:
+            if service.accept_cycle > self.cycle:
+                self._noticed.append(service)
+            elif service.code is None and service.area is not None:
+                requests += self._accept(service, service.area, words, now_ns)
         return requests
 
-    def _accept(self, service: Service, area: Area, memory: AreaMemory, now_ns: int) -> list[Request]:
-        parameters = Parameters.read(memory.words("D"), area.first)
-        service.parameters = parameters
+    def _accept(self, service: Service, area: Area, words: Words, now_ns: int) -> list[Request]:
+        parameters = service.parameters = Parameters.read(words.d, area.first)
         self._delay(service, self._timing.delay(), now_ns)
         number = parameters.socket
-        service.code = (
-            self._fault(service.switch, number, first=True)
-            or check_request(service.switch, parameters, area, self._sockets.get(number), memory, self.cycle)
-            or self._fault(service.switch, number, first=False)
-            or None
-        )
-        if service.code is not None:
+        socket = self._sockets.get(number)
+        refusal = self._faults and self._fault(service.switch, number, first=True) or check_request(
+            service.switch, parameters, area, socket, words.memory, self.cycle)
+        if self._faults and not refusal:
+            refusal = self._fault(service.switch, number, first=False)
+        if refusal or socket is None:
+            service.code = refusal
             return []
-        socket = self._sockets[number]
-        if service.switch is Switch.CLOSE:
+        if service.switch is CLOSE:
             service.interrupts = self._interrupt(socket, now_ns)
-        around = Surroundings(memory, self._address, self._held_ports, now_ns)
-        requests = start(service, parameters, socket, around)
-        self._touch(socket, TOGETHER)
-        return requests
+        around = Surroundings(words.memory, self._address, self._held_ports, now_ns)
+        self._touched.setdefault(number, TOGETHER)
+        return start(service, parameters, socket, around)
 
     def _interrupt(self, socket: Socket, now_ns: int) -> tuple[Service, ...]:
         """End what runs on a socket with 0081; a result that is already decided stays."""
-        running = tuple(service for service in socket.services.values() if service.switch is not Switch.CLOSE)
+        running = tuple(service for service in socket.services.values() if service.switch is not CLOSE)
         for service in running:
             if service.code is None:
                 service.code = codes.SOCKET_CLOSED
-                self._delay(service, Delay(1, 0), now_ns)
+                self._delay(service, NEXT, now_ns)
         return running
 
     def _delay(self, service: Service, delay: Delay, now_ns: int) -> None:
@@ -254,12 +265,7 @@ class Dispatch:
 
     # --- 5. force-close ----------------------------------------------------------------------------------------------
 
-    @property
-    def is_force_closing(self) -> bool:
-        """True from the acceptance of n bit 2 until it goes OFF."""
-        return self._forced is not None
-
-    def force_close(self, now_ns: int) -> list[Request]:
+    def _force_close(self, now_ns: int) -> list[Request]:
         """Close every socket, whatever it does (W421 6-7-5 p120).  Stores no response code of its own (assumed).
 
         Requests that were seen and are not accepted yet end, too (assumed)."""
@@ -270,8 +276,8 @@ class Dispatch:
                 service.code = codes.SOCKET_CLOSED
                 service.earliest_cycle = self.cycle + 1
         for socket in self._sockets.values():
-            if socket.phase in (Phase.OPENING, Phase.OPEN):
-                service = Service(Switch.CLOSE, None, self.cycle)
+            if socket.phase in (OPENING, OPEN):
+                service = Service(CLOSE, None, self.cycle)
                 service.interrupts = self._interrupt(socket, now_ns)
                 self._delay(service, self._timing.delay(), now_ns)
                 requests += socket.begin_close(service)
@@ -280,19 +286,19 @@ class Dispatch:
         self._services += self._forced
         return requests
 
-    def _conclude_force_close(self) -> None:
-        if self._forced is not None and all(self._is_over(service, self.cycle) for service in self._forced):
-            self._display.clear_bit(("CIO", self._layout.n), at.FORCE_CLOSE_BIT, self.cycle)
+    def _conclude_force_close(self, forced: list[Service]) -> None:
+        if all(service.concluded_cycle <= self.cycle for service in forced):
+            self._display.end_force_close()
             self._forced = None
 
     # --- 6. what is seen ---------------------------------------------------------------------------------------------
 
-    def show(self, memory: AreaMemory) -> bool:
-        """Write what changed and is due; True if that is anything."""
+    def show(self) -> bool:
+        """Write what changed and is due; True if this refresh has written anything."""
         for number, skew in self._touched.items():
-            self._display.show(self._sockets[number], skew, self.cycle)
+            self._display.show(self._sockets[number], skew)
         self._touched.clear()
-        return self._display.flush(memory, self.cycle)
+        return self._display.end()
 
     def _touch(self, socket: Socket, skew: Skew) -> None:
         self._touched.setdefault(socket.number, skew)
@@ -307,6 +313,6 @@ class Dispatch:
                 wake_ns = min(wake_ns, service.earliest_ns)
             elif service.code is not None or service.accept_cycle > self.cycle:
                 return 0
-            if service.deadline_ns is not None:
-                wake_ns = min(wake_ns, service.deadline_ns)
+            if service.deadline_ns < wake_ns:
+                wake_ns = service.deadline_ns
         return wake_ns

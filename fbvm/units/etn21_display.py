@@ -1,4 +1,4 @@
-"""The words that an ETN21 shows: collects changes of bits, each with the refresh in which it is due, and writes them.
+"""The words that an ETN21 shows: takes changes of bits, each with the refresh in which it is due, and writes them.
 
 Only bits that changed are written, so what the CPU has cleared meanwhile (a change of mode) stays cleared
 (W421 6-9-1 p155).  Changes of one word keep their order, whatever delays they were given.
@@ -6,95 +6,117 @@ Only bits that changed are written, so what the CPU has cleared meanwhile (a cha
 
 from __future__ import annotations
 
-from functools import cache
+from dataclasses import dataclass
 
 from fbvm.units import etn21_map as at
+from fbvm.units.etn21_service import Area, Service
 from fbvm.units.etn21_socket import Socket
 from fbvm.units.etn21_timing import TOGETHER, Skew
-from fbvm.units.unit import AreaMemory
-
-Word = tuple[str, int]
-"""Area and address."""
+from fbvm.units.etn21_words import Words
 
 
-@cache
-def _words_of(layout: at.Layout) -> dict[tuple[str, int], tuple[Word, Word, Word]]:
-    """By protocol and socket: status, bytes received, TCP state; the same for all units of a number."""
-    return {
-        (protocol, socket): (
-            ("CIO", layout.status(protocol, socket)),
-            ("D", layout.m + at.BYTES_RECEIVED + socket),
-            ("D", layout.m + at.TCP_STATE + socket),
-        )
-        for protocol in ("TCP", "UDP") for socket in at.SOCKETS
-    }  # fmt: skip
+@dataclass(slots=True)
+class Shown:
+    """What the words of one socket and protocol say, and where they are: status in CIO, the others in D."""
+
+    status_at: int
+    received_at: int
+    state_at: int
+    status: int = 0
+    received: int = 0
+    state: int = 0
 
 
 class Display:
-    """Writes for one unit's status words, R words and request switches."""
+    """Writes one unit's status words, R words and request switches."""
 
     def __init__(self, layout: at.Layout) -> None:
-        self._words_of = _words_of(layout)
-        self._shown: dict[Word, int] = {}
-        self._queue: list[tuple[int, Word, int, int]] = []
-        """Due refresh, word, mask of the bits that stay, bits that turn ON."""
-        self._last_due: dict[Word, int] = {}
+        self._layout = layout
+        self._shown: dict[tuple[str, int], Shown] = {}
+        """By protocol and socket, from the first time on that it has something to show."""
+        self._words: Words | None = None
+        self._cycle = 0
+        self._changed = False
+        self._later: list[tuple[int, bool, int, int, int]] = []
+        """Due refresh, whether in D, address, mask of the bits that stay, bits that turn ON."""
+        self._last_due: dict[tuple[bool, int], int] = {}
 
-    def put(self, word: Word, value: int, due_cycle: int) -> None:
-        """Write a whole word in refresh `due_cycle`."""
-        self._change(word, 0, value, due_cycle)
+    def begin(self, words: Words, cycle: int) -> None:
+        """A refresh begins, in which the unit has something to do."""
+        self._words, self._cycle, self._changed = words, cycle, False
 
-    def clear_bit(self, word: Word, bit: int, due_cycle: int) -> None:
-        """Turn one bit OFF in refresh `due_cycle`."""
-        self._change(word, ~(1 << bit), 0, due_cycle)
-
-    def show(self, socket: Socket, skew: Skew, cycle: int) -> None:
-        """Report what changed of a socket since it was last shown."""
-        protocol = socket.protocol
-        status, received, state = self._words_of[protocol, socket.number]
-        size_bytes = socket.bytes_shown()
-        self._differences(status, socket.status(size_bytes), skew, cycle)
-        if protocol == "TCP":
-            self._differences(received, size_bytes, skew, cycle)
-            self._differences(state, socket.state, skew, cycle)
-
-    def flush(self, memory: AreaMemory, cycle: int) -> bool:
-        """Write everything that is due; True if that is anything."""
-        queue, self._queue = self._queue, []
-        if not queue:
-            return False
-        cio, d = memory.words("CIO"), memory.words("D")
-        for change in queue:
-            due_cycle, (area, at), stays, turns_on = change
-            if due_cycle > cycle:
-                self._queue.append(change)
-            else:
-                words = d if area == "D" else cio
-                words[at] = words[at] & stays | turns_on
-        if not self._queue:
-            self._last_due.clear()
-        return len(self._queue) < len(queue)
+    def end(self) -> bool:
+        """The refresh ends: write what was put off until now; True if any word was written in this refresh."""
+        if self._later:
+            later, self._later = self._later, []
+            for change in later:
+                if change[0] > self._cycle:
+                    self._later.append(change)
+                else:
+                    self._write(*change[1:])
+            if not self._later:
+                self._last_due.clear()
+        return self._changed
 
     @property
     def pending(self) -> bool:
         """True while a write is still to come."""
-        return bool(self._queue)
+        return bool(self._later)
 
-    def _differences(self, word: Word, value: int, skew: Skew, cycle: int) -> None:
-        changed = self._shown.get(word, 0) ^ value
-        if not changed:
-            return
-        self._shown[word] = value
+    def show_result(self, service: Service, area: Area, due_cycle: int) -> None:
+        """Write the results of a service and its response code, and turn its switch OFF, in refresh `due_cycle`."""
+        change, first = self._change, area.first
+        for offset, value in service.results.items():
+            change(True, first + offset, 0, value, due_cycle)
+        change(True, first + at.RESPONSE, 0, service.code or 0, due_cycle)
+        word, first_bit = area.switches
+        change(False, word, ~(1 << first_bit + service.switch), 0, due_cycle)
+
+    def end_force_close(self) -> None:
+        """Turn bit 2 of n OFF."""
+        self._change(False, self._layout.n, ~at.FORCE_CLOSE, 0, self._cycle)
+
+    def show(self, socket: Socket, skew: Skew) -> None:
+        """Report what changed of a socket since it was last shown."""
+        shown = self._shown.get((socket.protocol, socket.number)) or self._first(socket)
+        status, received = socket.shown()
+        if status != shown.status:
+            self._differences(False, shown.status_at, shown.status ^ status, status, skew)
+            shown.status = status
+        if socket.protocol == "TCP":
+            if received != shown.received:
+                self._differences(True, shown.received_at, shown.received ^ received, received, skew)
+                shown.received = received
+            if socket.state != shown.state:
+                self._differences(True, shown.state_at, shown.state ^ socket.state, socket.state, skew)
+                shown.state = socket.state
+
+    def _first(self, socket: Socket) -> Shown:
+        protocol, number, m = socket.protocol, socket.number, self._layout.m
+        shown = self._shown[protocol, number] = Shown(
+            self._layout.status(protocol, number), m + at.BYTES_RECEIVED + number, m + at.TCP_STATE + number)
+        return shown
+
+    def _differences(self, in_d: bool, address: int, changed: int, value: int, skew: Skew) -> None:
         if skew is TOGETHER:
-            self._change(word, ~changed, changed & value, cycle)
+            self._change(in_d, address, ~changed, changed & value, self._cycle)
             return
-        flags, opened = (at.FLAGS, at.OPEN) if word[0] == "CIO" else (0, 0)
+        flags, opened = (0, 0) if in_d else (at.FLAGS, at.OPEN)
         groups = ((flags, skew.flag), (opened, skew.open), (0xFFFF & ~flags & ~opened, skew.data))
         for mask, delay in groups:
             if changed & mask:
-                self._change(word, ~(changed & mask), changed & mask & value, cycle + delay)
+                self._change(in_d, address, ~(changed & mask), changed & mask & value, self._cycle + delay)
 
-    def _change(self, word: Word, stays: int, turns_on: int, due_cycle: int) -> None:
-        due_cycle = max(due_cycle, self._last_due.get(word, 0))
-        self._last_due[word] = due_cycle
-        self._queue.append((due_cycle, word, stays, turns_on))
+    def _change(self, in_d: bool, address: int, stays: int, turns_on: int, due_cycle: int) -> None:
+        if due_cycle > self._cycle or self._later:
+            due_cycle = max(due_cycle, self._last_due.get((in_d, address), 0))
+            self._last_due[in_d, address] = due_cycle
+            self._later.append((due_cycle, in_d, address, stays, turns_on))
+        else:
+            self._write(in_d, address, stays, turns_on)
+
+    def _write(self, in_d: bool, address: int, stays: int, turns_on: int) -> None:
+        assert self._words
+        words = self._words.d if in_d else self._words.cio
+        words[address] = words[address] & stays | turns_on
+        self._changed = True

@@ -62,19 +62,15 @@ class Switch(IntEnum):
     CLOSE = 5
 
 
-OPENS = frozenset({Switch.UDP_OPEN, Switch.PASSIVE_OPEN, Switch.ACTIVE_OPEN})
+UDP_OPEN, PASSIVE_OPEN, ACTIVE_OPEN, SEND, RECEIVE, CLOSE = Switch  # Python 3.11 finds the member of an Enum by a call
+OPENS = frozenset({UDP_OPEN, PASSIVE_OPEN, ACTIVE_OPEN})
 ALL_SWITCHES = 0x3F
 SWITCHES_IN = tuple(tuple(switch for switch in Switch if mask >> switch & 1) for mask in range(ALL_SWITCHES + 1))
 """The switches that are ON in a mask of them."""
 
-FLAG_OF = {
-    Switch.UDP_OPEN: OPENING,
-    Switch.PASSIVE_OPEN: OPENING,
-    Switch.ACTIVE_OPEN: OPENING,
-    Switch.SEND: SENDING,
-    Switch.RECEIVE: RECEIVING,
-    Switch.CLOSE: CLOSING,
-}
+FLAG_OF = (OPENING, OPENING, OPENING, SENDING, RECEIVING, CLOSING)
+"""By switch."""
+TRANSFERS = SENDING | RECEIVING
 
 
 class TcpState(IntEnum):

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from fbvm.units.etn21_map import FLAG_OF, Parameters, Switch
+from fbvm.units.etn21_map import CLOSE, FLAG_OF, Parameters, Switch
 
 if TYPE_CHECKING:
     from fbvm.units.etn21_socket import Socket
+
+NEVER_NS = 1 << 63
 
 
 @dataclass(slots=True, eq=False)
@@ -29,7 +31,7 @@ class Service:
     code: int | None = None
     earliest_cycle: int = 0
     earliest_ns: int = 0
-    deadline_ns: int | None = None
+    deadline_ns: int = NEVER_NS
     deadline_code: int = 0
     unanswered: int = 0
     """Parts of a send that the network has not answered yet."""
@@ -44,20 +46,21 @@ class Service:
     interrupts: tuple[Service, ...] = ()
     """The services that this close ended; their results come first, a cycle apart."""
 
-    concluded_cycle: int | None = None
+    concluded_cycle: int = NEVER_NS
     """Refresh that writes the response code; the switch goes OFF with it."""
 
-    @property
-    def flag(self) -> int:
-        """Its bit in the socket's status word."""
-        return FLAG_OF[self.switch]
+    flag: int = 0
+    """Its bit in the socket's status word; follows from the switch."""
+
+    def __post_init__(self) -> None:
+        self.flag = FLAG_OF[self.switch]
 
     @property
     def rank(self) -> int:
         """Order in which results are written: refusals, services, closes."""
         if self.socket is None:
             return 0
-        return 2 if self.switch is Switch.CLOSE else 1
+        return 2 if self.switch is CLOSE else 1
 
 
 @dataclass(slots=True, eq=False)

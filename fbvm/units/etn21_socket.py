@@ -9,7 +9,7 @@ from enum import Enum
 
 from fbvm.units import etn21_codes as codes
 from fbvm.units import etn21_map as at
-from fbvm.units.etn21_map import Switch, TcpState
+from fbvm.units.etn21_map import PASSIVE_OPEN, TcpState
 from fbvm.units.etn21_service import Area, Service
 from fbvm.wire.link import (
     Bind,
@@ -51,6 +51,9 @@ class Phase(Enum):
     CLOSING = "closing"
 
 
+CLOSED, OPENING, OPEN, CLOSING = Phase  # Python 3.11 finds the member of an Enum by a call
+
+
 class Socket:
     """Socket 1..8; its number is its channel on the network."""
 
@@ -58,7 +61,7 @@ class Socket:
         self.number = number
         self.protocol = "TCP"
         self.state = TcpState.CLOSED
-        self.phase = Phase.CLOSED
+        self.phase = CLOSED
         self.services: dict[int, Service] = {}
         """What runs, by the flag that it shows."""
         self.settled_cycle = -1
@@ -85,23 +88,19 @@ class Socket:
 
     # --- what the words show -----------------------------------------------------------------------------------------
 
-    def status(self, bytes_shown: int) -> int:
-        """The status word n+1..n+16, with what `bytes_shown` gives."""
+    def shown(self) -> tuple[int, int]:
+        """The status word n+1..n+16, and m+1..m+8: 0 while a receive runs, at most 1,984 (W420 4-2 p88)."""
         word = at.OPEN if self.connected else 0
         for flag in self.services:
             word |= flag
-        return word | at.DATA_RECEIVED if bytes_shown else word
-
-    def bytes_shown(self) -> int:
-        """The word m+1..m+8: 0 while a receive runs, at most 1,984 (W420 4-2 p88)."""
-        if at.RECEIVING in self.services or not self.connected:
-            return 0
-        return min(len(self._stream), SERVICE_LIMIT)
+        if not self._stream or not self.connected or word & at.RECEIVING:
+            return word, 0
+        return word | at.DATA_RECEIVED, min(len(self._stream), SERVICE_LIMIT)
 
     @property
     def is_open(self) -> bool:
         """True if a send or a receive makes sense: bit 15 is ON and nobody closes."""
-        return self.connected and self.phase is Phase.OPEN
+        return self.connected and self.phase is OPEN
 
     @property
     def holds_port(self) -> bool:
@@ -120,7 +119,7 @@ class Socket:
     def begin_open(self, service: Service, request: Connect | Listen | Bind) -> list[Request]:
         """Start opening; the request waits while the network still closes what was open before."""
         self._run(service)
-        self.phase = Phase.OPENING
+        self.phase = OPENING
         if not isinstance(request, Bind):
             self.state = TcpState.LISTEN if isinstance(request, Listen) else TcpState.SYN_SENT
         if self._unanswered_closes:
@@ -153,8 +152,10 @@ class Socket:
             service.code = self._unreported or codes.ERRNO["EPIPE"]
             self._unreported = 0
             return []
+        service.unanswered = -(-len(data) // TCP_PART)
+        if service.unanswered == 1:
+            return [Send(self.number, data)]
         parts = [data[start : start + TCP_PART] for start in range(0, len(data), TCP_PART)]
-        service.unanswered = len(parts)
         return [Send(self.number, part) for part in parts]
 
     def begin_receive(self, service: Service) -> list[Request]:
@@ -165,7 +166,7 @@ class Socket:
     def begin_close(self, service: Service) -> list[Request]:
         """Start closing, by RST if the linger option was set at the open."""
         self._run(service)
-        self.phase = Phase.CLOSING
+        self.phase = CLOSING
         if self.protocol == "UDP":
             return self._close(False)
         after = TcpState.CLOSED if self.linger else AFTER_CLOSE.get(self.state, TcpState.CLOSED)
@@ -175,18 +176,18 @@ class Socket:
 
     def withdraw(self) -> list[Request]:
         """Give up an open that took too long; the network's answers to it no longer count."""
-        self.phase = Phase.CLOSED
+        self.phase = CLOSED
         self.state = TcpState.CLOSED
         return self._close(False)
 
     def reset(self) -> list[Request]:
         """Restart of the unit: everything is forgotten, the connection breaks."""
-        was_in_use = self.phase is not Phase.CLOSED
+        was_in_use = self.phase is not CLOSED
         self.services.clear()
         self.area = None
         self.settled_cycle = -1
         self._forget()
-        self.phase = Phase.CLOSED
+        self.phase = CLOSED
         self.state = TcpState.CLOSED
         self.protocol = "TCP"
         return self._close(True) if was_in_use else []
@@ -196,11 +197,11 @@ class Socket:
     def end(self, service: Service) -> None:
         """The service's result is being written: its flag goes OFF, bit 15 follows an open or a close."""
         del self.services[service.flag]
-        if service.switch in at.OPENS:
+        if service.flag == at.OPENING:
             self.connected = service.code == codes.NORMAL_END
             if self.connected and service.area is not None:
                 service.area.bound, self.area = self, service.area
-        elif service.switch is Switch.CLOSE:
+        elif service.flag == at.CLOSING:
             if self.protocol == "TCP":
                 self.state = AFTER_CLOSED.get(self.state, self.state)
             if self.area is not None:
@@ -215,11 +216,11 @@ class Socket:
             return self._take_closed()
         if self._unanswered_closes:
             return []
-        if self.phase is Phase.OPENING:
-            return self._take_while_opening(event)
-        if self.phase is Phase.OPEN:
+        if self.phase is OPEN:
             self._take_while_open(event)
-            return self._serve_receive()
+            return self._serve_receive() if at.RECEIVING in self.services else []
+        if self.phase is OPENING:
+            return self._take_while_opening(event)
         return []
 
     def _take_closed(self) -> list[Request]:
@@ -228,8 +229,8 @@ class Socket:
         self._unanswered_closes -= 1
         if self._unanswered_closes:
             return []
-        if self.phase is Phase.CLOSING:
-            self.phase = Phase.CLOSED
+        if self.phase is CLOSING:
+            self.phase = CLOSED
             self.services[at.CLOSING].code = codes.NORMAL_END
         deferred, self._deferred = self._deferred, None
         return [] if deferred is None else [deferred]
@@ -239,19 +240,19 @@ class Socket:
         if isinstance(event, Opened):
             return self._take_opened(service, event)
         if isinstance(event, Failed | Broken):
-            self.phase = Phase.CLOSED
+            self.phase = CLOSED
             self.state = TcpState.CLOSED
             service.code = codes.code_of(event.error)
         return []
 
     def _take_opened(self, service: Service, event: Opened) -> list[Request]:
-        self.phase = Phase.OPEN
+        self.phase = OPEN
         self.local_port = event.local_port
         service.code = codes.NORMAL_END
         if self.protocol == "UDP":
             return []
         self.state = TcpState.ESTABLISHED
-        if service.switch is Switch.PASSIVE_OPEN:
+        if service.switch is PASSIVE_OPEN:
             service.results = results_of(event.remote)
         elif not self.local_port_fixed:
             service.results = {at.LOCAL_PORT: event.local_port}

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from fbvm.units import etn21_codes as codes
 from fbvm.units import etn21_map as at
 from fbvm.units.etn21_data import fetch
-from fbvm.units.etn21_map import Parameters, Switch
+from fbvm.units.etn21_map import PASSIVE_OPEN, RECEIVE, SEND, UDP_OPEN, Parameters
 from fbvm.units.etn21_service import Service
 from fbvm.units.etn21_socket import Socket
 from fbvm.units.unit import AreaMemory
@@ -41,18 +41,18 @@ class Surroundings(NamedTuple):
 def start(service: Service, parameters: Parameters, socket: Socket, around: Surroundings) -> list[Request]:
     """Begin the service and return the requests for the network."""
     switch = service.switch
-    if switch in at.OPENS:
-        return _start_open(service, parameters, socket, around)
-    if switch is Switch.SEND:
+    if switch is SEND:
         data = fetch(around.memory, parameters)
         if socket.protocol == "TCP":
             return socket.begin_send(service, data)
         if parameters.remote.host == BROADCAST and parameters.size_bytes > DATAGRAM_LIMIT:
             return socket.fail(service, codes.ERRNO["EMSGSIZE"])
         return socket.begin_send_to(service, parameters.remote, data)
-    if switch is Switch.RECEIVE:
+    if switch is RECEIVE:
         _limit(service, parameters.timeout_ns, codes.TIMED_OUT, around.now_ns)
         return socket.begin_receive(service)
+    if switch in at.OPENS:
+        return _start_open(service, parameters, socket, around)
     return socket.begin_close(service)
 
 
@@ -60,9 +60,9 @@ def _start_open(service: Service, parameters: Parameters, socket: Socket, around
     channel, port, remote = parameters.socket, parameters.local_port, parameters.remote
     keep_alive = bool(parameters.option & at.KEEP_ALIVE)
     request: Connect | Listen | Bind
-    if service.switch is Switch.UDP_OPEN:
+    if service.switch is UDP_OPEN:
         request = Bind(channel, port)
-    elif service.switch is Switch.PASSIVE_OPEN:
+    elif service.switch is PASSIVE_OPEN:
         request = Listen(channel, port, remote, keep_alive)
         _limit(service, parameters.timeout_ns, codes.TIMED_OUT, around.now_ns)
     else:

@@ -32,6 +32,9 @@ class Delay(NamedTuple):
     time_ns: int
 
 
+NEXT = Delay(1, 0)
+
+
 class Timing(Protocol):
     """Delays of one unit."""
 
@@ -54,13 +57,13 @@ class Exact:
     accept_refreshes = 0
 
     def delay(self) -> Delay:
-        return Delay(1, 0)
+        return NEXT
 
     def skew(self) -> Skew:
         return TOGETHER
 
     def start_up(self) -> Delay:
-        return Delay(1, 0)
+        return NEXT
 
 
 class Real:
