@@ -16,9 +16,10 @@ from fbvm.code.image import Image, RungPicture
 from fbvm.plc import Plc
 from fbvm.record.history import looking
 from fbvm.record.ladder_svg import ladder_svg
-from fbvm.record.ladder_text import Places, States, ladder_text, rung_surface
+from fbvm.record.ladder_text import ladder_surface, ladder_text
 from fbvm.record.names import Names
 from fbvm.record.power import Power
+from fbvm.syntax.rung_drawing import Sight
 from fbvm.watch.paths import Place
 
 SVG_WIDTH = 120
@@ -37,7 +38,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     if not image.rungs:
         raise click.UsageError("there is no LADDER .. END_LADDER in these files")
     if svg:
-        drawn = [rung_surface(rung, width or SVG_WIDTH, None, _places(image, rung.body)) for rung in image.rungs]
+        drawn = [ladder_surface(rung, width or SVG_WIDTH, Sight(None, _places(image, rung.body))) for rung in image.rungs]
         svg.write_text(ladder_svg(drawn), encoding="utf-8")
         return
     body = -1
@@ -45,16 +46,16 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         if rung.body != body:
             body = rung.body
             click.echo(f"{image.bodies[body].kind} {image.bodies[body].name}")
-        _draw(image, rung, width or chart_width(), None)
+        _draw(rung, width or chart_width(), Sight(None, _places(image, rung.body)))
 
 
-def _draw(image: Image, rung: RungPicture, width: int, states: States | None) -> None:
-    for line in ladder_text(rung, width, states, _places(image, rung.body)):
+def _draw(rung: RungPicture, width: int, sight: Sight) -> None:
+    for line in ladder_text(rung, width, sight):
         click.echo(line)
     click.echo()
 
 
-def _places(image: Image, body: int) -> Places:
+def _places(image: Image, body: int) -> Callable[[str], str]:
     """The addresses of what a POU declares AT one, and of global variables."""
     own = image.types.get(fold(image.bodies[body].name))
     names = Names(image.symbols, image.layout.areas)
@@ -96,4 +97,4 @@ def drawing(plc: Plc, scans: str | None) -> Iterator[None]:
         if before != (made.scan, made.base):
             before = made.scan, made.base
             click.echo(f"scan {made.scan}, {names.instance(made.base)}")
-        _draw(plc.image, made.picture, chart_width(), made.states)
+        _draw(made.picture, chart_width(), Sight(made.states, _places(plc.image, made.picture.body)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.sax.saxutils import escape
 
-from fbvm.record.box_lines import DOWN, LEFT, RIGHT, THICK, Surface
+from fbvm.syntax.box_lines import DOWN, LEFT, RIGHT, THICK, Surface
 
 CELL_WIDTH, CELL_HEIGHT = 9, 18
 """Pixels of a character."""

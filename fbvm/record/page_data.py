@@ -26,6 +26,7 @@ from fbvm.record.trace_format import PHASES
 from fbvm.record.trace_signals import chosen_signals
 from fbvm.record.trace_writer import Depth
 from fbvm.record.traffic import Passed, Reader
+from fbvm.syntax.rung_drawing import Sight
 from fbvm.watch.paths import UnknownPlace
 
 MOST_ROWS = 200_000
@@ -111,7 +112,7 @@ class Collector:
             key = made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items())
             if key not in self.drawings and len(self.pictures) < MOST_PICTURES:
                 self.drawings[key] = len(self.pictures)
-                self.pictures.append("\n".join(ladder_text(made.picture, RUNG_WIDTH, made.states)))
+                self.pictures.append("\n".join(ladder_text(made.picture, RUNG_WIDTH, Sight(made.states))))
             if key in self.drawings:
                 instance = self.instances.setdefault(self._trace.names.instance(made.base), len(self.instances))
                 self.ladder.setdefault(scan, []).append([instance, self.drawings[key]])

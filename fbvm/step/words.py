@@ -9,6 +9,7 @@ from fbvm.code.image import Site
 from fbvm.record.inside import Frame
 from fbvm.record.ladder_text import ladder_text
 from fbvm.step.session import Session
+from fbvm.syntax.rung_drawing import Sight
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import show, show_time
 
@@ -87,7 +88,7 @@ class Words:
         for rung in chosen:
             seen = [made.states for made in self._session.rungs
                     if made.picture is rung and made.base == statement.frame.base]  # fmt: skip
-            yield from ladder_text(rung, WIDEST_RUNG, seen[-1] if seen and seen[-1] else None)
+            yield from ladder_text(rung, WIDEST_RUNG, Sight(seen[-1] if seen and seen[-1] else None))
 
     def changes(self) -> Iterator[str]:
         """What the last move changed."""

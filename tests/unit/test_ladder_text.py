@@ -12,8 +12,9 @@ from fbvm.code.image import Image
 from fbvm.plc import Plc
 from fbvm.record.history import looking
 from fbvm.record.ladder_svg import ladder_svg
-from fbvm.record.ladder_text import ladder_text, rung_surface
+from fbvm.record.ladder_text import ladder_surface, ladder_text
 from fbvm.record.power import Executed, Power
+from fbvm.syntax.rung_drawing import Sight
 
 
 def image(rungs: str, declarations: str = "a, b, c, d, e, f : BOOL;") -> Image:
@@ -40,10 +41,10 @@ DRAWINGS = {
         │       └──┤ ├────┤/├─┘          │
     """),
     "branch points": ("LD a\nOUT TR0\nAND b\nOUT c\nLD TR0\nANDNOT d\n@SET e", """
-        │   a      b             c   │
-        ├──┤ ├─┬──┤ ├───────────( )──┤
-        │      │   d            e    │
-        │      └──┤/├────────(@SET)──┤
+        │   a      b           c   │
+        ├──┤ ├─┬──┤ ├─────────( )──┤
+        │      │   d          e    │
+        │      └──┤/├────────(@S)──┤
     """),
     "edges": ("@LD a\n%AND b\nUP\nDIFU c", """
         │   a      b    ┌────┐       c   │
@@ -57,15 +58,15 @@ DRAWINGS = {
         ├──┤ ├────┤ ├──┤ #10 │ │
         │              └─────┘ │
     """),
-    "a block that lets power on": ("LD a\nFBCALL TON t IN:=b PT:=T#1s\nAND t.Q\nOUT c", """
-        │   a    ┌──────────┐    t.Q       c   │
-        ├──┤ ├───┤ t : TON  ├────┤ ├──────( )──┤
-        │        │ IN:=b    │                  │
-        │        │ PT:=T#1s │                  │
-        │        └──────────┘                  │
+    "a block that lets power on": ("LD a\nFBCALL TON t IN:=b PT:=T#1s Q=>c\nAND t.Q\nOUT c", """
+        │   a        ┌─ t : TON ─┐     t.Q       c   │
+        ├──┤ ├───────┤EN      ENO├─────┤ ├──────( )──┤
+        │          b╶┤IN         │                   │
+        │       T#1s╶┤PT        Q├╴c                 │
+        │            └───────────┘                   │
     """),
     "a comparison": ("LD=S D0 -5\nOR a\nOUT b", """
-        │   D0 -5          b   │
+        │  D0 -5           b   │
         ├┬──┤=S├─┬────────( )──┤
         ││   a   │             │
         │└──┤ ├──┘             │
@@ -94,7 +95,7 @@ def test_a_long_rung_goes_on_below() -> None:
 
 def test_addresses_stand_below_and_nothing_collides() -> None:
     here = image("LD Start\nOUT W0.00", "Start AT CIO 0.05 : BOOL;")
-    assert ladder_text(here.rungs[0], places=lambda name: {"Start": "0.05"}.get(name, ""))[1:] == text("""
+    assert ladder_text(here.rungs[0], sight=Sight(places=lambda name: {"Start": "0.05"}.get(name, "")))[1:] == text("""
         │ Start         W0.00  │
         ├──┤ ├───────────( )───┤
         │ 0.05                 │
@@ -130,7 +131,7 @@ def executed(rungs: str, on: str, declarations: str = "a, b, c, d, e, f : BOOL;"
 
 def lit(rungs: str, on: str) -> list[str]:
     made = executed(rungs, on)[0]
-    return ladder_text(made.picture, states=made.states)[1:]
+    return ladder_text(made.picture, sight=Sight(made.states))[1:]
 
 
 def test_power_ends_at_a_contact_that_is_open() -> None:
@@ -146,14 +147,14 @@ def test_power_is_what_was_seen_and_not_what_is_there_at_the_end_of_the_scan() -
     """The contact was closed when the rung was executed; the next rung opens it."""
     first, second = executed("LD a\nOUT b\nLD P_On\nRSET a\n", "a")
     assert first.states == {0: [True], 1: [True]}
-    assert "┫ ┣━━" in ladder_text(first.picture, states=first.states)[2]
+    assert "┫ ┣━━" in ladder_text(first.picture, sight=Sight(first.states))[2]
     assert second.picture.steps[1][2] == "RSET"
 
 
 def test_a_rung_that_was_passed_over_is_not_there() -> None:
     made = executed("LD a\nJMP 1\nLD b\nOUT c\nJME 1", "b")
     assert [len(one.states) for one in made] == [2, 0, 0]
-    assert "┫" not in "".join(ladder_text(made[1].picture, states=made[1].states))
+    assert "┫" not in "".join(ladder_text(made[1].picture, sight=Sight(made[1].states)))
 
 
 def test_each_instance_has_its_own_power() -> None:
@@ -177,7 +178,7 @@ def test_each_instance_has_its_own_power() -> None:
 
 def test_a_picture_is_well_formed_and_shows_power() -> None:
     made = executed("LD= D0 #0\nOUT a", "")[0]
-    root = ElementTree.fromstring(ladder_svg([rung_surface(made.picture, 60, made.states)]))
+    root = ElementTree.fromstring(ladder_svg([ladder_surface(made.picture, 60, Sight(made.states))]))
     kinds = [(part.tag.rpartition("}")[2], part.get("class")) for part in root]
     assert ("path", None) in kinds and ("path", "power") in kinds and ("text", "head") in kinds
     assert "D0 #0" in [part.text for part in root]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from fbvm.code.image import RungPicture
+StepText = tuple[str, str, tuple[str, ...]]
+"""Prefix, mnemonic and operands of an instruction."""
 
 
 class Undrawable(Exception):
@@ -18,29 +19,44 @@ class Contact:
 
     step: int
     mark: str
-    label: str
+    operands: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A pin of a function block: an input with what enters it, or an output with where its value goes."""
+
+    name: str
+    operand: str
+    output: bool = False
 
 
 @dataclass(eq=False)
 class Box:
-    """What is drawn as a box; `inputs` are the conditions below the first one.  One with `through` lets power on."""
+    """What is drawn as a box.  `inputs` are the conditions below the first one; one with `through` lets power on.
+
+    A function block has an `instance`, and names of the pins that conditions enter; others have operands."""
 
     step: int
-    lines: tuple[str, ...]
+    name: str
+    operands: tuple[str, ...] = ()
     inputs: tuple[Series, ...] = ()
     through: bool = False
+    instance: str = ""
+    pins: tuple[Pin, ...] = ()
+    entries: tuple[str, ...] = ()
 
 
 @dataclass(eq=False)
 class Coil:
     step: int
     mark: str
-    label: str
+    operands: tuple[str, ...]
 
 
 @dataclass(eq=False)
 class Series:
-    parts: list[Contact | Box | Parallel] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
 
 
 @dataclass(eq=False)
@@ -53,7 +69,18 @@ class Point:
     """A place behind a series from which power goes on to outputs and to other points; the first one is the bus bar."""
 
     path: Series
-    outs: list[Coil | Box | Point] = field(default_factory=list)
+    outs: list[Out] = field(default_factory=list)
+
+
+Part = Contact | Box | Parallel
+Out = Coil | Box | Point
+
+CALL = "CALL"
+"""The call of a block in Structured Text, as a step: type, instance, pins; a pin takes a condition where nothing enters it."""
+COILS = {"OUT": " ", "OUTNOT": "/", "SET": "S", "RSET": "R", "DIFU": "↑", "DIFD": "↓"}
+EDGES = {"": "", "@": "↑", "%": "↓"}
+INPUTS = {"KEEP": 2, "CNT": 2, "CNTX": 2, "TTIM": 2, "TTIMX": 2, "CNTR": 3, "CNTRX": 3, "SFT": 3}
+"""Instructions that take several conditions."""
 
 
 @dataclass
@@ -65,11 +92,14 @@ class _Condition:
         return not self.path.parts
 
 
-def diagram(picture: RungPicture) -> Point:
+def diagram(steps: Sequence[StepText]) -> Point:
     """The bus bar of a rung with all that hangs on it.  Raises Undrawable."""
     reader = _Reader()
-    for number, (_, prefix, mnemonic, operands) in enumerate(picture.steps):
-        reader.step(number, prefix.replace("!", ""), mnemonic, operands)
+    try:
+        for number, (prefix, mnemonic, operands) in enumerate(steps):
+            reader.step(number, prefix, mnemonic, operands)
+    except IndexError:
+        raise Undrawable from None
     reader.finish()
     return reader.bar
 
@@ -82,12 +112,17 @@ class _Reader:
         self.now = _Condition(self.bar, Series())
         self.stack: list[_Condition] = []
         self.kept: dict[str, Point] = {}
+        self.lost = False
+        """Whether the condition is that of the last input of a box, which nothing can be drawn behind."""
 
     def step(self, number: int, prefix: str, mnemonic: str, operands: tuple[str, ...]) -> None:
         if operands and operands[0].upper() in self.kept and mnemonic == "LD":
-            self.now = _Condition(self.kept[operands[0].upper()], Series())
+            self.now, self.lost = _Condition(self.kept[operands[0].upper()], Series()), False
             return
-        join = _joined(mnemonic)
+        join = joined(mnemonic)
+        self.lost &= join is None or join[0] != "LD"
+        if self.lost:
+            raise Undrawable
         if join is not None and (operands or join[1]):
             self._join(join[0], _contact(number, prefix, join[1], operands))
         elif mnemonic in _SINGLE:
@@ -102,7 +137,7 @@ class _Reader:
             self.now = _Condition(self.bar, Series([contact]))
         elif how == "AND":
             self.now.path.parts.append(contact)
-        elif self.now.is_empty():
+        elif self.now.is_empty() or self.now.start is not self.bar:
             raise Undrawable
         else:
             self.now.path = Series([Parallel([*_branches(self.now.path), Series([contact])])])
@@ -122,7 +157,7 @@ class _Reader:
 
     def inline(self, number: int, text: str) -> None:
         """NOT, UP, DOWN change the condition where they stand."""
-        self.now.path.parts.append(Box(number, (text,), through=True))
+        self.now.path.parts.append(Box(number, text, through=True))
 
     def _point(self) -> Point:
         """The point at which the condition is now; made if there is none."""
@@ -134,29 +169,38 @@ class _Reader:
         return point
 
     def _output(self, number: int, prefix: str, mnemonic: str, operands: tuple[str, ...]) -> None:
-        name = prefix + mnemonic
         if mnemonic == "OUT" and operands[0].upper().startswith("TR") and operands[0][2:].isdigit():
             self.kept[operands[0].upper()] = self._point()
-        elif mnemonic in _COILS:
-            mark = _COILS[mnemonic] if not prefix else name
-            self._point().outs.append(Coil(number, mark, operands[0]))
+        elif mnemonic in COILS:
+            self._point().outs.append(Coil(number, coil_mark(prefix, mnemonic), operands))
         elif mnemonic == "FBCALL":
-            self.now.path.parts.append(Box(number, (f"{operands[1]} : {operands[0]}", *operands[2:]), through=True))
-        elif mnemonic in _INPUTS:
-            self._with_inputs(number, name, operands, _INPUTS[mnemonic])
+            block, instance, *pins = operands
+            self.now.path.parts.append(
+                Box(number, block, (), (), True, instance, tuple(map(_pin, pins)), ("EN",)))
+        elif mnemonic == CALL:
+            block, instance, *pins = operands
+            entries = tuple(pin.name for pin in map(_pin, pins) if not pin.operand)
+            given = tuple(pin for pin in map(_pin, pins) if pin.operand)
+            self._box(Box(number, block, (), (), False, instance, given, entries), len(entries))
         else:
-            self._point().outs.append(Box(number, (name, *operands)))
+            self._box(Box(number, prefix + mnemonic, operands), INPUTS.get(mnemonic, 1))
 
-    def _with_inputs(self, number: int, name: str, operands: tuple[str, ...], count: int) -> None:
-        """A box with several inputs: the last blocks; all but the first begin at the bus bar."""
+    def _box(self, box: Box, count: int) -> None:
+        """A box at the end of a rung.  If it has several inputs, they are the last blocks; all but the first begin at the
+        bus bar."""
+        if count < 2:
+            start = self.bar if box.instance and not count else self._point()
+            start.outs.append(box)
+            return
         blocks = [*self.stack[len(self.stack) - count + 1:], self.now]
-        if len(blocks) < count or any(block.start is not self.bar for block in blocks[1:]):
+        if len(blocks) < count or any(block.start is not self.bar or block.is_empty() for block in blocks[1:]):
             raise Undrawable
         del self.stack[len(self.stack) - count + 1:]
         self.now = blocks[0]
-        self._point().outs.append(Box(number, (name, *operands), tuple(block.path for block in blocks[1:])))
-        if self.now.start is self.bar:
-            self.now = _Condition(self.bar, Series())
+        box.inputs = tuple(block.path for block in blocks[1:])
+        self._point().outs.append(box)
+        self.lost = self.now.start is not self.bar
+        self.now = self.now if self.lost else _Condition(self.bar, Series())
 
     def finish(self) -> None:
         """A path behind which nothing stands, as a block whose ENO nobody uses, goes on to the end."""
@@ -171,7 +215,7 @@ def _branches(path: Series) -> list[Series]:
     return [path]
 
 
-def _joined(mnemonic: str) -> tuple[str, str] | None:
+def joined(mnemonic: str) -> tuple[str, str] | None:
     """How a mnemonic of a contact joins, and what is behind LD, AND, OR in it; None for all others."""
     for how in ("LD", "AND", "OR"):
         rest = mnemonic.removeprefix(how)
@@ -181,14 +225,24 @@ def _joined(mnemonic: str) -> tuple[str, str] | None:
 
 
 def _contact(number: int, prefix: str, rest: str, operands: tuple[str, ...]) -> Contact:
-    if rest in ("", "NOT"):
-        edge = {"": "", "@": "↑", "%": "↓"}[prefix]
-        return Contact(number, ("/" if rest else "") + edge or " ", operands[0])
-    return Contact(number, rest, " ".join(operands))
+    if rest not in ("", "NOT"):
+        return Contact(number, prefix + rest, operands)
+    at_once, edge = "!" * ("!" in prefix), EDGES[prefix.replace("!", "")]
+    return Contact(number, at_once + ("/" if rest else "") + edge or " ", operands)
 
 
-_COILS = {"OUT": " ", "OUTNOT": "/", "SET": "S", "RSET": "R", "DIFU": "↑", "DIFD": "↓"}
-_INPUTS = {"KEEP": 2, "CNT": 2, "CNTX": 2, "TTIM": 2, "TTIMX": 2, "CNTR": 3, "CNTRX": 3, "SFT": 3}
+def coil_mark(prefix: str, mnemonic: str) -> str:
+    """What stands between the brackets of a coil."""
+    mark = COILS[mnemonic]
+    return (prefix + mark.strip()) or mark
+
+
+def _pin(text: str) -> Pin:
+    sign = ":=" if ":=" in text else "=>"
+    name, _, operand = text.partition(sign)
+    return Pin(name, operand, sign == "=>")
+
+
 _SINGLE: dict[str, Callable[[_Reader, int], None]] = {
     "ANDLD": lambda reader, _: reader.block("AND"), "ORLD": lambda reader, _: reader.block("OR"),
     "NOT": lambda reader, number: reader.inline(number, "NOT"), "UP": lambda reader, number: reader.inline(number, "UP"),

@@ -1,0 +1,94 @@
+"""Boxes of a rung as they are drawn: what stands on which of their rows, and how wide that is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+from fbvm.syntax.rung_diagram import Box, Pin
+
+Values = Callable[[int, str], str]
+
+
+class Row(NamedTuple):
+    """A row of a box: what stands inside at the left and at the right, and beside it what enters and what leaves."""
+
+    left: str
+    right: str = ""
+    entering: str = ""
+    leaving: str = ""
+
+
+class Shape(NamedTuple):
+    """A box: `left`, `wide` and `right` are the columns of what enters, from side to side, and of what leaves."""
+
+    title: str
+    heads: tuple[Row, ...]
+    """Rows on the lines of conditions."""
+    rows: tuple[Row, ...]
+    left: int
+    wide: int
+    right: int
+    inset: int
+    """Columns from the left side to the text of a row."""
+
+    def placed(self, conditions: Sequence[int]) -> dict[int, Row]:
+        """Its rows by their distance from the upper side; conditions come in on some."""
+        made = dict(zip(conditions, self.heads, strict=False))
+        free = max(made, default=0) + 1
+        return made | dict(enumerate(self.rows, free))
+
+
+def shape(box: Box, values: Values) -> Shape:
+    """How a box is drawn, with the values that its operands had."""
+    if box.instance:
+        return _block(box, values)
+    texts = [_valued(box.step, operand, values) for operand in box.operands]
+    wide = max(map(len, (box.name, *texts))) + 3
+    return Shape("", (Row(box.name),), tuple(map(Row, texts)), 0, wide, 0, 2)
+
+
+def _block(box: Box, values: Values) -> Shape:
+    """A function block: its instance and type in its upper side, operands beside its pins."""
+    heads = tuple(Row(name, "ENO" if box.through else "") for name in box.entries)
+    rows = tuple(_rows(box, values))
+    everything = (*heads, *rows)
+    title = f" {box.instance} : {box.name} "
+    inside = max((len(row.left) + len(row.right) + 2 * bool(row.right) for row in everything), default=0)
+    return Shape(title, heads, rows, _widest(row.entering for row in rows), max(len(title) + 3, inside + 2),
+                 _widest(row.leaving for row in rows), 1)
+
+
+def _widest(texts: Iterator[str]) -> int:
+    """Columns of the longest text and the line to it."""
+    longest = max(map(len, texts), default=0)
+    return longest + 1 if longest else 0
+
+
+def _rows(box: Box, values: Values) -> Iterator[Row]:
+    """The pins in their order: one that gives stands beside the one before if that takes."""
+    before: Pin | None = None
+    for pin in box.pins:
+        if before is not None and pin.output:
+            yield _row(box, before, pin, values)
+            before = None
+            continue
+        if before is not None:
+            yield _row(box, before, None, values)
+        before = None if pin.output else pin
+        if pin.output:
+            yield _row(box, None, pin, values)
+    if before is not None:
+        yield _row(box, before, None, values)
+
+
+def _row(box: Box, taking: Pin | None, giving: Pin | None, values: Values) -> Row:
+    return Row(taking.name if taking else "", giving.name if giving else "",
+               _valued(box.step, taking.operand, values) if taking else "",
+               _valued(box.step, giving.operand, values) if giving else "")
+
+
+def _valued(step: int, operand: str, values: Values) -> str:
+    """An operand with the value it had."""
+    value = values(step, operand)
+    return f"{operand} = {value}" if value else operand

@@ -1,0 +1,348 @@
+"""Ladder as a drawing of characters: rungs with contacts, coils and boxes, and with thick lines where power was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+from fbvm.syntax.box_lines import Surface
+from fbvm.syntax.rung_boxes import Shape, shape
+from fbvm.syntax.rung_diagram import Box, Coil, Contact, Out, Parallel, Part, Point, Series, StepText, Undrawable, diagram
+
+States = Mapping[int, Sequence[bool]]
+"""What was seen at the steps of a rung in one execution: of a contact its state, of an output the power that reached
+it, of a block the power into it and out of it."""
+LINK = 5
+"""Columns of the arrow with a number at the end of a line that goes on below."""
+LEAST = 24
+"""Columns that a rung needs for anything to be drawn."""
+LEAD = 2
+"""Columns of line on either side of a box."""
+
+
+def _nothing(symbol: str) -> str:
+    return ""
+
+
+def _unseen(step: int, operand: str) -> str:
+    return ""
+
+
+class Sight(NamedTuple):
+    """What is known about a rung besides its steps.  No `states` draw it at rest."""
+
+    states: States | None = None
+    places: Callable[[str], str] = _nothing
+    """The address behind a symbol, "" if it has none."""
+    values: Callable[[int, str], str] = _unseen
+    """The value that an operand of a step had, "" if nobody has seen one."""
+
+
+AT_REST = Sight()
+
+
+def rung_text(steps: Sequence[StepText], width: int = 80, sight: Sight = AT_REST) -> list[str]:
+    """The lines of a rung without its headline.
+
+    Rungs that have no drawing, as one with an OR behind an output, are shown as their instructions."""
+    return rung_surface(steps, width, sight).rows()
+
+
+def rung_surface(steps: Sequence[StepText], width: int = 80, sight: Sight = AT_REST) -> Surface:
+    """The drawing of a rung; see `rung_text`."""
+    try:
+        return drawn(diagram(steps), width, sight)
+    except Undrawable:
+        surface = Surface()
+        for row, (prefix, mnemonic, operands) in enumerate(steps):
+            surface.write(4, row, f"{prefix}{mnemonic} {' '.join(operands)}".rstrip())
+        return surface
+
+
+def drawn(bar: Point, width: int = 80, sight: Sight = AT_REST) -> Surface:
+    """The drawing of a diagram.  It is wider than `width` only if a single element is."""
+    width = max(LEAST, min(width, _reach(bar, sight)))
+    while True:
+        drawing = _Drawing(width, sight)
+        surface = drawing.drawn(bar)
+        if drawing.need <= width:
+            return surface
+        width = drawing.need
+
+
+class _Rest(NamedTuple):
+    """What a line left for another one further down."""
+
+    number: int
+    point: Point
+    power: bool | None
+
+
+class _Drawing:
+    """Draws one rung.  Power is True, False, or None at rest."""
+
+    def __init__(self, width: int, sight: Sight) -> None:
+        self.surface = Surface()
+        self.width, self.sight = width, sight
+        self.need = 0
+        """Columns that would have been enough for what did not fit."""
+        self._start = 0
+        """The column in which the line at work begins."""
+        self._left: list[_Rest] = []
+        self._links = 0
+
+    def drawn(self, bar: Point) -> Surface:
+        alive = self.sight.states is not None
+        depth = self._outs(bar, 0, 0, alive, False, trunk=True)
+        while self._left:
+            rest = self._left.pop(0)
+            self._start = self._go_on(rest.number, 2, depth, bool(rest.power))
+            depth = self._point(rest.point, self._start, depth, rest.power, False)
+        for x, thick in ((0, alive), (self.width - 1, False)):
+            self.surface.down(x, -1, depth, thick)
+        self.surface.cut(depth)
+        return self.surface
+
+    def _state(self, step: int, which: int = -1) -> bool | None:
+        """What was seen at a step; None at rest or if it was not reached."""
+        if self.sight.states is None:
+            return None
+        seen = self.sight.states.get(step)
+        return bool(seen[which]) if seen else False
+
+    def _shape(self, box: Box) -> Shape:
+        return shape(box, self.sight.values)
+
+    # --- branch points and outputs ----------------------------------------------------------------------------------
+
+    def _outs(self, point: Point, x: int, y: int, power: bool | None, is_open: bool, trunk: bool = False) -> int:
+        """What hangs on a point in column x whose line is in the row below y; the row behind it all.
+
+        `is_open`: a line passes below what is drawn here, so nothing may come from the left."""
+        first = last = y + 1
+        for position, out in enumerate(point.outs):
+            last = y + 1
+            passed = is_open or not trunk and position + 1 < len(point.outs)
+            if isinstance(out, Point):
+                y = self._point(out, x, y, power, passed)
+            elif isinstance(out, Box) and out.inputs and passed:
+                y = self._leave(Point(Series(), [out]), x, y, power)
+            else:
+                y = self._output(out, x, y, power)
+        if not trunk:
+            self.surface.down(x, first, last, bool(power))
+        if not point.outs:
+            self.surface.across(x, self.width - 1, y + 1, bool(power))
+            y += 2
+        return y
+
+    def _point(self, point: Point, x: int, y: int, power: bool | None, is_open: bool) -> int:
+        """A path, and what hangs on its end; what does not fit is left for another line."""
+        depth, parts = y, point.path.parts
+        for at, part in enumerate(parts):
+            behind = LINK if at + 1 < len(parts) else _needed(point, self.sight)
+            if x + _part_width(part, self.sight) + behind > self.width and x > max(self._start, LINK):
+                return max(depth, self._leave(Point(Series(parts[at:]), point.outs), x, y, power))
+            wide = self._fitting(part, self.width - behind - x)
+            height, power = self._part(part, x, y, power, wide)
+            x, depth = x + wide, max(depth, y + height)
+            self._take(x + behind)
+        return max(depth, self._outs(point, x, y, power, is_open))
+
+    def _leave(self, rest: Point, x: int, y: int, power: bool | None) -> int:
+        """End a line with an arrow and a number; the rest of it begins with them, in a line below all that is begun."""
+        self._links += 1
+        self._left.append(_Rest(self._links, rest, power))
+        self._arrow(self._links, x, y, bool(power))
+        return y + 2
+
+    def _arrow(self, number: int, x: int, y: int, power: bool) -> None:
+        self.surface.across(x, x + 2, y + 1, power)
+        self.surface.write(x + 2, y + 1, f"►{number}")
+        self._take(x + 4 + len(str(number)))
+
+    def _go_on(self, number: int, x: int, y: int, power: bool) -> int:
+        """Begin a line with an arrow in column x; the column behind it."""
+        mark = f"►{number}"
+        self.surface.write(x, y + 1, mark)
+        self.surface.across(x + len(mark), x + len(mark) + 2, y + 1, power)
+        return x + len(mark) + 2
+
+    def _take(self, columns: int) -> None:
+        if columns > self.width:
+            self.need = max(self.need, columns)
+
+    def _output(self, out: Coil | Box, x: int, y: int, power: bool | None) -> int:
+        seen = self._state(out.step, 0)
+        on = bool(power if seen is None else seen)
+        end = self.width - 1
+        self._take(x + _output_width(out, self.sight))
+        if isinstance(out, Coil):
+            mark, label = f"({out.mark})", " ".join(out.operands)
+            at = end - 2 - max(len(mark), (self._label_width(out) + len(mark)) // 2)
+            self.surface.across(x, at, y + 1, on)
+            self.surface.across(at + len(mark) - 1, end, y + 1, on)
+            self.surface.write(at, y + 1, mark)
+            return y + 2 + self._labels(label, self.sight.places(label), at, len(mark), y)
+        made = self._shape(out)
+        at = end - made.right - made.wide - 2
+        if out.entries or not out.instance:
+            self.surface.across(x, at, y + 1, on)
+        return y + self._box(made, at, y, [1, *self._more_inputs(out, y, at, bool(on))])
+
+    def _more_inputs(self, box: Box, y: int, until: int, on: bool) -> list[int]:
+        """The conditions below the first one, each from the bus bar to the box; the rows of their lines, counted from y."""
+        rows, row = [], y + 2
+        for path in box.inputs:
+            height, power, line, x = self._series(path, 0, row, self.sight.states is not None or None, until - 1)
+            self.surface.across(x, until, line, bool(power))
+            self._take(x + self.width - until + 1)
+            rows.append(line - y)
+            row += height
+        return rows
+
+    def _box(self, made: Shape, x: int, y: int, conditions: Sequence[int]) -> int:
+        """A box whose first condition is on the line; how many rows it takes."""
+        rows = made.placed(conditions)
+        deep = max([*rows, *conditions, 1]) + 1
+        for edge in (y, y + deep):
+            self.surface.across(x, x + made.wide, edge)
+        for side in (x, x + made.wide):
+            self.surface.down(side, y, y + deep)
+        if made.title:
+            self.surface.write(x + 2, y, made.title)
+        for at, row in rows.items():
+            self.surface.write(x + made.inset, y + at, row.left)
+            self.surface.write(x + made.wide - len(row.right), y + at, row.right)
+            if row.entering:
+                self.surface.across(x - 1, x, y + at)
+                self.surface.write(x - 1 - len(row.entering), y + at, row.entering)
+            if row.leaving:
+                self.surface.across(x + made.wide, x + made.wide + 1, y + at)
+                self.surface.write(x + made.wide + 2, y + at, row.leaving)
+        return deep + 1
+
+    def _labels(self, label: str, below: str, x: int, wide: int, y: int) -> int:
+        """A name above a mark and an address or a value below; how many rows that are more than two."""
+        self.surface.write(x + (wide - len(label)) // 2, y, label)
+        if below:
+            self.surface.write(x + (wide - len(below)) // 2, y + 2, below)
+        return bool(below)
+
+    def _label_width(self, drawn: Contact | Coil) -> int:
+        return _label_width(drawn, self.sight)
+
+    # --- conditions: each gives the rows that it takes and the power behind it --------------------------------------
+
+    def _series(self, path: Series, x: int, y: int, power: bool | None, limit: int) -> tuple[int, bool | None, int, int]:
+        """Parts one behind the other that end left of `limit`, in several lines if need be: also the row and the column
+        in which the last line ends."""
+        top, start, begin, height = y, x, x, 2
+        for at, part in enumerate(path.parts):
+            behind = LINK if at + 1 < len(path.parts) else 0
+            if x + _part_width(part, self.sight) + behind > limit and x > begin:
+                self._links += 1
+                self._arrow(self._links, x, y, bool(power))
+                y, height = y + height, 2
+                x = begin = self._go_on(self._links, start + 2, y, bool(power))
+            wide = self._fitting(part, limit - behind - x)
+            rows, power = self._part(part, x, y, power, wide)
+            x, height = x + wide, max(height, rows)
+            self._take(x + behind - limit + self.width)
+        return y + height - top, power, y + 1, x
+
+    def _fitting(self, part: Part, room: int) -> int:
+        """The columns for a part where there are so many: branches can be made to go on below."""
+        natural = _part_width(part, self.sight)
+        return max(room, LEAST // 2) if isinstance(part, Parallel) and room < natural else natural
+
+    def _part(self, part: Part, x: int, y: int, power: bool | None, wide: int) -> tuple[int, bool | None]:
+        if isinstance(part, Contact):
+            return self._contact(part, x, y, power, wide)
+        if isinstance(part, Parallel):
+            return self._parallel(part, x, y, power, wide)
+        made = self._shape(part)
+        at = x + max(LEAD, made.left + 1)
+        self.surface.across(x, at, y + 1, bool(power))
+        height = self._box(made, at, y, [1])
+        out = self._state(part.step) and (power or not part.instance)
+        self.surface.across(at + made.wide, x + wide, y + 1, bool(out))
+        return height, out
+
+    def _contact(self, contact: Contact, x: int, y: int, power: bool | None, wide: int) -> tuple[int, bool | None]:
+        mark = f"┤{contact.mark}├"
+        state = self._state(contact.step)
+        out = None if state is None else bool(power and state)
+        at = x + (wide - len(mark) + 1) // 2 + 1
+        self.surface.across(x, at, y + 1, bool(power))
+        self.surface.across(at + len(mark) - 1, x + wide, y + 1, bool(out))
+        self.surface.write(at, y + 1, mark if not state else f"┫{contact.mark}┣")
+        below = _below(contact, self.sight)
+        return 2 + self._labels(" ".join(contact.operands), below, at, len(mark), y), out
+
+    def _parallel(self, parallel: Parallel, x: int, y: int, power: bool | None, wide: int) -> tuple[int, bool | None]:
+        left, right, top = x + 1, x + wide - 1, y
+        self.surface.across(x, left, y + 1, bool(power))
+        powers, begun, ended = [], y + 1, y + 1
+        for branch in parallel.branches:
+            begun = y + 1
+            height, out, ended, end = self._series(branch, left, y, power, right)
+            self.surface.across(end, right, ended, bool(out))
+            powers.append(out)
+            y += height
+        on = any(powers)
+        self.surface.down(left, top + 1, begun, bool(power))
+        self.surface.down(right, top + 1, ended, on)
+        self.surface.across(right, x + wide, top + 1, on)
+        return y - top, None if powers[0] is None else on
+
+
+# --- widths ---------------------------------------------------------------------------------------------------------
+
+
+def _reach(point: Point, sight: Sight) -> int:
+    """The columns that a rung takes on one line."""
+    behind = [_reach(out, sight) if isinstance(out, Point) else _output_width(out, sight) for out in point.outs]
+    return _series_width(point.path, sight) + 2 + max(behind, default=4)
+
+
+def _needed(point: Point, sight: Sight) -> int:
+    """The columns that must be left behind a path: for what ends the rung, or for an arrow."""
+    return max((_end_width(out, sight) for out in point.outs), default=2)
+
+
+def _end_width(out: Out, sight: Sight) -> int:
+    return LINK if isinstance(out, Point) else _output_width(out, sight)
+
+
+def _below(contact: Contact, sight: Sight) -> str:
+    """What stands below a contact: its address, or the values that it compares."""
+    if len(contact.operands) == 1:
+        return sight.places(contact.operands[0])
+    seen = [value for operand in contact.operands if (value := sight.values(contact.step, operand))]
+    return f"= {', '.join(seen)}" if seen else ""
+
+
+def _label_width(drawn: Contact | Coil, sight: Sight) -> int:
+    below = _below(drawn, sight) if isinstance(drawn, Contact) else sight.places(" ".join(drawn.operands))
+    return max(len(" ".join(drawn.operands)), len(below))
+
+
+def _part_width(part: Part, sight: Sight) -> int:
+    if isinstance(part, Contact):
+        return max(len(part.mark) + 6, _label_width(part, sight) + 2)
+    if isinstance(part, Box):
+        made = shape(part, sight.values)
+        return max(LEAD, made.left + 1) + made.wide + max(LEAD, made.right + 1)
+    return max(_series_width(branch, sight) for branch in part.branches) + 2
+
+
+def _series_width(path: Series, sight: Sight) -> int:
+    return sum(_part_width(part, sight) for part in path.parts)
+
+
+def _output_width(out: Coil | Box, sight: Sight) -> int:
+    if isinstance(out, Coil):
+        return max(len(out.mark) + 6, _label_width(out, sight) + 6)
+    made = shape(out, sight.values)
+    return max(1, made.left + 1) + made.wide + made.right + 3
