@@ -30,6 +30,7 @@ class Dialect:
     numbers_of_enumerations: bool = False
     number_times_duration: bool = False
     mixed_arguments: bool = False
+    bare_actions: bool = False
 
 
 QUESTIONS = {
@@ -48,6 +49,7 @@ QUESTIONS = {
     "number_times_duration": ("2 * T#5s", "an error: the TIME stands in front", "T#10s"),
     "mixed_arguments": ("F(1, b := 2): some arguments named, some not", "an error",
                         "those without a name are for the parameters that none names, in order"),
+    "bare_actions": ("Reset; where Reset is an ACTION", "an error", "a call of it"),
     "libraries": ("blocks that begin or end another way", "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
 }
@@ -58,7 +60,7 @@ _ROWS = (
     STANDARD,
     Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
             lenient_positions=True, real_bits_by_value=True, arithmetic_of_bits=True, integers_and_bits=True,
-            numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True),
+            numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, bare_actions=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True),
     Dialect("rusty", "programs for RuSTy", loop_ends_each_pass=True, arithmetic_of_bits=True, integers_and_bits=True,
             numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True),

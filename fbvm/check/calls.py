@@ -64,7 +64,7 @@ class Calls:
         callee = call.callee
         variable = self.expressions.variable(callee.text) if isinstance(callee, tree.NameRef) else None
         name = callee.text if isinstance(callee, tree.NameRef) else qualified.bare(self.expressions, callee)
-        if variable is None and (action := self._action(callee, name)) is not None:
+        if (action := self.action(callee)) is not None:
             return self._bind_action(call, action)
         if name is None or variable is not None and variable.kind != "RESULT":
             return self._instance(call, as_value)
@@ -81,8 +81,11 @@ class Calls:
             return None
         return self.standard.call(call, fold(name), want, as_value)
 
-    def _action(self, callee: tree.Expr, name: str | None) -> tuple[Pou, tree.Expr | None] | None:
-        """The ACTION that is called, of an instance or of the POU itself."""
+    def action(self, callee: tree.Expr) -> tuple[Pou, tree.Expr | None] | None:
+        """The ACTION that an expression names, and the instance of which; None for one of the POU itself."""
+        if isinstance(callee, tree.NameRef) and self.expressions.variable(callee.text) is not None:
+            return None
+        name = callee.text if isinstance(callee, tree.NameRef) else qualified.bare(self.expressions, callee)
         if name is not None:
             home = self.expressions.pou.owner if self.expressions.pou is not None else None
             action = home.actions.get(fold(name)) if home is not None else None

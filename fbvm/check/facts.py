@@ -222,6 +222,8 @@ class Facts:
     """Calls whose result is the whole value of an assignment."""
     turned: set[tree.Call] = field(default_factory=set)
     """Calls whose result is what lies in memory, its bytes in another order."""
+    bare: dict[tree.CallStatement, tree.Call] = field(default_factory=dict)
+    """Statements that name an ACTION without (), and the calls that they mean."""
     text_cases: set[tree.Case] = field(default_factory=set)
     """CASE statements that choose by a STRING."""
     sources: dict[tree.Node, Source] = field(default_factory=dict)

@@ -34,9 +34,11 @@ _QUALIFIERS = {
     "VAR_GLOBAL": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"),
     "VAR_STAT": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"),
 }
+_LOCATED = ("VAR", "VAR_INPUT", "VAR_OUTPUT")
+"""Sections of blocks and programs whose variables may lie AT an address."""
 BORROWED = (OpenArrayType, AnyType)
 """Types whose slot holds a reference and more."""
-_LATER = ("VAR_INST", "VAR_ACCESS", "VAR_CONFIG")
+_LATER = ("VAR_INST", "VAR_GENERIC", "VAR_ACCESS", "VAR_CONFIG")
 
 
 class Interfaces:
@@ -226,13 +228,15 @@ class Interfaces:
             variable.place = "abs"  # one for all instances and calls
         elif variable.kind == "VAR_TEMP" or pou.is_function:
             variable.place = "self" if pou.is_function else "frame"
-        if declared.location is not None and is_open(declared.location) and variable.kind == "VAR" and not pou.is_function:
-            self._completed(variable, declared.location, pou)
-        elif declared.location is not None:
-            if variable.kind != "VAR" or pou.is_function:
+        if declared.location is not None:
+            located = variable.kind in _LOCATED and not pou.is_function
+            if located and is_open(declared.location):
+                self._completed(variable, declared.location, pou)
+            else:
+                variable.place = "area"
+            if not located:
                 self.report.add("S0604", pou.source, declared.location,
                                 f"{variable.kind} of a {pou.kind} has no location", "declare it in a VAR section")
-            variable.place = "area"
         if declared.edge:
             self._edge(variable, declared, pou)
         if fold(variable.name) == "EN" and variable.kind == "VAR_INPUT" and not variable.explicit:

@@ -18,7 +18,7 @@ from fbvm.check.facts import Facts, Pou, Report, Variable, list_name
 from fbvm.check.library import Libraries
 from fbvm.check.names import refuse_reserved
 from fbvm.syntax import tree
-from fbvm.syntax.pragmas import attributes
+from fbvm.syntax.pragmas import attributes, pack_mode
 
 
 @dataclass(eq=False)
@@ -27,6 +27,8 @@ class TypeEntry:
 
     tree: tree.TypeDecl
     source: Source
+    pack: int | None = None
+    """The multiple of bytes at which members lie at most, where an attribute says that."""
     resolved: tuple[Type, bytes] | None = None
     busy: bool = False
     known: bool = False
@@ -94,7 +96,7 @@ class Project:
             elif isinstance(declaration, tree.TypeDecl):
                 key = (source.library, fold(declaration.name.text))
                 if not self._twice(key, declaration.name, source, "type"):
-                    self.types[key] = TypeEntry(declaration, source)
+                    self.types[key] = TypeEntry(declaration, source, pack_mode(text, declaration))
             elif isinstance(declaration, tree.GlobalVars):
                 self.sections.append((declaration.section, source))
                 self.lists.add(list_name(source))

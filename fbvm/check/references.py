@@ -1,4 +1,4 @@
-"""References: what may be referred to, REF(), ADR(), SIZEOF() and REF= (IEC 61131-3 ed. 3, table 12, and CODESYS's forms).
+"""References: what may be referred to, REF(), ADR() and REF= (IEC 61131-3 ed. 3, table 12, and CODESYS's forms).
 
 REF() refers to a variable that lives as long as the program: never to VAR_TEMP, to variables of functions or to what an
 in-out stands for.  ADR() and REF= refer to these too; following such a pointer after its POU has ended stops the program.
@@ -10,31 +10,21 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import (
-    BOOL,
     BYTE,
-    DINT,
-    UDINT,
-    AnyType,
     ArrayType,
-    OpenArrayType,
     StructType,
     Type,
     fold,
     pointer,
     reference,
-    string,
 )
-from fbvm.check.arguments import Arguments
-from fbvm.check.facts import UNTYPED_INT, Facts, Holder, StandardCall, Start, Variable
-from fbvm.check.values import MAKERS, is_any, is_null
+from fbvm.check.facts import Facts, Holder, StandardCall, Start, Variable
+from fbvm.check.values import MAKERS, is_null
 from fbvm.check.writes import writable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
-
-SIZES = ("SIZEOF", "XSIZEOF")
-"""CODESYS has the second one for sizes of 64 bits; here both are as wide as they need to be."""
 
 
 def refer(expressions: Expressions, expr: tree.Expr, lasting: bool) -> Type | None:
@@ -170,73 +160,6 @@ def _fits(expressions: Expressions, start: Start) -> bool:
         return kind is not None
     expressions.error("S0705", start.place, f"a {start.kind} is needed here, this is {kind}")
     return False
-
-
-ASKED = ("__ISVALIDREF", "__POUNAME")
-"""Questions of CODESYS's compiler that look like functions."""
-
-
-def asked(expressions: Expressions, call: tree.Call, name: str) -> Type | None:
-    """__ISVALIDREF(r): whether a REFERENCE TO is bound; __POUNAME(): the name of the POU that asks."""
-    values = Arguments(expressions, call, ["REF"] if name == "__ISVALIDREF" else []).in_order()
-    if values is None:
-        return None
-    if name == "__POUNAME":
-        shown = expressions.pou.name.encode("latin-1", "replace") if expressions.pou is not None else b""
-        expressions.facts.constants[call] = shown
-        return string(max(1, len(shown)))
-    kind = expressions.infer(values[0])
-    if kind is None:
-        return None
-    if values[0] not in expressions.facts.followed:
-        expressions.error("S0405", values[0], "this is no variable that is declared REFERENCE TO", "compare a REF_TO with NULL")
-        return None
-    expressions.facts.calls[call] = StandardCall(name, [(values[0], kind)])
-    return BOOL
-
-
-def bound(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr, dimension: tree.Expr) -> Type | None:
-    """LOWER_BOUND(array, dimension) and UPPER_BOUND, as DINT; a constant but for ARRAY [*]."""
-    kind = expressions.infer(value)
-    counted = expressions.settle(dimension)
-    if kind is None or counted is None:
-        return None
-    number = expressions.facts.constants.get(dimension)
-    if isinstance(number, bool) or not isinstance(number, int) or not is_any(counted, "ANY_INT"):
-        expressions.error("S0701", dimension, f"{name} needs its dimension as a constant integer",
-                          "write a number, or declare the name in a VAR CONSTANT section")
-        return None
-    if not isinstance(kind, ArrayType | OpenArrayType):
-        expressions.error("S0405", value, f"{name} needs an array, this is {kind}")
-        return None
-    count = kind.dimensions if isinstance(kind, OpenArrayType) else len(kind.bounds)
-    if not 1 <= number <= count:
-        expressions.error("S0405", dimension, f"{kind} has dimensions 1 to {count}, not {number}")
-        return None
-    if isinstance(kind, ArrayType):
-        expressions.facts.constants[call] = kind.bounds[number - 1][name == "UPPER_BOUND"]
-    else:
-        expressions.facts.calls[call] = StandardCall(name, [(value, kind), (dimension, DINT)], (kind,))
-    return DINT
-
-
-def size(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:
-    """SIZEOF(x) of a variable or a type: bytes, as a literal would be written but for ANY."""
-    kind: Type | None = None
-    if isinstance(value, tree.NameRef) and expressions.variable(value.text) is None:
-        kind = expressions.checker.specs.named_type(value.text, expressions.source)
-        pou = expressions.project.pou(value.text, expressions.source) if kind is None else None
-        if pou is not None and pou.kind == "FUNCTION_BLOCK" and expressions.checker.interface(pou, expressions.source, value):
-            kind = pou.type
-    if kind is None:
-        kind = expressions.settle(value)
-    if kind is None:
-        return None
-    if isinstance(kind, AnyType):
-        expressions.facts.calls[call] = StandardCall("SIZEOF", [(value, kind)])
-        return UDINT
-    expressions.facts.constants[call] = kind.size
-    return UNTYPED_INT
 
 
 def bind(expressions: Expressions, node: tree.Assign) -> None:

@@ -46,6 +46,8 @@ FOREIGN = {
 }
 """Names of other languages for elementary types."""
 MAX_STRING = 65534
+WIDE = {"__UXINT": "ULINT", "__XINT": "LINT", "__XWORD": "LWORD"}
+"""CODESYS's names for the types that are as wide as a pointer; here one has 64 bits."""
 Resolved = tuple[Type, bytes]
 
 
@@ -139,6 +141,7 @@ class Specs:
         folded = fold(name)
         if folded in ("STRING", "WSTRING"):
             return string(wide=folded == "WSTRING")
+        folded = WIDE.get(folded, folded)
         return ELEMENTARY.get(SHORT_NAMES.get(folded, folded) if folded not in ("T", "D", "LT", "LD") else folded)
 
     def _named(self, spec: tree.NamedType, source: Source) -> Resolved | None:
@@ -201,7 +204,9 @@ class Specs:
 
     def _type(self, entry: TypeEntry) -> Resolved | None:
         declared = entry.tree
-        resolved = self.resolve(declared.spec, entry.source, declared.name.text)
+        spec = declared.spec
+        resolved = self._structure(spec, entry.source, declared.name.text, entry.pack) \
+            if isinstance(spec, tree.UnionSpec | tree.StructSpec) else self.resolve(spec, entry.source, declared.name.text)
         if resolved and declared.initial is not None:
             kind, initial = resolved
             resolved = kind, self.values.initial(kind, declared.initial, entry.source, initial)
@@ -320,9 +325,10 @@ class Specs:
             self.project.enum_members.setdefault(member_name, []).append((made, value, source.library))
         return made, default(made)
 
-    def _structure(self, spec: tree.StructSpec | tree.UnionSpec, source: Source, name: str) -> Resolved | None:
+    def _structure(self, spec: tree.StructSpec | tree.UnionSpec, source: Source, name: str,
+                   pack: int | None = None) -> Resolved | None:
         """A structure, or a union: its members share their place, and the first initial value holds."""
-        made = Members(shared=isinstance(spec, tree.UnionSpec) or spec.overlap)
+        made = Members(isinstance(spec, tree.UnionSpec) or spec.overlap, pack)
         complete = True
         for declared in spec.members:
             packed = isinstance(declared.spec, tree.NamedType) and fold(declared.spec.text) == "BIT"

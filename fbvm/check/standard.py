@@ -23,7 +23,7 @@ from fbvm.base.types import (
     machine,
     string,
 )
-from fbvm.check import functions, references
+from fbvm.check import functions, questions, references
 from fbvm.check.arguments import Arguments, callee
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
 from fbvm.check.fitting import as_number, convertible, same
@@ -82,18 +82,11 @@ class StandardCalls:
             self.facts.constants[call] = value
 
     def _typed(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
-        if name in references.ASKED:
-            return references.asked(self.expressions, call, name)
-        if name in MAKERS or name in references.SIZES:
+        if name in questions.NAMES:
+            return questions.answer(self.expressions, call, name)
+        if name in MAKERS:
             values = Arguments(self.expressions, call, ["IN"]).in_order()
-            if values is None:
-                return None
-            if name in references.SIZES:
-                return references.size(self.expressions, call, values[0])
-            return references.make(self.expressions, call, name, values[0])
-        if name in ("LOWER_BOUND", "UPPER_BOUND"):
-            values = Arguments(self.expressions, call, ["ARR", "DIM"]).in_order()
-            return references.bound(self.expressions, call, name, *values) if values is not None else None
+            return references.make(self.expressions, call, name, values[0]) if values is not None else None
         if name in functions.TIME_OPERATORS:
             return self._time_operator(call, *functions.TIME_OPERATORS[name], want)
         if name in functions.OPERATORS:
@@ -324,7 +317,7 @@ class StandardCalls:
             return None
         value = values[0]
         target = self._named(row.target)
-        source = self._named(row.source) if row.source else self.expressions.settle(value)
+        source = self._named(row.source) if row.source else self._own(value, row)
         if source is None or target is None or not self.expressions.fit(value, source, "S0405"):
             return None
         if isinstance(source, StringType):
@@ -336,6 +329,15 @@ class StandardCalls:
             return None
         self.facts.calls[call] = StandardCall(row.form, [(value, base(source))], (base(source), target))
         return target
+
+    def _own(self, value: tree.Expr, row: Conversion) -> Type | None:
+        """The type of an argument that the name leaves open; a literal is BCD in the smallest bit string that holds it."""
+        kind = self.expressions.infer(value)
+        number = self.facts.constants.get(value)
+        if row.form != "BCD_TO" or kind is not UNTYPED_INT or not isinstance(number, int):
+            return self.expressions.settle(value)
+        fitting = next((name for name in ("BYTE", "WORD", "DWORD", "LWORD") if 0 <= number <= ELEMENTARY[name].high), "LWORD")
+        return self.expressions.adopt(value, ELEMENTARY[fitting], "S0405")
 
     def _named(self, name: str) -> Type | None:
         return functions.named_type(name) or self.expressions.checker.specs.named_type(name, self.expressions.source)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, EnumType, RefType, StringType, Type, base, fold
 from fbvm.check import references
 from fbvm.check.facts import Pou, Value
@@ -95,11 +96,25 @@ class Statements:
         if isinstance(node.call, tree.Call):
             self.calls.statement(node.call)
             return
+        if self.calls.action(node.call) is not None:
+            self._bare_action(node)
+            return
         kind = self.expressions.infer(node.call)
         if kind is not None:
             compares = isinstance(node.call, tree.Binary) and node.call.op == "="
             self.error("S0401", node.call, "this is no statement: it does nothing", "`=` compares, `:=` assigns" if compares else
                        "write () behind an instance to call it, or := to assign")
+
+    def _bare_action(self, node: tree.CallStatement) -> None:
+        """An ACTION without (), which is a call of it in some dialects."""
+        called = tree.Call(node.call.start, node.call.end, node.call, ())
+        if self.expressions.project.dialect.bare_actions:
+            self.facts.bare[node] = called
+            self.calls.statement(called)
+            return
+        text = self.expressions.text(node.call)
+        self.error("S0401", node.call, f"the ACTION {text} is named and not called",
+                   f"write {text}(), or take {takers('bare_actions')}")
 
     # --- choices ----------------------------------------------------------------------------------------------------
 

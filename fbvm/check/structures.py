@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 
 from fbvm.base.types import BOOL, Field, StructType, Type, base, fold
-from fbvm.check.facts import is_block
+from fbvm.check.facts import holds_block, is_block
 from fbvm.syntax import tree
 
 RELATIVE = "a place in a structure is written %B2 (byte 2), %W1 (word 1) or %X2.0 (bit 0 of byte 2)"
@@ -19,10 +19,12 @@ _UNITS = {"X": 1, "B": 1, "W": 2, "D": 4, "L": 8}
 
 
 class Members:
-    """Collects members.  `shared` ones lie on each other, and the first initial value that is not all zero holds."""
+    """Collects members.  `shared` ones lie on each other, and the first initial value that is not all zero holds.
 
-    def __init__(self, shared: bool) -> None:
-        self.shared = shared
+    With `pack` members lie at multiples of so many bytes at most, as CODESYS's attribute pack_mode has it."""
+
+    def __init__(self, shared: bool, pack: int | None = None) -> None:
+        self.shared, self.pack = shared, pack
         self.fields: dict[str, Field] = {}
         self._content = bytearray()
         self._taken: list[tuple[int, int]] = []
@@ -31,8 +33,9 @@ class Members:
 
     def add(self, name: str, kind: Type, initial: bytes, location: tree.Location | None, packed: bool = False) -> str:
         """Put one more member in its place; what is wrong with it, "" if nothing.  `packed` ones are single bits."""
-        self._align = max(self._align, kind.align)
-        offset, bit = 0 if self.shared else len(self._content) + -len(self._content) % kind.align, None
+        align = kind.align if self.pack is None or holds_block(kind) else min(kind.align, self.pack)
+        self._align = max(self._align, align)
+        offset, bit = 0 if self.shared else len(self._content) + -len(self._content) % align, None
         if packed:
             offset, bit = self._next_bit()
         if location is not None:

@@ -64,7 +64,8 @@ class BodyLowering:
         if fresh:
             self.out.append(("fill", ("abs", self.pou.frame_offset + start, ()), fresh))
         for offset, made in self.program.late_starts.get(self.pou, ()):
-            self.out.append(("store", "ref", ("abs", offset, ()), self.pointers.to(made.place)))
+            slot = Place(("abs", offset, ()), made.kind)
+            self.out.append(self.places.store(slot, self.pointers.to(made.place), self.entry_site))
         for edge in self.pou.edges:
             raw, memory = self.places.slot(edge.raw), self.places.slot(edge.memory)
             pin = self.places.load(raw)
@@ -246,7 +247,7 @@ class BodyLowering:
         return self.values.converted(node, kind, base(target))
 
     def _call(self, node: tree.CallStatement, site: int) -> None:
-        call = node.call
+        call = self.facts.bare.get(node, node.call)
         assert isinstance(call, tree.Call)
         called = self.facts.calls.get(call)
         if isinstance(called, PouCall):

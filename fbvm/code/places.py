@@ -95,7 +95,8 @@ class Places:
             if member.absolute:
                 of = self.body.program.located(member, self.facts.types[expr.of])
                 return Place(("abs", of.offset, ()), kind, of.bit)
-            return self.of(expr.of).moved(member.offset, kind, member.bit)
+            slot = self.of(expr.of).moved(member.offset, kind, member.bit)
+            return self.behind(slot, self.body.site(expr)) if member.reference else slot
         if isinstance(expr, tree.Part):
             return self._part(expr, kind)
         if isinstance(expr, tree.Call):
@@ -115,8 +116,11 @@ class Places:
         slot = self.slot(variable)
         if not variable.reference:
             return slot
-        site = self.body.site(expr) if expr is not None else self.body.entry_site
-        return Place((("ref", ("load", "ref", slot.address), site), 0, ()), variable.type)
+        return self.behind(slot, self.body.site(expr) if expr is not None else self.body.entry_site)
+
+    def behind(self, slot: Place, site: int) -> Place:
+        """What the reference in a slot points at; the slot has the type of that."""
+        return Place((("ref", ("load", "ref", slot.address), site), 0, ()), slot.type)
 
     def slot(self, variable: Variable) -> Place:
         """The place of a variable itself (of the reference, for an in-out)."""

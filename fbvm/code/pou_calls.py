@@ -183,8 +183,8 @@ class CallLowering:
         return next((v for v in called.pou.parameters(kind) if v.name.upper() == name), None)
 
     def _place(self, called: PouCall, variable: Variable, instance: Place | None) -> Place:
-        """The slot of a callee's variable."""
+        """The slot of a callee's variable; of one that VAR_CONFIG gives a place, that place."""
         if instance is None or variable.place != "self":
-            return Place(self.body.places.slot(variable).address, variable.type)
-        start, offset, terms = instance.address
-        return Place((start, offset + variable.offset, terms), variable.type)
+            return self.body.places.slot(variable)
+        slot = instance.moved(variable.offset, variable.type)
+        return self.body.places.behind(slot, self.body.entry_site) if variable.open else slot

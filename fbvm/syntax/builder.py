@@ -106,7 +106,7 @@ class Builder:
     def declared(self, token: Token) -> Name:
         """A name at its declaration, where the standard's rule for underscores is checked."""
         text = token.text
-        if "__" in text or text.endswith("_"):
+        if ("__" in text or text.endswith("_")) and not self.source.library:
             self.report("S0191", token.start, token.end, f"`{text}` has a doubled or trailing underscore",
                         "the standard forbids it; other compilers may refuse this name")
         return Name(token.start, token.end, text)

@@ -65,7 +65,8 @@ class Declarations(Statements):
         return refused
 
     def pou_head(self, modifiers: list[Token], token: Token, inheritance: list[Refused]) -> Head:
-        return self.declared(token), [*map(self.refused, modifiers), *inheritance]
+        """FINAL, PUBLIC and their like say who may extend or name a POU, and change nothing that it does."""
+        return self.declared(token), [*(self.refused(m) for m in modifiers if m.text.upper() == "ABSTRACT"), *inheritance]
 
     def pou(self, word: Token, head: Head, sections: list[Section], items: Items, actions: list[Action | Refused],
             end: Token) -> Pou:

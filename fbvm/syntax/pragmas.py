@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 
 from fbvm.syntax.tree import Declaration, SourceText
 
@@ -16,6 +17,10 @@ ATTRIBUTES = {
     "opc.ua.da", "tcencoding", "tcdisplayscale", "tcnocopy"}
 """Names of attributes that make no valid program do anything else: they restrict, show, hide or export."""
 
+PACK_MODES = {"0": 1, "1": 1, "2": 2, "4": 4, "8": 8}
+"""Values of the attribute pack_mode, and the multiples of bytes at which members of a structure lie at most."""
+
+_PACK_MODE = re.compile(r"\s*attribute\s*'pack_mode'\s*:=\s*'([^']*)'\s*", re.IGNORECASE)
 _HEXADECIMAL = re.compile(r"""\{\s*attribute\s*'displaymode'\s*:=\s*'hex(?:adecimal)?'\s*\}\s*\Z""", re.IGNORECASE)
 _REACH = 100
 """How far before a name its pragma is looked for."""
@@ -25,6 +30,8 @@ _SHAPE = re.compile(r"""\s*(?:attribute\s*'([^']*)'|(\w+))""", re.IGNORECASE)
 
 def harmless(text: str) -> bool:
     """Whether the program means the same without the pragma whose contents are `text`."""
+    if packed := _PACK_MODE.fullmatch(text):
+        return packed[1] in PACK_MODES
     found = _SHAPE.match(text)
     if not found:
         return not text.strip()
@@ -40,6 +47,19 @@ def shown_in_hexadecimal(text: str, start: int) -> bool:
 
 def attributes(text: SourceText, declaration: Declaration) -> set[str]:
     """Names of the attributes that stand directly in front of a declaration."""
-    before = max((d.end for d in text.declarations if d.end <= declaration.start), default=0)
-    found = (_SHAPE.match(p.text) for p in text.pragmas if before <= p.start and p.end <= declaration.start)
+    found = (_SHAPE.match(pragma) for pragma in _in_front(text, declaration))
     return {match[1].lower() for match in found if match and match[1] is not None}
+
+
+def pack_mode(text: SourceText, declaration: Declaration) -> int | None:
+    """The multiple of bytes at which members of a structure lie at most, if an attribute in front of it says that."""
+    found = [match for pragma in _in_front(text, declaration) if (match := _PACK_MODE.fullmatch(pragma))]
+    return PACK_MODES.get(found[-1][1]) if found else None
+
+
+def _in_front(text: SourceText, declaration: Declaration) -> Iterator[str]:
+    """The contents of the pragmas directly in front of a declaration."""
+    if not text.pragmas:
+        return
+    before = max((d.end for d in text.declarations if d.end <= declaration.start), default=0)
+    yield from (p.text for p in text.pragmas if before <= p.start and p.end <= declaration.start)
