@@ -24,14 +24,20 @@ LIBRARIES = sorted({path.parent for path in FILES})
 MTCP = FBLIB / "omron" / "mtcp_etn"
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
-def test_a_file_holds_the_pou_that_it_is_named_after(path: Path) -> None:
+def wrong_with(path: Path) -> list[str]:
     described = tomllib.loads((path.parent / "library.toml").read_text(encoding="utf-8"))
     text = path.read_text(encoding="utf-8")
     pous = re.findall(r"^(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|TYPE) (\w+)", text, re.M)
-    assert pous == ([] if path.name in described["globals"] else [path.stem])
-    assert text.startswith("//"), "it says what it is for"
-    assert max(map(len, text.splitlines())) <= 120
+    kept = {
+        "it holds the POU that it is named after": pous == ([] if path.name in described["globals"] else [path.stem]),
+        "it says what it is for": text.startswith("//"),
+        "its lines are short": max(map(len, text.splitlines())) <= 120,
+    }
+    return [rule for rule, keeps in kept.items() if not keeps]
+
+
+def test_each_file_holds_one_pou_and_says_what_it_is_for() -> None:
+    assert {path.name: wrong for path in FILES if (wrong := wrong_with(path))} == {}
 
 
 @pytest.mark.parametrize("folder", LIBRARIES, ids=lambda path: path.name)
