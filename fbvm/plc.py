@@ -8,47 +8,34 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
 from fbvm.base.memory import Memory, Snapshot
 from fbvm.breakpoints import Breakpoints, Halt
 from fbvm.code.image import Image
-from fbvm.engine.tiers import Engine, engine_for, native_of
+from fbvm.engine.native import NativeEngine
+from fbvm.engine.native_scans import Series
+from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
-from fbvm.flags import CLOCKWORK, TENTH_MS_NS, Flags
+from fbvm.exchange import Attached, refresh, wake_ns
+from fbvm.flags import CLOCKWORK, MOST, TENTH_MS_NS, Flags
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
 from fbvm.scan_times import Lateness, ScanTimes
 from fbvm.schedule import Schedule, hurried
+from fbvm.state import RUN
 from fbvm.state import Mode as Mode
 from fbvm.state import Phase as Phase
 from fbvm.state import State as State
+from fbvm.state import Stopped as Stopped
 from fbvm.units.unit import Unit
 from fbvm.watch import places
 from fbvm.watch.paths import Place, Span, find, find_place
 from fbvm.watch.values import Value
-from fbvm.wire.link import Link, Network
+from fbvm.wire.link import Network
 
 STEP_BUDGET = 2_000_000
 """Statements that one scan may execute before the watchdog ends it."""
-
-
-class Stopped(RuntimeError):
-    """The PLC was asked to go on after a trap; `trap` says what stopped it.  Restart it first."""
-
-    def __init__(self, trap: Trap) -> None:
-        super().__init__(f"the PLC has stopped: {trap.message}")
-        self.trap = trap
-
-
-@dataclass(frozen=True)
-class Attached:
-    """A unit on the backplane and its place on a network."""
-
-    unit: Unit
-    link: Link
-    network: Network
 
 
 class Plc:
@@ -94,8 +81,10 @@ class Plc:
         self.lateness = Lateness()
         """How late they began, where time is real."""
         self.trap: Trap | None = None
-        self._mode = Mode.RUN
+        self._mode = RUN
         self._first = True
+        self._series: Series | None = None
+        self._series_of: NativeEngine | None = None
         self._forces: dict[Place, Value] = {}
         self._found: dict[str, Place | Span] = {}
         self._past: deque[State] = deque(maxlen=0)
@@ -117,9 +106,12 @@ class Plc:
         connections are to live in virtual time."""
         if self.trap:
             raise Stopped(self.trap)
-        if not self.halted:
+        if not self.breakpoints.halted:
+            now_ns = self._time(now_ns)
+            if (series := self._in_one_piece()) is not None:
+                return self._scan_at_once(series, now_ns)
             self._begin(now_ns)
-        if self._mode is Mode.RUN:
+        if self._mode is RUN:
             self.trap = self._execute()
             if self.halted:
                 return None
@@ -130,13 +122,37 @@ class Plc:
         self._end()
         return self.trap
 
-    def _begin(self, now_ns: int | None) -> None:
+    def _in_one_piece(self) -> Series | None:
+        """What does the next scan up to its refresh; None if that is not machine code, or somebody has a part in it."""
+        machine = self.engine.machine
+        if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
+            return None
+        turns = self._schedule.turns()
+        if not turns or self.breakpoints.armed:
+            return None
+        if machine is not self._series_of:
+            self._series, self._series_of = machine.series(turns, CLOCKWORK), machine
+        return self._series
+
+    def _scan_at_once(self, series: Series, now_ns: int) -> Trap | None:
+        """A scan whose time, flags and tasks are one call of machine code."""
+        step_ns = now_ns - self.now_ns
+        self.now_ns = now_ns
+        point = series.once(step_ns, self.budget, min(step_ns // TENTH_MS_NS, MOST))
+        self.scans += 1
+        if point:
+            self.trap = self._series_of.trap_at(point) if self._series_of else None
+        else:
+            refresh(self.units, self.memory, now_ns, None)
+        self._tell()
+        return self.trap
+
+    def _begin(self, now_ns: int) -> None:
         """A scan up to its program."""
-        now_ns = self._time(now_ns)
         if self._journal:
             self._journal.before(self.scans, now_ns, self.budget, self.forces)
         self._oversee(now_ns)
-        if self._mode is Mode.RUN:
+        if self._mode is RUN:
             if self._forces:
                 self._apply_forces()
             if self.phases:
@@ -146,13 +162,17 @@ class Plc:
     def _end(self) -> None:
         """A scan from the end of its program on."""
         if not self.trap:
-            self._refresh()
+            refresh(self.units, self.memory, self.now_ns, self._journal)
             if self.phases:
                 self._over(Phase.REFRESH)
         self.scans += 1
         self._system[SCANS // 8] = self.scans
         if self._journal:
             self._journal.after()
+        self._tell()
+
+    def _tell(self) -> None:
+        """Keep and tell what the scan has left."""
         if self._past.maxlen:
             self._past.append(self.snapshot())
         for watcher in self.watchers:
@@ -179,7 +199,7 @@ class Plc:
         self.now_ns = now_ns
         system = self._system
         system[NOW // 8], system[DUE // 8], system[BUDGET // 8] = now_ns, NEVER, self.budget
-        self._flags.update(now_ns, cycle_time_ns, self._first and self._mode is Mode.RUN)
+        self._flags.update(now_ns, cycle_time_ns, self._first and self._mode is RUN)
 
     def _over(self, phase: Phase) -> None:
         for told in self.phases:
@@ -202,16 +222,6 @@ class Plc:
         self._first = False
         return None
 
-    def _refresh(self) -> None:
-        """I/O refresh: each unit exchanges its words once, the networks take what the units ask for."""
-        for number, attached in enumerate(self.units):
-            events = attached.link.events(self.now_ns)
-            if self._journal:
-                self._journal.told(number, events)
-            requests = attached.unit.refresh(self.memory, events, self.now_ns)
-            if requests:
-                attached.link.submit(requests, self.now_ns)
-
     @property
     def elapsed_ns(self) -> int:
         """Time from power-on to the end of the last cycle."""
@@ -221,10 +231,7 @@ class Plc:
     def due_ns(self) -> int:
         """When the next scan is worth while, if no network tells anything before: at once if a unit has news for the
         program, else when a timer of the program, a task's interval or a unit changes something by itself."""
-        due_ns: int = self._system[DUE // 8]
-        for attached in self.units:
-            due_ns = min(due_ns, attached.unit.wake_ns)
-        return min(due_ns, self._schedule.next_ns(self.now_ns))
+        return min(wake_ns(self.units, self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
 
     def run(
         self,
@@ -248,17 +255,16 @@ class Plc:
     def _scan_many(self, most: int) -> bool:
         """Several scans inside machine code, if nobody has to be told between them; False if there was none."""
         armed = self.breakpoints.armed
-        native = self.breakpoints.guarding(self.engine) if armed else native_of(self.engine)
+        native = self.breakpoints.guarding(self.engine) if armed else self.engine.machine
         outside = self.units or self.watchers or self.phases or self._forces or self._journal or self._past.maxlen
-        if native is None or outside or self._first or self._mode is not Mode.RUN or self.halted:
+        if native is None or outside or self._first or self._mode is not RUN or self.halted:
             return False
         turns = self._schedule.turns()
         if turns is None:
             return False
         self._system[BUDGET // 8] = self.budget
-        cycle_time = min(self.cycle_ns // TENTH_MS_NS, 0xFFFFFFFF)
+        cycle_time = min(self.cycle_ns // TENTH_MS_NS, MOST)
         done, self.trap = native.run_many(turns, most, self.cycle_ns, CLOCKWORK, cycle_time=cycle_time, spend=STEP_BUDGET)
-        self._schedule.took(turns)
         self.scans += done
         self.now_ns += done * self.cycle_ns
         return done > 0
@@ -335,7 +341,7 @@ class Plc:
     @mode.setter
     def mode(self, mode: Mode) -> None:
         with self._acting("mode", mode.value):
-            if mode is Mode.RUN and self._mode is Mode.PROGRAM:
+            if mode is RUN and self._mode is not RUN:
                 held = ("CIO", "W", "TF", "T") if self._flags.io_memory_held else ()
                 self._restart(self._kept(held))
             self._mode = mode
@@ -356,7 +362,7 @@ class Plc:
 
     def _power_on(self, kept: list[tuple[int, bytes]]) -> None:
         self._restart(kept)
-        self._mode = Mode.RUN
+        self._mode = RUN
         for attached in self.units:
             attached.link.submit(attached.unit.reset(self.memory), self.now_ns)
 

@@ -15,6 +15,8 @@ from fbvm.code.image import TaskRow
 from fbvm.engine.native_scans import Turn
 from fbvm.watch.values import show_time
 
+UNPLANNED = -1
+"""Time of a task that has not been planned yet."""
 ScheduleState = tuple[dict[int, int], dict[int, bool], frozenset[int]]
 
 
@@ -24,7 +26,6 @@ class Schedule:
 
     tasks: tuple[TaskRow, ...]
     single: Callable[[str], bool]
-    _next_ns: dict[int, int] = field(default_factory=dict)
     _levels: dict[int, bool] = field(default_factory=dict)
     fresh: set[int] = field(default_factory=set)
     """Tasks that have not been executed since the start."""
@@ -32,7 +33,10 @@ class Schedule:
     def __post_init__(self) -> None:
         self.fresh.update(range(len(self.tasks)))
         self._order = sorted(range(len(self.tasks)), key=lambda number: self.tasks[number].priority)
-        self._always = not any(task.single or task.interval_ns for task in self.tasks)
+        self._turns = [Turn(number, self.tasks[number].interval_ns, UNPLANNED) for number in self._order]
+        self._timed = {turn.task: turn for turn in self._turns if turn.interval_ns}
+        self._by_time = not any(task.single for task in self.tasks)
+        self._always = self._by_time and not self._timed
 
     def due(self, now_ns: int) -> list[int]:
         """Numbers of the tasks that run in the scan at `now_ns`, by priority."""
@@ -42,9 +46,9 @@ class Schedule:
 
     def next_ns(self, now_ns: int) -> int:
         """The earliest time after `now_ns` at which an interval has passed; NEVER if no task has one."""
-        if not self._next_ns:
+        if not self._timed:
             return NEVER
-        return min((planned_ns for planned_ns in self._next_ns.values() if planned_ns > now_ns), default=NEVER)
+        return min((turn.next_ns for turn in self._timed.values() if turn.next_ns > now_ns), default=NEVER)
 
     def _is_due(self, number: int, now_ns: int) -> bool:
         task = self.tasks[number]
@@ -53,36 +57,36 @@ class Schedule:
         self._levels[number] = level
         if not task.interval_ns:
             return edge or not task.single
-        planned_ns = self._next_ns.setdefault(number, now_ns)
-        if now_ns < planned_ns:
+        turn = self._timed[number]
+        if turn.next_ns == UNPLANNED:
+            turn.next_ns = now_ns
+        if now_ns < turn.next_ns:
             return edge
-        missed = (now_ns - planned_ns) // task.interval_ns
-        self._next_ns[number] = planned_ns + (missed + 1) * task.interval_ns
+        missed = (now_ns - turn.next_ns) // task.interval_ns
+        turn.next_ns += (missed + 1) * task.interval_ns
         return edge or not level
 
     def turns(self) -> list[Turn] | None:
-        """The tasks in their order, as far as only time says when they run; None if a variable does, too."""
-        if self.fresh or any(task.single for task in self.tasks):
-            return None
-        return [Turn(number, self.tasks[number].interval_ns, self._next_ns.get(number, 0)) for number in self._order]
-
-    def took(self, turns: list[Turn]) -> None:
-        """The tasks have had turns up to these."""
-        self._next_ns.update((turn.task, turn.next_ns) for turn in turns if turn.interval_ns)
+        """The tasks in their order, always the same list, whose times move on; None if not only time says when they run."""
+        return self._turns if self._by_time and not self.fresh else None
 
     def reset(self) -> None:
         """As at power-on."""
-        self._next_ns.clear()
+        for turn in self._turns:
+            turn.next_ns = UNPLANNED
         self._levels.clear()
         self.fresh.update(range(len(self.tasks)))
 
     def state(self) -> ScheduleState:
         """What a snapshot keeps."""
-        return dict(self._next_ns), dict(self._levels), frozenset(self.fresh)
+        planned = {turn.task: turn.next_ns for turn in self._timed.values() if turn.next_ns != UNPLANNED}
+        return planned, dict(self._levels), frozenset(self.fresh)
 
     def restore(self, state: ScheduleState) -> None:
         """Back to a state that `state` gave."""
-        self._next_ns, self._levels, self.fresh = dict(state[0]), dict(state[1]), set(state[2])
+        for turn in self._timed.values():
+            turn.next_ns = state[0].get(turn.task, UNPLANNED)
+        self._levels, self.fresh = dict(state[1]), set(state[2])
 
 
 def hurried(tasks: tuple[TaskRow, ...], cycle_ns: int) -> Iterator[str]:

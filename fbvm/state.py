@@ -19,6 +19,9 @@ class Mode(Enum):
     RUN = "RUN"
 
 
+RUN = Mode.RUN
+
+
 class Phase(Enum):
     """What a scan consists of, for those who look inside: each is told when it is over."""
 
@@ -39,3 +42,11 @@ class State:
     mode: Mode
     first: bool
     trap: Trap | None
+
+
+class Stopped(RuntimeError):
+    """The PLC was asked to go on after a trap; `trap` says what stopped it.  Restart it first."""
+
+    def __init__(self, trap: Trap) -> None:
+        super().__init__(f"the PLC has stopped: {trap.message}")
+        self.trap = trap

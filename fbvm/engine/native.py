@@ -16,7 +16,7 @@ from fbvm.engine import native_compiler
 from fbvm.engine.native_code import Code, code_of
 from fbvm.engine.native_context import Context
 from fbvm.engine.native_entries import Entry, entry
-from fbvm.engine.native_scans import NOTHING, PARAMETERS, Clockwork, Turn, scans
+from fbvm.engine.native_scans import NO_LIMIT, NOTHING, Clockwork, Series, Turn
 from fbvm.engine.native_writer import Unsupported
 from fbvm.engine.stops import PAUSE, STOPPED, Stops
 from fbvm.engine.trap import Trap, trap
@@ -46,6 +46,7 @@ class NativeEngine:
         self._memory_at = ctypes.addressof(self._place)
         self._entries = [self._entry(number) for number in range(len(image.tasks))]
         self._calls = [entry.call for entry in self._entries]
+        self._series: dict[tuple[tuple[tuple[int, int], ...], Clockwork], Series] = {}
 
     def _entry(self, task: int) -> Entry:
         bound = entry()
@@ -64,31 +65,35 @@ class NativeEngine:
         """True if the fast code is running."""
         return self._code.level_of(self.level) == 2
 
+    @property
+    def machine(self) -> NativeEngine:
+        """What runs as machine code: all of it."""
+        return self
+
     def run(self, task_index: int) -> Trap | None:
         """Execute the programs of a task in their order, until the end or a trap."""
         point = self._calls[task_index]()
-        return self._trap(point) if point else None
+        return self.trap_at(point) if point else None
+
+    def series(self, turns: Sequence[Turn], clockwork: Clockwork = NOTHING) -> Series:
+        """Scans with the tasks in this order, which write the clockwork; nobody else's may be going on meanwhile."""
+        return Series(self._memory_at, self._context.at, self._entries, turns, clockwork)
 
     def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork = NOTHING, *,
-                 cycle_time: int = 0, spend: int = 1 << 62) -> tuple[int, Trap | None]:  # fmt: skip
-        """Up to n scans while nobody needs to be told; returns how many there were, and the trap of the last.
-
-        In each of them the scan's time advances by `step_ns`, nothing is due, the budget is what it is now, `clockwork`
-        is written, with `cycle_time` in its unit; then the tasks that are due take their turns, whose `next_ns` move on,
-        and the number of scans grows.  No other begins when all together have executed `spend` statements."""
+                 cycle_time: int = 0, spend: int = NO_LIMIT) -> tuple[int, Trap | None]:  # fmt: skip
+        """Up to n scans of a `Series` with the budget that there is now; how many there were, and the trap of the last."""
         if not turns or n <= 0:
             return 0, None
+        shape = tuple((turn.task, turn.interval_ns) for turn in turns), clockwork
+        series = self._series.get(shape)
+        if series is None:
+            series = self._series[shape] = self.series(turns, clockwork)
+        series.turns = turns
         budget: int = self.memory.views["i64"][BUDGET // 8]
-        rows = [(self._code.address(turn.task, self.level), turn.interval_ns, turn.next_ns, 0) for turn in turns]
-        numbers = (n, step_ns, budget, spend, 0, cycle_time, *(number for row in rows for number in row))
-        parameters = (ctypes.c_int64 * len(numbers))(*numbers)
-        function = scans(tuple(turn.interval_ns > 0 for turn in turns), clockwork)
-        point = function(self._memory_at, self._context.at, ctypes.addressof(parameters))
-        for number, turn in enumerate(turns):
-            turn.next_ns = parameters[len(PARAMETERS) + 4 * number + 2]
-        return parameters[PARAMETERS.index("done")], self._trap(point) if point else None
+        done, point = series.run(n, step_ns, budget, cycle_time, spend)
+        return done, self.trap_at(point) if point else None
 
-    def _trap(self, number: int) -> Trap:
+    def trap_at(self, number: int) -> Trap:
         """What the point says, with the values that the context holds."""
         code, site, shown = self._code.points[number - 1]
         if code == STOPPED:

@@ -42,6 +42,11 @@ class Entry:
         """Say what the entry calls from now on; another thread may say so."""
         self._slot[0] = function
 
+    @property
+    def function_at(self) -> int:
+        """Where the address of what it calls lies, at any time."""
+        return self._block.slots + SLOT_BYTES * self._number
+
     def give_back(self) -> None:
         """Somebody else may have the slot; `call` must not be used any more."""
         self._block.free.append(self._number)

@@ -1,20 +1,22 @@
-"""Many scans inside machine code: what a scan does besides its tasks, for as long as nobody outside has to be told.
+"""Scans inside machine code: what a scan does up to its refresh, for as long as nobody outside has to be told.
 
 The function that does them is made for a shape: which of the tasks have an interval, and which words tell the program
 about time.  It has no calls but those of the tasks."""
 
 from __future__ import annotations
 
-import ctypes
+from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from string import Template
+from weakref import finalize
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
 from fbvm.engine import native_cache
 from fbvm.engine.native_cache import Stored, name_of
 from fbvm.engine.native_compiler import Linked, compile_text
+from fbvm.engine.native_entries import Entry, entry
 
 
 @dataclass
@@ -41,24 +43,29 @@ class Clockwork:
 
 
 NOTHING = Clockwork()
-PARAMETERS = ("left", "step", "budget", "spend", "done", "cycle")
-"""64 bits each, and then the rows of turns: how many scans, by how far time goes on, statements that a scan may execute
-and all of them together, how many scans there were; the cycle time."""
-ROW_BYTES = 32
-"""A turn: address of the function, interval, next time, whether it is due."""
+MEMORY, CONTEXT, LEFT, STEP, BUDGETED, SPEND, DONE, CYCLE, ROWS = range(9)
+"""Parameters, 64 bits each, and then the rows of turns: the addresses of memory and context, how many scans, by how far
+time goes on, statements that a scan may execute and all of them together, how many scans there were, the cycle time."""
+ROW = 4
+"""Numbers of a turn: where the address of its function lies, interval, next time, whether it is due."""
+NO_LIMIT = 1 << 62
 _SCANS = Template(f"""
-define i32 @scans(ptr %m, ptr %c, ptr %p) {{
+define i32 @scans(ptr %p, ptr %unused) {{
 entry:
+%m = load ptr, ptr %p
+%c_at = getelementptr inbounds i8, ptr %p, i64 {8 * CONTEXT}
+%c = load ptr, ptr %c_at
 %now_at = getelementptr inbounds i8, ptr %m, i64 {NOW}
 %due_at = getelementptr inbounds i8, ptr %m, i64 {DUE}
 %budget_at = getelementptr inbounds i8, ptr %m, i64 {BUDGET}
 %count_at = getelementptr inbounds i8, ptr %m, i64 {SCANS}
-%step_at = getelementptr inbounds i8, ptr %p, i64 8
-%amount_at = getelementptr inbounds i8, ptr %p, i64 16
-%spend_at = getelementptr inbounds i8, ptr %p, i64 24
-%done_at = getelementptr inbounds i8, ptr %p, i64 32
-%cycle_at = getelementptr inbounds i8, ptr %p, i64 40
-%n = load i64, ptr %p
+%n_at = getelementptr inbounds i8, ptr %p, i64 {8 * LEFT}
+%step_at = getelementptr inbounds i8, ptr %p, i64 {8 * STEP}
+%amount_at = getelementptr inbounds i8, ptr %p, i64 {8 * BUDGETED}
+%spend_at = getelementptr inbounds i8, ptr %p, i64 {8 * SPEND}
+%done_at = getelementptr inbounds i8, ptr %p, i64 {8 * DONE}
+%cycle_at = getelementptr inbounds i8, ptr %p, i64 {8 * CYCLE}
+%n = load i64, ptr %n_at
 %step = load i64, ptr %step_at
 %amount = load i64, ptr %amount_at
 %spend = load i64, ptr %spend_at
@@ -133,10 +140,9 @@ def _clockwork(row: Clockwork) -> Iterator[str]:
 def _rows(count: int) -> Iterator[str]:
     """The functions of the turns, and where their times are."""
     for n in range(count):
-        at = 8 * len(PARAMETERS) + ROW_BYTES * n
-        for letter, offset in zip("finw", range(at, at + ROW_BYTES, 8), strict=True):
-            yield f"%{letter}a{n} = getelementptr inbounds i8, ptr %p, i64 {offset}"
-        yield f"%f{n} = load ptr, ptr %fa{n}"
+        for letter, number in zip("finw", range(ROWS + ROW * n, ROWS + ROW * n + ROW), strict=True):
+            yield f"%{letter}a{n} = getelementptr inbounds i8, ptr %p, i64 {8 * number}"
+        yield from (f"%fs{n} = load ptr, ptr %fa{n}", f"%f{n} = load ptr, ptr %fs{n}")
 
 
 def _turns(intervals: Sequence[bool]) -> Iterator[str]:
@@ -157,9 +163,52 @@ def _turns(intervals: Sequence[bool]) -> Iterator[str]:
                     f"br i1 %t{n}, label %over{n}, label %trap", f"over{n}:")
 
 
+class Series:
+    """Scans of one PLC: its memory and context by their addresses, its tasks by their entries, in the order of `turns`.
+
+    In each scan time advances by a step, nothing is due, the budget is full, the clockwork is written with the cycle
+    time in its unit; then the tasks that are due take their turns, and the number of scans grows."""
+
+    def __init__(self, memory_at: int, context_at: int, tasks: Sequence[Entry], turns: Sequence[Turn],
+                 clockwork: Clockwork) -> None:  # fmt: skip
+        rows = [(tasks[turn.task].function_at, turn.interval_ns, turn.next_ns, 0) for turn in turns]
+        self._tasks = tasks  # which stay while machine code calls them
+        self.turns = turns
+        """These move on, or others of the same tasks."""
+        self._timed = [(row, ROWS + ROW * row + 2) for row, turn in enumerate(turns) if turn.interval_ns]
+        """Which turns have an interval, and where their next time is."""
+        self._numbers = array("q", (memory_at, context_at, 1, 0, 0, NO_LIMIT, 0, 0, *(number for row in rows for number in row)))
+        entered = entry()
+        entered.bind(self._numbers.buffer_info()[0], 0)
+        entered.point_to(_scans(tuple(turn.interval_ns > 0 for turn in turns), clockwork).address("scans"))
+        finalize(self, entered.give_back)
+        self._call: Callable[[], int] = entered.call
+
+    def once(self, step_ns: int, budget: int, cycle_time: int) -> int:
+        """One scan; the point of its trap, or 0."""
+        numbers, timed = self._numbers, self._timed
+        numbers[STEP], numbers[BUDGETED], numbers[CYCLE] = step_ns, budget, cycle_time
+        for row, at in timed:
+            numbers[at] = self.turns[row].next_ns
+        point = self._call()
+        for row, at in timed:
+            self.turns[row].next_ns = numbers[at]
+        return point
+
+    def run(self, n: int, step_ns: int, budget: int, cycle_time: int, spend: int) -> tuple[int, int]:
+        """Up to n scans; how many there were, and the point of the last one's trap, or 0.
+
+        No other begins when all together have executed `spend` statements."""
+        numbers = self._numbers
+        numbers[LEFT], numbers[SPEND] = n, spend
+        point = self.once(step_ns, budget, cycle_time)
+        numbers[LEFT], numbers[SPEND] = 1, NO_LIMIT
+        return numbers[DONE], point
+
+
 @cache
-def scans(intervals: tuple[bool, ...], clockwork: Clockwork) -> Callable[[int, int, int], int]:
-    """The function for a shape: (memory, context, parameters), which returns the point of a trap or 0."""
+def _scans(intervals: tuple[bool, ...], clockwork: Clockwork) -> Linked:
+    """The code for a shape: its function takes the parameters and returns the point of a trap or 0."""
     points = ", ".join(f"[ %r{n}, %run{n} ]" for n in range(len(intervals)))
     text = _SCANS.substitute(rows="\n".join(_rows(len(intervals))), clockwork="\n".join(_clockwork(clockwork)),
                              turns="\n".join(_turns(intervals)), points=points)  # fmt: skip
@@ -168,11 +217,4 @@ def scans(intervals: tuple[bool, ...], clockwork: Clockwork) -> Callable[[int, i
     if stored is None:
         stored = Stored({}, compile_text(text, 2))
         native_cache.write(name, stored)
-    linked = Linked(stored.compiled, ["scans"])
-    function = ctypes.PYFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)(linked.address("scans"))
-    _LOADED.append(linked)
-    return function
-
-
-_LOADED: list[Linked] = []
-"""What functions that were given out lie in."""
+    return Linked(stored.compiled, ["scans"])

@@ -100,6 +100,9 @@ class PythonEngine:
     The caller sets time and budget in the system page before a run.  `source` is the Python text that runs, which
     tracebacks show.  A program's mistakes come back as a Trap; memory is then what was stored before it."""
 
+    machine = None
+    """It runs no machine code."""
+
     def __init__(self, image: Image, memory: Memory, observed: bool = False) -> None:
         if memory.size < image.layout.size:
             raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")

@@ -14,6 +14,7 @@ from fbvm.base.areas import BUDGET
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
 from fbvm.engine import native
+from fbvm.engine.native import NativeEngine
 from fbvm.engine.native_code import code_of
 from fbvm.engine.python import PythonEngine
 from fbvm.engine.trap import Trap
@@ -28,6 +29,10 @@ on disk."""
 
 class Engine(Protocol):
     """What executes the tasks of an image on a memory."""
+
+    @property
+    def machine(self) -> NativeEngine | None:
+        """The machine code that it runs now, if it does."""
 
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of one task once; time and budget are in the memory's system page."""
@@ -44,7 +49,7 @@ def engine_for(image: Image, memory: Memory, choice: str = "auto", observed: boo
             raise ValueError("machine code tells nothing about statements: observe with the python engine")
         if not native.available():
             raise ValueError("the native engine needs the package llvmlite, which is not installed")
-        return native.NativeEngine(image, memory)
+        return NativeEngine(image, memory)
     if choice == "python" or observed or not native.available():
         return PythonEngine(image, memory, observed=observed)
     return Tiers(image, memory)
@@ -52,17 +57,10 @@ def engine_for(image: Image, memory: Memory, choice: str = "auto", observed: boo
 
 def choice_of(engine: object) -> str:
     """The choice by which `engine_for` makes such an engine.  Raises ValueError for what it does not make."""
-    for choice, kind in (("auto", Tiers), ("python", PythonEngine), ("native", native.NativeEngine)):
+    for choice, kind in (("auto", Tiers), ("python", PythonEngine), ("native", NativeEngine)):
         if isinstance(engine, kind):
             return choice
     raise ValueError("somebody looks into every scan already: a run with breakpoints is another one")
-
-
-def native_of(engine: object) -> native.NativeEngine | None:
-    """The machine code that an engine runs now, if it does."""
-    if isinstance(engine, Tiers):
-        engine = engine._engine if engine.native and not engine.substitutes else None
-    return engine if isinstance(engine, native.NativeEngine) else None
 
 
 def substitutes_of(engine: object) -> Mapping[int, Callable[[int], None]]:
@@ -91,9 +89,8 @@ class Tiers:
         self._budget = memory.views["i64"]
         self._done = 0
         self._asked = False
-        self.native = False
-        """True once fast machine code runs."""
-        self._engine: Engine = native.NativeEngine(image, memory, level=0) if len(image.sites) >= LARGE else self.python
+        self._fast: NativeEngine | None = None
+        self._engine: Engine = NativeEngine(image, memory, level=0) if len(image.sites) >= LARGE else self.python
 
     @property
     def python(self) -> PythonEngine:
@@ -107,12 +104,22 @@ class Tiers:
         """What stands in place of bodies; a run that has any stays in Python."""
         return self._python.substitutes if self._python else {}
 
+    @property
+    def machine(self) -> NativeEngine | None:
+        """Fast machine code, once it runs and as long as nothing stands in place of bodies."""
+        return None if self._python and self._python.substitutes else self._fast
+
+    @property
+    def native(self) -> bool:
+        """True once fast machine code runs."""
+        return self._fast is not None
+
     def run(self, task_index: int) -> Trap | None:
         """Execute the programs of a task once, in whatever tier the run is."""
         if self.substitutes:
-            self._engine, self.native = self.python, False
-        if self.native:
-            return self._engine.run(task_index)
+            self._engine, self._fast = self.python, None
+        if self._fast:
+            return self._fast.run(task_index)
         if self._asked:
             self._change()
         before = self._budget[BUDGET // 8]
@@ -126,5 +133,4 @@ class Tiers:
     def _change(self) -> None:
         """Go over to machine code if it is there."""
         if self._code.ready and not self.substitutes:
-            self._engine = native.NativeEngine(self._image, self._memory, level=2)
-            self.native = True
+            self._engine = self._fast = NativeEngine(self._image, self._memory, level=2)

@@ -100,6 +100,9 @@ Event: TypeAlias = Began | Ended | Statement | Read | Write | Contact | Passing
 class Inside:
     """An engine that tells every event of a run.  `program` is the engine in whose place it stands."""
 
+    machine = None
+    """It runs no machine code."""
+
     def __init__(self, image: Image, memory: Memory, tell: Callable[[Event], None], program: object = None) -> None:
         self.memory = memory
         self.tell = tell
