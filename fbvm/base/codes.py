@@ -35,6 +35,8 @@ CODES: dict[str, Code] = {
         "S0108": "literal out of range of its type",
         "S0109": "no instruction of ladder",
         "S0110": "ladder that cannot be executed",
+        "S0111": "chart that cannot be executed",
+        "S0112": "action of a step is wrong",
         "S0201": "unknown name",
         "S0202": "name declared twice",
         "S0203": "POU or type declared twice",

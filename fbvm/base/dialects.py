@@ -50,7 +50,8 @@ QUESTIONS = {
     "mixed_arguments": ("F(1, b := 2): some arguments named, some not", "an error",
                         "those without a name are for the parameters that none names, in order"),
     "bare_actions": ("Reset; where Reset is an ACTION", "an error", "a call of it"),
-    "libraries": ("blocks that begin or end another way", "as the standard's bodies compute it", "blocks of its own"),
+    "libraries": ("blocks that begin or end another way; whether actions of charts have a final scan",
+                  "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
 }
 """For each switch: what compilers disagree about, the answer without it, and with it."""

@@ -83,7 +83,8 @@ class Calls:
 
     def action(self, callee: tree.Expr) -> tuple[Pou, tree.Expr | None] | None:
         """The ACTION that an expression names, and the instance of which; None for one of the POU itself."""
-        if isinstance(callee, tree.NameRef) and self.expressions.variable(callee.text) is not None:
+        hides = self.expressions.variable(callee.text) if isinstance(callee, tree.NameRef) else None
+        if hides is not None and hides.role != "action":
             return None
         name = callee.text if isinstance(callee, tree.NameRef) else qualified.bare(self.expressions, callee)
         if name is not None:

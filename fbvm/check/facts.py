@@ -53,6 +53,8 @@ class Variable:
     """True for an in-out STRING that is declared without a length."""
     location: Address | None = None
     edge: str = ""
+    role: str = ""
+    """"step" or "action" for the flags of one, which programs only read."""
     written: bool = False
     object: int | None = None
     """Of a variable that something refers to: the number of its object (see code.operations), or of one that every

@@ -77,7 +77,7 @@ class Interfaces:
         name = fold(action.name.text)
         if pou.is_function:
             self.report.add("S0205", source, action.name, "a FUNCTION has no ACTION", "make it a FUNCTION_BLOCK")
-        elif name in pou.variables or name in pou.actions:
+        elif name in pou.variables and pou.variables[name].role != "action" or name in pou.actions:
             self.report.add("S0202", source, action.name, f"{action.name.text} is declared twice in {pou.name}",
                             "an ACTION needs a name of its own")
         else:
@@ -155,7 +155,8 @@ class Interfaces:
         kind, initial = resolved
         words = {fold(q.text) for q in section.qualifiers}
         made = Variable(name.text, kind, section.kind, source, name, initial=initial, constant="CONSTANT" in words,
-                        retain=bool({"RETAIN", "PERSISTENT"} & words), explicit=declared.initial is not None)
+                        retain=bool({"RETAIN", "PERSISTENT"} & words), explicit=declared.initial is not None,
+                        role=section.role)
         if made.constant and is_block(kind):
             self.report.add("S0206", source, name, "an instance cannot be CONSTANT")
         elif made.constant:

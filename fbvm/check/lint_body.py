@@ -7,7 +7,7 @@ from typing import Any
 
 from fbvm.base.diagnostics import Source
 from fbvm.check.facts import Facts, Pou, Report
-from fbvm.syntax import ladder, tree
+from fbvm.syntax import ladder, sfc, tree
 
 
 class Body:
@@ -95,7 +95,7 @@ _BELOW: dict[type, Callable[[Any], Iterable[tree.Node | None]]] = {
     tree.Deref: lambda n: (n.of,),
     tree.Literal: _nothing, tree.EnumLiteral: _nothing, tree.NullLiteral: _nothing, tree.NameRef: _nothing,
     tree.Direct: _nothing,
-    ladder.Ladder: lambda n: n.body, ladder.Rung: lambda n: n.body,
+    ladder.Ladder: lambda n: n.body, ladder.Rung: lambda n: n.body, sfc.Sfc: lambda n: n.body,
     ladder.Edge: lambda n: (n.of, n.memory), ladder.Element: lambda n: (n.value,),
 }
 """For each kind of node of a body the nodes directly below it, in the order of the text."""

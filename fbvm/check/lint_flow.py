@@ -5,7 +5,7 @@ from __future__ import annotations
 from fbvm.base.types import Elementary, EnumType, base
 from fbvm.check.lint_body import Body
 from fbvm.check.values import is_any
-from fbvm.syntax import ladder, tree
+from fbvm.syntax import ladder, sfc, tree
 
 _LEAVES = {tree.Return: "RETURN", tree.Exit: "EXIT", tree.Continue: "CONTINUE"}
 _TURNED = {"<": ">", ">": "<", "<=": ">=", ">=": "<="}
@@ -47,7 +47,7 @@ class _Flow:
             return statement.otherwise is not None and self.block(statement.otherwise) and all(ends)
         if isinstance(statement, tree.For | tree.While | tree.Repeat):
             return self.loop(statement)
-        if isinstance(statement, ladder.Ladder | ladder.Rung):
+        if isinstance(statement, ladder.Ladder | ladder.Rung | sfc.Sfc):
             return self.block(statement.body)
         if isinstance(statement, tree.Exit) and self.left:
             self.left[-1] = True

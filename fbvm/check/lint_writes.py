@@ -16,7 +16,7 @@ from fbvm.base.types import BOOL, base
 from fbvm.check.facts import PouCall, Variable
 from fbvm.check.lint_body import Body
 from fbvm.check.writes import place
-from fbvm.syntax import ladder, tree
+from fbvm.syntax import ladder, sfc, tree
 
 SCANNED = frozenset((
     "R_TRIG", "F_TRIG", "TP", "TON", "TOF", "CTU", "CTD", "CTUD",
@@ -158,8 +158,8 @@ class _Order:
         if not isinstance(node, tree.While):
             definite.update((key, call) for key, call in inside.items() if isinstance(call, tree.Call))
 
-    def rungs(self, node: ladder.Ladder | ladder.Rung, definite: Definite) -> None:
-        """Rungs are executed one after the other, as if they were not there."""
+    def inside(self, node: ladder.Ladder | ladder.Rung | sfc.Sfc, definite: Definite) -> None:
+        """Rungs are executed one after the other, as if they were not there; so is what a chart does."""
         for statement in node.body:
             _STEPS[type(statement)](self, statement, definite)
 
@@ -268,5 +268,6 @@ _STEPS: dict[type, Callable[[_Order, Any, Definite], None]] = {
     tree.Assign: _Order.assign, tree.CallStatement: _Order.call, tree.If: _Order.choice, tree.Case: _Order.case,
     tree.For: _Order.loop, tree.While: _Order.loop, tree.Repeat: _Order.loop, tree.Return: _Order.leave,
     tree.Exit: _Order.leave, tree.Continue: _Order.leave, tree.Empty: _Order.nothing,
-    tree.RefusedStatement: _Order.nothing, ladder.Ladder: _Order.rungs, ladder.Rung: _Order.rungs,
+    tree.RefusedStatement: _Order.nothing, ladder.Ladder: _Order.inside, ladder.Rung: _Order.inside,
+    sfc.Sfc: _Order.inside,
 }

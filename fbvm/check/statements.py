@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, EnumType, RefType, StringType, Type, base, fold
-from fbvm.check import references
+from fbvm.check import charts, references
 from fbvm.check.facts import Pou, Value
 from fbvm.check.fitting import as_number, assignable, conversion_hint
 from fbvm.check.values import is_any
 from fbvm.check.writes import note_count, place, writable
-from fbvm.syntax import ladder, tree
+from fbvm.syntax import ladder, sfc, tree
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
@@ -250,6 +250,10 @@ class Statements:
     def _rungs(self, node: ladder.Ladder | ladder.Rung) -> None:
         self.block(node.body)
 
+    def _sfc(self, node: sfc.Sfc) -> None:
+        if charts.check(self, node):
+            self.block(node.body)
+
     def _empty(self, node: tree.Empty) -> None:
         """Nothing is wrong with `;`."""
 
@@ -263,7 +267,7 @@ _CHECK: dict[type, Callable[..., None]] = {
     tree.Assign: Statements._assign, tree.CallStatement: Statements._call, tree.If: Statements._if,
     tree.Case: Statements._case, tree.For: Statements._for, tree.While: Statements._while,
     tree.Repeat: Statements._repeat, tree.Exit: Statements._leave, tree.Continue: Statements._leave,
-    ladder.Ladder: Statements._rungs, ladder.Rung: Statements._rungs,
+    ladder.Ladder: Statements._rungs, ladder.Rung: Statements._rungs, sfc.Sfc: Statements._sfc,
     tree.Return: Statements._return, tree.Empty: Statements._empty, tree.RefusedStatement: Statements._refused,
 }
 
@@ -285,6 +289,6 @@ def bodies(statement: tree.Statement) -> list[tree.Block]:
         return [body for _, body in statement.branches] + [statement.otherwise or ()]
     if isinstance(statement, tree.Case):
         return [branch.body for branch in statement.branches] + [statement.otherwise or ()]
-    if isinstance(statement, tree.For | tree.While | tree.Repeat | ladder.Ladder | ladder.Rung):
+    if isinstance(statement, tree.For | tree.While | tree.Repeat | ladder.Ladder | ladder.Rung | sfc.Sfc):
         return [statement.body]
     return []

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 _OWN = {"VAR": "a variable of its program", "VAR_OUTPUT": "an output"}
 """What members are that only their own body writes."""
+_ROLES = {"step": "a step", "action": "an ACTION of a chart"}
 Path = tuple[object, ...]
 """A variable or address, and the steps from it to a part."""
 
@@ -42,6 +43,10 @@ def writable(expressions: Expressions, expr: tree.Expr, purpose: str, bound: boo
         if variable.constant:
             expressions.error("S0501", expr, f"{variable.name} is CONSTANT and cannot {purpose}", "",
                               (variable.source, variable.node.start, "declared here"))
+            return False
+        if variable.role and expr.end > expr.start:
+            expressions.error("S0501", expr, f"{variable.name} is {_ROLES[variable.role]} and cannot {purpose}",
+                              "transitions and the qualifiers of actions decide it")
             return False
         _note_input(expressions, expr, variable)
     if address is not None and _is_read_only(expressions, address):

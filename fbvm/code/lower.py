@@ -20,7 +20,7 @@ from fbvm.code.pointers import PointerLowering
 from fbvm.code.pou_calls import CallLowering
 from fbvm.code.values import DEEPEST, ValueLowering, is_aggregate
 from fbvm.code.weights import counted
-from fbvm.syntax import ladder, tree
+from fbvm.syntax import ladder, sfc, tree
 
 if TYPE_CHECKING:
     from fbvm.code.compiler import Program
@@ -160,7 +160,7 @@ class BodyLowering:
             if isinstance(statement, tree.Empty):
                 continue
             site = self.site(statement)
-            if not isinstance(statement, ladder.Ladder | ladder.Rung) and statement.end > statement.start:
+            if not isinstance(statement, ladder.Ladder | ladder.Rung | sfc.Sfc) and statement.end > statement.start:
                 self.out.append(("observe", "statement", site, None))
             mark = len(self.out)
             _LOWER[type(statement)](self, statement, site)
@@ -333,6 +333,9 @@ class BodyLowering:
         self.out.append(("observe", "rung", site, node.number))
         self.block_into(node.body)
 
+    def _sfc(self, node: sfc.Sfc, site: int) -> None:
+        self.block_into(node.body)
+
     def _return(self, node: tree.Return, site: int) -> None:
         if node.value is not None:
             assert self.pou.result is not None
@@ -349,4 +352,5 @@ _LOWER: dict[type, Callable[..., None]] = {
     tree.Case: BodyLowering._case, tree.For: BodyLowering._for, tree.While: BodyLowering._while,
     tree.Repeat: BodyLowering._repeat, tree.Exit: BodyLowering._exit, tree.Continue: BodyLowering._next,
     tree.Return: BodyLowering._return, ladder.Ladder: BodyLowering._ladder, ladder.Rung: BodyLowering._rung,
+    sfc.Sfc: BodyLowering._sfc,
 }

@@ -21,10 +21,12 @@ NESTING = frozenset(("LPAR", "LSQB", "IF", "CASE", "FOR", "WHILE", "REPEAT", "ST
                      "POINTER", "REFERENCE"))
 REFUSED = frozenset(("REFUSED_SECTION", "REFUSED_BLOCK", "TRY"))
 DIVIDERS = frozenset(("ELSE", "ELSIF", "UNTIL", "END_IF", "END_CASE", "END_FOR", "END_WHILE", "END_REPEAT",
-                      "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM", "END_ACTION"))
+                      "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM", "END_ACTION", "END_TRANSITION"))
 """Words that end a list of statements.  The tables reduce the list for any of them and find out later that it was the
 wrong one; those who mend want to know before."""
 
+ELEMENTS = frozenset(("STEP", "TRANSITION"))
+"""Words of charts: what must follow them says that they are no names."""
 FUNCTION_OPERATORS = frozenset(("AND", "OR", "XOR", "MOD", "NOT"))
 """Reserved words that are names in front of `(`, as in `AND(a, b)`."""
 
@@ -186,5 +188,5 @@ class Automaton:
     def may_be_name(self, token: Token) -> bool:
         """Whether a word that the grammar cannot take here may be the user's name."""
         if token.type in self.soft:
-            return token.text[-1] != "="
+            return token.text[-1] != "=" and token.type not in ELEMENTS
         return token.type in FUNCTION_OPERATORS and self.text[token.end:token.end + 20].lstrip().startswith("(")

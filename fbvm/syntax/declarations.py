@@ -7,7 +7,9 @@ from collections.abc import Sequence
 from fbvm.syntax.jumps import Jumps, Tangled
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
-from fbvm.syntax.statements import Items, Statements
+from fbvm.syntax.sfc import Step, Transition
+from fbvm.syntax.sfc_elements import SfcElements
+from fbvm.syntax.statements import Items
 from fbvm.syntax.tree import (
     Access,
     AccessVars,
@@ -45,13 +47,14 @@ Head = tuple[Name, list[Refused]]
 Item = tuple[Expr | None, Initial | None]
 Settings = AccessVars | ConfigVars
 Section = VarSection | Refused | Settings
+Element = Action | Step | Transition | Refused
 ConfigItem = VarSection | Task | ProgramInstance | Refused | Settings
 
 REPEATED_LIMIT = 1_000_000
 """Most values that one `n(a, b)` of an array may stand for."""
 
 
-class Declarations(Statements):
+class Declarations(SfcElements):
     """The functions of the rules of declarations."""
 
     def source_text(self, declarations: list[Declaration]) -> SourceText:
@@ -68,16 +71,16 @@ class Declarations(Statements):
         """FINAL, PUBLIC and their like say who may extend or name a POU, and change nothing that it does."""
         return self.declared(token), [*(self.refused(m) for m in modifiers if m.text.upper() == "ABSTRACT"), *inheritance]
 
-    def pou(self, word: Token, head: Head, sections: list[Section], items: Items, actions: list[Action | Refused],
+    def pou(self, word: Token, head: Head, sections: list[Section], items: Items, actions: list[Element],
             end: Token) -> Pou:
         return self.function(word, head, None, None, sections, items, actions, end)
 
     def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None,
-                 sections: list[Section], items: Items, actions: list[Action | Refused], end: Token) -> Pou:
+                 sections: list[Section], items: Items, actions: list[Element], end: Token) -> Pou:
         name, refused = head
         accesses = [s for s in sections if isinstance(s, AccessVars) and word.type == "PROGRAM"]
         refused += [_out_of_place(s) for s in (*sections, *actions)
-                    if s not in accesses and not isinstance(s, VarSection | Action)]
+                    if s not in accesses and not isinstance(s, VarSection | Action | Step | Transition)]
         blocks = [i for i in items if isinstance(i, RefusedStatement) and self.is_block(i)]
         refused += [Refused(b.start, b.end, b.what, b.code) for b in blocks]
         body = self.block([i for i in items if i not in blocks] if blocks else items)
@@ -88,8 +91,28 @@ class Declarations(Statements):
             own += [subroutine for ladder in self.ladders for subroutine in ladder.subroutines]
             declared += self.ladder_sections(declared)
         body = self.without_jumps(body, declared)
+        if any(isinstance(a, Step | Transition) for a in actions):
+            body = self.chart(word, body, actions, declared)
         return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused), tuple(own),
                    tuple(accesses))
+
+    def chart(self, word: Token, body: Block, elements: list[Element], declared: list[VarSection]) -> Block:
+        """The body of a POU that is a sequential function chart."""
+        from fbvm.syntax.evolution import Evolution
+        from fbvm.syntax.sfc_rules import sound
+
+        steps = [e for e in elements if isinstance(e, Step)]
+        transitions = [e for e in elements if isinstance(e, Transition)]
+        if word.type == "FUNCTION":
+            self.report("S0111", word.start, word.end, "a FUNCTION has no steps: it remembers nothing",
+                        "make it a FUNCTION_BLOCK")
+        if body:
+            self.report("S0111", body[0].start, body[0].end, "statements stand in front of a chart",
+                        "what is to be executed in every scan belongs in an ACTION of a step, or in a POU of its own")
+        evolution = Evolution(self, steps, transitions, (e for e in elements if isinstance(e, Action)))
+        chart = evolution.sfc(elements[0].start, elements[-1].end, sound(steps, transitions, self.report))
+        declared += chart.sections
+        return (chart,)
 
     def without_jumps(self, body: Block, declared: list[VarSection]) -> Block:
         """The body of a POU with conditions and loops for its jumps; as it is where these cannot say the same."""
@@ -125,20 +148,13 @@ class Declarations(Statements):
         self.refuse_selves()
         return Action(word.start, end.end, self.name(owner) if owner else None, self.declared(token), body)
 
-    def actions_of(self, word: Token, owner: Token | None, actions: list[Action | Refused], end: Token) -> Actions:
+    def actions_of(self, word: Token, owner: Token | None, actions: list[Element], end: Token) -> Actions:
         return Actions(word.start, end.end, self.name(owner) if owner else None,
                        tuple(a for a in actions if isinstance(a, Action)), tuple(a for a in actions if isinstance(a, Refused)))
 
     def is_block(self, statement: RefusedStatement) -> bool:
         """Whether a refused statement is a METHOD or the like, which belongs to the POU and not to its body."""
         return statement.what not in ("THIS", "SUPER", "JMP", "__TRY") and not statement.what.startswith("label")
-
-    def refuse_selves(self) -> None:
-        """Report THIS and SUPER that stand where no statement could carry the refusal."""
-        for token in self.selves:
-            word = token.text.upper()
-            self.report("S0902", token.start, token.end, f"{word} is object-oriented text, which is refused", "")
-        self.selves.clear()
 
     # --- variables ---
 

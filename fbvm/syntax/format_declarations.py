@@ -2,31 +2,35 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-from fbvm.syntax.format_expressions import Phrase
+from fbvm.syntax.format_expressions import Phrase, in_capitals
 from fbvm.syntax.format_layout import BLANK, HARD, Doc, Indent, Leaf
+from fbvm.syntax.format_sfc import SfcLayout
 from fbvm.syntax.format_statements import Row, lines
 from fbvm.syntax.format_types import TypeLayout
 from fbvm.syntax.lexer import Token
 
 
-class DeclarationLayout(TypeLayout):
+class DeclarationLayout(TypeLayout, SfcLayout):
     """The functions of the rules of declarations; with those it inherits, the whole grammar's."""
 
     def source_text(self, declarations: list[Phrase]) -> Doc:
         """The whole text: at least one empty line between declarations."""
-        rows: list[Row] = []
-        for declaration in declarations:
-            new = self.rows([declaration])
-            if rows and not any(row.blank for row in new):
-                new[0] = new[0]._replace(blank=True)
-            rows += new
+        rows = self.apart(declarations)
         rows += self.remarks(self.comments.claim(len(self.comments.text)))
         parts: list[Doc] = []
         for row in rows:
             parts += (BLANK if row.blank else HARD, row.doc)
         return tuple(parts[1:])
+
+    def apart(self, items: list[Phrase]) -> list[Row]:
+        """Items with at least one empty line between them."""
+        rows: list[Row] = []
+        for item in items:
+            new = self.rows([item])
+            if rows and not any(row.blank for row in new):
+                new[0] = new[0]._replace(blank=True)
+            rows += new
+        return rows
 
     # --- POUs ---
 
@@ -49,7 +53,9 @@ class DeclarationLayout(TypeLayout):
         declared, body = self.rows(sections), self.rows(items)
         if not actions:
             body += self.before_end(end)
-        more = [row._replace(blank=True) for row in self.rows(actions)]
+        more = self.apart(actions)
+        if more:
+            more[0] = more[0]._replace(blank=True)
         phrase.parts += (lines(declared), Indent(lines(body, bool(declared))), lines(more, True))
         if actions:
             phrase.parts.append(Indent(lines(self.before_end(end))))
@@ -100,7 +106,7 @@ class DeclarationLayout(TypeLayout):
     def task(self, word: Token, token: Token, opener: Token, arguments: list[Phrase] | None, closer: Token,
              end: Token) -> Phrase:
         for argument in arguments or ():
-            argument.parts[0] = _in_capitals(argument.parts[0])
+            argument.parts[0] = in_capitals(argument.parts[0])
         return Phrase(word.start, self.leaf(word), " ", self.leaf(token), self.leaf(opener), self.listed(arguments),
                       self.closer(closer), self.closer(end))
 
@@ -150,10 +156,3 @@ class DeclarationLayout(TypeLayout):
 
     def fb_task(self, instance: Phrase, with_: Token, task: Token) -> Phrase:
         return Phrase(instance.start, instance.doc, " ", self.leaf(with_), " ", self.leaf(task))
-
-
-def _in_capitals(doc: Doc) -> Doc:
-    """A piece whose first word is written in capitals."""
-    if isinstance(doc, tuple) and doc:
-        return (_in_capitals(doc[0]), *doc[1:])
-    return replace(doc, text=doc.text.upper()) if isinstance(doc, Leaf) else doc

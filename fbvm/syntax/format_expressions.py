@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from fbvm.syntax.format_comments import Comments
@@ -177,3 +178,10 @@ class ExpressionLayout:
     def operand(self, phrase: Phrase) -> Doc:
         """A part of a chain; a chain in it is broken further in."""
         return Indent(phrase.doc) if phrase.level in CHAINS else phrase.doc
+
+
+def in_capitals(doc: Doc) -> Doc:
+    """A piece whose first word is written in capitals."""
+    if isinstance(doc, tuple) and doc:
+        return (in_capitals(doc[0]), *doc[1:])
+    return replace(doc, text=doc.text.upper()) if isinstance(doc, Leaf) else doc

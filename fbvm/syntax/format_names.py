@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 from fbvm.base.types import ELEMENTARY, GENERIC, SHORT_NAMES, fold
 from fbvm.syntax.format_scopes import Scope, declared_in, element, global_scope, members
 from fbvm.syntax.ladder import Ladder
+from fbvm.syntax.sfc import Association, Sfc, Transition
 from fbvm.syntax.tree import (
     Argument,
     ArrayInit,
@@ -97,6 +98,11 @@ class Spelling:
             self._function_name(node.callee, scope)
         elif isinstance(node, ProgramInstance):
             self._program(node)
+        elif isinstance(node, Transition):
+            for name in (*node.sources, *node.targets):
+                self._name(name, scope)
+        elif isinstance(node, Association):
+            self._name(node.action, scope)
         elif isinstance(node, VarSection) and node.kind == "VAR_EXTERNAL":
             for name in (name for variable in node.variables for name in variable.names):
                 if entry := self.globals.get(fold(name.text)):
@@ -231,8 +237,8 @@ def _is_ladder(node: Node) -> bool:
 
 
 def _children(node: Node) -> Iterator[Node]:
-    """The nodes directly below a node."""
-    todo: list[Any] = [getattr(node, f.name) for f in fields(node)]
+    """The nodes directly below a node; of a chart what was written."""
+    todo: list[Any] = [node.steps, node.transitions] if isinstance(node, Sfc) else [getattr(node, f.name) for f in fields(node)]
     while todo:
         value = todo.pop()
         if isinstance(value, Node):

@@ -17,7 +17,7 @@ ENDS = {
     "VAR": "END_VAR", "VAR_GLOBAL": "END_VAR", "STRUCT": "END_STRUCT", "UNION": "END_UNION", "TYPE": "END_TYPE",
     "FUNCTION": "END_FUNCTION", "FUNCTION_BLOCK": "END_FUNCTION_BLOCK", "PROGRAM": "END_PROGRAM",
     "CONFIGURATION": "END_CONFIGURATION", "RESOURCE": "END_RESOURCE", "ACTION": "END_ACTION", "ACTIONS": "END_ACTIONS",
-    "VAR_ACCESS": "END_VAR", "VAR_CONFIG": "END_VAR"}
+    "VAR_ACCESS": "END_VAR", "VAR_CONFIG": "END_VAR", "STEP": "END_STEP", "TRANSITION": "END_TRANSITION"}
 """Word that opens -> word that ends it."""
 
 OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL": {"REPEAT"}}
@@ -34,7 +34,7 @@ HEADS = {"IF": "THEN", "ELSIF": "THEN", "WHILE": "DO", "FOR": "DO", "CASE": "OF"
 """Words behind which a head stands, and the word that ends the head."""
 
 LISTS = ("ended_list", "var_decls", "type_decls", "declarations", "config_items", "resource_items", "some_actions",
-         "access_decls", "config_decls")
+         "access_decls", "config_decls", "associations")
 STATEMENT_LISTS = {"ended_list", "open_list", "statement_list"}
 
 

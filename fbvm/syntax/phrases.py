@@ -32,7 +32,7 @@ LABEL_SIGNS = {"COLON", "COMMA", "RANGE", "SET_ASSIGN", "ATTEMPT"}
 """What may follow a name at the start of a statement, beside `:=`, `(` and `;`."""
 
 UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "TRY", "ACCESS", "INHERITANCE", "POU_MODIFIER", "SELF", "JMP", "QUALIFIER", "EDGE",
-          "OVERLAP", "ACTION", "DIRECTION"}
+          "OVERLAP", "ACTION", "DIRECTION", "STEP", "TRANSITION"}
 """What may stand there and would be refused, or is seldom meant."""
 
 FIRST = ("SEMICOLON", "THEN", "DO", "OF", "TO", "ASSIGN", "COLON", "COMMA", "RPAR", "RSQB")

@@ -10,8 +10,7 @@ from fbvm.syntax.lexer import Token
 
 OBJECT_ORIENTED = {"CLASS", "INTERFACE", "NAMESPACE", "METHOD", "PROPERTY", "USING", "EXTENDS", "IMPLEMENTS", "THIS",
                    "SUPER", "ABSTRACT", "FINAL", "PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
-SFC = {"STEP", "INITIAL_STEP", "TRANSITION"}
-ENDS = {"INITIAL_STEP": "END_STEP", "USING": ";", "__TRY": "__ENDTRY"}
+ENDS = {"USING": ";", "__TRY": "__ENDTRY"}
 """What ends a refused text, where it is not END_ and the word."""
 
 HOUSES = {"CLASS", "INTERFACE", "NAMESPACE"}
@@ -26,7 +25,7 @@ def refused_what(text: str) -> tuple[str, str]:
     word = text.split(None, 1)[0].split("(")[0].upper()
     if word in OBJECT_ORIENTED:
         return word, "S0902"
-    return (f"{word} (sequential function chart)" if word in SFC else word), "S0901"
+    return word, "S0901"
 
 
 def whole(opener: Token, source: str, following: Callable[[], Token]) -> tuple[Token, Token | None]:

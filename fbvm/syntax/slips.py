@@ -17,6 +17,8 @@ from fbvm.syntax.tree import Deref, Name
 
 ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
 POU_ENDS = {ENDS[word] for word in POUS}
+BODY_ENDS = POU_ENDS | {"END_ACTION", "END_TRANSITION"}
+"""Words behind which no statement of the same body stands."""
 
 
 @dataclass(frozen=True)
@@ -305,7 +307,7 @@ def _instruction_list(automaton: Automaton, token: Token, following: list[Token]
         return None
     if token.type not in ("NAME", "NUMBER", "TYPED_LITERAL", "DIRECT") or "\n" in automaton.text[word.end:token.start]:
         return None
-    while token.type not in POU_ENDS and token.type != "$END":
+    while token.type not in BODY_ENDS and token.type != "$END":
         token = automaton.next()
     return Mend([token], word.start, word.end, "the instruction list is understood but not executed by this version",
                 "write the body in Structured Text", cut=True, code="S0901", silent=token.start)

@@ -85,6 +85,13 @@ class Statements(Expressions):
         del self.selves[-len(mine):]
         return RefusedStatement(statement.start, statement.end, mine[0].text.upper(), "S0902")
 
+    def refuse_selves(self) -> None:
+        """Report THIS and SUPER that stand where no statement could carry the refusal."""
+        for token in self.selves:
+            word = token.text.upper()
+            self.report("S0902", token.start, token.end, f"{word} is object-oriented text, which is refused", "")
+        self.selves.clear()
+
     # --- simple statements ---
 
     def one_target(self, target: Expr, sign: Token) -> list[Expr]:

@@ -134,12 +134,14 @@ class VarDecl(Node):
 @_node
 class VarSection(Node):
     """One VAR.. END_VAR: `kind` is VAR, VAR_INPUT, VAR_OUTPUT, VAR_IN_OUT, VAR_TEMP, VAR_EXTERNAL, VAR_GLOBAL,
-    VAR_STAT or VAR_INST; `qualifiers` the words behind it in capitals; `hidden` ones hold what rungs need, unwritten."""
+    VAR_STAT or VAR_INST; `qualifiers` the words behind it in capitals; `hidden` ones hold what rungs and charts need, unwritten;
+    their `role` is "step" or "action" where they are the flags of these, which programs may read."""
 
     kind: str
     qualifiers: tuple[Name, ...]
     variables: tuple[VarDecl, ...]
     hidden: bool = False
+    role: str = ""
 
 
 # --- statements (7.3.3) --------------------------------------------------------------------------------------------

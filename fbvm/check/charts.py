@@ -1,0 +1,86 @@
+"""Rules of sequential function charts (IEC 61131-3 ed. 3, tables 54 to 59) that need names and types."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import BOOL, TIME, base, fold
+from fbvm.check.writes import writable
+from fbvm.syntax import sfc, tree
+
+if TYPE_CHECKING:
+    from fbvm.check.statements import Statements
+
+
+def check(statements: Statements, chart: sfc.Sfc) -> bool:
+    """Check conditions and associations; whether the statements of the chart can be checked after that."""
+    rules = _Rules(statements)
+    good = [rules.transition(transition) for transition in chart.transitions]
+    good += [rules.is_free(variable) for section in chart.sections for variable in section.variables]
+    for step in chart.steps:
+        good += [rules.association(association) for association in step.associations]
+    return all(good)
+
+
+class _Rules:
+    def __init__(self, statements: Statements) -> None:
+        self.expressions = statements.expressions
+        self.facts = statements.facts
+        self.error = statements.error
+        self.pou = statements.pou
+
+    def is_free(self, declared: tree.VarDecl) -> bool:
+        """Whether a name of a step or action is not taken by a variable, which was told."""
+        name = declared.names[0]
+        found = self.pou.variables.get(fold(name.text))
+        return found is not None and found.node is name
+
+    def transition(self, transition: sfc.Transition) -> bool:
+        return self._is_bool(transition.condition, "a transition")
+
+    def association(self, association: sfc.Association) -> bool:
+        good = self._action(association.action)
+        qualifier = association.qualifier
+        if association.time is None and sfc.QUALIFIERS[qualifier]:
+            self.error("S0112", association, f"the qualifier {qualifier} needs a time",
+                       f"write {association.action.text}({qualifier}, T#5s)")
+            good = False
+        elif association.time is not None:
+            good &= self._time(association.time)
+        for indicator in association.indicators:
+            good &= self._is_bool(indicator, "an indicator")
+        return good
+
+    def _is_bool(self, expr: tree.Expr, what: str) -> bool:
+        self.expressions.condition(expr, what)
+        kind = self.facts.types.get(expr)
+        return kind is not None and base(kind) == BOOL
+
+    def _time(self, expr: tree.Expr) -> bool:
+        if not self.expressions.fit(expr, TIME, "S0112", "the time of an action"):
+            return False
+        value = self.facts.constants.get(expr)
+        if isinstance(value, int) and value < 0:
+            self.error("S0112", expr, "the time of an action is below 0")
+            return False
+        return True
+
+    def _action(self, name: tree.Name) -> bool:
+        """An ACTION of the POU, or a BOOL variable that can be written."""
+        if fold(name.text) in self.pou.actions:
+            return True
+        variable = self.expressions.variable(name.text)
+        if variable is None and self.expressions.pou is not None and fold(name.text) in self.expressions.pou.damaged:
+            return False
+        if variable is None or variable.role:
+            nearest = self.expressions.project.nearest(name.text, (action.tree.name.text for action in self.pou.actions.values()))
+            self.error("S0112", name, f"{name.text} is neither an ACTION of {self.pou.name} nor a variable",
+                       nearest or f"write ACTION {name.text}: .. END_ACTION")
+            return False
+        target = tree.NameRef(name.start, name.end, name.text)
+        if self.expressions.infer(target) is None:
+            return False
+        if base(variable.type) != BOOL:
+            self.error("S0112", name, f"{name.text} is {variable.type}: a variable that is an action is BOOL")
+            return False
+        return writable(self.expressions, target, "be an action")

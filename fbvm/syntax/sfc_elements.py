@@ -1,0 +1,67 @@
+"""Builds the nodes of steps and transitions (grammar/sfc.lark)."""
+
+from __future__ import annotations
+
+from fbvm.syntax.lexer import Token
+from fbvm.syntax.sfc import QUALIFIERS, Association, Step, Transition
+from fbvm.syntax.statements import Items, Statements
+from fbvm.syntax.tree import Block, Expr, Name, NameRef
+
+
+class SfcElements(Statements):
+    """The functions of the rules of steps and transitions."""
+
+    def step(self, word: Token, token: Token, colon: Token, associations: list[Association], end: Token) -> Step:
+        self.refuse_selves()
+        return Step(word.start, end.end, self.declared(token), word.text.upper() == "INITIAL_STEP", tuple(associations))
+
+    def association(self, token: Token, opener: Token | None, given: list[Expr] | None, closer: Token | None,
+                    end: Token) -> Association:
+        values = list(given or ())
+        qualifier = "N"
+        first = values[0] if values else None
+        if isinstance(first, NameRef) and first.text.upper() in QUALIFIERS:
+            qualifier = first.text.upper()
+            del values[0]
+        elif first is not None:
+            self.report("S0112", first.start, first.end, "the first thing in the parentheses is a qualifier",
+                        f"one of {', '.join(QUALIFIERS)}; indicators stand behind it")
+            values.clear()
+        time = values.pop(0) if values and QUALIFIERS[qualifier] else None
+        return Association(token.start, end.end, self.name(token), qualifier, time, tuple(values))
+
+    def transition(self, word: Token, token: Token | None, priority: int | None, from_: Token, sources: list[Name],
+                   to: Token, targets: list[Name], sign: Token, condition: Expr, semicolon: Token, end: Token) -> Transition:
+        self.depths.clear()
+        return self._transition(word, token, priority, sources, targets, condition, None, end)
+
+    def transition_body(self, word: Token, token: Token | None, priority: int | None, from_: Token, sources: list[Name],
+                        to: Token, targets: list[Name], colon: Token, items: Items, end: Token) -> Transition:
+        body = self.block(items)
+        if token is None:
+            self.report("S0111", word.start, word.end, "a transition with statements needs a name",
+                        "the statements assign the condition to it; or write `:= condition;`")
+            token = word
+        return self._transition(word, token, priority, sources, targets, NameRef(token.start, token.end, token.text), body, end)
+
+    def _transition(self, word: Token, token: Token | None, priority: int | None, sources: list[Name],
+                    targets: list[Name], condition: Expr, body: Block | None, end: Token) -> Transition:
+        self.refuse_selves()
+        return Transition(word.start, end.end, self.declared(token) if token else None, priority, tuple(sources),
+                          tuple(targets), condition, body)
+
+    def step_names(self, token: Token) -> list[Name]:
+        return [self.name(token)]
+
+    def step_names_listed(self, opener: Token, names: list[Name], closer: Token) -> list[Name]:
+        return names
+
+    def step_name(self, token: Token) -> Name:
+        return self.name(token)
+
+    def priority(self, opener: Token, word: Token, sign: Token, number: Token, closer: Token) -> int | None:
+        value = self.number(number).value
+        if not isinstance(value, int):
+            self.report("S0111", number.start, number.end, "a priority is a whole number", "the lowest one goes first")
+            return None
+        return value

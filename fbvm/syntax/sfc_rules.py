@@ -1,0 +1,71 @@
+"""Whether steps and transitions are a chart: every name is there once, and each network has one initial step.
+
+What is allowed and hardly meant, such as steps that nothing reaches, is told by `check/lint_sfc.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from difflib import get_close_matches
+
+from fbvm.base.types import fold
+from fbvm.syntax.sfc import Step, Transition
+from fbvm.syntax.tree import Name
+
+Report = Callable[..., None]
+
+
+def sound(steps: Sequence[Step], transitions: Sequence[Transition], report: Report) -> bool:
+    """Whether the chart can be executed; what is wrong is told."""
+    wrong: list[bool] = []
+
+    def tell(code: str, name: Name, message: str, hint: str = "") -> None:
+        wrong.append(True)
+        report(code, name.start, name.end, message, hint)
+
+    known: dict[str, Step] = {}
+    for step in steps:
+        if fold(step.name.text) in known:
+            tell("S0202", step.name, f"the step {step.name.text} is declared twice", "every step has a name of its own")
+        known.setdefault(fold(step.name.text), step)
+    _names(transitions, known, tell)
+    if not wrong:
+        _initial(steps, transitions, tell)
+    return not wrong
+
+
+def _names(transitions: Iterable[Transition], known: dict[str, Step], tell: Callable[..., None]) -> None:
+    """Every step that a transition names is there, and is named once on each side."""
+    for transition in transitions:
+        for side, names in (("FROM", transition.sources), ("TO", transition.targets)):
+            seen: set[str] = set()
+            for name in names:
+                if fold(name.text) not in known:
+                    close = get_close_matches(fold(name.text), known, 1)
+                    hint = f"the nearest is {known[close[0]].name.text}" if close else f"declare it: STEP {name.text}: END_STEP"
+                    tell("S0201", name, f"there is no step {name.text}", hint)
+                elif fold(name.text) in seen:
+                    tell("S0111", name, f"{name.text} stands twice behind {side}", "")
+                seen.add(fold(name.text))
+
+
+def _initial(steps: Sequence[Step], transitions: Iterable[Transition], tell: Callable[..., None]) -> None:
+    """Each network, which is what transitions connect, has one initial step."""
+    network = {fold(step.name.text): position for position, step in enumerate(steps)}
+    for transition in transitions:
+        joined = {network[fold(name.text)] for name in (*transition.sources, *transition.targets)}
+        network = {name: min(joined) if number in joined else number for name, number in network.items()}
+    begins: dict[int, Step] = {}
+    for step in steps:
+        number = network[fold(step.name.text)]
+        if step.initial and number in begins:
+            tell("S0111", step.name, f"{step.name.text} is a second initial step beside {begins[number].name.text}",
+                 "a network begins with one step; begin several at once with a transition TO (a, b)")
+        elif step.initial:
+            begins[number] = step
+    for step in steps:
+        number = network[fold(step.name.text)]
+        if number not in begins:
+            tell("S0111", step.name, f"no initial step leads to {step.name.text}" if begins else "there is no initial step",
+                 "write INITIAL_STEP in place of STEP where the chart begins")
+            begins[number] = step
