@@ -8,6 +8,8 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+import pytest
+
 from fbvm.base.diagnostics import Source
 from fbvm.syntax.automaton import Automaton
 from fbvm.syntax.builder import Stop
@@ -54,6 +56,7 @@ def used() -> frozenset[int]:
     return frozenset(seen)
 
 
+@pytest.mark.slow
 def test_every_rule_is_exercised() -> None:
     """Rules by number: how lark orders them differs from run to run."""
     rules: tuple[Rule, ...] = tables("st").rules

@@ -68,16 +68,24 @@ def room_of(dotted: str) -> str:
     return parts[1] if len(parts) > 1 else ""
 
 
+BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
+"""Where statements hold others."""
+
+
 @cache
-def nodes(path: Path) -> list[ast.AST]:
-    return list(ast.walk(tree(path)))
+def statements(path: Path) -> list[ast.AST]:
+    """All statements of a module, also within functions."""
+    found: list[ast.AST] = [tree(path)]
+    for node in found:
+        found += [inner for block in BLOCKS for inner in getattr(node, block, ())]
+    return found
 
 
 @cache
 def imports(path: Path) -> list[str]:
     """Dotted names of all that a module imports, also within functions."""
     found = []
-    for node in nodes(path):
+    for node in statements(path):
         if isinstance(node, ast.Import):
             found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
@@ -114,14 +122,16 @@ def out_of_place(path: Path) -> list[str]:
 
 
 def too_long(path: Path) -> list[str]:
-    long = [node.name for node in nodes(path) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    long = [node.name for node in statements(path) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
             and (node.end_lineno or 0) - node.lineno + 1 > LONGEST_FUNCTION]  # fmt: skip
     lines = len(path.read_text(encoding="utf-8").splitlines())
     return long + [f"{lines} lines"] * (lines > LONGEST_FILE)
 
 
 def dates(path: Path) -> list[str]:
-    return [node.attr for node in nodes(path) if isinstance(node, ast.Attribute)
+    if not re.search(r"\.(now|utcnow|today)\b", path.read_text(encoding="utf-8")):
+        return []
+    return [node.attr for node in ast.walk(tree(path)) if isinstance(node, ast.Attribute)
             and node.attr in ("now", "utcnow", "today") and ast.unparse(node.value) in DATES]  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from random import Random
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mb_tcp_rig import Rig
@@ -34,6 +35,7 @@ def request(dice: Random) -> bytes:
     return pdu if dice.random() < 0.9 else pdu[: dice.randrange(1, len(pdu) + 1)]
 
 
+@pytest.mark.slow
 @COMMON
 @given(st.integers(0, 2**32), st.integers(1, 60))
 def test_as_the_model_answers(seed: int, cut: int) -> None:

@@ -182,6 +182,7 @@ def test_requests_that_come_together_are_served_one_in_a_call() -> None:
     assert len(client.data) == 12 + 11 + 9
 
 
+@pytest.mark.slow
 def test_a_client_that_does_not_take_its_replies() -> None:
     """7005 until the network takes the reply; the requests behind it wait, and are served when the client reads again."""
     rig = Rig()

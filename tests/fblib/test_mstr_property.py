@@ -75,6 +75,7 @@ def test_any_bytes_for_an_answer(data: bytes, control: tuple[int, ...], has_head
     assert rig.databuf(3) == list(rig.server.holding_registers[:3])
 
 
+@pytest.mark.slow
 @settings(COMMON, max_examples=15)
 @given(st.integers(0, 2**32), st.sampled_from(["good", "late", "silent", "refused", "resets"]))
 def test_pins_at_any_time_and_no_path_is_lost(seed: int, kind: str) -> None:

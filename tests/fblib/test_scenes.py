@@ -40,6 +40,7 @@ def test_a_panel_fills_the_tank() -> None:
     assert values["tank"]["Main.Holding[0]"] == 800
 
 
+@pytest.mark.slow
 def test_three_plcs_in_a_row() -> None:
     values = scene("row")
     assert values["panel"] == {"Main.Level": 704}
@@ -52,6 +53,7 @@ def test_the_row_on_a_bad_network(kind: str) -> None:
     assert scene("row", fault=KINDS[kind])["gateway"]["Main.Level"] == 704
 
 
+@pytest.mark.slow
 def test_the_row_when_the_tank_is_away_for_two_seconds() -> None:
     away = Fault(TANK, reset=True, error="EHOSTUNREACH", from_ns=3 * SECOND_NS, until_ns=5 * SECOND_NS)
     values = scene("row", fault=away)

@@ -78,6 +78,7 @@ def compared(a: Any, b: Any) -> Results:
     return {"lt": a < b, "le": a <= b, "gt": a > b, "ge": a >= b, "eq": a == b, "ne": a != b, "mx": max(a, b), "mn": min(a, b)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [*SIGNED, *UNSIGNED])
 def test_integers(kind: str) -> None:
     declared = f"a, b, sum, dif, pro, quo, rem, neg, mag, lim, mx, mn : {kind}; lt, le, gt, ge, eq, ne : BOOL;"
@@ -134,6 +135,7 @@ def root(a: float) -> float:
     return math.nan if a < 0 else math.sqrt(a)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["REAL", "LREAL"])
 def test_reals(kind: str) -> None:
     declared = f"a, b, sum, dif, pro, quo, neg, mag, rt, mx, mn, back : {kind}; lt, le, gt, ge, eq, ne, ok : BOOL; t : STRING;"

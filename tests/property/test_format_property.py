@@ -159,6 +159,7 @@ REMARKS = (" (* c{} *) ", " // c{}\n", "\n// c{}\n", "\n\n  // c{}\n\n", " /* c{
            " {{region {}}} ", " (* c{} *) // d\n", "\n// c{}\n    // d\n")
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.sampled_from(range(len(corpus()))), st.randoms(use_true_random=False))
 def test_spaces_line_ends_and_case_of_words_do_not_matter(number: int, chance: random.Random) -> None:
@@ -167,6 +168,7 @@ def test_spaces_line_ends_and_case_of_words_do_not_matter(number: int, chance: r
     assert write(respaced(text, chance)).replace("\r\n", "\n") == write(text)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.sampled_from(range(len(corpus()))), st.randoms(use_true_random=False))
 def test_names_are_written_as_they_are_declared(number: int, chance: random.Random) -> None:
@@ -174,6 +176,7 @@ def test_names_are_written_as_they_are_declared(number: int, chance: random.Rand
     assert write(renamed(text, chance)) == write(text)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=100)
 @given(st.sampled_from(range(len(corpus()))), st.randoms(use_true_random=False))
 def test_comments_may_stand_anywhere(number: int, chance: random.Random) -> None:

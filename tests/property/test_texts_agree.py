@@ -91,6 +91,7 @@ def test_every_seed_is_read(data_type: str) -> None:
     assert seen == {seed: wanted(data_type, seed.encode()) for seed in SEEDS}
 
 
+@pytest.mark.slow
 @settings(max_examples=1500, deadline=None)
 @given(st.sampled_from(sorted(TYPES)), st.sampled_from(SEEDS), EDITS)
 def test_any_text_is_read(data_type: str, seed: str, edits: list[tuple[int, int, str]]) -> None:
@@ -98,6 +99,7 @@ def test_any_text_is_read(data_type: str, seed: str, edits: list[tuple[int, int,
     assert read(data_type, text) == wanted(data_type, text)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(st.sampled_from(("REAL", "LREAL", "DINT", "TIME")),
        st.from_regex(r"[+-]?[0-9]{1,20}(\.[0-9]{1,30})?([eE][+-]?[0-9]{1,3})?", fullmatch=True))
@@ -117,6 +119,7 @@ VALUES = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=2000, deadline=None)
 @given(st.sampled_from(sorted(TYPES)), st.data())
 def test_any_value_is_written(data_type: str, data: st.DataObject) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -50,6 +51,7 @@ def feed(plc: Plc, rows: list[tuple[bool, ...]]) -> bytes:
     return bytes(plc.memory.snapshot())
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(before=inputs, after=inputs, astray=inputs)
 def test_a_way_back_is_a_way_back(before: list[tuple[bool, ...]], after: list[tuple[bool, ...]],

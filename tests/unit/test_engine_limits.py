@@ -71,6 +71,7 @@ def test_a_case_in_deep_blocks_reads_its_value_from_outside() -> None:
     assert rig.slot("i16", 0) == 255
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("value", [0, 1, 24, 25, 26, 999, 1999, 2500])
 def test_a_long_chain_of_branches(value: int) -> None:
     rows = tuple((("eq", "b", "i16", load("i16", 4), const("i16", row)), (store("i16", 0, const("i16", row)),))
@@ -79,6 +80,7 @@ def test_a_long_chain_of_branches(value: int) -> None:
     assert rig.slot("i16", 0) == (value if value < 2000 else -1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["add", "mul", "sub", "min", "div"])
 def test_expressions_nest_to_both_sides(name: str) -> None:
     site = (3,) if name == "div" else ()

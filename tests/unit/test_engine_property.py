@@ -8,6 +8,7 @@ from collections.abc import Callable
 from fractions import Fraction
 from typing import Any
 
+import pytest
 from hand_image import const, image, load, power_on, store
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -106,6 +107,7 @@ def trees(draw: st.DrawFn, machine: str, depth: int, slots: dict[int, bytes]) ->
     return ("shl" if left_shift else "shr", machine, a, const("i64", count), 3), shifted
 
 
+@pytest.mark.slow
 @given(data=st.data(), machine=integer_types)
 @settings(max_examples=300, deadline=None)
 def test_trees_of_integer_operations(data: st.DataObject, machine: str) -> None:
@@ -155,6 +157,7 @@ def rounded(value: Fraction) -> float:
     return min(near)[2]
 
 
+@pytest.mark.slow
 @given(a=reals, b=reals, name=st.sampled_from(("add", "sub", "mul", "div")))
 @settings(max_examples=300, deadline=None)
 def test_real_is_rounded_once(a: float, b: float, name: str) -> None:
@@ -177,6 +180,7 @@ def test_an_integer_becomes_the_nearest_real(value: int) -> None:
     assert arithmetic.single_of_integer(value) == rounded(Fraction(value))
 
 
+@pytest.mark.slow
 @given(value=long_reals, machine=integer_types)
 @settings(max_examples=300, deadline=None)
 def test_a_float_becomes_an_integer_or_traps(value: float, machine: str) -> None:

@@ -201,6 +201,7 @@ turns = st.tuples(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.lists(turns, max_size=3), max_size=30), timings, st.sampled_from([10, 90]))
 def test_any_program_on_a_network_opens_a_channel_only_when_it_is_free(

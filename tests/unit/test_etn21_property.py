@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from common_unit_tests import answer, events
 from etn21_rig import CIO, D, Rig
 from hypothesis import given, settings
@@ -45,6 +46,7 @@ def has_only_cleared_switches(rig: Rig, before: dict[str, bytes]) -> bool:
     return all(rig.cio[word] & ~old[word] == 0 for area, word in SWITCHES)
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.lists(cycles, max_size=25), timings, st.integers(0, 9))
 def test_any_order_of_switches_and_events(

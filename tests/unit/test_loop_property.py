@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -152,6 +153,7 @@ def play(script: list[list[Action]], table: list[Fault], steps: list[tuple[str, 
     return told
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(scripts, faults, st.lists(wishes, max_size=40))
 def test_every_order_of_requests(

@@ -71,6 +71,7 @@ def state(plc: Plc) -> tuple[Any, ...]:
     return bytes(snapshot.memory), snapshot.now_ns, snapshot.scans, snapshot.schedule, repr(snapshot.trap)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.sampled_from([1, 99_999, 1_000_000, 3_333_333, 10_000_000, 60_000_000, 1_000_000_000, 10**15]),
        st.lists(st.integers(0, 400), min_size=1, max_size=4))

@@ -78,6 +78,7 @@ def test_plcs_with_one_image_share_its_code() -> None:
     assert len({id(e._code) for e in engines}) == 1
 
 
+@pytest.mark.slow
 def test_an_entry_is_used_again() -> None:
     program = image(COUNT)
     e: NativeEngine | None = NativeEngine(program, power_on(program), 0)

@@ -39,6 +39,7 @@ def text(trace: Trace, name: str, scan: int) -> str:
     return str(int(value)) if isinstance(value, bool) else Signal(place, name).said(value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", list(Depth))
 def test_every_value_of_every_scan_is_there(depth: Depth) -> None:
     trace = traced(160, depth)

@@ -89,6 +89,7 @@ def test_what_changed_is_said() -> None:
     assert "  Main.N: 1 -> 0" in said(commands, "back")
 
 
+@pytest.mark.slow
 @given(moves=st.lists(st.sampled_from(["step", "next", "out", "scan", "back", "back scan", "goto 2", "run 14"]), max_size=12),
        button=st.integers(0, 12))  # fmt: skip
 @settings(max_examples=40, deadline=None)
@@ -147,6 +148,7 @@ def test_a_trap_can_be_gone_back_from() -> None:
     assert commands.session.read("Main.N") == 7
 
 
+@pytest.mark.slow
 def test_run_and_back_to_lines_conditions_and_breakpoints() -> None:
     commands = made()
     said(commands, "run Main.N = 3")
@@ -303,6 +305,7 @@ def test_a_script_from_a_pipe() -> None:
     assert "Modbus 1, unit 1: 03 read holding registers, address 2, quantity 10" in output
 
 
+@pytest.mark.slow
 def test_a_script_ends_with_what_is_wrong() -> None:
     assert called("expect D200 = 1\nquit\n") == (1, called("expect D200 = 1\n")[1])
     assert "does not hold in scan 0" in called("expect D200 = 1\n")[1]
@@ -326,6 +329,7 @@ address = "192.168.250.2"
 """
 
 
+@pytest.mark.slow
 def test_one_plc_of_a_project_while_the_others_scan_along(tmp_path: Path) -> None:
     for name in ("server.st", "given.st"):
         text = (HOUSE / "lessons" / "12-two-plcs-one-wire" / name).read_text(encoding="utf-8")

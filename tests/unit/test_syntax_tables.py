@@ -26,6 +26,7 @@ def fresh() -> Tables:
     return tables.__wrapped__("st")
 
 
+@pytest.mark.slow
 def test_a_missing_file_is_written_and_used(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = fresh()
     assert len(list((cache / "grammars").iterdir())) == 1
@@ -65,6 +66,7 @@ def test_a_file_with_wrong_contents_is_replaced(cache: Path, spoil: object) -> N
     assert file.read_bytes() == good
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_made_does_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("FBVM_CACHE", str(tmp_path / "file" / "cache"))
@@ -84,6 +86,7 @@ def test_the_grammar_has_only_the_conflicts_that_are_meant(caplog: pytest.LogCap
         "Shift/Reduce conflict for terminal SEMICOLON: (resolving as shift)"] * 4
 
 
+@pytest.mark.slow
 def test_the_grammar_is_plain_lark() -> None:
     text = grammar_text("st")
     tree = lark.Lark(text + "\n%ignore /\\s+/", parser="lalr", start="source_text").parse("PROGRAM p x := 1; END_PROGRAM")

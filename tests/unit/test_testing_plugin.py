@@ -107,6 +107,7 @@ def test_a_failure_says_where_its_page_is(project: pytest.Pytester) -> None:
     assert "test_wrong</title>" in (project.path / name).read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_a_mistake_of_the_test_ends_in_the_test(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def test_name(fb):
@@ -189,6 +190,7 @@ END_PROGRAM
     run(project).assert_outcomes(passed=2)
 
 
+@pytest.mark.slow
 def test_what_cannot_be_had_says_why(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def test_no_file(fb):
@@ -280,6 +282,7 @@ END_PROGRAM
     result.stdout.fnmatch_lines(["test_pump.st::Test_starts_late PASSED*", "test_pump.st::Test_once PASSED*"])
 
 
+@pytest.mark.slow
 def test_a_failed_assert_shows_line_and_values(project: pytest.Pytester) -> None:
     project.makefile(".st", test_pump="""\
 PROGRAM Test_wrong
@@ -365,6 +368,7 @@ GOLDEN = """
 """
 
 
+@pytest.mark.slow
 def test_a_golden_trace_is_written_kept_and_told_apart(project: pytest.Pytester) -> None:
     project.makepyfile(GOLDEN)
     run(project).stdout.fnmatch_lines(["*start.txt is not there; look at this run, then write it with --fbvm-golden:*"])
@@ -430,6 +434,7 @@ def test_warnings_that_are_not_wanted_are_not_shown(slack: pytest.Pytester, argu
     assert "S0290" not in run(slack, argument).stdout.str()
 
 
+@pytest.mark.slow
 def test_warnings_can_fail_a_test(slack: pytest.Pytester) -> None:
     result = run(slack, "--fbvm-warnings-as-errors")
     result.assert_outcomes(failed=2)
@@ -500,6 +505,7 @@ def test_a_network_of_plcs_from_a_project_file(project: pytest.Pytester) -> None
     result.stdout.fnmatch_lines(["P.Starts is 1 since scan 8 (80ms), by src/pump.st:17 in P:*"])
 
 
+@pytest.mark.slow
 def test_a_project_file_that_is_wrong(project: pytest.Pytester) -> None:
     (project.path / "fbvm.toml").write_text("[plc.a]\nsource = 1\n", encoding="utf-8")
     project.makepyfile("def test_wrong(plant):\n    plant()\ndef test_none(plant):\n    plant('other.toml')\n")
@@ -538,6 +544,7 @@ def test_a_failure_with_a_unit_shows_the_network_and_the_units_words(project: py
     assert data["frames"][0][4] == "asks for a connection"
 
 
+@pytest.mark.slow
 def test_a_plc_hears_what_another_one_answers(project: pytest.Pytester) -> None:
     lesson = Path(__file__).resolve().parents[2] / "lessons" / "12-two-plcs-one-wire"
     for name in ("server.st", "given.st", "given.toml"):

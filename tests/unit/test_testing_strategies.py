@@ -64,6 +64,7 @@ def test_delays_are_whole_steps(delay_ns: int) -> None:
     assert 0 <= delay_ns <= ns("50ms")
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.data())
 def test_a_pump_runs_only_with_start(data: st.DataObject) -> None:

@@ -84,6 +84,7 @@ def test_what_is_no_such_table(text: str, said: str) -> None:
         read_rows(io.StringIO(text, newline=""), io.BytesIO())
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(st.booleans(), st.integers(-(1 << 63), (1 << 63) - 1), st.floats(allow_nan=False),
                           st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=20)), min_size=1))  # fmt: skip
 def test_any_values_go_out_and_in(values: list[tuple[Any, ...]]) -> None:
