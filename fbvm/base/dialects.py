@@ -31,6 +31,7 @@ class Dialect:
     number_times_duration: bool = False
     mixed_arguments: bool = False
     bare_actions: bool = False
+    locals_are_read: bool = False
 
 
 QUESTIONS = {
@@ -43,13 +44,15 @@ QUESTIONS = {
     "loop_ends_each_pass": ("end and step of FOR", "worked out once, in front of the loop",
                             "worked out on every pass, the end in front of it, the step behind it"),
     "arithmetic_of_bits": ("+ - * / MOD of BYTE, WORD, DWORD, LWORD", "an error", "as unsigned numbers"),
-    "integers_and_bits": ("WORD where INT is needed, INT where UINT is, LREAL where REAL is, DINT where REAL is",
-                          "an error that names the conversion", "converted as it stands if the width suffices"),
+    "integers_and_bits": ("WORD where INT is needed, INT where UINT is, LREAL where REAL is, DINT where REAL is; AND, OR, XOR, "
+                          "NOT of integers",
+                          "an error that names the conversion", "converted as it stands if the width suffices; on their bits"),
     "numbers_of_enumerations": ("an enumeration as a number, < and > between its members", "an error", "its value"),
     "number_times_duration": ("2 * T#5s", "an error: the TIME stands in front", "T#10s"),
     "mixed_arguments": ("F(1, b := 2): some arguments named, some not", "an error",
                         "those without a name are for the parameters that none names, in order"),
     "bare_actions": ("Reset; where Reset is an ACTION", "an error", "a call of it"),
+    "locals_are_read": ("a VAR of a function block, read through an instance", "an error", "its value; it cannot be written"),
     "libraries": ("blocks that begin or end another way; whether actions of charts have a final scan",
                   "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
@@ -61,7 +64,8 @@ _ROWS = (
     STANDARD,
     Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
             lenient_positions=True, real_bits_by_value=True, arithmetic_of_bits=True, integers_and_bits=True,
-            numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, bare_actions=True),
+            numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, bare_actions=True,
+            locals_are_read=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True),
     Dialect("rusty", "programs for RuSTy", loop_ends_each_pass=True, arithmetic_of_bits=True, integers_and_bits=True,
             numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True),

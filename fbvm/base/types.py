@@ -233,7 +233,12 @@ def followed(kind: Type) -> Type:
 
 @cache
 def string(capacity: int = DEFAULT_STRING, wide: bool = False) -> StringType:
-    """STRING[capacity] or WSTRING[capacity]."""
+    """STRING[capacity] or WSTRING[capacity], the same object for the same length."""
+    return _string(capacity, wide)
+
+
+@cache
+def _string(capacity: int, wide: bool) -> StringType:
     unit = 2 if wide else 1
     name = "WSTRING" if wide else "STRING"
     return StringType(f"{name}[{capacity}]", (capacity + 1) * unit, unit, capacity, wide)

@@ -10,6 +10,7 @@ from fbvm.base.types import (
     DEFAULT_STRING,
     AnyType,
     ArrayType,
+    EnumType,
     RefType,
     StringType,
     StructType,
@@ -171,7 +172,7 @@ class Calls:
             self._named(argument, pou, bound, given)
         empty = {name for name, node in given.items() if isinstance(node, tree.Argument) and node.value is None}
         missing = [v.name for v in pou.parameters("VAR_IN_OUT") if fold(v.name) not in given.keys() - empty]
-        if missing and not pou.damaged:
+        if missing and not pou.has_lost:
             self.error("S0404", call, f"the in-out {' and '.join(missing)} of {pou.name} is missing",
                        f"pass a variable: {missing[0]} := ...")
 
@@ -180,7 +181,7 @@ class Calls:
         names = {fold(a.name.text) for a in named if a.name is not None}
         names = {pou.other_names.get(name, name) for name in names} | {"EN", "ENO"}
         parameters = [v for v in pou.order if v.kind in PARAMETER_KINDS and fold(v.name) not in names]
-        if len(arguments) > len(parameters) and not pou.damaged:
+        if len(arguments) > len(parameters) and not pou.has_lost:
             plural = "" if len(parameters) == 1 else "s"
             self.error("S0402", arguments[len(parameters)],
                        f"{pou.name} has {len(parameters) or 'no'} parameter{plural}, {len(arguments)} given")
@@ -231,7 +232,7 @@ class Calls:
         elif name == "ENO" and argument.kind == "=>":
             if argument.value is not None and self.output(argument, BOOL, "ENO"):
                 bound.enabled.append((argument.value, argument.negated))
-        elif name not in pou.damaged:
+        elif not pou.lost(name):
             known = [v.name for v in pou.order if v.kind in PARAMETER_KINDS]
             self.error("S0402", argument.name, f"{pou.name} has no parameter {argument.name.text}",
                        self.project.choices(argument.name.text, known))
@@ -267,7 +268,9 @@ class Calls:
             self.error("S0405", value, f"{variable.name} is {variable.type}, and {kind} is or holds an instance",
                        "pass a variable of it")
             return False
-        if not same(kind, variable.type) and not _long_enough(kind, variable):
+        numbers = self.project.dialect.numbers_of_enumerations
+        if not same(kind.base if numbers and isinstance(kind, EnumType) else kind, variable.type) and \
+                not _long_enough(kind, variable):
             hint = "an in-out takes a variable of exactly its own type"
             if isinstance(kind, StringType) and variable.any_length:
                 hint = f"an in-out STRING without a length works on {DEFAULT_STRING} characters: " \

@@ -75,6 +75,7 @@ class Checker:
             if not pou.source.library and not is_generic(pou):
                 self._body(pou)
         configurations.resolve(program)
+        self.globals.declare()
         named = self.resource.name.text if self.resource is not None and self.resource.name is not None else ""
         self.settings = Settings(self, named)
         if program is None:
@@ -102,9 +103,6 @@ class Checker:
         elif name in E_NAMES:
             self.e_banks.add(name)
 
-    def is_damaged(self, pou: Pou, name: str) -> bool:
-        return fold(name) in pou.damaged
-
     def block_of(self, kind: StructType) -> Pou:
         return self._blocks[id(kind)]
 
@@ -116,9 +114,6 @@ class Checker:
             self.report.add("S0207", source, node, f"{pou.name} holds an instance of itself",
                             "an instance can hold instances of other blocks only")
             return False
-        self.globals.declare()
-        if pou.resolved:  # a global variable asked for it
-            return True
         pou.busy = True
         with self.scope(pou):
             self.interfaces.resolve(pou)

@@ -28,6 +28,8 @@ def encode(kind: Type, value: Value) -> bytes:
     form = machine(kind)
     if form == "f32" and isinstance(value, float | int):
         return struct.pack("<f", arithmetic.single(float(value)))
+    if form == "ref":
+        return bytes(8)  # 0, CODESYS's NULL
     return struct.pack(_FORMATS[form], value)
 
 

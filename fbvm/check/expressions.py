@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import AddressError, parse_address
@@ -32,7 +32,7 @@ from fbvm.base.types import (
     fold,
     string,
 )
-from fbvm.check import anything, qualified
+from fbvm.check import anything, qualified, unknown
 from fbvm.check.constants import convert, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
 from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, is_untyped, lent, literal_hint
@@ -58,6 +58,8 @@ class Expressions:
         self.source = source
         self.pou = pou
         self.operators = Operators(self)
+        self.spaces: set[tree.NameRef] = set()
+        """Names that stand in front of a point."""
         self.counting: list[tuple[object, ...]] = []
         """Places of the counters of the FOR loops around the present statement."""
 
@@ -247,9 +249,8 @@ class Expressions:
 
     def _name(self, expr: tree.NameRef, want: Type | None) -> Type | None:
         if self.pou is not None and fold(expr.text) in self.pou.later:
-            self.error("S0701", expr, f"{expr.text} has no value yet where this is worked out",
-                       "declare it in front, in a VAR CONSTANT section")
-            return None
+            early = self.checker.interfaces.early(expr, self.pou)
+            return self._variable(expr, early) if early is not None else None
         variable = self.variable(expr.text)
         if variable is not None:
             return self._variable(expr, variable)
@@ -263,7 +264,7 @@ class Expressions:
             self.error("S0201", expr, f"{expr.text} is a member of several enumerations",
                        "write which: " + " or ".join(f"{kind}#{expr.text}" for kind, _, _ in wanted))
             return None
-        self._unknown(expr)
+        unknown.complain(self, expr)
         return None
 
     def program(self, expr: tree.NameRef) -> bool:
@@ -284,29 +285,6 @@ class Expressions:
         if variable.constant and variable.value is not None:
             self.facts.constants[expr] = variable.value
         return variable.type
-
-    def _unknown(self, expr: tree.NameRef) -> None:
-        name = expr.text
-        if self.pou is not None and self.checker.is_damaged(self.pou, name) or \
-                self.checker.globals.is_told(expr, self.source):
-            return
-        try:
-            address = parse_address(name, self.checker.areas)
-            hint = f"for the address write %{name}, or declare a variable AT {address}"
-        except AddressError:
-            known = [v.name for v in self.pou.order] if self.pou else []
-            hint = ELSEWHERE.get(fold(name)) or self.project.nearest(
-                name, [*known, *(v.name for v in self.project.globals.values()), *self._members()])
-        pou = self.project.pou(name, self.source)
-        if pou is None:
-            self.error("S0201", expr, f"{name} is not declared", hint)
-        else:
-            self.error("S0201", expr, f"{name} is a {pou.kind} and has no value", _USES[pou.kind].format(pou.name))
-
-    def _members(self) -> Iterator[str]:
-        """The members of all enumerations of the user's own."""
-        for rows in self.project.enum_members.values():
-            yield from (kind.shown[value] for kind, value, library in rows if not library)
 
     def _direct(self, expr: tree.Direct, want: Type | None) -> Type | None:
         try:
@@ -329,11 +307,14 @@ class Expressions:
         if isinstance(meant, Variable):
             return self._variable(expr, meant)
         if isinstance(expr.of, tree.NameRef) and qualified.is_space(self, expr.of):
+            if self.checker.globals.is_lost(expr.of.text, expr.name.text, self.source):
+                return None
             self.error("S0210", expr.name, f"{expr.of.text} has no {expr.name.text}",
                        self.project.choices(expr.name.text, self.project.names_in(expr.of.text)))
             return None
         if isinstance(expr.of, tree.NameRef):
             self.program(expr.of)
+            self.spaces.add(expr.of)
         whole = self.infer(expr.of)
         if whole is None:
             return None
@@ -347,7 +328,7 @@ class Expressions:
                        if isinstance(whole, RefType) and isinstance(whole.target, StructType) else "")
             return None
         member = whole.member(expr.name.text)
-        if member is None and whole.block and self.checker.is_damaged(self.checker.block_of(whole), expr.name.text):
+        if member is None and whole.block and self.checker.block_of(whole).lost(expr.name.text):
             return None
         if member is None:
             readable = [f.name for f in whole.fields.values() if not whole.block or f.kind in READABLE]
@@ -355,7 +336,8 @@ class Expressions:
                        self.project.choices(expr.name.text, readable))
             return None
         if whole.block and member.kind not in READABLE and \
-                (member.kind != "VAR" or self.checker.block_of(whole).kind != "PROGRAM"):
+                not (member.kind == "VAR" and (self.project.dialect.locals_are_read or
+                                               self.checker.block_of(whole).kind == "PROGRAM")):
             what = "an in-out of" if member.kind == "VAR_IN_OUT" else "internal to"
             self.error("S0210", expr.name, f"{member.name} is {what} {whole} and cannot be reached from outside")
             return None
@@ -427,17 +409,6 @@ class Expressions:
 
 _KNOWN = ("S0503", "S0705", "S0801")
 """Codes of places whose values must be known before the program runs: a conversion does not help there."""
-_USES = {
-    "FUNCTION": "call it: {}(...)",
-    "FUNCTION_BLOCK": "declare an instance, such as  my_{0} : {0};  and name an output of it",
-    "PROGRAM": "a task runs it; what others need of it belongs in a VAR_GLOBAL",
-}
-"""What to do with a POU of each kind that is named where a value is needed."""
-ELSEWHERE = dict.fromkeys(("DEFAULT", "OTHERS", "OTHERWISE"), "the rest of a CASE stands behind ELSE, without a colon") | {
-    "NIL": "write NULL", "NULLPTR": "write NULL", "PI": "write 3.14159265358979, or declare a constant",
-    "THEN": "THEN belongs to IF", "NEXT": "a loop ends with END_FOR", "WEND": "a loop ends with END_WHILE",
-    "BREAK": "EXIT leaves a loop"}
-"""Names of other languages, and what to write here."""
 READABLE = ("", "VAR_INPUT", "VAR_OUTPUT")
 """Kinds of members that may be named from outside."""
 

@@ -11,7 +11,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.types import ArrayType, Elementary, EnumType, Field, RefType, StructType, Type, fold
 from fbvm.syntax import tree
 from fbvm.syntax.pragmas import shown_in_hexadecimal
-from fbvm.syntax.tree import Action, Node
+from fbvm.syntax.tree import Action, Node, VarDecl, VarSection
 
 Value = int | float | bool | bytes | str
 """A constant: bool for BOOL, int for integers, bits, times, enumerations and characters, float for reals, bytes for STRING,
@@ -97,8 +97,10 @@ class Pou:
     """True if the body writes ENO without declaring it: ENO is TRUE at each start then."""
     damaged: set[str] = field(default_factory=set)
     """Folded names whose declaration is wrong: using them is not complained about again."""
-    later: set[str] = field(default_factory=set)
-    """Folded names that are declared behind what is being worked out."""
+    inherits: bool = False
+    """True if it EXTENDS another one, which was refused: any name may come from that."""
+    later: dict[str, tuple[VarDecl, VarSection]] = field(default_factory=dict)
+    """By folded name what is declared behind what is being worked out."""
     busy: bool = False
     awaited: list[RefType] = field(default_factory=list)
     """References to instances that were met while the POU was being resolved."""
@@ -118,6 +120,15 @@ class Pou:
     @property
     def is_function(self) -> bool:
         return self.kind == "FUNCTION"
+
+    def lost(self, name: str) -> bool:
+        """True if it was said why nothing is known under this name."""
+        return self.inherits or fold(name) in self.damaged
+
+    @property
+    def has_lost(self) -> bool:
+        """True if not all of its declarations are known, which was said."""
+        return self.inherits or bool(self.damaged)
 
     @property
     def owner(self) -> Pou:

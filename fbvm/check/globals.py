@@ -75,8 +75,14 @@ class Globals:
             return True
         return any(key in self._damaged for key in keys)
 
+    def is_lost(self, space: str, name: str, source: Source) -> bool:
+        """True if it has been said why a list has no variable of that name."""
+        keys = {(owner, fold(text)) for owner in self.project.owners(source) for text in (name, f"{space}.{name}")}
+        return not keys.isdisjoint(self._damaged)
+
     def _on_demand(self, key: Key) -> None:
         """Declare a variable whose turn has not come, if there is one."""
+        self.enroll()
         turn = self._waiting.get(key)
         if turn is not None:
             self._declare(turn)

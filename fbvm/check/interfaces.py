@@ -49,15 +49,17 @@ class Interfaces:
         self.project = checker.project
         self.report = checker.project.report
         self._identifiers = 0
+        self._early: dict[tree.VarDecl, tuple[Type, bytes] | None] = {}
+        """What was asked for before its turn came; None while it is being worked out."""
 
     def resolve(self, pou: Pou) -> None:
         """Fill in the variables and the layout of a POU."""
-        pou.later = {fold(name.text) for section in pou.tree.sections if section.kind != "VAR_EXTERNAL"
+        pou.later = {fold(name.text): (declared, section) for section in pou.tree.sections if section.kind != "VAR_EXTERNAL"
                      for declared in section.variables for name in declared.names}
         for section in pou.tree.sections:
             if self._section_allowed(section, pou):
                 self._section(section, pou)
-        pou.later = set()
+        pou.later = {}
         if pou.tree.result is not None:
             self._result(pou, pou.tree.result)
         if "ENO" not in pou.variables and assigns_to(pou.tree.body, "ENO"):
@@ -83,7 +85,7 @@ class Interfaces:
         else:
             body = tree.Pou(action.start, action.end, "ACTION", action.name, None, (), action.body)
             pou.actions[name] = Pou(f"{pou.name}.{action.name.text}", "ACTION", source, body, pou.variables, type=pou.type,
-                                    resolved=True, damaged=pou.damaged, home=pou)
+                                    resolved=True, damaged=pou.damaged, inherits=pou.inherits, home=pou)
 
     # --- sections ---------------------------------------------------------------------------------------------------
 
@@ -114,10 +116,11 @@ class Interfaces:
                 self._external(declared, section, pou)
                 continue
             inner = section.kind in ("VAR", "VAR_OUTPUT") and pou.is_function
-            resolved = self.typed(declared, pou.source, pou, late=inner or section.kind == "VAR_TEMP")
+            late = inner or section.kind == "VAR_TEMP"
+            resolved = self._early.get(declared) or self.typed(declared, pou.source, pou, late)
             borrowed = resolved is not None and section.kind == "VAR_INPUT" and isinstance(resolved[0], AnyType)
             for name in declared.names:
-                pou.later.discard(fold(name.text))
+                pou.later.pop(fold(name.text), None)
                 if resolved is None:
                     pou.damaged.add(fold(name.text))
                     continue
@@ -132,6 +135,21 @@ class Interfaces:
                 self._register(variable, pou)
                 if variable.kind == "VAR_STAT":
                     self.checker.global_order.append(variable)
+
+    def early(self, name: tree.NameRef, pou: Pou) -> Variable | None:
+        """A CONSTANT of a POU that is declared behind what needs it; None after a diagnostic."""
+        declared, section = pou.later[fold(name.text)]
+        if all(fold(word.text) != "CONSTANT" for word in section.qualifiers):
+            self.report.add("S0701", pou.source, name, f"{name.text} has no value yet where this is worked out",
+                            "declare it in front, in a VAR CONSTANT section")
+            return None
+        if declared in self._early and self._early[declared] is None:
+            self.report.add("S0207", pou.source, name, f"the value of {name.text} needs {name.text} itself")
+            return None
+        self._early[declared] = None
+        resolved = self._early[declared] = self.typed(declared, pou.source, pou)
+        node = next(each for each in declared.names if fold(each.text) == fold(name.text))
+        return self.variable(declared, node, section, pou.source, resolved) if resolved is not None else None
 
     def typed(self, declared: tree.VarDecl, source: Source, pou: Pou | None, late: bool = False) -> tuple[Type, bytes] | None:
         """Type and initial bytes of a declaration in `pou`, or of a global one; None after a diagnostic.

@@ -79,7 +79,7 @@ class Operators:
                 kind = self.expressions.adopt(expr.operand, want)
                 if kind is None:
                     return None
-            good = is_any(kind, "ANY_BIT")
+            good = is_any(kind, *self._family("AND"))
         else:
             good = kind in (UNTYPED_INT, UNTYPED_REAL) or is_any(kind, "ANY_NUM", "ANY_DURATION")
         if not good:
@@ -232,7 +232,12 @@ class Operators:
             return True
         if kind is UNTYPED_REAL:
             return _FAMILY[op] == ("ANY_NUM",)
-        return is_any(kind, *_FAMILY[op])
+        return is_any(kind, *self._family(op))
+
+    def _family(self, op: str) -> tuple[str, ...]:
+        """The generic types that an operator works on; dialects take the bits of integers too."""
+        family = _FAMILY[op]
+        return (*family, "ANY_INT") if family == ("ANY_BIT",) and self.expressions.project.dialect.integers_and_bits else family
 
     def _undefined(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> None:
         hint = ""

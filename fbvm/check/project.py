@@ -69,6 +69,8 @@ class Project:
         self.late_global: Callable[[tuple[str, str]], None] = lambda key: None
         """Declares a global variable whose turn has not come yet (set by the checker)."""
         self._loaded: set[str] = set()
+        self._refused: set[tuple[str, str]] = set()
+        """Library and folded name of what was declared and refused: an INTERFACE, a structure that EXTENDS another."""
         self._absent: set[tuple[bool, str, str]] = set()
         """Names of types (True) and POUs that were looked for and are nowhere, and the library that asked."""
         self._compared = 0
@@ -84,6 +86,7 @@ class Project:
         for declaration in text.declarations:
             if isinstance(declaration, tree.Refused):
                 self.report.add(declaration.code, source, declaration, _refusal(declaration))
+                self._refused.add((source.library, _refused_name(declaration, source)))
             elif isinstance(declaration, tree.Pou):
                 last = self._add_pou(declaration, source)
             elif isinstance(declaration, tree.Action):
@@ -127,6 +130,7 @@ class Project:
         if not self._twice(key, declaration.name, source, "POU"):
             self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
             pou.other_names = self.libraries.other_pins(source.library, pou.name)
+            pou.inherits = any(refused.what == "EXTENDS" for refused in declaration.refused)
             pou.damaged |= {name for refused in declaration.refused if (name := _refused_name(refused, source))}
             pou.written_actions += [(action, source) for action in declaration.actions]
             self.new_pous.append(pou)
@@ -175,6 +179,10 @@ class Project:
                 return table[owner, folded]
         self._absent.add((types, source.library, folded))
         return None
+
+    def is_refused(self, name: str, source: Source) -> bool:
+        """True for a folded name whose declaration was refused."""
+        return any((owner, name) in self._refused for owner in self.owners(source))
 
     def global_variable(self, name: str, source: Source) -> Variable | None:
         folded = fold(name)
@@ -228,7 +236,9 @@ _PART = re.compile(r"\w+\s+(?:(?:PUBLIC|PRIVATE|PROTECTED|INTERNAL|FINAL|ABSTRAC
 
 
 def _refused_name(node: tree.Refused, source: Source) -> str:
-    """The name of an ACTION or METHOD that is refused, folded: calls of it are not complained about again."""
+    """The name of an ACTION, METHOD or INTERFACE that is refused, folded: uses of it are not complained about again."""
+    if node.what.endswith("of a structure"):
+        return fold(source.text[node.start:node.end].split(None, 1)[0].rstrip(":"))
     match = _PART.match(source.text, node.start)
     return fold(match[1]) if match else ""
 

@@ -28,8 +28,9 @@ from fbvm.base.types import (
     reference,
     string,
 )
+from fbvm.check import foreign
 from fbvm.check.constants import default
-from fbvm.check.facts import Pou, is_open
+from fbvm.check.facts import Pou, is_block, is_open
 from fbvm.check.names import refuse_reserved
 from fbvm.check.project import Project, TypeEntry
 from fbvm.check.structures import RELATIVE, Members
@@ -38,13 +39,6 @@ from fbvm.syntax import tree
 
 MAX_SIZE = 64 << 20
 """Largest variable in bytes."""
-FOREIGN = {
-    "BOOLEAN": "BOOL", "BIT": "BOOL", "INTEGER": "INT", "SHORT": "INT", "INT16": "INT", "LONG": "DINT", "INT32": "DINT",
-    "LONGINT": "DINT", "INT64": "LINT", "INT8": "SINT", "UINT8": "USINT", "UINT16": "UINT", "UINT32": "UDINT",
-    "UINT64": "ULINT", "FLOAT": "REAL", "FLOAT32": "REAL", "SINGLE": "REAL", "DOUBLE": "LREAL", "FLOAT64": "LREAL",
-    "LONGREAL": "LREAL", "CARDINAL": "UDINT", "QWORD": "LWORD", "TEXT": "STRING",
-}
-"""Names of other languages for elementary types."""
 MAX_STRING = 65534
 WIDE = {"__UXINT": "ULINT", "__XINT": "LINT", "__XWORD": "LWORD"}
 """CODESYS's names for the types that are as wide as a pointer; here one has 64 bits."""
@@ -90,6 +84,8 @@ class Specs:
             return self._array(spec, source)
         if isinstance(spec, tree.EnumSpec):
             return self._enumeration(spec, source, name)
+        if isinstance(spec, tree.ConstructedSpec):
+            return self._constructed(spec, spec.base, source)
         if isinstance(spec, tree.UnionSpec | tree.StructSpec):
             return self._structure(spec, source, name)
         assert isinstance(spec, tree.RefSpec)
@@ -160,7 +156,8 @@ class Specs:
         if folded in GENERIC:
             self.report.add("S0205", source, spec, f"{folded} is no type of a variable", "it is one of a parameter only")
             return None
-        self.report.add("S0204", source, spec, f"there is no type or block {spec.text}", self._meant(spec.text))
+        if not self.project.is_refused(folded, source):
+            self.report.add("S0204", source, spec, f"there is no type or block {spec.text}", self._meant(spec.text))
         return None
 
     def _without_space(self, name: str) -> str:
@@ -170,12 +167,13 @@ class Specs:
 
     def _meant(self, name: str) -> str:
         """A hint for a type that there is not."""
-        if fold(name) in FOREIGN:
+        if fold(name) in foreign.TYPES:
             also = ", and BIT in structures" if fold(name) == "BIT" else ""
-            return f"its name here is {FOREIGN[fold(name)]}{also}"
+            return f"its name here is {foreign.TYPES[fold(name)]}{also}"
         project = self.project
-        return project.nearest(name, [*ELEMENTARY, "STRING", *(entry.tree.name.text for entry in project.types.values()),
-                                      *(pou.name for pou in project.pous.values()), *project.libraries.block_names()])
+        known = (*ELEMENTARY, "STRING", *(entry.tree.name.text for entry in project.types.values()),
+                 *(pou.name for pou in project.pous.values()), *project.libraries.block_names())
+        return foreign.library_of(name) or project.nearest(name, known)
 
     def named_type(self, name: str, source: Source) -> Type | None:
         """The type of that name, elementary or declared, without any complaint."""
@@ -253,6 +251,17 @@ class Specs:
         made = SubrangeType(name or f"{kind} ({low}..{high})", kind.size, kind.align, kind, low, high)
         return made, default(made)
 
+    def _constructed(self, spec: tree.TypeSpec, base: tree.NamedType, source: Source) -> Resolved | None:
+        """A type with arguments in parentheses: those of FB_init, or a subrange or enumeration that is written wrongly."""
+        resolved = self.resolve(base, source)
+        if resolved is not None and is_block(resolved[0]):
+            self.report.add("S0902", source, spec, f"arguments for FB_init of {base.text} are object-oriented text, which fbvm "
+                            "does not execute", f"initial values of its variables are written {base.text} := (name := value)")
+        elif resolved is not None:
+            self.report.add("S0704", source, spec, f"{resolved[0]} takes no arguments",
+                            f"a subrange is written {base.text} (0..9), an initial value {base.text} := 5")
+        return resolved
+
     def _array(self, spec: tree.ArraySpec, source: Source) -> Resolved | None:
         if None in spec.dimensions:
             return self._open_array(spec, source)
@@ -296,6 +305,8 @@ class Specs:
             resolved = self.resolve(spec.base, source)
             if resolved is None:
                 return None
+            if is_block(resolved[0]):
+                return self._constructed(spec, spec.base, source)
             if not isinstance(resolved[0], Elementary) or not {"ANY_INT", "ANY_BIT"} & resolved[0].families:
                 self.report.add("S0704", source, spec.base, "an enumeration is based on an integer or bit string type")
                 return None

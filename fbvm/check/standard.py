@@ -23,7 +23,7 @@ from fbvm.base.types import (
     machine,
     string,
 )
-from fbvm.check import functions, questions, references
+from fbvm.check import foreign, functions, questions, references, unknown
 from fbvm.check.arguments import Arguments, callee
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
 from fbvm.check.fitting import as_number, convertible, same
@@ -35,18 +35,6 @@ if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
 
 _SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations", "ANY_STRING": "STRING and WSTRING"}
-_WAIT = "a scan never waits: use a timer, such as TON"
-_PRINT = "a PLC prints nothing: watch a variable"
-ELSEWHERE = {
-    "SWITCH": "a choice among values is CASE x OF 1: .. END_CASE", "POW": "write a ** b, or EXPT(a, b)",
-    "POWER": "write a ** b, or EXPT(a, b)", "FABS": "write ABS", "SQR": "write x * x", "LOG10": "write LOG",
-    "ROUND": "a conversion rounds: REAL_TO_DINT(x)", "FLOOR": "TRUNC(x) drops the fraction",
-    "CEIL": "TRUNC(x) drops the fraction", "INT": "write TO_INT(x)", "REAL": "write TO_REAL(x)", "FLOAT": "write TO_REAL(x)",
-    "BOOL": "compare it: x <> 0", "STR": "write TO_STRING(x)", "STRLEN": "write LEN", "STRCAT": "write CONCAT",
-    "STRCMP": "compare texts with =", "STRCPY": "assign it: a := b", "SUBSTR": "write MID(text, length, position)",
-    "PRINT": _PRINT, "PRINTF": _PRINT, "PUTS": _PRINT, "SLEEP": _WAIT, "DELAY": _WAIT, "WAIT": _WAIT,
-    "IIF": "write SEL(condition, if_false, if_true)"}
-"""Functions of other languages, and what to write here."""
 UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
 _NUMBERS = ("ANY_NUM", "ANY_BIT")
 
@@ -104,13 +92,13 @@ class StandardCalls:
         for argument in call.arguments:
             if argument.value is not None:
                 self.expressions.infer(argument.value)
-        pou = self.expressions.pou
-        if pou is not None and name in pou.damaged:
+        if unknown.told(self.expressions, call.callee):
             return None
         project = self.expressions.project
         known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]
         self.error("S0401", call.callee, f"there is no function or instance {callee(call)}",
-                   ELSEWHERE.get(name) or project.nearest(callee(call), known))
+                   foreign.FUNCTIONS.get(name) or foreign.library_of(callee(call)) or
+                   project.nearest(callee(call), known))
         return None
 
     # --- kinds ------------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from fbvm.syntax import tree
 if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
 
-_OWN = {"VAR": "a variable of its program", "VAR_OUTPUT": "an output"}
+_OWN = {"VAR": "a variable of its own body", "VAR_OUTPUT": "an output"}
 """What members are that only their own body writes."""
 _ROLES = {"step": "a step", "action": "an ACTION of a chart"}
 Path = tuple[object, ...]

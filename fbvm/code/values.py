@@ -156,7 +156,7 @@ class ValueLowering:
         form = machine(self.facts.types[expr])
         if expr.op == "+":
             return node
-        return ("not" if expr.op == "NOT" else "neg", form, node)
+        return _on_bits("not", form, node) if expr.op == "NOT" else ("neg", form, node)
 
     def call(self, expr: tree.Call) -> Node:
         """The result of a call."""
@@ -197,6 +197,8 @@ class ValueLowering:
         if expr.op in _COMPARE:
             return (_COMPARE[expr.op], "b", form, a, b)
         name = _ARITHMETIC[expr.op]
+        if name in ("and", "or", "xor"):
+            return _on_bits(name, form, a, b)
         return (name, form, a, b, self.body.site(expr)) if name in ("div", "mod") else (name, form, a, b)
 
     def _to_float(self, node: Node, kind: Type, *forms: str) -> Node:
@@ -241,6 +243,14 @@ def in_day(body: BodyLowering, node: Node) -> Node:
     kept = body.keep(node)
     return ("sub", "i64", kept, ("mul", "i64", ("floor_div", "i64", kept, ("const", "i64", DAY_NS)),
                                  ("const", "i64", DAY_NS)))
+
+
+def _on_bits(name: str, form: str, *operands: Node) -> Node:
+    """A bitwise operation; one on signed integers is done on their bits."""
+    if form[0] != "i":
+        return (name, form, *operands)
+    bits = f"u{form[1:]}"
+    return ("convert", form, bits, (name, bits, *(("convert", bits, form, node) for node in operands)))
 
 
 def is_aggregate(kind: Type) -> bool:

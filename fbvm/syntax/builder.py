@@ -92,6 +92,10 @@ class Builder:
         items.append(item)
         return items
 
+    def drop_comma(self, items: list[Any], comma: Token) -> list[Any]:
+        """A `,` behind the last item of a list."""
+        return items
+
     def pass_over(self, items: list[Any], semicolon: Token) -> list[Any]:
         """A `;` behind the END of a declaration, which means nothing."""
         return items

@@ -164,6 +164,9 @@ class Declarations(SfcElements):
     def global_vars(self, section: VarSection) -> GlobalVars:
         return GlobalVars(section.start, section.end, section)
 
+    def pass_over_variable(self, variables: list[VarDecl], semicolon: Token) -> list[VarDecl]:
+        return variables
+
     def var_decl(self, names: list[Name], at: Token | None, location: Token | None, colon: Token, spec: TypeSpec,
                  edge: Token | None, sign: Token | None, initial: Initial | None, end: Token) -> VarDecl:
         place = self.location(location) if location else None

@@ -87,6 +87,11 @@ class ExpressionLayout:
         items.append(item)
         return items
 
+    def drop_comma(self, items: list[Phrase], comma: Token) -> list[Phrase]:
+        self.comments.draw(comma, always=True)
+        items[-1].parts.append(self.leaf(comma, ""))
+        return items
+
     def one_name(self, token: Token) -> list[Phrase]:
         return [Phrase(token.start, self.leaf(token))]
 

@@ -62,6 +62,11 @@ class TypeLayout(StatementLayout):
         value: Doc = (" ", self.leaf(sign), " ", self.hung(initial)) if sign and initial else ()
         return Declared(start, listed, place, self.leaf(colon), kind, value, self.closer(end) if end else ())
 
+    def pass_over_variable(self, variables: list[Phrase], semicolon: Token) -> list[Phrase]:
+        if variables and isinstance(variables[-1], Declared):
+            variables[-1].end = (variables[-1].end, self.dropped(semicolon))
+        return variables
+
     def var_decl_nameless(self, at: Token, location: Token, colon: Token, spec: Phrase, sign: Token | None,
                           initial: Phrase | None, end: Token) -> Declared:
         return self.var_decl(None, at, location, colon, spec, None, sign, initial, end)
@@ -149,7 +154,10 @@ class TypeLayout(StatementLayout):
     def enum_plain(self, opener: Token, members: list[Phrase], closer: Token) -> Phrase:
         return Phrase(opener.start, self.leaf(opener), self.listed(members), self.closer(closer))
 
-    def enum_based(self, base: Phrase, opener: Token, members: list[Phrase], closer: Token) -> Phrase:
+    def constructed_elements(self, base: Phrase, opener: Token, items: list[Phrase], closer: Token) -> Phrase:
+        return Phrase(base.start, base.doc, self.array_init(opener, items, closer).doc)
+
+    def based(self, base: Phrase, opener: Token, members: list[Phrase], closer: Token) -> Phrase:
         return Phrase(base.start, base.doc, " ", self.enum_plain(opener, members, closer).doc)
 
     def enum_based_behind(self, opener: Token, members: list[Phrase], closer: Token, base: Phrase) -> Phrase:

@@ -105,7 +105,7 @@ def _meant(text: str) -> str:
 
 def _based(text: str) -> int:
     base, digits = text.split("#", 1)
-    if base not in ("2", "8", "16"):
+    if base not in ("2", "8", "10", "16"):  # CODESYS writes 10#5 too
         raise Malformed(f"`{text}` has the base {base}", "write 2#, 8# or 16#")
     if not re.fullmatch(r"[0-9A-Za-z]+(?:_[0-9A-Za-z]+)*", digits):
         raise Malformed(f"`{text}` needs digits behind `#`, with single `_` between them", "")

@@ -60,6 +60,8 @@ def quoted(kind: str) -> str:
 def wanted(kinds: set[str]) -> str:
     """What is expected, in the user's words; "" if everything is."""
     rest = set(kinds) - UNSAID
+    if {"NAME", "SEMICOLON"} <= rest and rest & {"END_VAR", "END_TYPE", "END_STRUCT", "END_UNION"}:
+        rest -= {"SEMICOLON"}  # one too many is taken, and seldom meant
     if {"SEMICOLON", "ASSIGN"} <= rest:
         rest -= LABEL_SIGNS
     elif rest - CONTINUATIONS - {"LPAR"}:

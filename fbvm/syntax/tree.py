@@ -103,6 +103,13 @@ class EnumSpec(TypeSpec):
 
 
 @_node
+class ConstructedSpec(TypeSpec):
+    """`FB (25)`, `FB [(n := 1), (n := 2)]`: a block with arguments of FB_init, which are understood and refused."""
+
+    base: NamedType
+
+
+@_node
 class RefSpec(TypeSpec):
     """`kind` is "REF_TO", "POINTER TO" or "REFERENCE TO"."""
 

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.declarations import Declarations
+from fbvm.syntax.declarations import Declarations, Item
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.tree import (
+    Argument,
     ArraySpec,
+    ConstructedSpec,
     Declaration,
     EnumSpec,
     Expr,
     Initial,
     Name,
     NamedType,
+    NameRef,
     RefSpec,
     Refused,
     StringSpec,
@@ -69,8 +72,20 @@ class Types(Declarations):
     def enum_plain(self, opener: Token, members: list[EnumMember], closer: Token) -> EnumSpec:
         return EnumSpec(opener.start, closer.end, None, tuple(members))
 
-    def enum_based(self, base: NamedType, opener: Token, members: list[EnumMember], closer: Token) -> EnumSpec:
+    def based(self, base: NamedType, opener: Token, given: list[Argument], closer: Token) -> EnumSpec | ConstructedSpec:
+        """`INT (A, B := 3)` is an enumeration; where other things stand in the parentheses, they are arguments."""
+        members: list[EnumMember] = []
+        for each in given:
+            if each.kind == ":=" and each.name is not None and each.value is not None:
+                members.append((each.name, each.value))
+            elif each.kind == "" and isinstance(each.value, NameRef):
+                members.append((Name(each.start, each.end, each.value.text), None))
+            else:
+                return ConstructedSpec(base.start, closer.end, base)
         return EnumSpec(base.start, closer.end, base, tuple(members))
+
+    def constructed_elements(self, base: NamedType, opener: Token, items: list[list[Item]], closer: Token) -> ConstructedSpec:
+        return ConstructedSpec(base.start, closer.end, base)
 
     def enum_based_behind(self, opener: Token, members: list[EnumMember], closer: Token, base: NamedType) -> EnumSpec:
         return EnumSpec(opener.start, base.end, base, tuple(members))

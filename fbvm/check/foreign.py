@@ -1,0 +1,55 @@
+"""Names that programs bring along: words of other languages, and what comes with libraries of vendors."""
+
+from __future__ import annotations
+
+import re
+
+_WAIT = "a scan never waits: use a timer, such as TON"
+_PRINT = "a PLC prints nothing: watch a variable"
+VALUES = dict.fromkeys(("DEFAULT", "OTHERS", "OTHERWISE"), "the rest of a CASE stands behind ELSE, without a colon") | {
+    "NIL": "write NULL", "NULLPTR": "write NULL", "PI": "write 3.14159265358979, or declare a constant",
+    "THEN": "THEN belongs to IF", "NEXT": "a loop ends with END_FOR", "WEND": "a loop ends with END_WHILE",
+    "BREAK": "EXIT leaves a loop"}
+"""Names of values."""
+FUNCTIONS = {
+    "SWITCH": "a choice among values is CASE x OF 1: .. END_CASE", "POW": "write a ** b, or EXPT(a, b)",
+    "POWER": "write a ** b, or EXPT(a, b)", "FABS": "write ABS", "SQR": "write x * x", "LOG10": "write LOG",
+    "ROUND": "a conversion rounds: REAL_TO_DINT(x)", "FLOOR": "TRUNC(x) drops the fraction",
+    "CEIL": "TRUNC(x) drops the fraction", "INT": "write TO_INT(x)", "REAL": "write TO_REAL(x)", "FLOAT": "write TO_REAL(x)",
+    "BOOL": "compare it: x <> 0", "STR": "write TO_STRING(x)", "STRLEN": "write LEN", "STRCAT": "write CONCAT",
+    "STRCMP": "compare texts with =", "STRCPY": "assign it: a := b", "SUBSTR": "write MID(text, length, position)",
+    "PRINT": _PRINT, "PRINTF": _PRINT, "PUTS": _PRINT, "SLEEP": _WAIT, "DELAY": _WAIT, "WAIT": _WAIT,
+    "IIF": "write SEL(condition, if_false, if_true)"}
+"""Functions of other languages, and what to write here."""
+TYPES = {
+    "BOOLEAN": "BOOL", "BIT": "BOOL", "INTEGER": "INT", "SHORT": "INT", "INT16": "INT", "LONG": "DINT", "INT32": "DINT",
+    "LONGINT": "DINT", "INT64": "LINT", "INT8": "SINT", "UINT8": "USINT", "UINT16": "UINT", "UINT32": "UDINT",
+    "UINT64": "ULINT", "FLOAT": "REAL", "FLOAT32": "REAL", "SINGLE": "REAL", "DOUBLE": "LREAL", "FLOAT64": "LREAL",
+    "LONGREAL": "LREAL", "CARDINAL": "UDINT", "QWORD": "LWORD", "TEXT": "STRING",
+}
+"""Names of elementary types, and ours."""
+_LIBRARIES = (
+    (r"MC_\w+|AXIS_REF\w*|_MC_\w+", "PLCopen's motion control (Tc2_MC2, SM3_Basic and their like)"),
+    (r"ADS(?:READ|WRITE|RDWRT|RDSTATE|WRTCTL|LOG)\w*|FB_(?:File|EOF|SimpleAdsLogEvent)\w*|T_AmsNetId\w*|T_AmsPort|"
+     r"T_IPv4Addr|TwinCAT_SystemInfoVarList|_AppInfo|_TaskInfo|PlcTaskSystemInfo|PlcAppSystemInfo|GETCURTASKINDEX\w*|"
+     r"F_GetSystemTime|MEMCPY|MEMSET|MEMCMP|MEMMOVE", "TwinCAT's Tc2_System"),
+    (r"T_MaxString|FB_(?:FormatString|LocalSystemTime|GetTimeZone\w*|TzSpecific\w*|HashTable\w*|CTRL_\w+)|NT_\w+|T_Arg|F_"
+     r"(?:SINT|INT|DINT|LINT|USINT|UINT|UDINT|ULINT|BYTE|WORD|DWORD|LWORD|BOOL|REAL|LREAL|STRING)|SYSTEMTIME_TO_\w+|"
+     r"(?:BYTE|WORD|DWORD|LWORD)_TO_(?:HEX|BIN|OCT|DEC)STR|TIMESTRUCT", "TwinCAT's Tc2_Utilities"),
+    (r"FB_(?:EcSoE|EcCoE|EcGet|EcSet|EcMaster)\w*|ST_Ec\w+|Tc2_EtherCAT", "TwinCAT's Tc2_EtherCAT"),
+    (r"FB_Json\w+|SJsonValue|SJsonAIterator", "TwinCAT's Tc3_JsonXml"),
+    (r"FB_TcMessage|FB_TcAlarm|FB_TcEvent|TcEventSeverity|TcEventEntry|I_TcMessage|I_TcSourceInfo", "TwinCAT's Tc3_EventLogger"),
+    (r"TcUnit|FB_TestSuite|TEST|TEST_FINISHED|AssertEquals\w*|AssertTrue|AssertFalse", "TcUnit"),
+    (r"Sys(?:Time|File|Mem|Sock|Com|Task|Target|Process|Cpu|Dir|Event|Lib)\w+|RTS_IEC_\w+|CmpErrors2?|TimerSwitch",
+     "CODESYS's system libraries"),
+    (r"(?:BLINK|GEN|HYSTERESIS|LIMITALARM|RAMP_INT|RAMP_REAL|VARIANCE|STATISTICS_\w+|CHARCURVE|LIN_TRAFO)", "CODESYS's Util"),
+)
+"""Patterns of names, and the library that they come from."""
+
+
+def library_of(name: str) -> str:
+    """A hint for an unknown name that comes from a library of a vendor; "" for any other."""
+    for pattern, library in _LIBRARIES:
+        if re.fullmatch(pattern, name.rpartition(".")[2] if "." in name else name, re.IGNORECASE):
+            return f"it comes from {library}, which fbvm does not bring: give its source, or one of your own, with the files"
+    return ""
