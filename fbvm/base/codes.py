@@ -1,8 +1,10 @@
-"""Every diagnostic code: S = source, P = project file, R = running (trap).  Each has a page in `pages/` and a test.
+"""Every diagnostic code: S = source, P = project file, X = PLCopen XML, R = running (trap).
+
+Each has a page in `pages/` and a test.
 
 Ranges: S01 text and syntax, S02 names and declarations, S03 types, S04 calls, S05 statements, S06 addresses and memory,
 S07 constants and initial values, S08 configuration and tasks, S09 understood but refused, P01 the project file,
-R01 traps.
+X01 XML and its frame, X02 diagrams, X03 export, R01 traps.
 """
 
 from __future__ import annotations
@@ -83,6 +85,14 @@ CODES: dict[str, Code] = {
         "P0103": "value in a project file does not fit",
         "P0104": "key missing from a project file",
         "P0201": "library.toml does not describe a library",
+        "X0101": "no well-formed XML",
+        "X0102": "XML with a document type",
+        "X0103": "XML too large or too deep",
+        "X0104": "no PLCopen XML",
+        "X0105": "element without what it needs",
+        "X0201": "wire that leads nowhere",
+        "X0202": "diagram that cannot be executed",
+        "X0203": "part of a program that is not taken over",
     }),
     **_table("warning", {
         "S0190": "pragma is not known and has no effect",
@@ -108,6 +118,10 @@ CODES: dict[str, Code] = {
         "S0790": "text is cut",
         "S0791": "constant loses digits",
         "S0890": "program that no task runs",
+        "X0190": "not taken over, and not needed to run",
+        "X0290": "loop of wires",
+        "X0291": "element without effect",
+        "X0292": "read in one of several ways",
     }),
     **_table("trap", {
         "R0101": "division by zero",

@@ -15,6 +15,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.pages import UnknownCode, near, page
 from fbvm.code.compiler import Compilation, compile_sources
 from fbvm.plc import Plc
+from fbvm.plcopen.importing import import_xml
 from fbvm.run.project import Project, read_project
 from fbvm.syntax.text import decode
 
@@ -26,7 +27,7 @@ ROWS = 12
 
 PAGE = re.compile(
     r"# (?P<title>[^\n]+)\n\n(?P<reason>.+?)\n\n"
-    r"## Wrong\n\n```(?P<language>st|sh|toml)\n(?P<wrong>.+?)```\n\n"
+    r"## Wrong\n\n```(?P<language>st|sh|toml|xml)\n(?P<wrong>.+?)```\n\n"
     r"## Right\n\n```(?P=language)\n(?P<right>.+?)```"
     r"(?:\n\n## See also\n(?P<neighbours>(?:\n- [^\n]+)+))?",
     re.DOTALL,
@@ -34,7 +35,8 @@ PAGE = re.compile(
 
 project_codes = [code for code in CODES if code.startswith("P01")]
 library_codes = [code for code in CODES if code.startswith("P02")]
-program_codes = [code for code in CODES if code != "S0107" and code not in project_codes + library_codes]
+xml_codes = [code for code in CODES if code.startswith("X")]
+program_codes = [code for code in CODES if code != "S0107" and code not in project_codes + library_codes + xml_codes]
 """All of programs but that of a file which is no text, and which a page cannot show."""
 source_codes = [code for code in program_codes if code.startswith("S")]
 trap_codes = [code for code in program_codes if code.startswith("R")]
@@ -161,6 +163,13 @@ def test_the_wrong_library_gives_this_diagnostic_and_the_right_one_none(code: st
         assert [diagnostic.code for diagnostic in found] == expected
 
 
+@pytest.mark.parametrize("code", xml_codes)
+def test_the_wrong_document_gives_this_diagnostic_and_the_right_one_none(code: str) -> None:
+    for half, expected in (("wrong", [code]), ("right", [])):
+        found = import_xml(parts(code)[half].encode()).diagnostics
+        assert [diagnostic.code for diagnostic in found] == expected
+
+
 def test_a_file_that_is_no_text_has_a_page_for_the_shell() -> None:
     text = "PROGRAM Main END_PROGRAM"
     assert text in parts("S0107")["wrong"]
@@ -195,7 +204,7 @@ def test_a_code_of_a_known_range_lists_that_range_only() -> None:
     assert {row.code[:3] for row in near("S0299")} == {"S02"}
 
 
-@pytest.mark.parametrize("nonsense", ["", "   ", "x1y2", "../codes"])
+@pytest.mark.parametrize("nonsense", ["", "   ", "q1y2", "../codes"])
 def test_nonsense_lists_nothing(nonsense: str) -> None:
     with pytest.raises(UnknownCode) as raised:
         page(nonsense)

@@ -1,0 +1,41 @@
+"""`fbvm import`: programs from PLCopen XML, as CODESYS, Beremiz and OpenPLC Editor write it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from fbvm.cli import status
+from fbvm.cli.sources import report
+from fbvm.plcopen.importing import import_xml
+
+
+@click.command("import")
+@click.argument("file", metavar="FILE.xml", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("-o", "--output", "folder", metavar="DIR", required=True, type=click.Path(file_okay=False, path_type=Path),
+              help="Where the sources go, a POU a file; made if it is not there.")
+@click.option("--force", is_flag=True, help="Write over files that are there.")
+@click.option("--json", "as_json", is_flag=True, help="Print messages as one JSON object.")
+def command(file: Path, folder: Path, force: bool, as_json: bool) -> None:
+    """Make sources of a project in PLCopen XML, and say what could not be taken over.
+
+    Ladder becomes LADDER .. END_LADDER where mnemonics say exactly what was drawn, else statements; diagrams of function
+    blocks become statements in the order of their evaluation. Status 3 if the program lacks something now."""
+    made = import_xml(file)
+    there = [name for name in made.files if (folder / name).exists()]
+    if there and not force:
+        raise click.UsageError(f"{folder / there[0]} is there already; --force writes over it")
+    if made.diagnostics or as_json:
+        report(made.diagnostics, as_json)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in made.files.items():
+            (folder / name).write_text(text, encoding="utf-8")
+            if not as_json:
+                click.echo(str(folder / name))
+    except OSError as error:
+        raise click.UsageError(f"{folder} cannot be written: {(error.strerror or str(error)).lower()}") from None
+    if made.errors:
+        sys.exit(status.PROGRAM_ERRORS)

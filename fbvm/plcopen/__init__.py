@@ -1,0 +1,1 @@
+"""Programs from and to other tools: PLCopen TC6 XML."""

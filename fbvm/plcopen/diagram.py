@@ -1,0 +1,265 @@
+"""The elements of a graphical body (LD, FBD) and the wires between them, as one flat list: the schema knows no networks.
+
+A wire is stored at its consumer.  Connectors and continuations are wires too and are gone behind this; a coil passes
+on the power that reaches it, so a wire from a coil is one from what feeds the coil.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+from fbvm.plcopen.document import Reading
+from fbvm.plcopen.markup import Element
+
+OBJECTS = {"leftPowerRail", "rightPowerRail", "contact", "coil", "block", "inVariable", "outVariable", "inOutVariable",
+           "label", "jump", "return"}
+"""What can be executed, or carries power."""
+SFC_OBJECTS = {"step", "macroStep", "jumpStep", "transition", "selectionDivergence", "selectionConvergence",
+               "simultaneousDivergence", "simultaneousConvergence", "actionBlock"}
+RETURN_OF_NOTHING = ("", "none")
+"""Pins that are named so have no name (CODESYS exporters)."""
+
+
+class Wire(NamedTuple):
+    """Where a value comes from: an object and the name of its pin, "" for its only one."""
+
+    source: Object
+    pin: str
+
+
+@dataclass(eq=False)
+class Pin:
+    """A place at an object where wires end or begin; `expression` is an operand that was typed there."""
+
+    name: str
+    negated: bool = False
+    edge: str = ""
+    storage: str = ""
+    wires: list[Wire] = field(default_factory=list)
+    expression: str = ""
+    raw: list[tuple[str, str, Element]] = field(default_factory=list)
+    """References as they were written: localId, pin, and the element that says so."""
+
+    @property
+    def connected(self) -> bool:
+        return bool(self.wires or self.expression)
+
+
+@dataclass(eq=False)
+class Object:
+    """An element of a diagram.  `text` is its variable, expression, label, name or type; `order` its executionOrderId, 0 if
+    none; `inputs` and `outputs` its pins, `in_outs` those that are both."""
+
+    kind: str
+    id: str
+    place: int
+    x: float
+    y: float
+    order: int
+    text: str
+    element: Element
+    instance: str = ""
+    negated: bool = False
+    edge: str = ""
+    storage: str = ""
+    inputs: list[Pin] = field(default_factory=list)
+    in_outs: list[Pin] = field(default_factory=list)
+    outputs: list[Pin] = field(default_factory=list)
+    broken: bool = False
+    """Whether something about it was not understood, and has a diagnostic."""
+
+    @property
+    def pins(self) -> list[Pin]:
+        """Where wires end."""
+        return [*self.inputs, *self.in_outs]
+
+    def pin(self, name: str) -> Pin | None:
+        """The input of a block of that name."""
+        return next((pin for pin in self.inputs if pin.name.upper() == name.upper()), None)
+
+
+@dataclass
+class Diagram:
+    """The objects of one body in the order of writing, and its comments."""
+
+    objects: list[Object]
+    comments: list[Object]
+
+
+def read_diagram(reading: Reading, body: Element) -> Diagram:
+    """The diagram in an element LD or FBD; what cannot be understood has a diagnostic."""
+    objects: list[Object] = []
+    comments: list[Object] = []
+    known: dict[str, Object] = {}
+    connectors: dict[str, Object] = {}
+    for place, element in enumerate(body.children):
+        if element.name in ("addData", "documentation"):
+            continue
+        made = _object(reading, element, place)
+        if made.kind == "comment":
+            comments.append(made)
+            continue
+        if element.name in SFC_OBJECTS:
+            made.broken = True
+            reading.report("X0202", element, f"{element.name} stands in a body of {body.name}")
+        objects.append(made)
+        _register(reading, made, known, connectors)
+    for item in objects:
+        for pin in item.pins:
+            for number, name, at in pin.raw:
+                item.broken |= not _connect(reading, pin, number, name, at, known, connectors)
+    kept = [item for item in objects if item.kind not in ("connector", "continuation")]
+    for item in kept:
+        for pin in item.pins:
+            pin.wires = _followed(pin.wires, set())
+    return Diagram(kept, comments)
+
+
+def _register(reading: Reading, made: Object, known: dict[str, Object], connectors: dict[str, Object]) -> None:
+    if not made.id.isdigit():
+        if made.element.name != "vendorElement":
+            made.broken = True
+            reading.report("X0105", made.element, f"<{made.element.name}> has no number as its localId")
+    elif made.id in known:
+        made.broken = known[made.id].broken = True
+        reading.report("X0105", made.element, f"localId {made.id} is there twice",
+                       "each element of a body has a number of its own")
+    known.setdefault(made.id, made)
+    if made.kind == "connector":
+        if made.text.upper() in connectors:
+            made.broken = connectors[made.text.upper()].broken = True
+            reading.report("X0202", made.element, f"there are two connectors {made.text}")
+        connectors.setdefault(made.text.upper(), made)
+
+
+def _connect(reading: Reading, pin: Pin, number: str, name: str, at: Element, known: dict[str, Object],
+             connectors: dict[str, Object]) -> bool:
+    """Lay one wire, and whether that could be done."""
+    source = known.get(number)
+    if source is None:
+        reading.report("X0201", at, f"a wire comes from element {number!r}, which there is not",
+                       "draw the wire once more")
+        return False
+    if source.kind == "continuation":
+        joined = connectors.get(source.text.upper())
+        if joined is None:
+            reading.report("X0201", source.element, f"there is no connector {source.text}")
+            return False
+        source = joined
+    elif source.kind == "block":
+        outputs = [*source.outputs, *source.in_outs]
+        if not name:
+            named = [pin for pin in outputs if pin.name.upper() != "ENO"]
+            name = (named or outputs)[0].name if outputs else ""
+        elif not any(output.name.upper() == name.upper() for output in outputs):
+            has = ", ".join(output.name for output in outputs if output.name) or "none"
+            reading.report("X0201", at, f"a wire comes from output {name} of {source.text}, which there is not",
+                           f"its outputs are {has}")
+            return False
+    pin.wires.append(Wire(source, name if source.kind == "block" else ""))
+    return True
+
+
+def _followed(wires: list[Wire], seen: set[Object]) -> list[Wire]:
+    """Wires with connectors and coils replaced by what feeds them."""
+    found: list[Wire] = []
+    for wire in wires:
+        if wire.source.kind in ("connector", "coil"):
+            if wire.source not in seen:
+                found += _followed([w for pin in wire.source.inputs for w in pin.wires], seen | {wire.source})
+        elif wire not in found:
+            found.append(wire)
+    return [wire for at, wire in enumerate(found) if wire not in found[:at]]
+
+
+# --- one element ------------------------------------------------------------------------------------------------------
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
+def _object(reading: Reading, element: Element, place: int) -> Object:
+    position = element.one("position")
+    x, y = (_number(position.get("x")), _number(position.get("y"))) if position else (0.0, 0.0)
+    order = element.get("executionOrderId")
+    made = Object(element.name, element.get("localId"), place, x, y, int(order) if order.isdigit() else 0, _text(element),
+                  element, element.get("instanceName").strip(), _true(element, "negated"), _word(element, "edge"),
+                  _word(element, "storage"))
+    if element.name == "block":
+        if not made.text:
+            made.broken = True
+            reading.report("X0105", element, "<block> has no typeName")
+        holders = {"inputVariables": made.inputs, "inOutVariables": made.in_outs, "outputVariables": made.outputs}
+        for holder, pins in holders.items():
+            for variable in (v for found in element.all(holder) for v in found.all("variable")):
+                pins.append(_pin(variable, variable.one("connectionPointIn"), pin_name(variable.get("formalParameter"))))
+        _merge_in_outs(made)
+    elif element.name == "inOutVariable":
+        made.inputs = [Pin("", _true(element, "negatedIn"), _word(element, "edgeIn"), _word(element, "storageIn"))]
+        _wire_in(made.inputs[0], element.one("connectionPointIn"))
+        made.negated, made.edge = _true(element, "negatedOut"), _word(element, "edgeOut")
+    elif element.name in ("coil", "outVariable", "contact", "jump", "return", "connector", "rightPowerRail", "vendorElement"):
+        made.inputs = [Pin("")]
+        for point in element.walk():
+            if point.name == "connectionPointIn":
+                _wire_in(made.inputs[0], point)
+    elif element.name not in (*OBJECTS, "continuation", "comment", "error"):
+        made.inputs = [Pin("")]
+        for point in element.all("connectionPointIn"):
+            _wire_in(made.inputs[0], point)
+    return made
+
+
+def _text(element: Element) -> str:
+    """What an element is about: its variable, expression, label, name or text."""
+    attribute = {"block": "typeName", "label": "label", "jump": "label", "connector": "name", "continuation": "name"}
+    if element.name in attribute:
+        return element.get(attribute[element.name]).strip()
+    inner = element.one({"contact": "variable", "coil": "variable", "comment": "content", "vendorElement": "alternativeText",
+                         "error": "content"}.get(element.name, "expression"))
+    return inner.text.strip() if inner else ""
+
+
+def _merge_in_outs(made: Object) -> None:
+    """Beremiz before 2.01 has an in-out as an input and an output of one name."""
+    outputs = {pin.name.upper(): pin for pin in made.outputs}
+    for pin in [pin for pin in made.inputs if pin.name and pin.name.upper() in outputs]:
+        made.inputs.remove(pin)
+        made.outputs.remove(outputs[pin.name.upper()])
+        made.in_outs.append(pin)
+
+
+def pin_name(text: str) -> str:
+    """The name of a pin, "" for those that have none."""
+    return "" if text.strip().lower() in RETURN_OF_NOTHING else text.strip()
+
+
+def _pin(element: Element, point: Element | None, name: str) -> Pin:
+    pin = Pin(name, _true(element, "negated"), _word(element, "edge"), _word(element, "storage"))
+    _wire_in(pin, point)
+    return pin
+
+
+def _wire_in(pin: Pin, point: Element | None) -> None:
+    """What a connectionPointIn says."""
+    if point is None:
+        return
+    for connection in point.all("connection"):
+        pin.raw.append((connection.get("refLocalId"), pin_name(connection.get("formalParameter")), connection))
+    if (typed := point.one("expression")) and typed.text.strip():
+        pin.expression = typed.text.strip()
+
+
+def _true(element: Element, name: str) -> bool:
+    return element.get(name).lower() in ("true", "1")
+
+
+def _word(element: Element, name: str) -> str:
+    """An enumerated attribute; "none" is the same as nothing."""
+    word = element.get(name).lower()
+    return "" if word == "none" else word

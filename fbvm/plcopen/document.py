@@ -1,0 +1,151 @@
+"""What a PLCopen document holds, as values: types, variables, POUs with their bodies, configurations.
+
+Types, values and expressions are text of Structured Text by then; bodies are still elements of XML.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.plcopen.markup import Element
+
+
+@dataclass
+class Reading:
+    """One document on its way; `diagnostics` grows, `where` names the POU at work."""
+
+    source: Source
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+    where: str = ""
+    counted: dict[str, tuple[Element, int]] = field(default_factory=dict)
+    """What is lost in many places and is not needed: the first place, and how often."""
+
+    def report(self, code: str, at: Element, message: str, hint: str = "") -> None:
+        """A message about an element."""
+        parts = [f"POU {self.where}"] if self.where else []
+        if number := at.get("localId"):
+            parts.append(f"{at.name} {number}")
+        text = f"{', '.join(parts)}: {message}" if parts else message
+        self.diagnostics.append(Diagnostic(code, self.source, at.at, at.at + 1 + len(at.name), text, hint))
+
+    def count(self, what: str, at: Element) -> None:
+        """Note something that is not needed to run."""
+        first, times = self.counted.get(what, (at, 0))
+        self.counted[what] = first, times + 1
+
+    def close(self) -> None:
+        """Say what was counted, a message for each kind."""
+        for what, (first, times) in self.counted.items():
+            again = f" ({times} times, here for the first)" if times > 1 else ""
+            self.diagnostics.append(Diagnostic("X0190", self.source, first.at, first.at + 1 + len(first.name), what + again))
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One variable; `note` is its documentation."""
+
+    name: str
+    type: str
+    initial: str = ""
+    address: str = ""
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class VarList:
+    """A section: `kind` as in VAR_INPUT; `name` is that of a list of globals."""
+
+    kind: str
+    qualifiers: tuple[str, ...]
+    variables: tuple[Variable, ...]
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body and the element of its language: ST, IL, LD, FBD or SFC."""
+
+    language: str
+    element: Element
+
+
+@dataclass(frozen=True)
+class Pou:
+    """A POU; `actions` and `transitions` by their names."""
+
+    kind: str
+    name: str
+    result: str
+    lists: tuple[VarList, ...]
+    body: Body | None
+    actions: tuple[tuple[str, Body], ...]
+    transitions: tuple[tuple[str, Body], ...]
+    note: str
+    element: Element
+
+    def variable(self, name: str) -> Variable | None:
+        """The variable of that name, whatever its case."""
+        for listed in self.lists:
+            for variable in listed.variables:
+                if variable.name.casefold() == name.casefold():
+                    return variable
+        return None
+
+
+@dataclass(frozen=True)
+class DataType:
+    """A user's type: `text` is what stands behind `name :`."""
+
+    name: str
+    text: str
+    initial: str
+    note: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """A task: times and names as they are to be written, "" where there is none."""
+
+    name: str
+    interval: str
+    single: str
+    priority: str
+
+
+@dataclass(frozen=True)
+class Instance:
+    """A program that runs; `task` "" for one that runs freely."""
+
+    name: str
+    type: str
+    task: str
+
+
+@dataclass(frozen=True)
+class Resource:
+    """A resource with all that is in it."""
+
+    name: str
+    globals: tuple[VarList, ...]
+    tasks: tuple[Task, ...]
+    instances: tuple[Instance, ...]
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A configuration with its resources."""
+
+    name: str
+    globals: tuple[VarList, ...]
+    resources: tuple[Resource, ...]
+
+
+@dataclass(frozen=True)
+class Document:
+    """All of it, in the order of writing; `globals` are lists that stand outside of configurations."""
+
+    types: tuple[DataType, ...]
+    pous: tuple[Pou, ...]
+    globals: tuple[VarList, ...]
+    configurations: tuple[Configuration, ...]

@@ -1,0 +1,43 @@
+"""Import of PLCopen TC6 XML: a document in, source files of ours and a list of what was not taken over out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.plcopen.document import Reading
+from fbvm.plcopen.markup import parse_markup, read_markup
+from fbvm.plcopen.read_project import read_project
+from fbvm.plcopen.sources import sources
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What became of a document: texts by the names of their files, and messages in order of place."""
+
+    files: dict[str, str]
+    diagnostics: list[Diagnostic]
+
+    @property
+    def errors(self) -> list[Diagnostic]:
+        """Those about what the program lacks now."""
+        return errors(self.diagnostics)
+
+
+def import_xml(document: Path | str | bytes, name: str = "") -> Imported:
+    """Import a file by its path, or the bytes of one, whose `name` messages then use.
+
+    Never raises for what the document contains; the same document gives the same files."""
+    if isinstance(document, bytes):
+        found = parse_markup(document, name or "document.xml")
+    else:
+        found = read_markup(Path(document), name or str(document))
+    if isinstance(found, Diagnostic):
+        return Imported({}, [found])
+    source, root = found
+    reading = Reading(source)
+    project = read_project(reading, root)
+    files = sources(reading, project) if project else {}
+    reading.close()
+    return Imported(files, sorted(reading.diagnostics, key=Diagnostic.order))

@@ -1,0 +1,168 @@
+"""The networks of a diagram, and the order in which things happen in them.
+
+A network is what wires hold together, rails left out.  Networks go by executionOrderId where all have one, else from top
+to bottom; without positions, as written.  In a network an object comes behind all that feed it; what is free goes by
+executionOrderId, then from top to bottom and from left to right.  A loop is cut where it leaves a variable, if one lies
+in it, else where it enters the block that comes first, which so sees what was there one pass before.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import inf
+
+from fbvm.plcopen.diagram import Diagram, Object, Wire
+
+RAILS = ("leftPowerRail", "rightPowerRail")
+SINKS = ("coil", "outVariable", "inOutVariable", "block", "jump", "return", "label")
+"""What does something."""
+
+
+@dataclass(eq=False)
+class Network:
+    """Objects in the order in which they are executed.  `cut` are wires (consumer, wire) that bring the value of the pass
+    before; `comments` stand above it."""
+
+    objects: list[Object]
+    cut: set[tuple[Object, Wire]] = field(default_factory=set)
+    comments: list[str] = field(default_factory=list)
+    number: int = 0
+
+    @property
+    def broken(self) -> bool:
+        return any(item.broken for item in self.objects)
+
+
+def networks(diagram: Diagram) -> list[Network]:
+    """The networks of a diagram in their order."""
+    free = [item for item in diagram.objects if item.kind not in RAILS]
+    flat = len({(item.x, item.y) for item in diagram.objects}) <= 1
+    groups: dict[Object, list[Object]] = {}
+    root = _Joined(free)
+    for item in free:
+        groups.setdefault(root(item), []).append(item)
+    made = [_network(group, flat) for group in groups.values()]
+    made.sort(key=lambda network: min(_place(item, flat) for item in network.objects))
+    if ordered := _by_number(made):
+        made = ordered
+    for number, network in enumerate(made, 1):
+        network.number = number
+    _comment(made, diagram.comments, flat)
+    return made
+
+
+def _place(item: Object, flat: bool) -> tuple[float, float, int]:
+    return (0, 0, item.place) if flat else (item.y, item.x, item.place)
+
+
+def _by_number(made: list[Network]) -> list[Network] | None:
+    """Networks by executionOrderId, if all that do something have one and no two networks mix theirs."""
+    spans = []
+    for network in made:
+        numbers = [item.order for item in network.objects if item.kind in SINKS and item.kind != "label"]
+        if not numbers or not all(numbers):
+            return None
+        spans.append((min(numbers), max(numbers), network))
+    spans.sort(key=lambda span: span[:2])
+    if any(before[1] >= behind[0] for before, behind in pairwise(spans)):
+        return None
+    return [network for _, _, network in spans]
+
+
+def _comment(made: list[Network], comments: list[Object], flat: bool) -> None:
+    """Give each comment to the network that comes next below it, else to the last one."""
+    for comment in sorted(comments, key=lambda item: _place(item, flat)):
+        here = _place(comment, flat)
+        below = [network for network in made if max(_place(item, flat) for item in network.objects) >= here]
+        for network in (below or made[-1:])[:1]:
+            if comment.text:
+                network.comments.append(comment.text)
+
+
+# --- one network ------------------------------------------------------------------------------------------------------
+
+
+class _Joined:
+    """Which objects hang together: called with an object, the one that stands for all of its network."""
+
+    def __init__(self, items: list[Object]) -> None:
+        self.parent = {item: item for item in items}
+        for item in items:
+            for pin in item.pins:
+                for wire in pin.wires:
+                    if wire.source in self.parent:
+                        self.parent[self(wire.source)] = self(item)
+
+    def __call__(self, item: Object) -> Object:
+        while self.parent[item] is not item:
+            self.parent[item] = item = self.parent[self.parent[item]]
+        return item
+
+
+def _key(item: Object, flat: bool) -> tuple[float, float, float, int]:
+    return (item.order or inf, *_place(item, flat))
+
+
+def _feeds(item: Object, inside: set[Object], cut: set[tuple[Object, Wire]]) -> list[Wire]:
+    return [wire for pin in item.pins for wire in pin.wires if wire.source in inside and (item, wire) not in cut]
+
+
+def _network(group: list[Object], flat: bool) -> Network:
+    """Sort a network; where only loops are left, cut one and go on."""
+    inside = set(group)
+    cut: set[tuple[Object, Wire]] = set()
+    order: list[Object] = []
+    done: set[Object] = set()
+    waiting = {item: len(_feeds(item, inside, cut)) for item in group}
+    consumers: dict[Object, list[Object]] = {}
+    for item in group:
+        for wire in _feeds(item, inside, cut):
+            consumers.setdefault(wire.source, []).append(item)
+    ready = [(_key(item, flat), at) for at, item in enumerate(group) if not waiting[item]]
+    heapq.heapify(ready)
+    place = {item: at for at, item in enumerate(group)}
+    while len(order) < len(group):
+        while not ready:
+            item, wire = _back([one for one in group if one not in done], inside, cut, done, flat)
+            cut.add((item, wire))
+            waiting[item] -= 1
+            if not waiting[item]:
+                heapq.heappush(ready, (_key(item, flat), place[item]))
+        item = group[heapq.heappop(ready)[1]]
+        order.append(item)
+        done.add(item)
+        for consumer in consumers.get(item, ()):
+            waiting[consumer] -= 1
+            if not waiting[consumer] and consumer not in done:
+                heapq.heappush(ready, (_key(consumer, flat), place[consumer]))
+    return Network(order, cut)
+
+
+def _back(left: list[Object], inside: set[Object], cut: set[tuple[Object, Wire]], done: set[Object],
+          flat: bool) -> tuple[Object, Wire]:
+    """The wire at which a loop is cut, and its consumer."""
+    loops = [(item, wire) for item in left for wire in _feeds(item, inside, cut)
+             if wire.source not in done and _depends(wire.source, item, inside, cut, done)]
+
+    def late(found: tuple[Object, Wire]) -> tuple[bool, bool, tuple[float, float, float, int]]:
+        item, wire = found
+        return wire.source.kind != "inOutVariable", item.kind != "block", _key(item, flat)
+
+    return min(loops, key=late)
+
+
+def _depends(item: Object, on: Object, inside: set[Object], cut: set[tuple[Object, Wire]], done: set[Object]) -> bool:
+    """Whether wires lead from one object to another."""
+    seen = {item}
+    todo = [item]
+    while todo:
+        here = todo.pop()
+        if here is on:
+            return True
+        for wire in _feeds(here, inside, cut):
+            if wire.source not in seen and wire.source not in done:
+                seen.add(wire.source)
+                todo.append(wire.source)
+    return False

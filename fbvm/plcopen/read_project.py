@@ -1,0 +1,241 @@
+"""The frame of a PLCopen document: where types, POUs, globals and configurations stand, and what is left out.
+
+Elements are found by their local names: TC6 1.x, 2.00 and 2.01 differ in little, and CODESYS keeps most of a project
+below `addData` of a resource.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from fbvm.plcopen.document import (
+    Body,
+    Configuration,
+    DataType,
+    Document,
+    Instance,
+    Pou,
+    Reading,
+    Resource,
+    Task,
+    Variable,
+    VarList,
+)
+from fbvm.plcopen.markup import Element
+from fbvm.plcopen.read_types import duration, note, type_text, value_text
+
+TC6 = "http://www.plcopen.org/xml/tc6"
+IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"
+"""Namespace of IEC 61131-10, another schema (from memory of the family, assumed)."""
+KINDS = {"function": "FUNCTION", "functionBlock": "FUNCTION_BLOCK", "program": "PROGRAM"}
+SECTIONS = {"localVars": "VAR", "tempVars": "VAR_TEMP", "inputVars": "VAR_INPUT", "outputVars": "VAR_OUTPUT",
+            "inOutVars": "VAR_IN_OUT", "externalVars": "VAR_EXTERNAL", "globalVars": "VAR_GLOBAL"}
+QUALIFIERS = {"constant": "CONSTANT", "retain": "RETAIN", "nonretain": "NON_RETAIN", "persistent": "PERSISTENT"}
+LANGUAGES = ("ST", "IL", "LD", "FBD", "SFC")
+LOCATION = "urn:fbvm:location"
+"""Our `addData`: an address that is no IEC location."""
+OBJECT_ORIENTED = {"method", "property", "interface", "getaccessor", "setaccessor", "pouinheritance", "itf", "namespace"}
+"""Last words of names of `addData` that hold parts of programs (CODESYS)."""
+READ = {"pou", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location", "action"}
+"""Those whose contents are taken."""
+_IDENTIFIER = re.compile(r"[^\W\d]\w*")
+
+
+def read_project(reading: Reading, root: Element) -> Document | None:
+    """What is in a document; None if it is none of PLCopen TC6, and then a diagnostic says why."""
+    if root.namespace == IEC_10 or (root.name == "Project" and "61131" in root.namespace):
+        reading.report("X0104", root, "this is XML of IEC 61131-10, the successor of PLCopen TC6, which is not read",
+                       "let the tool export PLCopen XML (TC6)")
+        return None
+    if root.name != "project" or not (root.namespace.startswith(TC6) or (not root.namespace and root.one("types"))):
+        reading.report("X0104", root, f"the document is <{root.name}> of {root.namespace or 'no namespace'}, no PLCopen project",
+                       f"a PLCopen project is <project xmlns=\"{TC6}_0201\">")
+        return None
+    types: list[DataType] = []
+    pous: list[Pou] = []
+    lists: list[VarList] = []
+    for element, parent in _parts(root):
+        if element.name == "dataType":
+            types += _data_type(reading, element)
+        elif element.name == "pou":
+            pous += _pou(reading, element)
+        elif element.name == "globalVars":
+            lists += _var_list(reading, element, parent.get("name"))
+    configurations = tuple(_configuration(reading, c) for c in root.walk() if c.name == "configuration")
+    _added(reading, root)
+    return Document(tuple(types), tuple(pous), tuple(lists), configurations)
+
+
+def _parts(root: Element) -> Iterator[tuple[Element, Element]]:
+    """Types, POUs, and lists of globals that are no part of the standard frame, each with the element around it."""
+    todo = [(root, root)]
+    while todo:
+        element, parent = todo.pop()
+        if element.name == "globalVars" and parent.name in ("configuration", "resource", "interface"):
+            if element.get("name") and parent.name != "interface":
+                yield element, element
+        elif element.name in ("dataType", "pou", "globalVars"):
+            yield element, parent
+        if element.name not in ("pou", "dataType"):
+            todo.extend((child, element) for child in reversed(element.children))
+
+
+def identifier(reading: Reading, element: Element, attribute: str = "name") -> str:
+    """A name that an element must have; "" with a diagnostic if it has none, or one that no program can say."""
+    name = element.get(attribute).strip()
+    if not name:
+        reading.report("X0105", element, f"<{element.name}> has no {attribute}")
+    elif not _IDENTIFIER.fullmatch(name):
+        reading.report("X0105", element, f"{name!r} is no name", "a name begins with a letter, and has letters, digits and `_`")
+        return ""
+    return name
+
+
+def _data_type(reading: Reading, element: Element) -> Iterator[DataType]:
+    name = identifier(reading, element)
+    kind = type_text(reading, element.one("baseType"), element)
+    if name and kind:
+        yield DataType(name, kind, value_text(reading, element.one("initialValue"), kind), note(element))
+
+
+# --- variables --------------------------------------------------------------------------------------------------------
+
+
+def _var_list(reading: Reading, element: Element, name: str = "") -> Iterator[VarList]:
+    """The list that an element is, and those of other qualifiers that it holds (CODESYS)."""
+    name = element.get("name") or name
+    inside = [inner for inner in element.walk() if inner is not element and inner.name == element.name]
+    qualifiers = tuple(word for key, word in QUALIFIERS.items() if element.get(key) in ("true", "1"))
+    variables = tuple(v for inner in element.all("variable") for v in _variable(reading, inner))
+    if variables:
+        yield VarList(SECTIONS[element.name], qualifiers, variables, name)
+    for inner in inside:
+        yield from _var_list(reading, inner, name)
+
+
+def _variable(reading: Reading, element: Element) -> Iterator[Variable]:
+    name = identifier(reading, element)
+    kind = type_text(reading, element.one("type"), element)
+    if name and kind:
+        own = next((d.text.strip() for d in _data(element) if d.get("name") == LOCATION), "")
+        yield Variable(name, kind, value_text(reading, element.one("initialValue"), kind),
+                       own or element.get("address").strip(), note(element))
+
+
+# --- POUs -------------------------------------------------------------------------------------------------------------
+
+
+def _pou(reading: Reading, element: Element) -> Iterator[Pou]:
+    name, kind = identifier(reading, element), KINDS.get(element.get("pouType"))
+    if kind is None:
+        reading.report("X0105", element, f"pouType is {element.get('pouType')!r}", f"it is one of {', '.join(KINDS)}")
+    if not name or kind is None:
+        return
+    reading.where = name
+    interface = element.one("interface")
+    parts = interface.children if interface else []
+    lists = tuple(made for part in parts if part.name in SECTIONS for made in _var_list(reading, part))
+    for part in parts:
+        if part.name == "accessVars" and part.all("variable"):
+            reading.report("X0203", part, "access variables are not taken over")
+    returned = interface.one("returnType") if interface else None
+    result = type_text(reading, returned, element) if returned and kind == "FUNCTION" else ""
+    bodies = element.all("body")
+    for other in bodies[1:]:
+        reading.report("X0203", other, f"worksheet {other.get('WorksheetName')} is not taken over: the POU has its first body",
+                       "one body a POU is read")
+    body = _body(reading, bodies[0]) if bodies else None
+    yield Pou(kind, name, result, lists, body, _named_bodies(reading, element, "action"),
+              _named_bodies(reading, element, "transition"), note(element) or (note(interface) if interface else ""), element)
+    reading.where = ""
+
+
+def _named_bodies(reading: Reading, pou: Element, what: str) -> tuple[tuple[str, Body], ...]:
+    """Actions and transitions; CODESYS has actions below `addData`."""
+    holders = [*pou.all(f"{what}s"), *(d for d in _data(pou) if d.get("name").endswith(f"/{what}"))]
+    found = []
+    for element in (inner for holder in holders for inner in holder.children if inner.name.lower() == what):
+        name, body = identifier(reading, element), element.one("body")
+        made = _body(reading, body) if body else None
+        if name and made:
+            found.append((name, made))
+    return tuple(found)
+
+
+def _body(reading: Reading, element: Element) -> Body | None:
+    inner = next((part for part in element.children if part.name in LANGUAGES), None)
+    if inner is None:
+        strange = next((part for part in element.children if part.name not in ("addData", "documentation")), None)
+        if strange is not None:
+            reading.report("X0203", strange, f"a body in {strange.name} is not taken over", f"read are {', '.join(LANGUAGES)}")
+        return None
+    return Body(inner.name, inner)
+
+
+# --- configurations ---------------------------------------------------------------------------------------------------
+
+
+def _configuration(reading: Reading, element: Element) -> Configuration:
+    resources = [inner for inner in element.walk() if inner.name == "resource"]
+    for what in ("accessVars", "configVars"):
+        if (found := element.one(what)) and found.children:
+            reading.report("X0203", found, f"{what} of a configuration are not taken over")
+    return Configuration(identifier(reading, element) or "Config0", _unnamed(reading, element),
+                         tuple(_resource(reading, r) for r in resources))
+
+
+def _unnamed(reading: Reading, element: Element) -> tuple[VarList, ...]:
+    return tuple(made for part in element.all("globalVars") if not part.get("name") for made in _var_list(reading, part))
+
+
+def _resource(reading: Reading, element: Element) -> Resource:
+    tasks, instances = [], []
+    for task in element.all("task"):
+        name = identifier(reading, task)
+        if not name:
+            continue
+        interval = duration(task.get("interval"))
+        if task.get("interval").strip() and not interval:
+            reading.report("X0203", task, f"the interval of task {name} is {task.get('interval')!r}, which is no duration",
+                           "write a duration such as T#20ms")
+        tasks.append(Task(name, interval, task.get("single").strip(), task.get("priority").strip()))
+        instances += _instances(reading, task, name)
+    instances += _instances(reading, element, "")
+    return Resource(identifier(reading, element) or "Res0", _unnamed(reading, element), tuple(tasks), tuple(instances))
+
+
+def _instances(reading: Reading, holder: Element, task: str) -> list[Instance]:
+    found = []
+    for element in holder.all("pouInstance"):
+        name = identifier(reading, element)
+        if name:
+            found.append(Instance(name, element.get("typeName").strip() or name, task))
+    return found
+
+
+# --- what is not taken ------------------------------------------------------------------------------------------------
+
+
+def _data(element: Element) -> list[Element]:
+    added = element.one("addData")
+    return added.all("data") if added else []
+
+
+def _added(reading: Reading, root: Element) -> None:
+    """List what stands in `addData`."""
+    pou = ""
+    for element in root.walk():
+        if element.name == "pou":
+            pou = element.get("name")
+        if element.name != "data" or not element.get("name"):
+            continue
+        name = element.get("name")
+        last = name.rstrip("/").rpartition("/")[2].lower()
+        if last in OBJECT_ORIENTED:
+            inner = next(iter(element.children), element)
+            called = " ".join(filter(None, (last, inner.get("name"), "of", pou or "the project")))
+            reading.report("X0203", inner, f"{called} is not taken over",
+                           "object-oriented parts are not executed by this version")
+        elif last not in READ and name != LOCATION:
+            reading.count(f"addData {name} is not taken over", element)

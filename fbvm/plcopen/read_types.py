@@ -1,0 +1,134 @@
+"""Types and values of a PLCopen document as text of Structured Text."""
+
+from __future__ import annotations
+
+import re
+
+from fbvm.plcopen.document import Reading
+from fbvm.plcopen.markup import Element
+
+_WORDS = (
+    "BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD LTIME LDATE LDT LTOD "
+    "CHAR WCHAR ANY ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE")
+ELEMENTARY = frozenset(_WORDS.split())
+"""Empty elements that are types (TC6 2.01 elementaryTypes; the long forms and CHAR are extensions)."""
+_NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
+_DURATION = re.compile(r"P(?:(\d+)D)?(?:T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?)?")
+
+
+def type_text(reading: Reading, holder: Element | None, owner: Element) -> str:
+    """The type that stands in `type`, `baseType` or `returnType`; "" with a diagnostic at `owner` if there is none."""
+    inner = next((part for part in holder.children if part.name not in ("addData", "documentation")), None) if holder else None
+    if inner is None:
+        reading.report("X0105", owner, f"{owner.get('name') or owner.name} has no type")
+        return ""
+    name = inner.name.upper()
+    if name in ELEMENTARY:
+        return name
+    if name in ("STRING", "WSTRING"):
+        return f"{name}[{inner.get('length')}]" if inner.get("length") else name
+    if inner.name in _WRITERS:
+        return _WRITERS[inner.name](reading, inner)
+    reading.report("X0105", inner, f"{inner.name} is no type of PLCopen XML")
+    return ""
+
+
+def _array(reading: Reading, element: Element) -> str:
+    bounds = [f"{d.get('lower')}..{d.get('upper')}" for d in element.all("dimension")]
+    return f"ARRAY [{', '.join(bounds)}] OF {type_text(reading, element.one('baseType'), element)}"
+
+
+def _derived(reading: Reading, element: Element) -> str:
+    name = element.get("name").strip()
+    if not _NAME.fullmatch(name):
+        reading.report("X0105", element, f"the type {name!r} is no name")
+        return ""
+    return name
+
+
+def _enum(reading: Reading, element: Element) -> str:
+    values = element.one("values")
+    members = [f"{v.get('name')} := {v.get('value')}" if v.get("value") else v.get("name")
+               for v in (values.all("value") if values else ())]
+    base = element.one("baseType")
+    return f"{type_text(reading, base, element) if base else ''} ({', '.join(members)})".strip()
+
+
+def _struct(reading: Reading, element: Element) -> str:
+    members = []
+    for variable in element.all("variable"):
+        kind = type_text(reading, variable.one("type"), variable)
+        initial = value_text(reading, variable.one("initialValue"), kind)
+        address = f" AT {variable.get('address')}" if variable.get("address") else ""
+        members.append(f"    {variable.get('name')}{address} : {kind}{initial and f' := {initial}'};{remark(variable)}\n")
+    return f"STRUCT\n{''.join(members)}END_STRUCT"
+
+
+def _subrange(reading: Reading, element: Element) -> str:
+    limits = element.one("range") or element
+    return f"{type_text(reading, element.one('baseType'), element)} ({limits.get('lower')}..{limits.get('upper')})"
+
+
+def _pointer(reading: Reading, element: Element) -> str:
+    return f"POINTER TO {type_text(reading, element.one('baseType'), element)}"
+
+
+_WRITERS = {"array": _array, "derived": _derived, "enum": _enum, "struct": _struct, "subrangeSigned": _subrange,
+            "subrangeUnsigned": _subrange, "pointer": _pointer}
+
+
+def value_text(reading: Reading, holder: Element | None, kind: str) -> str:
+    """The value in `initialValue` and its like for a variable of a type; "" if there is none."""
+    inner = next((part for part in holder.children if part.name.endswith("Value")), None) if holder else None
+    if inner is None:
+        return ""
+    if inner.name == "arrayValue":
+        items = []
+        element_kind = kind.split(" OF ", 1)[-1] if kind.startswith("ARRAY") else ""
+        for value in inner.all("value"):
+            text, times = value_text(reading, value, element_kind), value.get("repetitionValue", "1")
+            items.append(f"{times}({text})" if times != "1" else text)
+        return f"[{', '.join(items)}]" if items else ""
+    if inner.name == "structValue":
+        fields = [f"{v.get('member')} := {value_text(reading, v, '')}" for v in inner.all("value")]
+        return f"({', '.join(fields)})" if fields else ""
+    return _simple(inner.get("value").strip(), kind)
+
+
+def _simple(text: str, kind: str) -> str:
+    """A simple value; strings are found with and without quotes."""
+    if kind.startswith(("STRING", "WSTRING")) and text and text[0] not in "'\"" and "#" not in text:
+        sign = '"' if kind.startswith("W") else "'"
+        return sign + text.replace("$", "$$").replace(sign, "$" + sign) + sign
+    return text
+
+
+def duration(text: str) -> str:
+    """An interval as a literal: `T#20ms`, `PT0.02S` (CODESYS) and `20ms` (OpenPLC) are found; "" for a name."""
+    text = text.strip()
+    iso = _DURATION.fullmatch(text)
+    if iso and any(iso.groups()):
+        days, hours, minutes, seconds = iso.groups()
+        parts = [f"{number}{unit}" for number, unit in ((days, "d"), (hours, "h"), (minutes, "m")) if number]
+        if seconds:
+            micros = round(float(seconds) * 1_000_000)
+            whole, rest = divmod(micros, 1_000_000)
+            parts += [f"{whole}s"] if whole else []
+            parts += [f"{rest // 1000}ms"] if rest // 1000 else []
+            parts += [f"{rest % 1000}us"] if rest % 1000 else []
+        return "T#" + ("".join(parts) or "0s")
+    if re.fullmatch(r"(?i)(L?TIME|L?T)#[\d._a-z]+", text):
+        return text
+    return f"T#{text}" if re.fullmatch(r"(?i)(\d+(\.\d+)?(d|h|m|s|ms|us|ns))+", text) else ""
+
+
+def note(element: Element) -> str:
+    """The documentation of an element on one line."""
+    inner = element.one("documentation")
+    return " ".join(inner.text.split()) if inner else ""
+
+
+def remark(element: Element) -> str:
+    """The same as a comment behind a declaration."""
+    text = note(element)
+    return f" // {text}" if text else ""

@@ -1,0 +1,185 @@
+"""What the names in a diagram stand for: types of variables and results, who shares memory, and names that are free.
+
+Only as much as the import needs to keep a value in a variable; whoever checks the program comes later.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from functools import cache
+from pathlib import Path
+
+from fbvm.base.data import data_folder
+from fbvm.base.diagnostics import Source
+from fbvm.check.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversion, typed_name
+from fbvm.plcopen.diagram import Object, Wire
+from fbvm.plcopen.document import Document, Pou, Variable
+from fbvm.syntax import tree
+from fbvm.syntax.parser import parse
+from fbvm.syntax.text import read
+
+SHARED = "%"
+"""Stands for all that somebody else may write: located, global and referenced variables."""
+COMPARISONS = ("GT", "GE", "EQ", "LE", "LT", "NE")
+_ROOT = re.compile(r"[^\W\d]\w*")
+_WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[A-Za-z]+#\S*|%[\w.]+|(?<![\w.%])[^\W\d]\w*")
+_OPERATORS = {"TRUE", "FALSE", "AND", "OR", "NOT", "XOR", "MOD"}
+_DEEP = 12
+"""How far a type is looked for against the wires."""
+
+
+class Scope:
+    """The names of one POU of a document."""
+
+    def __init__(self, document: Document, pou: Pou) -> None:
+        self.document, self.pou = document, pou
+        self.pous = {other.name.upper(): other for other in document.pous}
+        self.own = {variable.name.upper(): (listed.kind, variable) for listed in pou.lists for variable in listed.variables}
+        self.taken = {*self.own, *self.pous, *(name.upper() for name, _ in (*pou.actions, *pou.transitions))}
+        self.taken |= {variable.name.upper() for listed in _globals(document) for variable in listed}
+        self.made: dict[tuple[str, str], list[str]] = {}
+        """Variables that the import adds: (section, type) -> names."""
+
+    def new(self, stem: str, kind: str, keeps: bool) -> str:
+        """Declare a variable; `keeps` if its value lasts to the next pass."""
+        name, number = stem, 1
+        while name.upper() in self.taken:
+            number += 1
+            name = f"{stem}_{number}"
+        self.taken.add(name.upper())
+        section = "VAR" if keeps or self.pou.kind == "FUNCTION" else "VAR_TEMP"
+        self.made.setdefault((section, kind), []).append(name)
+        return name
+
+    @property
+    def is_function(self) -> bool:
+        """Whether nothing lasts from one call to the next."""
+        return self.pou.kind == "FUNCTION"
+
+    def roots(self, expression: str) -> frozenset[str]:
+        """What a text of Structured Text reads: names of variables that only this POU can write, and SHARED for all others."""
+        found = set()
+        for match in _WORDS.finditer(expression):
+            word = match[0]
+            if word[0] == "%":
+                found.add(SHARED)
+            elif word[0] not in "'\"" and "#" not in word and word.upper() not in _OPERATORS:
+                found.add(self.root(word))
+        return frozenset(found)
+
+    def root(self, name: str) -> str:
+        """What memory a name stands for."""
+        match = _ROOT.match(name)
+        if not match:
+            return SHARED
+        word = match[0].upper()
+        kind, variable = self.own.get(word, ("", None))
+        if variable is None:
+            return word if word in self.taken and word not in self.pous else SHARED
+        alone = kind in ("VAR", "VAR_TEMP", "VAR_INPUT", "VAR_OUTPUT") and not variable.address
+        return word if alone and "POINTER" not in variable.type and "REF" not in variable.type else SHARED
+
+    # --- types ---
+
+    def type_of(self, expression: str) -> str:
+        """The type of an expression that is the name of a variable, or a literal; "" if that is not known."""
+        expression = expression.strip()
+        if expression.upper() in ("TRUE", "FALSE"):
+            return "BOOL"
+        first, *rest = re.split(r"[.]", expression)
+        _, found = self.own.get(first.strip().upper(), ("", None))
+        if found is None:
+            found = next((v for listed in _globals(self.document) for v in listed if v.name.upper() == first.upper()), None)
+        if found is not None and not rest:
+            return found.type
+        if found is not None and len(rest) == 1:
+            return self.output_type(found.type, rest[0])
+        typed = re.match(r"(?i)(BOOL|[SUL]*INT|[UD]+INT|L?REAL|BYTE|[DL]?WORD|TIME|T|LTIME|DATE|D|TOD|DT|STRING)#", expression)
+        if typed:
+            word = typed[1].upper()
+            return {"T": "TIME", "D": "DATE"}.get(word, word)
+        return ""
+
+    def output_type(self, block: str, pin: str) -> str:
+        """The type of a pin of a block, of this document or of a library; "" if it is not known."""
+        other = self.pous.get(block.upper())
+        if other is not None:
+            variable = other.variable(pin)
+            return variable.type if variable else ""
+        return _library_pins(block.upper()).get(pin.upper(), "")
+
+    def wire_type(self, wire: Wire, depth: int = 0) -> str:
+        """The type of what a wire carries; "" if that cannot be told."""
+        item = wire.source
+        if depth > _DEEP:
+            return ""
+        if item.kind in ("leftPowerRail", "contact", "jump", "return"):
+            return "BOOL"
+        if item.kind in ("inVariable", "inOutVariable"):
+            return "BOOL" if item.negated and not self.type_of(item.text) else self.type_of(item.text)
+        if item.kind != "block":
+            return ""
+        if wire.pin.upper() == "ENO":
+            return "BOOL"
+        if item.instance:
+            return self.output_type(item.text, wire.pin)
+        return self._function_type(item, wire.pin, depth)
+
+    def _function_type(self, item: Object, pin: str, depth: int) -> str:
+        name = item.text.upper()
+        other = self.pous.get(name)
+        if other is not None:
+            variable = other.variable(pin)
+            return variable.type if variable else other.result
+        if name in COMPARISONS:
+            return "BOOL"
+        row = SIGNATURES.get(name)
+        if row is not None and row.result not in ("T", ""):
+            return row.result
+        if (change := conversion(name)) is not None:
+            return change.target
+        if name in TIME_OPERATORS:
+            function, (left, right) = TIME_OPERATORS[name]
+            return ("LTIME" if left.startswith("L") else "TIME") if function == "SUB" and left == right else left
+        if (typed := typed_name(name)) is not None:
+            return name.removeprefix(f"{typed[0]}_") if typed[0] not in COMPARISONS else "BOOL"
+        if row is None and name not in OPERATORS:
+            return ""
+        skipped = {"EN", "G", "K", "N", "L", "P"}
+        for data in (p for p in item.inputs if p.name.upper() not in skipped):
+            found = self.type_of(data.expression) if data.expression else ""
+            for inner in data.wires:
+                found = found or self.wire_type(inner, depth + 1)
+            if found:
+                return found
+        return ""
+
+
+def _globals(document: Document) -> Iterable[tuple[Variable, ...]]:
+    for listed in document.globals:
+        yield listed.variables
+    for configuration in document.configurations:
+        for listed in configuration.globals:
+            yield listed.variables
+        for resource in configuration.resources:
+            for listed in resource.globals:
+                yield listed.variables
+
+
+@cache
+def _library_files() -> dict[str, Path]:
+    return {path.stem.upper(): path for path in sorted(data_folder("fblib").rglob("*.st"), reverse=True)}
+
+
+@cache
+def _library_pins(block: str) -> dict[str, str]:
+    """Types of the pins of a library's block, by name in capitals."""
+    path = _library_files().get(block)
+    source = read(path, path.name) if path else None
+    if not isinstance(source, Source):
+        return {}
+    declared = (d for d in parse(source)[0].declarations if isinstance(d, tree.Pou) and d.name.text.upper() == block)
+    return {name.text.upper(): source.text[variable.spec.start:variable.spec.end] for pou in declared
+            for section in pou.sections if section.kind in ("VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT")
+            for variable in section.variables for name in variable.names}

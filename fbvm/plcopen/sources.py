@@ -1,0 +1,129 @@
+"""A document as source files of ours: a POU a file, a file for types, one for each list of globals, one for configurations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+
+from fbvm.base.diagnostics import Source
+from fbvm.plcopen.bodies import Bodies
+from fbvm.plcopen.document import Configuration, DataType, Document, Pou, Reading, Resource, Variable, VarList
+from fbvm.syntax.format import formatted
+
+GLOBALS = "globals"
+"""File of the lists of globals that have no name."""
+TYPES = "types"
+
+
+def sources(reading: Reading, document: Document) -> dict[str, str]:
+    """Texts by the names of their files."""
+    files: dict[str, list[str]] = {}
+    if document.types:
+        files[TYPES] = [line for data_type in document.types for line in _data_type(data_type)]
+    for listed in document.globals:
+        files.setdefault(listed.name or GLOBALS, []).extend(_section(listed))
+    for pou in document.pous:
+        reading.where = pou.name
+        _add(files, pou.name, _pou(reading, document, pou))
+    reading.where = ""
+    for configuration in document.configurations:
+        lines = _configuration(configuration)
+        if lines:
+            _add(files, configuration.name, lines)
+    return {_file_name(name): _canonical(lines) for name, lines in files.items()}
+
+
+def _add(files: dict[str, list[str]], name: str, lines: list[str]) -> None:
+    """Put lines into a file of their own; no two files differ by case only."""
+    taken = {known.casefold() for known in files}
+    free, number = name, 1
+    while free.casefold() in taken:
+        number += 1
+        free = f"{name}_{number}"
+    files[free] = lines
+
+
+def _file_name(name: str) -> str:
+    return re.sub(r"[^\w-]", "_", name) + ".st"
+
+
+def _canonical(lines: Iterable[str]) -> str:
+    """The lines in the form in which `fmt` writes them; as they are if they cannot be read."""
+    text = "\n".join(lines) + "\n"
+    return formatted(Source("", text))[0]
+
+
+def _remark(text: str) -> str:
+    return f" // {text}" if text else ""
+
+
+def _data_type(data_type: DataType) -> list[str]:
+    initial = f" := {data_type.initial}" if data_type.initial else ""
+    return [f"TYPE{_remark(data_type.note)}", f"{data_type.name} : {data_type.text}{initial};", "END_TYPE", ""]
+
+
+def _section(listed: VarList) -> list[str]:
+    head = " ".join((listed.kind, *listed.qualifiers))
+    return [head, *(_variable(variable) for variable in listed.variables), "END_VAR", ""]
+
+
+def _variable(variable: Variable) -> str:
+    address = f" AT {variable.address}" if variable.address else ""
+    initial = f" := {variable.initial}" if variable.initial else ""
+    return f"{variable.name}{address} : {variable.type}{initial};{_remark(variable.note)}"
+
+
+# --- POUs -------------------------------------------------------------------------------------------------------------
+
+
+def _pou(reading: Reading, document: Document, pou: Pou) -> list[str]:
+    bodies = Bodies(reading, document, pou)
+    main = bodies.lines(pou.body) if pou.body else []
+    actions = [(name, bodies.lines(body)) for name, body in pou.actions]
+    if pou.transitions and (pou.body is None or pou.body.language != "SFC"):
+        reading.report("X0203", pou.element, f"{len(pou.transitions)} transitions without a chart are not taken over")
+    head = f"{pou.kind} {pou.name}" + (f" : {pou.result}" if pou.result else "")
+    made = [VarList(section, (), tuple(Variable(name, kind) for name in names))
+            for (section, kind), names in bodies.scope.made.items()]
+    lines = [f"// {pou.note}"] if pou.note else []
+    lines += [head, *(line for listed in [*pou.lists, *_gathered(made)] for line in _section(listed)[:-1])]
+    lines += main
+    for name, inner in actions:
+        lines += ["", f"ACTION {name}:", *inner, "END_ACTION"]
+    return [*lines, f"END_{pou.kind}"]
+
+
+def _gathered(lists: list[VarList]) -> Iterator[VarList]:
+    """One list for each kind."""
+    for kind in dict.fromkeys(listed.kind for listed in lists):
+        yield VarList(kind, (), tuple(v for listed in lists if listed.kind == kind for v in listed.variables))
+
+
+# --- configurations ---------------------------------------------------------------------------------------------------
+
+
+def _configuration(configuration: Configuration) -> list[str]:
+    """A configuration; nothing if no program of it runs and it declares nothing."""
+    resources = [resource for resource in configuration.resources if resource.instances or resource.globals]
+    if not resources:
+        return [line for listed in configuration.globals for line in _section(listed)]
+    lines = [f"CONFIGURATION {configuration.name}"]
+    lines += [line for listed in configuration.globals for line in _section(listed)[:-1]]
+    for resource in resources:
+        lines += _resource(resource)
+    return [*lines, "END_CONFIGURATION"]
+
+
+def _resource(resource: Resource) -> Iterator[str]:
+    yield f"RESOURCE {resource.name} ON PLC"
+    for listed in resource.globals:
+        yield from _section(listed)[:-1]
+    for task in resource.tasks:
+        settings = [f"SINGLE := {task.single}"] if task.single else []
+        settings += [f"INTERVAL := {task.interval}"] if task.interval else []
+        settings += [f"PRIORITY := {task.priority}"] if task.priority else []
+        yield f"TASK {task.name} ({', '.join(settings)});"
+    for instance in resource.instances:
+        bound = f" WITH {instance.task}" if instance.task else ""
+        yield f"PROGRAM {instance.name}{bound} : {instance.type};"
+    yield "END_RESOURCE"

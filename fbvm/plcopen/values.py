@@ -1,0 +1,82 @@
+"""Values on wires as texts of Structured Text, that remember how tightly they bind and what they read."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+LOOSE, OR, XOR, AND, EQUAL, COMPARE, ADD, MULTIPLY, UNARY, ATOM = range(10)
+"""How tightly an operator binds, the weakest first (IEC 61131-3 table 71)."""
+INFIX = {"OR": ("OR", OR), "XOR": ("XOR", XOR), "AND": ("AND", AND), "EQ": ("=", EQUAL), "NE": ("<>", EQUAL),
+         "LT": ("<", COMPARE), "GT": (">", COMPARE), "LE": ("<=", COMPARE),
+         "GE": (">=", COMPARE), "ADD": ("+", ADD), "SUB": ("-", ADD),
+         "MUL": ("*", MULTIPLY), "DIV": ("/", MULTIPLY), "MOD": ("MOD", MULTIPLY)}
+"""Functions that are written as operators."""
+CHAINED = ("OR", "XOR", "AND", "ADD", "MUL")
+"""Those that take more than two inputs."""
+_ATOM = re.compile(r"[\w.#%\[\]^]+|'[^']*'|\"[^\"]*\"")
+
+
+class Unexecutable(Exception):
+    """The network cannot be executed; the arguments are the object, a message and a hint."""
+
+
+@dataclass(frozen=True)
+class Value:
+    """A text, its level, and the roots of what it reads (`Scope.roots`)."""
+
+    text: str
+    level: int = ATOM
+    reads: frozenset[str] = frozenset()
+
+    def at(self, level: int) -> str:
+        """The text where an operand of that level is wanted."""
+        return self.text if self.level >= level else f"({self.text})"
+
+    @property
+    def is_true(self) -> bool:
+        return self.text == "TRUE"
+
+    @property
+    def is_false(self) -> bool:
+        return self.text == "FALSE"
+
+
+TRUE, FALSE = Value("TRUE"), Value("FALSE")
+
+
+def written(text: str, reads: frozenset[str]) -> Value:
+    """A value that somebody else wrote as an expression."""
+    text = " ".join(text.split())
+    return Value(text, ATOM if _ATOM.fullmatch(text) else LOOSE, reads)
+
+
+def joined(name: str, values: list[Value]) -> Value:
+    """Two or more values with an operator between them."""
+    sign, level = INFIX[name]
+    texts = [values[0].at(level), *(value.at(level if name in ("OR", "XOR", "AND") else level + 1) for value in values[1:])]
+    return Value(f" {sign} ".join(texts), level, frozenset().union(*(value.reads for value in values)))
+
+
+def either(values: list[Value]) -> Value:
+    """A wired OR; no value at all is FALSE."""
+    left = [value for value in values if not value.is_false]
+    if any(value.is_true for value in left):
+        return TRUE
+    return joined("OR", left) if len(left) > 1 else left[0] if left else FALSE
+
+
+def both(first: Value, second: Value) -> Value:
+    """Two contacts in series."""
+    if first.is_false or second.is_false:
+        return FALSE
+    return second if first.is_true else first if second.is_true else joined("AND", [first, second])
+
+
+def negation(value: Value) -> Value:
+    """The other state."""
+    if value.is_true or value.is_false:
+        return FALSE if value.is_true else TRUE
+    if value.level == UNARY and value.text.startswith("NOT "):
+        return Value(value.text[4:], ATOM if _ATOM.fullmatch(value.text[4:]) else LOOSE, value.reads)
+    return Value(f"NOT {value.at(UNARY)}", UNARY, value.reads)

@@ -1,0 +1,58 @@
+"""Whole documents in the manner of the editors: what comes of them can be checked and run as any other source."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from click.testing import CliRunner
+
+from fbvm.cli.main import main
+from fbvm.code.compiler import compile_files
+from fbvm.plc import Plc
+from fbvm.plcopen.importing import import_xml
+
+DOCUMENTS = Path(__file__).parent / "documents"
+
+
+def test_a_project_of_beremiz_is_checked_without_a_word_and_runs(tmp_path: Path) -> None:
+    done = CliRunner().invoke(main, ["import", str(DOCUMENTS / "beremiz.xml"), "-o", str(tmp_path / "made")])
+    assert done.exit_code == 0, done.output
+    files = sorted((tmp_path / "made").glob("*.st"))
+    assert {file.stem for file in files} == {"Config0", "Counting", "Mean", "Pump", "types"}
+    compiled = compile_files(files, runnable=True)
+    assert compiled.image is not None
+    assert not compiled.diagnostics
+    plc = Plc(compiled.image)
+    plc.write("%IX0.0", True)
+    plc.scan()
+    assert plc.read("%QX0.0") is True
+    assert plc.read("Instance0.n") == 17
+    plc.run(scans=3)
+    assert plc.read("Instance0.Lamp") is True
+    assert plc.read("Instance0.n") == 18
+
+
+def test_importing_again_gives_the_same_to_the_letter() -> None:
+    data = (DOCUMENTS / "beremiz.xml").read_bytes()
+    first, second = import_xml(data), import_xml(data)
+    assert first.files == second.files
+    assert [d.render() for d in first.diagnostics] == [d.render() for d in second.diagnostics]
+
+
+def test_files_that_are_there_stay_without_force(tmp_path: Path) -> None:
+    (tmp_path / "Pump.st").write_text("mine", encoding="utf-8")
+    command = ["import", str(DOCUMENTS / "beremiz.xml"), "-o", str(tmp_path)]
+    refused = CliRunner().invoke(main, command)
+    assert refused.exit_code == 2
+    assert "--force" in refused.output
+    assert (tmp_path / "Pump.st").read_text(encoding="utf-8") == "mine"
+    assert CliRunner().invoke(main, [*command, "--force"]).exit_code == 0
+    assert "PROGRAM Pump" in (tmp_path / "Pump.st").read_text(encoding="utf-8")
+
+
+def test_a_program_that_lacks_something_has_status_3(tmp_path: Path) -> None:
+    file = tmp_path / "bad.xml"
+    file.write_text("<project/>", encoding="utf-8")
+    done = CliRunner().invoke(main, ["import", str(file), "-o", str(tmp_path / "made"), "--json"])
+    assert done.exit_code == 3
+    assert '"code": "X0104"' in done.output

@@ -1,0 +1,117 @@
+"""XML that is no project, or means harm: each has a message with its place, and nothing else happens."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from fbvm.base.diagnostics import Diagnostic
+from fbvm.plcopen.importing import import_xml
+from fbvm.plcopen.markup import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, parse_markup
+
+BOMB = b'<?xml version="1.0"?>\n<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>\n<project>&b;</project>'
+FETCHED = b'<!DOCTYPE project [<!ENTITY x SYSTEM "file:///etc/hostname">]>\n<project>&x;</project>'
+DTD = b'<!DOCTYPE project SYSTEM "http://127.0.0.1:9/project.dtd">\n<project/>'
+
+
+def only(data: bytes) -> Diagnostic:
+    found = import_xml(data, "bad.xml")
+    assert not found.files
+    [diagnostic] = found.diagnostics
+    assert diagnostic.hint
+    return diagnostic
+
+
+@pytest.mark.parametrize("data", [BOMB, FETCHED, DTD], ids=["bomb", "external entity", "external DTD"])
+def test_a_document_type_is_refused_before_anything_is_expanded_or_fetched(data: bytes) -> None:
+    found = only(data)
+    assert found.code == "X0102"
+    assert "<!DOCTYPE" in found.source.line(found.line)
+
+
+@pytest.mark.parametrize(("data", "code", "says"), [
+    (b"", "X0101", "no element found"),
+    (b"PROGRAM Main END_PROGRAM", "X0101", "syntax error"),
+    (b"<project><types>", "X0101", "no element found"),
+    (b"<project></types>", "X0101", "mismatched tag"),
+    (b"<project>&nbsp;</project>", "X0101", "undefined entity"),
+    (b"<a:project/>", "X0101", "unbound prefix"),
+    (b"<project>\x00</project>", "X0101", "invalid token"),
+    (b"<project a='1' a='2'/>", "X0101", "duplicate attribute"),
+    (b"<html/>", "X0104", "<html> of no namespace"),
+    (b'<project xmlns="http://maven.apache.org/POM/4.0.0"/>', "X0104", "maven"),
+    (b'<Project xmlns="www.iec.ch/public/TC65SC65BWG7TF10"/>', "X0104", "IEC 61131-10"),
+])
+def test_what_is_no_project_says_what_it_is(data: bytes, code: str, says: str) -> None:
+    found = only(data)
+    assert found.code == code
+    assert says in found.message
+
+
+def test_a_truncated_file_names_the_element_that_is_open() -> None:
+    found = only(b'<project xmlns="http://www.plcopen.org/xml/tc6_0201">\n<types>\n<pous>\n')
+    assert found.line == 4
+    assert "<pous> of line 3 is open" in found.hint
+
+
+def test_deep_nesting_ends_at_the_limit() -> None:
+    found = only(b"<a>" * 1_000_000)
+    assert found.code == "X0103"
+    assert str(MAX_DEPTH) in found.message
+
+
+def test_too_many_elements_end_at_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fbvm.plcopen.markup.MAX_ELEMENTS", 1_000)
+    assert MAX_ELEMENTS >= 1_000
+    assert only(b"<a>" + b"<b/>" * 1_001 + b"</a>").code == "X0103"
+
+
+def test_a_huge_file_is_not_even_read(tmp_path: Path) -> None:
+    path = tmp_path / "huge.xml"
+    with path.open("wb") as file:
+        file.truncate(MAX_BYTES + 1)
+    [found] = import_xml(path).diagnostics
+    assert found.code == "X0103"
+
+
+def test_a_folder_and_a_missing_file_are_messages(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "none.xml"):
+        assert [d.code for d in import_xml(path).diagnostics] == ["X0101"]
+
+
+@pytest.mark.parametrize(("data", "says"), [
+    (b"<a>\xff\xfe</a>", "names no encoding, and so is UTF-8, and is none at byte 3"),
+    (b'<?xml version="1.0" encoding="utf-16"?><a/>', "says that it is UTF-16"),
+    (b'<?xml version="1.0" encoding="utf-7"?><a/>', "written in utf-7, which is not read"),
+    (b'<?xml version="1.0" encoding="idna"?><a/>', "written in idna"),
+    (b'<?xml version="1.0" encoding="nonsense"?><a/>', "written in nonsense"),
+])
+def test_a_wrong_encoding_is_named(data: bytes, says: str) -> None:
+    found = only(data)
+    assert found.code == "X0101"
+    assert says in found.message
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1", "cp1252"])
+def test_encodings_that_tools_write_are_read(encoding: str) -> None:
+    name = {"latin-1": "iso-8859-1", "cp1252": "windows-1252"}.get(encoding)
+    declared = f'<?xml version="1.0" encoding="{name}"?>' if name else ""
+    found = parse_markup(f"{declared}<a>grün</a>".encode(encoding), "a.xml")
+    assert not isinstance(found, Diagnostic)
+    assert found[1].text == "grün"
+
+
+def test_places_are_exact_behind_letters_and_line_ends_of_all_kinds() -> None:
+    found = parse_markup("<a>äöü€😀\r\nß\r<b/><c/>\n</a>".encode(), "a.xml")
+    assert not isinstance(found, Diagnostic)
+    source, root = found
+    assert [source.text[child.at:child.at + 4] for child in root.children] == ["<b/>", "<c/>"]
+
+
+def test_depth_within_the_limit_needs_no_deep_stack() -> None:
+    found = parse_markup(b"<a>" * MAX_DEPTH + b"x" + b"</a>" * MAX_DEPTH, "a.xml")
+    assert not isinstance(found, Diagnostic)
+    assert found[1].text == "x"
+    assert sys.getrecursionlimit() >= 200

@@ -1,0 +1,295 @@
+"""Where importers of PLCopen XML go wrong: what a diagram means is seen by running what comes of it."""
+
+from __future__ import annotations
+
+import pytest
+from drawings import (
+    RAIL,
+    block,
+    codes,
+    coil,
+    contact,
+    document,
+    imported,
+    pou,
+    result,
+    states,
+    value,
+    variable,
+    wires,
+)
+
+from fbvm.plcopen.importing import import_xml
+
+BRANCH = RAIL + contact(2, "1", "a") + contact(3, "1", "b")
+
+
+def test_two_wires_at_a_coil_are_ored() -> None:
+    made = imported(pou(BRANCH + coil(4, "2 3", "x"), "a b x"))
+    assert states(made, "x", ["", "a=1", "a=0 b=1"]) == ["0", "1", "1"]
+    assert "LADDER" in made.files["Main.st"]
+
+
+@pytest.mark.parametrize("strange", [
+    '<vendorElement localId="9">{}<alternativeText><xhtml:p>box</xhtml:p></alternativeText></vendorElement>',
+    '<teleporter localId="9">{}</teleporter>', '<error localId="9">{}<content><xhtml:p>lost</xhtml:p></content></error>',
+])
+def test_a_diagram_that_is_not_understood_does_not_become_an_empty_program(strange: str) -> None:
+    good = contact(5, "1", "a") + coil(6, "5", "y")
+    made = imported(pou(RAIL + strange.format(wires("1")) + coil(4, "9", "x") + good, "a x y"))
+    assert [d.code for d in made.errors] == ["X0202"]
+    assert " 9: " in made.errors[0].message
+    assert "was not taken over" in made.files["Main.st"]
+    assert states(made, "x y", ["a=1"]) == ["0 1"]
+
+
+def test_a_shared_contact_in_front_of_set_and_reset_is_evaluated_once() -> None:
+    made = imported(pou(RAIL + contact(2, "1", "a", 'negated="true"', "50,0") + coil(4, "2", "a", 'storage="set"', "90,0")
+                        + coil(5, "2", "y", 'storage="set"', "90,50"), "a y"))
+    assert states(made, "a y", ["", ""]) == ["1 1", "1 1"]
+
+
+def test_a_shared_contact_is_kept_when_statements_write_what_it_read() -> None:
+    adds = (contact(2, "1", "a", 'negated="true"', "50,0") + value(6, "n", at="60,20")
+            + block(3, "ADD", "EN=2 IN1=6 IN2=6", "ENO,OUT", at="90,0"))
+    made = imported(pou(RAIL + adds + coil(4, "3.ENO", "a", 'storage="set"', "150,0")
+                        + result(7, "3.OUT", "n", at="150,20") + coil(5, "2", "y", 'storage="set"', "90,90"),
+                        variable("a") + variable("y") + variable("n", "INT", "2")))
+    assert states(made, "a y n", ["", ""]) == ["1 1 4", "1 1 4"]
+
+
+def test_of_two_coils_of_one_variable_the_last_network_wins() -> None:
+    made = imported(pou(RAIL + contact(2, "1", "a") + coil(3, "2", "x") + contact(4, "1", "b") + coil(5, "4", "x"), "a b x"))
+    assert states(made, "x", ["a=1", "a=0 b=1"]) == ["0", "1"]
+
+
+def test_a_sink_that_is_drawn_above_its_block_comes_behind_it() -> None:
+    made = imported(pou(result(1, "2.OUT", "n", at="200,0") + block(2, "ADD", "IN1=3 IN2=4", "OUT", at="100,50")
+                        + value(3, "m", at="0,50") + value(4, "1", at="0,70"),
+                        variable("n", "INT") + variable("m", "INT"), language="FBD"))
+    assert states(made, "n", ["m=4"]) == ["5"]
+
+
+def test_without_positions_things_happen_as_they_are_written() -> None:
+    made = imported(pou(RAIL + contact(2, "1", "a") + coil(3, "2", "x") + contact(4, "1", "x") + coil(5, "4", "y"), "a x y"))
+    assert states(made, "x y", ["a=1"]) == ["1 1"]
+    made = imported(pou(RAIL + contact(4, "1", "x") + coil(5, "4", "y") + contact(2, "1", "a") + coil(3, "2", "x"), "a x y"))
+    assert states(made, "x y", ["a=1", ""]) == ["1 0", "1 1"]
+
+
+def test_with_positions_the_place_decides_and_not_the_writing() -> None:
+    made = imported(pou(RAIL + contact(4, "1", "x", at="50,100") + coil(5, "4", "y", at="90,100")
+                        + contact(2, "1", "a", at="50,10") + coil(3, "2", "x", at="90,10"), "a x y"))
+    assert states(made, "x y", ["a=1"]) == ["1 1"]
+
+
+def test_execution_order_goes_before_places() -> None:
+    made = imported(pou(value(1, "x", at="0,0") + result(2, "1", "y", 'executionOrderId="2"', "50,0")
+                        + value(3, "a", at="0,50") + result(4, "3", "x", 'executionOrderId="1"', "50,50"),
+                        "a x y", language="FBD"))
+    assert states(made, "x y", ["a=1"]) == ["1 1"]
+
+
+def test_the_second_output_and_the_second_input_are_what_they_say() -> None:
+    made = imported(pou(value(1, "n") + value(2, "3") + block(3, "SUB", "IN2=1 IN1=2", "OUT") + result(4, "3.OUT", "m")
+                        + value(5, "a") + value(6, "T#0s") + block(7, "TON", "IN=5 PT=6", "Q,ET", "t") + result(8, "7.ET", "e"),
+                        "".join((variable("n", "INT", "1"), variable("m", "INT"), variable("a"), variable("t", "TON"),
+                                 variable("e", "TIME", "T#5s"))), language="FBD"))
+    text = made.files["Main.st"]
+    assert "e := t.ET;" in text
+    assert "m := n - 3;" in text
+
+
+@pytest.mark.parametrize("reference", ["undefined", "99", ""])
+def test_a_wire_to_nothing_is_an_error_with_its_place(reference: str) -> None:
+    loose = contact(2, "1", "a").replace('refLocalId="1"', f'refLocalId="{reference}"')
+    made = imported(pou(RAIL + loose + coil(3, "2", "x"), "a x"))
+    [found] = made.errors
+    assert found.code == "X0201"
+    assert "POU Main" in found.message
+    assert "was not taken over" in made.files["Main.st"]
+
+
+@pytest.mark.parametrize("pin", ["", ' formalParameter=""', ' formalParameter="none"'])
+def test_a_pin_without_a_name_is_the_first_output_that_is_not_eno(pin: str) -> None:
+    wire = f'<connection refLocalId="3"{pin}/>'
+    made = imported(pou(value(1, "n") + value(2, "3") + block(3, "ADD", "IN1=1 IN2=2", "ENO,OUT")
+                        + result(4, "3", "n").replace('<connection refLocalId="3"/>', wire),
+                        variable("n", "INT"), language="FBD"))
+    assert states(made, "n", ["", ""]) == ["3", "6"]
+
+
+def test_an_output_that_there_is_not_is_an_error() -> None:
+    made = imported(pou(value(1, "n") + block(3, "ADD", "IN1=1 IN2=1", "OUT") + result(4, "3.SUM", "n"), variable("n", "INT"),
+                        language="FBD"))
+    assert [d.code for d in made.errors] == ["X0201"]
+    assert "its outputs are OUT" in made.errors[0].hint
+
+
+@pytest.mark.parametrize("holder", ['<xhtml:p><![CDATA[{}]]></xhtml:p>', '<xhtml xmlns="http://www.w3.org/1999/xhtml">{}</xhtml>',
+                                    "<![CDATA[{}]]>", "<xhtml:p>{}</xhtml:p>"])
+def test_structured_text_is_found_in_all_its_wrappings_with_its_blanks(holder: str) -> None:
+    body = "\n  (* one\n     two *)\n  x := a;\n"
+    made = imported(pou(holder.format(body), "a x", language="ST"))
+    assert "(* one\n       two *)" in made.files["Main.st"]
+    assert states(made, "x", ["a=1"]) == ["1"]
+
+
+def test_initial_values_of_arrays_and_structures() -> None:
+    types = ('<dataType name="Pair"><baseType><struct><variable name="l"><type><INT/></type></variable>'
+             '<variable name="r"><type><array><dimension lower="0" upper="2"/><baseType><INT/></baseType></array></type>'
+             "</variable></struct></baseType></dataType>")
+    initial = ('<variable name="p"><type><derived name="Pair"/></type><initialValue><structValue>'
+               '<value member="l"><simpleValue value="4"/></value><value member="r"><arrayValue>'
+               '<value repetitionValue="2"><simpleValue value="5"/></value><value><simpleValue value="6"/></value>'
+               "</arrayValue></value></structValue></initialValue></variable>")
+    main = pou("<xhtml:p>n := p.l + p.r[1] + p.r[2];</xhtml:p>", initial + variable("n", "INT"), language="ST")
+    made = import_xml(document(main, types=types))
+    assert states(made, "n", [""]) == ["15"]
+
+
+def test_a_language_that_is_not_read_is_named() -> None:
+    made = imported(pou("x", "x", language="CFC"))
+    assert codes(made) == ["X0203"]
+    assert "CFC" in made.errors[0].message
+
+
+def test_jump_label_and_return() -> None:
+    jump = f'<jump localId="3" label="over">{wires("2")}</jump>'
+    back = f'<return localId="9">{wires("8")}</return>'
+    made = imported(pou(RAIL + contact(2, "1", "a") + jump + contact(4, "1", "b") + coil(5, "4", "x")
+                        + '<label localId="6" label="over"/>' + contact(8, "1", "b") + back + contact(10, "1", "a")
+                        + coil(11, "10", "y"), "a b x y"))
+    assert states(made, "x y", ["b=1", "a=1 b=0", "b=1"]) == ["1 0", "1 1", "1 1"]
+
+
+def test_a_negated_coil_with_storage_keeps_both() -> None:
+    made = imported(pou(RAIL + contact(2, "1", "a") + coil(3, "2", "x", 'negated="true" storage="set"'), "a x"))
+    assert states(made, "x", ["a=1", "a=0", "a=1"]) == ["0", "1", "1"]
+
+
+def test_negated_with_an_edge_is_the_edge_of_the_inverse_assumed() -> None:
+    made = imported(pou(RAIL + contact(2, "1", "a", 'negated="true" edge="rising"') + coil(3, "2", "x"), "a x"))
+    assert "X0292" in codes(made)
+    assert states(made, "x", ["a=1", "a=0", ""]) == ["0", "1", "0"]
+
+
+def test_edges_of_contacts_and_coils() -> None:
+    made = imported(pou(RAIL + contact(2, "1", "a", 'edge="rising"') + coil(3, "2", "x") + contact(4, "1", "a")
+                        + coil(5, "4", "y", 'edge="falling"'), "a x y"))
+    assert states(made, "x y", ["", "a=1", "", "a=0", ""]) == ["0 0", "1 0", "0 0", "0 1", "0 0"]
+    assert "@LD" in made.files["Main.st"]
+
+
+def test_a_loop_through_a_block_takes_what_was_there_a_pass_before() -> None:
+    made = imported(pou(value(1, "a") + block(2, "XOR", "IN1=1 IN2=2.OUT", "OUT") + result(3, "2.OUT", "x"),
+                        "a x", language="FBD"))
+    assert codes(made) == ["X0290"]
+    assert states(made, "x", ["a=1", "", ""]) == ["1", "0", "1"]
+
+
+def test_a_loop_through_a_variable_is_cut_there() -> None:
+    variable_in_it = (f'<inOutVariable localId="3"><position x="0" y="0"/>{wires("2.OUT")}<connectionPointOut/>'
+                      "<expression>n</expression></inOutVariable>")
+    made = imported(pou(value(1, "1") + variable_in_it + block(2, "ADD", "IN1=1 IN2=3", "OUT") + result(4, "3", "m"),
+                        variable("n", "INT", "5") + variable("m", "INT"), language="FBD"))
+    assert codes(made) == ["X0290"]
+    assert states(made, "n m", ["", ""]) == ["6 6", "7 7"]
+
+
+def test_power_goes_on_behind_a_coil() -> None:
+    made = imported(pou(RAIL + contact(2, "1", "a") + coil(3, "2", "x", 'negated="true"') + contact(4, "3", "b")
+                        + coil(5, "4", "y") + '<rightPowerRail localId="6"/>', "a b x y"))
+    assert states(made, "x y", ["a=1 b=1", "b=0"]) == ["0 1", "0 0"]
+
+
+def test_without_a_right_rail_nothing_is_missing_and_a_dead_end_is_named() -> None:
+    made = imported(pou(RAIL + contact(2, "1", "a") + coil(3, "2", "x") + contact(4, "1", "b"), "a b x"))
+    assert codes(made) == ["X0291"]
+    assert states(made, "x", ["a=1"]) == ["1"]
+
+
+@pytest.mark.parametrize("pin", ["OUT", ""])
+def test_a_function_with_en_holds_its_result_while_en_is_off(pin: str) -> None:
+    made = imported(pou(RAIL + contact(2, "1", "a") + value(6, "n") + value(7, "1")
+                        + block(3, "ADD", "EN=2 IN1=6 IN2=7", f"ENO,{pin}" if pin else "ENO,") + result(4, f"3.{pin}", "n"),
+                        variable("a") + variable("n", "INT")))
+    assert states(made, "n", ["a=1", "", "a=0", "n=9"]) == ["1", "2", "2", "9"]
+
+
+def test_a_block_with_en_and_eno() -> None:
+    made = imported(pou(RAIL + contact(2, "1", "a") + value(5, "TRUE") + value(6, "T#0s")
+                        + block(3, "TON", "EN=2 IN=5 PT=6", "ENO,Q", "t") + coil(4, "3.ENO", "x") + coil(7, "3.Q", "y"),
+                        variable("a") + variable("x") + variable("y") + variable("t", "TON")))
+    assert states(made, "x y", ["", "a=1", "a=0"]) == ["0 0", "1 1", "0 1"]
+
+
+def test_one_local_id_in_two_bodies_is_right_and_twice_in_one_is_not() -> None:
+    body = RAIL + contact(2, "1", "a") + coil(3, "2", "x")
+    assert codes(imported(pou(body, "a x"), pou(body, "a x", name="Other"))) == []
+    made = imported(pou(body + contact(2, "1", "a") + coil(4, "2", "a"), "a x"))
+    assert {d.code for d in made.errors} == {"X0105"}
+
+
+def test_several_lists_of_inputs_keep_their_order() -> None:
+    lists = (f'<inputVars>{variable("p", "INT")}</inputVars><localVars>{variable("l")}</localVars>'
+             f'<inputVars>{variable("q", "INT")}</inputVars>')
+    made = imported(pou("<xhtml:p>F := p &gt; q;</xhtml:p>", lists, "function", "F", "ST"),
+                    pou("<xhtml:p>x := F(2, 1); y := F(1, 2);</xhtml:p>", "x y", language="ST"))
+    assert states(made, "x y", [""]) == ["1 0"]
+
+
+@pytest.mark.parametrize("namespace", ["http://www.plcopen.org/xml/tc6_0201", "http://www.plcopen.org/xml/tc6_0200",
+                                       "http://www.plcopen.org/xml/tc6.xsd"])
+def test_namespaces_of_all_versions_and_a_prefix_for_the_same(namespace: str) -> None:
+    text = document(pou(RAIL + contact(2, "1", "a") + coil(3, "2", "x"), "a x"), namespace=namespace).decode()
+    twice = text.replace("<project ", f'<project xmlns:ns1="{namespace}" ')
+    prefixed = text.replace(f'xmlns="{namespace}"', f'xmlns:p="{namespace}"').replace("<project", "<p:project").replace(
+        "</project", "</p:project")
+    for variant in (text, twice, prefixed.replace("<types>", f'<types xmlns="{namespace}">')):
+        made = import_xml(variant.encode())
+        assert codes(made) == []
+        assert states(made, "x", ["a=1"]) == ["1"]
+
+
+def test_data_of_the_tools_own_is_listed_once_a_kind_with_its_count() -> None:
+    data = '<addData><data name="http://example.com/colour" handleUnknown="preserve"><red/></data></addData>'
+    text = document(pou("<xhtml:p>x := TRUE;</xhtml:p>", "x", language="ST")).decode().replace(
+        "</pou>", f"{data}</pou>").replace("</pous>", f"</pous>{data}")
+    [found] = import_xml(text.encode()).diagnostics
+    assert found.code == "X0190"
+    assert "http://example.com/colour" in found.message
+    assert "2 times" in found.message
+
+
+def test_wires_of_numbers_cannot_be_joined() -> None:
+    made = imported(pou(value(1, "n") + value(2, "m") + block(3, "ADD", "IN1=1+2 IN2=1", "OUT") + result(4, "3.OUT", "n"),
+                        variable("n", "INT") + variable("m", "INT"), language="FBD"))
+    assert [d.code for d in made.errors] == ["X0202"]
+    assert "only BOOL" in made.errors[0].hint
+
+
+def test_an_in_out_needs_one_variable() -> None:
+    inner = pou("<xhtml:p>v := v + 1;</xhtml:p>", f'<inOutVars>{variable("v", "INT")}</inOutVars>', "functionBlock", "Up", "ST")
+    lists = variable("u", "Up") + variable("n", "INT")
+    good = imported(inner, pou(value(1, "n") + block(2, "Up", "", "", "u", in_outs="v=1"), lists, language="FBD"))
+    assert states(good, "n", ["", ""]) == ["1", "2"]
+    loose = imported(inner, pou(block(2, "Up", "", "", "u", in_outs="v="), lists, language="FBD"))
+    assert [d.code for d in loose.errors] == ["X0202"]
+
+
+def test_connectors_are_wires() -> None:
+    lines = f'<connector localId="4" name="far">{wires("2")}</connector><continuation localId="5" name="FAR"/>'
+    made = imported(pou(RAIL + contact(2, "1", "a") + lines + contact(6, "5", "b") + coil(7, "6", "x"), "a b x"))
+    assert states(made, "x", ["a=1", "b=1"]) == ["0", "1"]
+    lost = imported(pou(RAIL + '<continuation localId="5" name="far"/>' + coil(7, "5", "x"), "x"))
+    assert [d.code for d in lost.errors] == ["X0201"]
+
+
+def test_an_operand_that_is_typed_at_a_pin_counts() -> None:
+    typed = block(3, "ADD", "IN1=1 IN2=1", "OUT").replace(
+        '<variable formalParameter="IN2"><connectionPointIn><connection refLocalId="1"/></connectionPointIn>',
+        '<variable formalParameter="IN2"><connectionPointIn><expression>40</expression></connectionPointIn>')
+    made = imported(pou(value(1, "n") + typed + result(4, "3.OUT", "m"), variable("n", "INT", "2") + variable("m", "INT"),
+                        language="FBD"))
+    assert states(made, "m", [""]) == ["42"]
