@@ -27,7 +27,7 @@ def test_a_project_of_beremiz_is_checked_without_a_word_and_runs(tmp_path: Path)
     plc.scan()
     assert plc.read("%QX0.0") is True
     assert plc.read("Instance0.n") == 17
-    plc.run(scans=3)
+    plc.run(scans=4)
     assert plc.read("Instance0.Lamp") is True
     assert plc.read("Instance0.n") == 18
 
