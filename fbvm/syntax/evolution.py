@@ -47,14 +47,13 @@ class Evolution:
     def sfc(self, start: int, end: int, sound: bool) -> Sfc:
         """The chart with its statements; one that is not `sound` has none."""
         used = self._used()
-        coded = {name: self.actions[name] for name in self.actions if name in used}
         self.start, self.end = start, end
         self.at = start
         body: tree.Block = () if not sound else (
             self._begun_or_evolved(), *map(self._commit, self.steps), *self._controls(used), *self._variables(used),
-            *(statement for action in coded.values() for statement in self._run(action)))
+            *(statement for name, action in self.actions.items() if name in used for statement in self._run(action)))
         sections = (self._section("VAR", [self._flags(step.name, STEP_FLAGS) for step in self.steps], "step"),
-                    self._section("VAR", [self._flags(action.name, ACTION_FLAGS) for action in coded.values()], "action"),
+                    self._section("VAR", [self._flags(action.name, ACTION_FLAGS) for action in self.actions.values()], "action"),
                     self._section("VAR", self.kept), self._section("VAR_TEMP", list(self.temporaries.values())))
         return Sfc(start, end, tuple(self.steps), tuple(self.transitions), body, sections)
 
