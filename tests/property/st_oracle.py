@@ -1,31 +1,32 @@
 """What a program that `st_making` makes has to do: a tree walker, written from the rules of the language and not from an
 engine.
 
-It covers expressions of all elementary types but dates and wide strings, assignments, IF, CASE, FOR, WHILE, REPEAT, EXIT,
-CONTINUE, RETURN, functions, function block instances with VAR_IN_OUT, structures, arrays, references, strings.  It does not
-know located variables, timers, dates, WSTRING, text to value, REAL to text, partial access, tasks and the step budget."""
+It covers all that is made but the step budget."""
 
 from __future__ import annotations
 
-import math
-import struct
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
-from st_making import BITS, REALS, SIGNED, Node, Pou, Program, limits
+from st_kinds import BITS, CHARACTERS, GENERIC, REALS, STANDARD, TEXTS, Node, Pou, Program, Task, Variable, limits
+from st_oracle_blocks import BLOCKS, Rungs
+from st_oracle_places import Part, Place, Pointer, Shared, SharedRow, Temporaries, Union
+from st_oracle_values import (
+    COMPARED,
+    Trapped,
+    binary,
+    converted,
+    moved,
+    of_bcd,
+    rounded,
+    standard,
+    to_bcd,
+    to_integer,
+    wrapped,
+)
 from st_text import Lines
 
-Place = tuple[Any, Any]
-"""A dict or list and the key in it."""
-
-
-class Trapped(Exception):
-    """The program stops with a code at a line."""
-
-    def __init__(self, code: str, line: int = 0) -> None:
-        super().__init__(code, line)
-        self.code, self.line = code, line
+AREA_BYTES = 400
 
 
 class _Exit(Exception):
@@ -40,232 +41,58 @@ class _Return(Exception):
     pass
 
 
-# --- values -----------------------------------------------------------------------------------------------------------
-
-
-def single(number: float) -> float:
-    """The nearest REAL."""
-    try:
-        answer: float = struct.unpack("<f", struct.pack("<f", number))[0]
-    except OverflowError:
-        return math.copysign(math.inf, number)
-    return answer
-
-
-def rounded(kind: str, number: float) -> float:
-    return single(number) if kind == "REAL" else number
-
-
-def wrapped(kind: str, number: int) -> int:
-    """The low bits, read in the type."""
-    number &= (1 << BITS[kind]) - 1
-    return number - (1 << BITS[kind]) if (kind in SIGNED or kind == "TIME") and number >> BITS[kind] - 1 else number
-
-
-def of_integer(kind: str, number: int) -> float:
-    """The nearest REAL or LREAL, ties to even, without rounding twice."""
-    spare = max(0, abs(number).bit_length() - (24 if kind == "REAL" else 53))
-    whole, rest = divmod(abs(number), 1 << spare)
-    half = (1 << spare) / 2
-    whole += spare > 0 and (rest > half or (rest == half and whole % 2 == 1))
-    return math.copysign(float(whole << spare), number)
-
-
-def truncated(a: int, b: int) -> int:
-    """The quotient toward zero."""
-    return abs(a) // abs(b) * (1 if (a < 0) == (b < 0) else -1)
-
-
-def divided(a: float, b: float) -> float:
-    if b != 0:
-        return a / b
-    return math.nan if a == 0 or a != a else math.copysign(math.inf, a) * math.copysign(1, b)
-
-
-def power(a: float, b: float) -> float:
-    if b == 0:
-        return 1.0
-    if a == 0 and b < 0:
-        return math.inf
-    try:
-        return math.pow(a, b)
-    except ValueError:
-        return math.nan
-    except OverflowError:
-        return -math.inf if a < 0 and b % 2 == 1 else math.inf
-
-
-def mathematical(name: str, a: float) -> float:
-    """A function of an LREAL; NaN outside its domain."""
-    try:
-        if name in ("LN", "LOG") and a == 0:
-            return -math.inf
-        return {"SQRT": math.sqrt, "LN": math.log, "LOG": math.log10, "EXP": math.exp, "SIN": math.sin, "COS": math.cos,
-                "TAN": math.tan, "ASIN": math.asin, "ACOS": math.acos, "ATAN": math.atan}[name](a)
-    except ValueError:
-        return math.nan
-    except OverflowError:
-        return math.inf
-
-
-def lesser(a: Any, b: Any) -> Any:
-    if a != a or b != b:
-        return math.nan
-    return b if b < a else a
-
-
-def greater(a: Any, b: Any) -> Any:
-    if a != a or b != b:
-        return math.nan
-    return b if b > a else a
-
-
-def to_integer(kind: str, number: float, nearest: bool) -> int:
-    if number != number or math.isinf(number):
-        raise Trapped("R0105")
-    whole = round(number) if nearest else math.trunc(number)
-    low, high = limits(kind)
-    if not low <= whole <= high:
-        raise Trapped("R0105")
-    return whole
-
-
-def converted(source: str, kind: str, value: Any) -> Any:
-    if kind == "BOOL":
-        return value != 0
-    if kind == "STRING":
-        return ("TRUE" if value else "FALSE") if source == "BOOL" else str(value)
-    if source in REALS:
-        return rounded(kind, value) if kind in REALS else to_integer(kind, value, True)
-    return of_integer(kind, int(value)) if kind in REALS else wrapped(kind, int(value))
-
-
-COMPARED: dict[str, Callable[[Any, Any], bool]] = {
-    "=": lambda a, b: a == b, "<>": lambda a, b: a != b, "<": lambda a, b: a < b, "<=": lambda a, b: a <= b,
-    ">": lambda a, b: a > b, ">=": lambda a, b: a >= b,
-}  # fmt: skip
-
-
-def binary(kind: str, sign: str, a: Any, b: Any) -> Any:
-    if kind in REALS:
-        if sign == "**":
-            return rounded(kind, power(a, b))
-        if sign == "/":
-            return rounded(kind, divided(a, b))
-        return rounded(kind, a + b if sign == "+" else a - b if sign == "-" else a * b)
-    if sign in ("AND", "&", "AND_THEN"):
-        return a & b
-    if sign in ("OR", "OR_ELSE"):
-        return a | b
-    if sign == "XOR":
-        return a ^ b
-    if sign in "+-*":
-        return wrapped(kind, a + b if sign == "+" else a - b if sign == "-" else a * b)
-    if b == 0:
-        raise Trapped("R0101")
-    return wrapped(kind, truncated(a, b) if sign == "/" else a - b * truncated(a, b))
-
-
-# --- functions --------------------------------------------------------------------------------------------------------
-
-
-def shifted(name: str, kind: str, a: int, count: int) -> int:
-    width = BITS[kind]
-    if count < 0:
-        raise Trapped("R0106")
-    if name in ("SHL", "SHR"):
-        return wrapped(kind, a << count if name == "SHL" else a >> count) if count < width else 0
-    count = count % width if name == "ROL" else -count % width
-    return wrapped(kind, a << count | a >> width - count)
-
-
-def position(number: int, least: int) -> int:
-    if number < least:
-        raise Trapped("R0108")
-    return number
-
-
-def of_text(name: str, values: list[Any]) -> Any:
-    """A function of strings."""
-    text = values[0]
-    if name == "CONCAT":
-        return "".join(values)
-    if name == "FIND":
-        return text.find(values[1]) + 1 if values[1] else 0
-    if name == "LEFT":
-        return text[:position(values[1], 0)]
-    if name == "RIGHT":
-        return text[max(0, len(text) - position(values[1], 0)):]
-    if name == "INSERT":
-        at = position(values[2], 0)
-        return text[:at] + values[1] + text[at:]
-    length, at = position(values[-2], 0), position(values[-1], 1) - 1
-    if name == "MID":
-        return text[at:at + length]
-    if name == "DELETE":
-        return text[:at] + text[at + length:]
-    return text[:at] + values[1] + text[at + length:]
-
-
-def standard(name: str, kind: str, values: list[Any]) -> Any:
-    """A standard function."""
-    if name == "SEL":
-        return values[2] if values[0] else values[1]
-    if name == "MUX":
-        if not 0 <= values[0] < len(values) - 1:
-            raise Trapped("R0107")
-        return values[1 + values[0]]
-    if name in ("MIN", "MAX"):
-        answer = values[0]
-        for other in values[1:]:
-            answer = (lesser if name == "MIN" else greater)(answer, other)
-        return answer
-    if name == "LIMIT":
-        return lesser(greater(values[1], values[0]), values[2])
-    if name == "ABS":
-        return abs(values[0]) if kind in REALS else wrapped(kind, abs(values[0]))
-    if name == "LEN":
-        return len(values[0])
-    if name in ("SHL", "SHR", "ROL", "ROR"):
-        return shifted(name, kind, *values)
-    if kind == "STRING" or name == "FIND":
-        return of_text(name, values)
-    return rounded(kind, mathematical(name, values[0]))
-
-
-# --- programs ---------------------------------------------------------------------------------------------------------
+class _Jump(Exception):
+    def __init__(self, label: str) -> None:
+        super().__init__(label)
+        self.label = label
 
 
 def default(kind: str) -> Any:
     if kind == "BOOL":
         return False
-    if kind.startswith("STRING"):
+    if kind.startswith(TEXTS):
         return ""
-    return None if kind.startswith("REF") else 0.0 if kind in REALS else 0
+    if kind in CHARACTERS:
+        return "\0"
+    return None if kind.startswith(("REF", "PTR")) else 0.0 if kind in REALS else 0
+
+
+def of_type(item: Any, generic: str, kind: str) -> Any:
+    """A piece of a function of a generic type, for one type."""
+    if isinstance(item, tuple):
+        return tuple(of_type(part, generic, kind) for part in item)
+    return kind if item == generic else item
 
 
 class Oracle:
-    """Executes a program, scan by scan; `variables` are those of its instance."""
+    """Executes a program, scan by scan."""
 
-    def __init__(self, program: Program, lines: Lines) -> None:
+    def __init__(self, program: Program, lines: Lines, cycle_ns: int) -> None:
         self._structs = dict(program.structs)
-        self._pous = {pou.name: pou for pou in program.pous}
-        self._lines = lines
-        self._line = 0
+        self._pous = STANDARD | {pou.name: pou for pou in program.pous}
+        self._lines, self._line = lines, 0
+        self._areas: dict[str, bytearray] = {}
         self._main = program.pous[-1]
-        self.variables = self._instance(self._main)
+        self._globals = {row.name: self._first(row) for row in program.variables}
+        self._tasks = program.tasks
+        names = [task.instance for task in program.tasks] or [self._main.name]
+        self._instances = {name: self._instance(self._main) for name in names}
+        self._cycle_ns, self._now_ns = cycle_ns, -cycle_ns
+        self._levels: dict[str, bool] = {}
 
-    def _instance(self, pou: Pou) -> dict[str, Any]:
-        made = {}
-        for row in pou.variables:
-            made[row.name] = self._made(row.kind) if row.initial is None else row.initial
-            if row.kind in REALS and row.initial is not None:
-                made[row.name] = rounded(row.kind, row.initial)
-        return made
+    def _instance(self, pou: Pou, section: str = "") -> dict[str, Any]:
+        rows = [row for row in pou.variables if row.section not in ("VAR_TEMP", "VAR_IN_OUT")]
+        return {row.name: self._first(row) for row in rows}
+
+    def _first(self, row: Variable) -> Any:
+        if row.initial is None:
+            return self._made(row.kind)
+        return rounded(row.kind, row.initial) if row.kind in REALS else row.initial
 
     def _made(self, kind: str) -> Any:
         if kind in self._structs:
-            return {name: self._made(inner) for name, inner in self._structs[kind]}
+            members = self._structs[kind]
+            return Union(members) if kind[0] == "U" else {name: self._made(inner) for name, inner in members}
         if kind in self._pous:
             return self._instance(self._pous[kind])
         if kind.startswith("ARRAY"):
@@ -274,23 +101,69 @@ class Oracle:
         return default(kind)
 
     def scan(self) -> Trapped | None:
-        """Execute the program once."""
+        """Execute what is due, one cycle later."""
+        self._now_ns += self._cycle_ns
         try:
-            self._body(self._main, self.variables, {})
+            for name in self._due():
+                self._body(self._main, self._instances[name], {})
         except Trapped as trapped:
             return Trapped(trapped.code, self._line)
         return None
 
-    def _body(self, pou: Pou, frame: dict[str, Any], passed: dict[str, Place]) -> None:
+    def _due(self) -> list[str]:
+        if not self._tasks:
+            return [self._main.name]
+        return [task.instance for task in sorted(self._tasks, key=lambda task: task.priority) if self._is_due(task)]
+
+    def _is_due(self, task: Task) -> bool:
+        level = bool(task.single and self._globals[task.single])
+        rose = level and not self._levels.get(task.instance, False)
+        self._levels[task.instance] = level
+        return rose or (bool(task.interval_ms) and not level and self._now_ns % (task.interval_ms * 10**6) == 0)
+
+    def values(self) -> dict[str, Any]:
+        """Global variables, and those of each instance of the program, by name; located ones as they are now."""
+        for instance in self._instances.values():
+            for row in self._main.variables:
+                if row.at:
+                    holder, key = self._located(row)
+                    instance[row.name] = holder[key][:] if row.kind.startswith("ARRAY") else holder[key]
+        return self._globals | self._instances
+
+    def _body(self, pou: Pou, variables: dict[str, Any], passed: dict[str, Place], name: str = "") -> None:
+        """Execute a body with its variables and what its in-outs stand for."""
+        temporaries = Temporaries((row.name, self._first(row)) for row in pou.variables if row.section == "VAR_TEMP")
+        places = passed | {name: (temporaries, name) for name in temporaries}
+        places |= {row.name: self._located(row) for row in pou.variables if row.at}
+        places |= {name: (self._globals, name) for name in self._globals if name not in variables}
         with suppress(_Return):
-            self._block(pou.body, (frame, passed))
+            self._block(pou.body, (variables, places, pou))
+        temporaries.ended = True
+
+    def _located(self, row: Variable) -> Place:
+        assert row.at
+        area, first, bit = row.at
+        content = self._areas.setdefault(area, bytearray(AREA_BYTES))
+        if row.kind.startswith("ARRAY"):
+            _, low, high, inner = row.kind.split(" ", 3)
+            return {"": SharedRow(content, inner, first, int(high) - int(low) + 1)}, ""
+        return Shared(content, row.kind, first, bit), ""
 
     # --- statements
 
     def _block(self, block: tuple[Node, ...], frame: Any) -> None:
-        for statement in block:
+        at = 0
+        while at < len(block):
+            statement = block[at]
+            at += 1
             self._line = self._lines[statement[1], -1 if statement[0] == "repeat" else 0]
-            getattr(self, f"_do_{statement[0]}")(frame, statement[1], *statement[2:])
+            try:
+                getattr(self, f"_do_{statement[0]}")(frame, statement[1], *statement[2:])
+            except _Jump as jump:
+                labels = [number for number, other in enumerate(block) if other[0] == "label" and other[2] == jump.label]
+                if not labels:
+                    raise
+                at = labels[0]
 
     def _at(self, number: int, part: int = 0) -> None:
         self._line = self._lines[number, part]
@@ -300,17 +173,24 @@ class Oracle:
         self._store(place, target[1], self._value(node, frame))
 
     def _store(self, place: Place, kind: str, value: Any) -> None:
-        if kind.startswith("STRING"):
-            value = value[:int(kind[7:])]
+        if kind.startswith(TEXTS):
+            value = value[:int(kind.split()[1])]
         place[0][place[1]] = value
 
     def _do_copy(self, frame: Any, number: int, target: Node, source: Node) -> None:
         into, out_of = self._place(target, frame), self._place(source, frame)
-        into[0][into[1]][:] = out_of[0][out_of[1]]
+        into[0][into[1]][:] = list(out_of[0][out_of[1]])
 
     def _do_bind(self, frame: Any, number: int, reference: Node, target: Node) -> None:
-        place = self._place(reference, frame)
-        place[0][place[1]] = self._place(target, frame)
+        holder, key = self._place(reference, frame)
+        holder[key] = Pointer(*self._place(target, frame))
+
+    _do_point = _do_bind
+
+    def _do_move(self, frame: Any, number: int, pointer: Node, count: int) -> None:
+        holder, key = self._place(pointer, frame)
+        if holder[key] is not None:
+            holder[key] = Pointer(holder[key].holder, holder[key].key, holder[key].moved + count)
 
     def _do_run(self, frame: Any, number: int, instance: Node, inputs: Any, outputs: Any) -> None:
         place = self._place(instance, frame)
@@ -321,10 +201,32 @@ class Oracle:
                 passed[name] = self._place(node[2], frame)
             else:
                 self._store((inside, name), kinds[name], self._value(node, frame))
-        self._body(pou, inside, passed)
+        if pou.name in STANDARD:
+            BLOCKS[pou.name](inside, self._now_ns)
+        else:
+            self._body(pou, inside, passed)
         self._at(number)
         for name, target in outputs:
             self._store(self._place(target, frame), target[1], inside[name])
+
+    def _do_open(self, frame: Any, number: int, target: Node, name: str, array: Node, index: Node) -> None:
+        place = self._place(target, frame)
+        value = self._called(self._pous[name], [self._value(index, frame)], {
+            "a": self._place(array, frame), "low": ({"": int(array[1].split()[1])}, "")})
+        self._store(place, target[1], value)
+
+    def _do_act(self, frame: Any, number: int, name: str) -> None:
+        with suppress(_Return):
+            self._block(dict(frame[2].actions)[name], frame)
+
+    def _do_jump(self, frame: Any, number: int, label: str) -> None:
+        raise _Jump(label)
+
+    def _do_label(self, frame: Any, number: int, name: str) -> None:
+        """Nothing."""
+
+    def _do_ladder(self, frame: Any, number: int, steps: Any) -> None:
+        Rungs(frame[0]).run(steps)
 
     def _do_if(self, frame: Any, number: int, rows: Any, otherwise: Any) -> None:
         for part, (condition, block) in enumerate(rows):
@@ -390,57 +292,93 @@ class Oracle:
     def _place(self, node: Node, frame: Any) -> Place:
         what = node[0]
         if what == "name":
-            variables, passed = frame
-            found: Place = passed[node[2]] if node[2] in passed else (variables, node[2])
+            variables, places, _ = frame
+            found: Place = places[node[2]] if node[2] in places else (variables, node[2])
             return found
         outer = self._place(node[2], frame)
+        if what == "part":
+            bits = BITS[node[1]]
+            return Part(outer, node[2][1], bits * node[3], bits), ""
         inside = outer[0][outer[1]]
         if what == "member":
             return inside, node[3]
-        if what == "deref":
-            if inside is None:
+        if what in ("deref", "through", "beside"):
+            place = inside.place(node[3] if what == "beside" else 0) if inside is not None else None
+            if place is None:
                 raise Trapped("R0110")
-            return inside  # type: ignore[no-any-return]
+            return place  # type: ignore[no-any-return]
+        low = node[4] if node[4] is not None else frame[1]["low"][0][""]
         index = self._value(node[3], frame)
-        if not node[4] <= index <= node[5]:
+        if not low <= index < low + len(inside):
             raise Trapped("R0102")
-        return inside, index - node[4]
+        return inside, index - low
 
     def _value(self, node: Node, frame: Any) -> Any:
         what, kind = node[0], node[1]
-        if what == "literal":
-            return rounded(kind, node[2]) if kind in REALS else node[2]
-        if what == "get":
-            place = self._place(node[2], frame)
-            return place[0][place[1]]
-        if what in ("widen", "convert", "truncate"):
-            value = self._value(node[2], frame)
-            if what == "truncate":
-                return to_integer(kind, value, False)
-            return value if node[2][1] == kind else converted(node[2][1], kind, value)
-        if what == "unary":
-            value = self._value(node[3], frame)
-            if node[2] == "NOT":
-                return not value if kind == "BOOL" else ~value & (1 << BITS[kind]) - 1
-            return -value if kind in REALS else wrapped(kind, -value)
-        if what == "call":
-            return standard(node[2], kind, [self._value(operand, frame) for operand in node[3]])
-        if what == "user":
-            return self._called(self._pous[node[2]], [self._value(operand, frame) for operand in node[3]])
+        row = getattr(self, f"_of_{what}", None)
+        if row:
+            return row(frame, kind, *node[2:])
         left = self._value(node[3], frame)
         if (node[2] == "AND_THEN" and not left) or (node[2] == "OR_ELSE" and left):
             return left
         right = self._value(node[4], frame)
         return COMPARED[node[2]](left, right) if what == "compare" else binary(kind, node[2], left, right)
 
-    def _called(self, pou: Pou, values: list[Any]) -> Any:
-        frame = self._instance(pou) | {pou.name: default(pou.result)}
+    def _of_literal(self, frame: Any, kind: str, value: Any) -> Any:
+        return rounded(kind, value) if kind in REALS else value
+
+    def _of_get(self, frame: Any, kind: str, node: Node) -> Any:
+        place = self._place(node, frame)
+        return place[0][place[1]]
+
+    def _of_convert(self, frame: Any, kind: str, node: Node) -> Any:
+        value = self._value(node, frame)
+        return value if node[1] == kind else converted(node[1], kind, value)
+
+    _of_widen = _of_convert
+
+    def _of_truncate(self, frame: Any, kind: str, node: Node) -> Any:
+        return to_integer(kind, self._value(node, frame), False)
+
+    def _of_bcd(self, frame: Any, kind: str, node: Node) -> Any:
+        return of_bcd(kind, self._value(node, frame))
+
+    def _of_to_bcd(self, frame: Any, kind: str, node: Node) -> Any:
+        return to_bcd(kind, self._value(node, frame))
+
+    def _of_moved(self, frame: Any, kind: str, sign: str, left: Node, right: Node) -> Any:
+        return moved(kind, sign, self._value(left, frame), self._value(right, frame))
+
+    def _of_apart(self, frame: Any, kind: str, left: Node, right: Node) -> Any:
+        return wrapped(kind, self._value(left, frame) - self._value(right, frame))
+
+    def _of_bound(self, frame: Any, kind: str, side: str, name: str) -> Any:
+        low = frame[1]["low"][0][""]
+        holder, key = frame[1][name]
+        return low if side == "LOWER" else low + len(holder[key]) - 1
+
+    def _of_unary(self, frame: Any, kind: str, sign: str, node: Node) -> Any:
+        value = self._value(node, frame)
+        if sign == "NOT":
+            return not value if kind == "BOOL" else ~value & (1 << BITS[kind]) - 1
+        return -value if kind in REALS else wrapped(kind, -value)
+
+    def _of_call(self, frame: Any, kind: str, name: str, operands: tuple[Node, ...]) -> Any:
+        return standard(name, kind, [self._value(operand, frame) for operand in operands])
+
+    def _of_user(self, frame: Any, kind: str, name: str, operands: tuple[Node, ...]) -> Any:
+        pou, values = self._pous[name], [self._value(operand, frame) for operand in operands]
+        if pou.result in GENERIC:
+            rows = [Variable(row.section, row.name, row.written, kind) for row in pou.variables]
+            pou = Pou(pou.kind, name, kind, tuple(rows), of_type(pou.body, pou.result, kind))
+        return self._called(pou, values, {})
+
+    def _called(self, pou: Pou, values: list[Any], passed: dict[str, Place]) -> Any:
+        variables = self._instance(pou) | {pou.name: default(pou.result)}
         names = [row for row in pou.variables if row.section == "VAR_INPUT"]
         for row, value in zip(names, values, strict=True):
-            self._store((frame, row.name), row.kind, value)
+            self._store((variables, row.name), row.kind, value)
         line = self._line
-        self._body(pou, frame, {})
+        self._body(pou, variables, passed)
         self._line = line
-        return frame[pou.name]
-
-
+        return variables[pou.name]

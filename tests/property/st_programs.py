@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -15,11 +14,15 @@ from typing import Any
 if __name__ == "__main__":
     sys.path[:0] = [str(Path(__file__).parent.parent.parent)]
 
-from st_making import Maker, Node, Pou, Program
-from st_oracle import Oracle, Trapped
+from st_kinds import Program
+from st_making import Maker
+from st_oracle import Oracle
+from st_oracle_places import Pointer
+from st_oracle_values import Trapped
+from st_shrinking import smallest
 from st_text import text_of
 
-from fbvm.base.types import StructType, base
+from fbvm.base.types import RefType, StructType, base
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.engine import native
@@ -27,7 +30,7 @@ from fbvm.engine.native import NativeEngine
 from fbvm.plc import Plc
 from fbvm.watch.paths import Place
 
-SCANS = 3
+SCANS, CYCLE_NS = 4, 10_000_000
 BUDGET = 20_000
 """Statements that a scan may execute; the tree walker does not count them."""
 
@@ -78,7 +81,7 @@ def difference(program: Program) -> str:
         return f"refused {wrong.code}: {wrong.render()}"
     plcs = {name: build(compilation.image) for name, build in BUILDS.items()}
     first = plcs["python plain"]
-    oracle: Oracle | None = Oracle(program, lines)
+    oracle = Oracle(program, lines, CYCLE_NS)
     for scan in range(SCANS):
         for plc in plcs.values():
             plc.scan()
@@ -87,11 +90,22 @@ def difference(program: Program) -> str:
                 return f"{name}: trap {plc.trap} where python plain has {first.trap}, scan {scan}"
             if bytes(plc.memory.u8) != bytes(first.memory.u8):
                 return f"{name}: other memory after scan {scan}"
-        if oracle and (found := _beside(oracle, first)):
+        if found := _beside(oracle, first):
             return f"tree walker: {found}, scan {scan}"
         if first.trap:
             break
-    return ""
+    return _at_once(compilation.image, first)
+
+
+def _at_once(image: Image, first: Plc) -> str:
+    """What differs if many scans are done inside machine code."""
+    if "native 2" not in BUILDS:
+        return ""
+    plc = BUILDS["native 2"](image)
+    plc.run(scans=SCANS)
+    if repr(plc.trap) != repr(first.trap):
+        return f"many scans at once: trap {plc.trap} where python plain has {first.trap}"
+    return "" if bytes(plc.memory.u8) == bytes(first.memory.u8) else "many scans at once: other memory"
 
 
 def _beside(oracle: Oracle, plc: Plc) -> str:
@@ -103,21 +117,24 @@ def _beside(oracle: Oracle, plc: Plc) -> str:
     its = (plc.trap.code, plc.trap.site.line) if plc.trap else None
     if mine != its:
         return f"trap {mine} where the PLC has {plc.trap}"
+    values = oracle.values()
     return next((f"{name} is {wanted!r} where the PLC has {found!r}"
-                 for name, wanted, found in _values(oracle.variables, plc, "Main") if not _same(wanted, found)), "")
+                 for name, wanted, found in _values(values, plc, "") if not _same(wanted, found)), "")
 
 
-def _values(variables: dict[str, Any], plc: Plc, path: str) -> Iterator[tuple[str, Any, Any]]:
+def _values(variables: dict[Any, Any], plc: Plc, path: str) -> Iterator[tuple[str, Any, Any]]:
     for name, wanted in variables.items():
-        if name == "x":
-            continue  # an in-out of an instance
-        where = f"{path}.{name}"
+        if not isinstance(name, str):
+            continue  # the tree walker's own
+        where = f"{path}.{name}" if path else name
         place = plc.find(where)
-        assert isinstance(place, Place)
+        if not isinstance(place, Place):  # an instance of a program
+            yield from _values(wanted, plc, where)
+            continue
         kind = base(place.type)
         if isinstance(kind, StructType) and kind.block:
             yield from _values(wanted, plc, where)
-        elif not isinstance(wanted, tuple) and wanted is not None:  # a reference has no value outside
+        elif not isinstance(kind, RefType) and not isinstance(wanted, Pointer) and wanted is not None:
             yield where, wanted, plc.read(place)
 
 
@@ -127,107 +144,6 @@ def _same(wanted: Any, found: Any) -> bool:
     if isinstance(wanted, dict):
         return all(_same(value, found[name]) for name, value in wanted.items())
     return repr(wanted) == repr(found)
-
-
-# --- small programs ---------------------------------------------------------------------------------------------------
-
-
-def smallest(program: Program, differs: Callable[[Program], bool]) -> Program:
-    """The program without all that it can lose while it still differs."""
-    while True:
-        for smaller in _smaller(program):
-            if differs(smaller):
-                program = smaller
-                break
-        else:
-            return program
-
-
-def _smaller(program: Program) -> Iterator[Program]:
-    for at, pou in enumerate(program.pous):
-        for changed in _smaller_pous(pou):
-            yield replace(program, pous=(*program.pous[:at], changed, *program.pous[at + 1:]))
-        if pou.kind != "PROGRAM":
-            yield replace(program, pous=(*program.pous[:at], *program.pous[at + 1:]))
-    if program.structs:
-        yield replace(program, structs=program.structs[:-1])
-
-
-def _smaller_pous(pou: Pou) -> Iterator[Pou]:
-    for body in _smaller_blocks(pou.body):
-        yield replace(pou, body=body)
-    used = repr(pou.body)
-    for at, row in enumerate(pou.variables):
-        if f"'{row.name}'" not in used:
-            yield replace(pou, variables=(*pou.variables[:at], *pou.variables[at + 1:]))
-        elif row.initial is not None:
-            yield replace(pou, variables=(*pou.variables[:at], replace(row, initial=None), *pou.variables[at + 1:]))
-
-
-def _is_block(item: Any) -> bool:
-    return isinstance(item, tuple) and all(_is_statement(part) for part in item)
-
-
-def _is_statement(item: Any) -> bool:
-    return isinstance(item, tuple) and len(item) > 1 and isinstance(item[0], str) and isinstance(item[1], int)
-
-
-def _is_value(item: Any) -> bool:
-    return isinstance(item, tuple) and len(item) > 2 and item[0] in (
-        "get", "widen", "convert", "truncate", "binary", "compare", "unary", "call", "user")
-
-
-def _smaller_blocks(block: tuple[Node, ...]) -> Iterator[tuple[Node, ...]]:
-    """Blocks with fewer statements, or smaller ones; big pieces go first."""
-    size = len(block) // 2
-    while size > 1:
-        for at in range(0, len(block), size):
-            yield block[:at] + block[at + size:]
-        size //= 2
-    for at, statement in enumerate(block):
-        yield block[:at] + block[at + 1:]
-        for inner in _blocks_in(statement):
-            yield block[:at] + inner + block[at + 1:]
-    for at, statement in enumerate(block):
-        for changed in _smaller_nodes(statement):
-            yield (*block[:at], changed, *block[at + 1:])
-
-
-def _blocks_in(item: Any) -> Iterator[tuple[Node, ...]]:
-    for part in item:
-        if part and _is_block(part):
-            yield part
-        elif isinstance(part, tuple):
-            yield from _blocks_in(part)
-
-
-def _smaller_nodes(item: Any) -> Iterator[Any]:
-    """A node with one of its parts made smaller."""
-    for at, part in enumerate(item):
-        if not isinstance(part, tuple):
-            continue
-        if part and _is_block(part):
-            changes: Iterator[Any] = _smaller_blocks(part)
-        else:
-            changes = _smaller_values(part) if _is_value(part) else _smaller_nodes(part)
-        for changed in changes:
-            yield (*item[:at], changed, *item[at + 1:])
-
-
-def _smaller_values(node: Node) -> Iterator[Node]:
-    """A literal, a part of the same type, the same operation with a smaller part."""
-    kind = node[1]
-    yield "literal", kind, {"BOOL": False, "STRING": "", "REAL": 1.0, "LREAL": 1.0}.get(kind, 1)
-    yield from (part for part in _values_in(node) if part[1] == kind and part is not node)
-    yield from _smaller_nodes(node)
-
-
-def _values_in(item: Any) -> Iterator[Node]:
-    for part in item:
-        if _is_value(part) or (isinstance(part, tuple) and part[:1] == ("literal",)):
-            yield part
-        if isinstance(part, tuple):
-            yield from _values_in(part)
 
 
 def report(seed: int) -> str:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from datetime import date, timedelta
 from typing import Any
 
-from st_making import LEVEL, Node, Pou, Program
+from st_kinds import BITS, DATES, DAY_NS, DAYS, DAYTIMES, DURATIONS, LEVEL, PARTS, REALS, Node, Pou, Program, Task, Variable
 
 Lines = dict[tuple[int, int], int]
 """The line of each statement by its number, and by the number of the part of it that stands on a line of its own."""
@@ -16,24 +18,56 @@ def text_of(program: Program) -> tuple[str, Lines]:
     lines: Lines = {}
     for name, members in program.structs:
         rows = " ".join(f"{member} : {kind};" for member, kind in members)
-        out.append(f"TYPE {name} : STRUCT {rows} END_STRUCT; END_TYPE")
+        word = "UNION" if name[0] == "U" else "STRUCT"
+        out.append(f"TYPE {name} : {word} {rows} END_{word}; END_TYPE")
+    _section("VAR_GLOBAL", program.variables, out)
     for pou in program.pous:
         _pou(pou, out, lines)
+    if program.tasks:
+        _configuration(program.tasks, out)
     return "\n".join(out) + "\n", lines
 
 
 def _pou(pou: Pou, out: list[str], lines: Lines) -> None:
     out.append(f"{pou.kind} {pou.name}" + (f" : {pou.result}" if pou.result else ""))
-    for section in ("VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR"):
-        rows = [row for row in pou.variables if row.section == section]
-        if rows:
-            out.append(section)
-            out.extend(f"  {row.name} : {row.written}"
-                       + (f" := {literal(row.kind.split()[0], row.initial)}" if row.initial is not None else "") + ";"
-                       for row in rows)
-            out.append("END_VAR")
+    for section in ("VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR", "VAR_TEMP"):
+        _section(section, [row for row in pou.variables if row.section == section], out)
     _block(pou.body, 1, out, lines)
+    for name, block in pou.actions:
+        out.append(f"ACTION {name}:")
+        _block(block, 1, out, lines)
+        out.append("END_ACTION")
     out.append(f"END_{pou.kind}")
+
+
+def _section(section: str, rows: Sequence[Variable], out: list[str]) -> None:
+    if rows:
+        out += [section, *map(_declaration, rows), "END_VAR"]
+
+
+def _declaration(row: Variable) -> str:
+    first = f" := {literal(row.kind.split()[0], row.initial)}" if row.initial is not None else ""
+    return f"  {row.name}{_location(row)} : {row.written}{first};"
+
+
+def _location(row: Variable) -> str:
+    if row.at is None:
+        return ""
+    area, byte, bit = row.at
+    if area == "%M":
+        size = BITS[row.kind.split()[-1]] // 8
+        return f" AT %MX{byte}.{bit}" if bit is not None else f" AT %M{' BW D   L'[size]}{byte // size}"
+    return f" AT {area}{byte // 2}" + (f".{bit + byte % 2 * 8:02}" if bit is not None else "")
+
+
+def _configuration(tasks: tuple[Task, ...], out: list[str]) -> None:
+    out += ["CONFIGURATION C", "RESOURCE R ON PLC"]
+    for task in tasks:
+        interval = f"INTERVAL := T#{task.interval_ms}ms, " if task.interval_ms else ""
+        single = f"SINGLE := {task.single}, " if task.single else ""
+        out.append(f"  TASK T{task.instance}({single}{interval}PRIORITY := {task.priority});")
+    out += [f"  PROGRAM {task.instance} WITH T{task.instance} : Main;" for task in tasks]
+    out += ["END_RESOURCE", "END_CONFIGURATION"]
 
 
 def _block(block: tuple[Node, ...], depth: int, out: list[str], lines: Lines) -> None:
@@ -55,8 +89,13 @@ def _statement(statement: Node, depth: int, out: list[str], lines: Lines) -> Non
         say(f"{place(operands[0])} := {value(operands[1])};")
     elif kind == "copy":
         say(f"{place(operands[0])} := {place(operands[1])};")
-    elif kind == "bind":
-        say(f"{place(operands[0])} := REF({place(operands[1])});")
+    elif kind in SIMPLE:
+        say(SIMPLE[kind](*operands))
+    elif kind == "ladder":
+        say("LADDER")
+        for mnemonic, operand in operands[0]:
+            out.append(f"    {mnemonic} {operand}".rstrip())
+        out.append("END_LADDER")
     elif kind == "run":
         pins = [f"{name} := {place(node[2]) if node[0] == 'at' else value(node)}" for name, node in operands[1]]
         pins += [f"{name} => {place(node)}" for name, node in operands[2]]
@@ -97,13 +136,40 @@ def _statement(statement: Node, depth: int, out: list[str], lines: Lines) -> Non
 
 
 def place(node: Node) -> str:
-    if node[0] == "name":
+    what = node[0]
+    if what == "name":
         return str(node[2])
-    if node[0] == "member":
-        return f"{place(node[2])}.{node[3]}"
-    if node[0] == "element":
-        return f"{place(node[2])}[{value(node[3])}]"
-    return f"{place(node[2])}^"
+    inner = place(node[2])
+    if what == "through":
+        return inner
+    if what == "member":
+        return f"{inner}.{node[3]}"
+    if what == "element":
+        return f"{inner}[{value(node[3])}]"
+    if what == "beside":
+        return f"{inner}[{node[3]}]"
+    if what == "part":
+        return f"{inner}.{'' if node[1] == 'BOOL' and node[3] % 2 else '%' + PARTS[node[1]]}{node[3]}"
+    return f"{inner}^"
+
+
+def _bind(reference: Node, target: Node) -> str:
+    if reference[1].startswith("REFERENCE"):
+        return f"{place(reference)} REF= {place(target)};"
+    return f"{place(reference)} := REF({place(target)});"
+
+
+def _move(pointer: Node, count: int) -> str:
+    return f"{place(pointer)} := {place(pointer)} {'-' if count < 0 else '+'} {abs(count)} * SIZEOF({pointer[1][4:]});"
+
+
+SIMPLE: dict[str, Callable[..., str]] = {
+    "bind": _bind, "move": _move,
+    "point": lambda pointer, target: f"{place(pointer)} := ADR({place(target)});",
+    "open": lambda target, name, array, index: f"{place(target)} := {name}(a := {place(array)}, p0 := {value(index)});",
+    "act": lambda name: f"{name}();", "jump": lambda name: f"JMP {name};", "label": lambda name: f"{name}:",
+}  # fmt: skip
+"""Statements of one line."""
 
 
 def value(node: Node) -> str:
@@ -124,15 +190,22 @@ def _value(node: Node) -> tuple[str, float]:
         return f"{_at_least(node[3], level)} {node[2]} {_at_least(node[4], level + 0.25)}", level
     if what == "unary":
         return f"{node[2]}{' ' if node[2] == 'NOT' else ''}{_at_least(node[3], 9)}", 8
-    if what == "convert":
-        return f"{_source(node[2])}_TO_{kind}({value(node[2])})", 9
-    if what == "truncate":
-        return f"{_source(node[2])}_TRUNC_{kind}({value(node[2])})", 9
+    if what in WRITTEN:
+        return WRITTEN[what].format(_source(node[2]), kind, value(node[2])), 9
+    if what in ("moved", "apart"):
+        sign, left, right = node[2:] if what == "moved" else ("-", *node[2:])
+        return f"{_at_least(left, 5)} {sign} {_at_least(right, 5.25)}", 5
+    if what == "bound":
+        return f"{node[2]}_BOUND({node[3]}, 1)", 9
     return f"{node[2]}({', '.join(value(operand) for operand in node[3])})", 9
 
 
+WRITTEN = {"convert": "{}_TO_{}({})", "truncate": "{}_TRUNC_{}({})", "bcd": "{}_BCD_TO_{}({})", "to_bcd": "{}_TO_BCD_{}({})"}
+"""Conversions: type of the operand, type of the result, operand."""
+
+
 def _source(node: Node) -> str:
-    return "STRING" if node[1].startswith("STRING") else str(node[1])
+    return str(node[1]).split()[0]
 
 
 def _at_least(node: Node, level: float) -> str:
@@ -143,12 +216,24 @@ def _at_least(node: Node, level: float) -> str:
 def literal(kind: str, number: Any) -> str:
     if kind == "BOOL":
         return "TRUE" if number else "FALSE"
-    if kind == "STRING":
-        escaped = str(number).replace("$", "$$").replace("'", "$'")
-        return f"'{escaped}'"
-    if kind == "TIME":
-        return f"T#{number}ns"
-    if kind in ("REAL", "LREAL"):
+    if kind in ("STRING", "CHAR", "WSTRING", "WCHAR"):
+        quote, width = ('"', 4) if kind[0] == "W" else ("'", 2)
+        inside = "".join(f"${c}" if c in ("$", quote) else c if " " <= c <= "~" else f"${ord(c):0{width}X}" for c in number)
+        return f"{f'{kind}#' if kind.endswith('CHAR') else ''}{quote}{inside}{quote}"
+    if kind in DURATIONS:
+        return f"{kind}#{number}ns"
+    if kind in DATES:
+        return f"{kind}#{moment(kind, number)}"
+    if kind in REALS:
         digits, _, exponent = repr(number).partition("e")
         return f"{kind}#{digits}{'' if '.' in digits else '.0'}{f'E{exponent}' if exponent else ''}"
     return f"{kind}#{number}"
+
+
+def moment(kind: str, number: int) -> str:
+    """A date, a time of day or both, as a literal has it behind its prefix."""
+    day, rest = divmod(number, DAY_NS)
+    seconds, fraction = divmod(rest, 10**9)
+    clock = f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}" + f".{fraction:09}".rstrip("0").rstrip(".")
+    first = (date(1970, 1, 1) + timedelta(days=day)).isoformat()
+    return first if kind in DAYS else clock if kind in DAYTIMES else f"{first}-{clock}"
