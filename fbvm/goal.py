@@ -58,7 +58,7 @@ class Goal:
     def reached(self) -> str:
         """"trap", "until", "scans", "time", "max" or "break" if that ended the run, else ""."""
         plc = self._plc
-        if plc.halted and plc.halted is not self._halted:
+        if (halted := plc.breakpoints.halted) and halted is not self._halted:
             return "break"
         if plc.trap:
             return "trap"
@@ -66,8 +66,11 @@ class Goal:
             return "until"
         if self.scans is not None and plc.scans >= self.scans:
             return "scans"
-        if self.for_ns is not None and plc.elapsed_ns >= self.for_ns:
+        if self.for_ns is None and self.max_ns is None:
+            return ""
+        elapsed_ns = plc.elapsed_ns
+        if self.for_ns is not None and elapsed_ns >= self.for_ns:
             return "time"
-        if self.max_ns is not None and plc.elapsed_ns >= self.max_ns:
+        if self.max_ns is not None and elapsed_ns >= self.max_ns:
             return "max"
         return ""

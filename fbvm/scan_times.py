@@ -27,12 +27,12 @@ class Times:
         """Take one in."""
         self.count += 1
         self._total_ns += time_ns
-        if time_ns > self._limit_ns:
-            self.beyond += 1
         if time_ns > self.longest_ns:
             self.longest_ns, self.longest_scan = time_ns, scan
-        dropped = max(time_ns.bit_length() - DIGIT_BITS, 0)
-        kind = dropped << DIGIT_BITS | time_ns >> dropped
+        if time_ns > self._limit_ns:
+            self.beyond += 1
+        dropped = time_ns.bit_length() - DIGIT_BITS
+        kind = dropped << DIGIT_BITS | time_ns >> dropped if dropped > 0 else time_ns
         self._sorted[kind] = self._sorted.get(kind, 0) + 1
 
     @property

@@ -21,6 +21,8 @@ from fbvm.wire.tap import Happening, Tap, What
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 TCP, UDP = "tcp", "udp"
 FD_SETSIZE = 1024
+COARSE_S = 0.001
+"""To what epoll rounds a timeout up, which is long for a short cycle time: the rest of it is waited for by select."""
 MAX_CALLERS = 64
 """Callers that a listener looks at in one scan; the others wait in the host."""
 MAX_ORPHANS = 64
@@ -35,9 +37,7 @@ def errno_name(error: OSError | int) -> str:
 
 
 def _number(selector: selectors.BaseSelector) -> int | None:
-    """File number by which a selector itself can be waited for; None if it has none, or one too high for select.
-
-    Worth it because epoll's own timeout is rounded up to milliseconds, which is long for a short cycle time."""
+    """File number by which a selector itself can be waited for; None if it has none, or one too high for select."""
     fileno: Callable[[], int] | None = getattr(selector, "fileno", None)
     number = fileno() if fileno else -1
     return number if 0 <= number < FD_SETSIZE else None
@@ -92,6 +92,8 @@ class Switchboard(ABC):
         self._number = _number(self._selector)
         self._watched = 0
         """How many sockets the selector has."""
+        self._found: list[tuple[selectors.SelectorKey, int]] = []
+        """What the host was ready for when somebody waited."""
         self._own: dict[tuple[str, Peer], Peer] = {}
         self._orphans: deque[tuple[int, Orphan]] = deque()
         self.closed = False
@@ -107,16 +109,22 @@ class Switchboard(ABC):
         if self.closed or any(link.told for link in self.links.values()):
             return True
         timeout_s = max(timeout_s, 0.0)
-        if self._number is not None:
-            return bool(select.select([self._number], [], [], timeout_s)[0])
-        return bool(self._selector.select(timeout_s))
+        coarse_s = timeout_s if self._number is None else timeout_s // COARSE_S * COARSE_S
+        if coarse_s or self._number is None:
+            self._found = self._selector.select(coarse_s)
+        if self._found or self._number is None:
+            return bool(self._found)
+        return bool(select.select([self._number], [], [], timeout_s - coarse_s)[0])
 
     def serve(self, now_ns: int) -> list[Link]:
         """Do everything that the host is ready for; whose connections that was."""
         if self.closed:
             return []
         woken: list[Link] = []
-        for key, ready in self._selector.select(0) if self._watched else ():
+        found, self._found = self._found, []
+        if not found and self._watched:
+            found = self._selector.select(0)
+        for key, ready in found:
             key.data.ready(ready, now_ns)
             woken.append(key.data.link)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):

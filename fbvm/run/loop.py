@@ -90,26 +90,36 @@ class _Queue:
 
     def __init__(self, runs: Sequence[Running]) -> None:
         self._runs = runs
-        self._rows: list[tuple[int, int]] = []
+        self._times: list[int] = []
+        """When anybody is due, the next first; PLCs with one period share theirs."""
+        self._rows: dict[int, list[int]] = {}
+        """Whose times these are, by number."""
         self._queued: list[int | None] = [None] * len(runs)
-        """When each is due, by its row that counts; others of its number are out of date."""
+        """When each is due; if it stands in the row of another time, too, that is out of date."""
         for number, run in enumerate(runs):
             self.put(number, run)
 
     def put(self, number: int, run: Running) -> None:
         """Remember when a run is due, unless it has ended."""
-        if not run.reason:
-            self._queued[number] = run.due_ns
-            heapq.heappush(self._rows, (run.due_ns, number))
+        if run.reason:
+            return
+        due_ns = self._queued[number] = run.due_ns
+        row = self._rows.get(due_ns)
+        if row is None:
+            self._rows[due_ns] = [number]
+            heapq.heappush(self._times, due_ns)
+        else:
+            row.append(number)
 
     def next_ns(self) -> int | None:
         """When somebody is due; None if all have ended."""
-        rows, queued = self._rows, self._queued
-        while rows:
-            due_ns, number = rows[0]
-            if queued[number] == due_ns:
-                return due_ns
-            heapq.heappop(rows)
+        times, queued = self._times, self._queued
+        while times:
+            due_ns = times[0]
+            for number in self._rows[due_ns]:
+                if queued[number] == due_ns:
+                    return due_ns
+            del self._rows[heapq.heappop(times)]
         return None
 
     def hasten(self, number: int, now_ns: int) -> None:
@@ -121,12 +131,13 @@ class _Queue:
 
     def take(self, now_ns: int) -> list[tuple[int, Running]]:
         """Takes out all that are due, with their numbers; who has scanned one puts it back."""
-        rows, queued, taken = self._rows, self._queued, []
-        while rows and rows[0][0] <= now_ns:
-            due_ns, number = heapq.heappop(rows)
-            if queued[number] == due_ns:
-                queued[number] = None
-                taken.append((number, self._runs[number]))
+        times, queued, taken = self._times, self._queued, []
+        while times and times[0] <= now_ns:
+            due_ns = heapq.heappop(times)
+            for number in self._rows.pop(due_ns):
+                if queued[number] == due_ns:
+                    queued[number] = None
+                    taken.append((number, self._runs[number]))
         return taken
 
 
@@ -173,25 +184,24 @@ class _Real:
         self._zero_ns = time.monotonic_ns() - start_ns
 
     def reach(self, due_ns: int) -> int:
-        while (left_ns := due_ns + self._zero_ns - time.monotonic_ns()) > 0:
+        while (left_ns := due_ns - (now_ns := time.monotonic_ns() - self._zero_ns)) > 0:
             if not self._waits:
                 time.sleep(left_ns / 1e9)
             elif self._networks[0].wait(left_ns / 1e9):
-                now_ns = self._serve()
+                self._serve(now_ns := time.monotonic_ns() - self._zero_ns)
                 if self.woken:
                     return now_ns
                 time.sleep(min(left_ns, PATIENCE_NS) / 1e9)
-        return self._serve()
+        self._serve(now_ns)
+        return now_ns
 
-    def _serve(self) -> int:
-        """Asks the networks what happened, and notes whom it wakes; the time."""
-        now_ns = time.monotonic_ns() - self._zero_ns
+    def _serve(self, now_ns: int) -> None:
+        """Asks the networks what happened until now, and notes whom it wakes."""
         self.woken.clear()
         for network in self._networks:
             for link in network.serve(now_ns):
                 if (number := self._numbers.get(id(link))) is not None:
                     self.woken.append(number)
-        return now_ns
 
     def stop(self) -> None:
         for network in self._networks:

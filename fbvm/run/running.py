@@ -74,7 +74,7 @@ class Running:
             plc.write(write.where, write.value)
         plc.scan(told_ns)
         self.reason = self._goal.reached()
-        if plc.halted:
+        if plc.breakpoints.halted:
             return
         if self.pace == EVENT:
             self.due_ns = max(now_ns, min(now_ns + plc.cycle_ns, plc.due_ns + self._behind_ns))
