@@ -76,6 +76,11 @@ class ChannelLink(ABC):
         for request in requests:
             there = self.channels.get(request.channel)
             match request:
+                case Send():
+                    self._check(request.channel, there.send(request.data, now_ns) if there else "ENOTCONN")
+                case Grant():
+                    if there:
+                        there.grant(request.size)
                 case Connect() | Listen() | Bind():
                     if there:
                         raise ValueError(f"channel {request.channel} of {self.address} is in use")
@@ -85,13 +90,8 @@ class ChannelLink(ABC):
                         del self.channels[channel]
                         there.close(reset, now_ns)
                     self.told.append(Closed(channel))
-                case Send(channel, data):
-                    self._check(channel, there.send(data, now_ns) if there else "ENOTCONN")
                 case SendTo(channel, remote, data):
                     self._check(channel, there.send_to(remote, data, now_ns) if there else "ENOTCONN")
-                case Grant(_, size):
-                    if there:
-                        there.grant(size)
 
     def events(self, now_ns: int) -> list[Event]:
         """What happened up to `now_ns`, in order, each once."""

@@ -19,7 +19,7 @@ from fbvm.net.addresses import AddressMap, dotted, fits, impossible
 from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink, undeliverable
 from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, UDP, WRITE, Switchboard, Watcher, errno_name
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
-from fbvm.wire.tap import What
+from fbvm.wire.tap import DATA, What
 
 BUFFER_BYTES = 65_536
 """Of the host for each connection: small, so that who grants or reads nothing soon closes the TCP window."""
@@ -285,8 +285,7 @@ class _Line(_OnHost):
             self._flush(self.sock, now_ns)
 
     def grant(self, size_bytes: int) -> None:
-        self.granted = size_bytes
-        self._stalled = False
+        self.granted, self._stalled = size_bytes, False
         self._watch()
 
     def fetch(self, now_ns: int) -> None:
@@ -302,7 +301,7 @@ class _Line(_OnHost):
     def send(self, data: bytes, now_ns: int) -> str:
         if not self._connected or self.sock is None:
             return "EPIPE" if self._connected else "ENOTCONN"
-        if sum(map(len, self._outbox)) + len(data) > SEND_BUFFER_BYTES:
+        if self._outbox and sum(map(len, self._outbox)) + len(data) > SEND_BUFFER_BYTES:
             return "ENOBUFS"
         self._outbox.append(data)
         self._flush(self.sock, now_ns)
@@ -352,17 +351,17 @@ class _Line(_OnHost):
             self._stalled = True
         else:
             self.granted -= len(data)
-            self._tap(now_ns, What.DATA, False, data)
+            self._tap(now_ns, DATA, False, data)
             self._report(Received(self.channel, data))
         self._watch()
 
     def _flush(self, sock: socket.socket, now_ns: int) -> None:
         try:
             while self._outbox:
-                rest = self._outbox[0][self._taken :]
+                rest = self._outbox[0][self._taken :] if self._taken else self._outbox[0]
                 size = sock.send(rest) if rest else 0
                 if size:
-                    self._tap(now_ns, What.DATA, True, rest[:size])
+                    self._tap(now_ns, DATA, True, rest[:size])
                 self._taken += size
                 if size == len(rest):
                     self._report(Sent(self.channel, len(self._outbox.popleft())))

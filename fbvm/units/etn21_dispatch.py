@@ -19,7 +19,7 @@ from fbvm.units.etn21_display import Display
 from fbvm.units.etn21_map import CLOSE, TRANSFERS, Layout, Parameters, Switch
 from fbvm.units.etn21_service import NEVER_NS, Area, Service
 from fbvm.units.etn21_socket import OPEN, OPENING, Socket
-from fbvm.units.etn21_start import Surroundings, start
+from fbvm.units.etn21_start import Surroundings, start_open, start_transfer
 from fbvm.units.etn21_timing import NEXT, TOGETHER, Delay, Skew, Timing
 from fbvm.units.etn21_words import Words
 from fbvm.units.unit import AreaMemory
@@ -116,14 +116,13 @@ class Dispatch:
         """New switches in n+19..n+22, judged before this refresh ends anything."""
         found = []
         for pair, word in enumerate(switches):
-            if not word:
-                continue
-            for area, byte in ((self._areas[2 * pair], word), (self._areas[2 * pair + 1], word >> 8)):
-                new = byte & at.ALL_SWITCHES
+            for half in (0, 1) if word else ():
+                new = word >> 8 * half & at.ALL_SWITCHES
+                area = self._areas[2 * pair + half]
                 if new and area.services:
                     new &= ~area.owned()
                 if new:
-                    busy = any(service.code != codes.OTHER_PROCESSING for service in area.services)
+                    busy = bool(area.services) and any(service.code != codes.OTHER_PROCESSING for service in area.services)
                     found.append(Found(area, at.SWITCHES_IN[new], busy))
         return found
 
@@ -228,18 +227,21 @@ class Dispatch:
         self._delay(service, self._timing.delay(), now_ns)
         number = parameters.socket
         socket = self._sockets.get(number)
-        refusal = self._faults and self._fault(service.switch, number, first=True) or check_request(
-            service.switch, parameters, area, socket, words.memory, self.cycle)
-        if self._faults and not refusal:
-            refusal = self._fault(service.switch, number, first=False)
+        refusal = (
+            self._fault(service.switch, number, first=True)
+            or check_request(service.switch, parameters, area, socket, words.memory, self.cycle)
+            or self._fault(service.switch, number, first=False)
+        )
         if refusal or socket is None:
             service.code = refusal
             return []
+        self._touched.setdefault(number, TOGETHER)
+        if service.flag & TRANSFERS:
+            return start_transfer(service, parameters, socket, words.memory, now_ns)
         if service.switch is CLOSE:
             service.interrupts = self._interrupt(socket, now_ns)
-        around = Surroundings(words.memory, self._address, self._held_ports, now_ns)
-        self._touched.setdefault(number, TOGETHER)
-        return start(service, parameters, socket, around)
+            return socket.begin_close(service)
+        return start_open(service, parameters, socket, Surroundings(self._address, self._held_ports, now_ns))
 
     def _interrupt(self, socket: Socket, now_ns: int) -> tuple[Service, ...]:
         """End what runs on a socket with 0081; a result that is already decided stays."""

@@ -34,7 +34,7 @@ class Display:
         self._layout = layout
         self._shown: dict[tuple[str, int], Shown] = {}
         """By protocol and socket, from the first time on that it has something to show."""
-        self._words: Words | None = None
+        self._words: Words
         self._cycle = 0
         self._changed = False
         self._later: list[tuple[int, bool, int, int, int]] = []
@@ -53,7 +53,10 @@ class Display:
                 if change[0] > self._cycle:
                     self._later.append(change)
                 else:
-                    self._write(*change[1:])
+                    _, in_d, address, stays, turns_on = change
+                    words = self._words.d if in_d else self._words.cio
+                    words[address] = words[address] & stays | turns_on
+                    self._changed = True
             if not self._later:
                 self._last_due.clear()
         return self._changed
@@ -113,10 +116,6 @@ class Display:
             self._last_due[in_d, address] = due_cycle
             self._later.append((due_cycle, in_d, address, stays, turns_on))
         else:
-            self._write(in_d, address, stays, turns_on)
-
-    def _write(self, in_d: bool, address: int, stays: int, turns_on: int) -> None:
-        assert self._words
-        words = self._words.d if in_d else self._words.cio
-        words[address] = words[address] & stays | turns_on
-        self._changed = True
+            words = self._words.d if in_d else self._words.cio
+            words[address] = words[address] & stays | turns_on
+            self._changed = True

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from fbvm.units import etn21_codes as codes
 from fbvm.units import etn21_map as at
 from fbvm.units.etn21_data import fetch
-from fbvm.units.etn21_map import PASSIVE_OPEN, RECEIVE, SEND, UDP_OPEN, Parameters
+from fbvm.units.etn21_map import PASSIVE_OPEN, SEND, UDP_OPEN, Parameters
 from fbvm.units.etn21_service import Service
 from fbvm.units.etn21_socket import Socket
 from fbvm.units.unit import AreaMemory
@@ -26,9 +26,8 @@ UDP_PORTS_OF_THE_UNIT = frozenset({53, 123, 9600})  # W343 6-1 p106
 
 
 class Surroundings(NamedTuple):
-    """What a starting service may look at."""
+    """What an open may look at."""
 
-    memory: AreaMemory
     address: str
     """IPv4 address of this unit."""
 
@@ -38,25 +37,23 @@ class Surroundings(NamedTuple):
     now_ns: int
 
 
-def start(service: Service, parameters: Parameters, socket: Socket, around: Surroundings) -> list[Request]:
-    """Begin the service and return the requests for the network."""
-    switch = service.switch
-    if switch is SEND:
-        data = fetch(around.memory, parameters)
+def start_transfer(
+    service: Service, parameters: Parameters, socket: Socket, memory: AreaMemory, now_ns: int
+) -> list[Request]:
+    """Begin a send or a receive and return the requests for the network."""
+    if service.switch is SEND:
+        data = fetch(memory, parameters)
         if socket.protocol == "TCP":
             return socket.begin_send(service, data)
         if parameters.remote.host == BROADCAST and parameters.size_bytes > DATAGRAM_LIMIT:
             return socket.fail(service, codes.ERRNO["EMSGSIZE"])
         return socket.begin_send_to(service, parameters.remote, data)
-    if switch is RECEIVE:
-        _limit(service, parameters.timeout_ns, codes.TIMED_OUT, around.now_ns)
-        return socket.begin_receive(service)
-    if switch in at.OPENS:
-        return _start_open(service, parameters, socket, around)
-    return socket.begin_close(service)
+    _limit(service, parameters.timeout_ns, codes.TIMED_OUT, now_ns)
+    return socket.begin_receive(service)
 
 
-def _start_open(service: Service, parameters: Parameters, socket: Socket, around: Surroundings) -> list[Request]:
+def start_open(service: Service, parameters: Parameters, socket: Socket, around: Surroundings) -> list[Request]:
+    """Begin an open and return the requests for the network."""
     channel, port, remote = parameters.socket, parameters.local_port, parameters.remote
     keep_alive = bool(parameters.option & at.KEEP_ALIVE)
     request: Connect | Listen | Bind

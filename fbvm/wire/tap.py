@@ -27,6 +27,9 @@ class What(Enum):
     """One datagram."""
 
 
+DATA = What.DATA
+
+
 @dataclass(frozen=True, slots=True)
 class Happening:
     """One happening at one unit.  `local` is the unit's endpoint, `remote` its peer's, with the program's addresses.
