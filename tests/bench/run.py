@@ -100,7 +100,7 @@ def starting() -> None:
     more = "VAR_GLOBAL NOW : TIME; D : ARRAY [0..1023] OF WORD; END_VAR\n"
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "lines5000.st"
-        path.write_text((BENCH / "programs" / path.name).read_text(encoding="utf-8") + more, encoding="utf-8")
+        path.write_text((BENCH / path.name).read_text(encoding="utf-8") + more, encoding="utf-8")
         for program in (DEMO, path):
             for state in ("cold", "warm", "warm"):
                 environment = os.environ | {"FBVM_CACHE": folder, "PYTHONPATH": str(HOUSE)}
