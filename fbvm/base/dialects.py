@@ -32,6 +32,11 @@ class Dialect:
     mixed_arguments: bool = False
     bare_actions: bool = False
     locals_are_read: bool = False
+    programs_are_written: bool = False
+    locals_are_written: bool = False
+    narrowing: bool = False
+    sums_in_dint: bool = False
+    reals_saturate: bool = False
 
 
 QUESTIONS = {
@@ -52,7 +57,15 @@ QUESTIONS = {
     "mixed_arguments": ("F(1, b := 2): some arguments named, some not", "an error",
                         "those without a name are for the parameters that none names, in order"),
     "bare_actions": ("Reset; where Reset is an ACTION", "an error", "a call of it"),
-    "locals_are_read": ("a VAR of a function block, read through an instance", "an error", "its value; it cannot be written"),
+    "locals_are_read": ("a VAR of a function block, read through an instance", "an error", "its value"),
+    "programs_are_written": ("Prog.count := 0, where count is a VAR of the PROGRAM", "an error", "written"),
+    "locals_are_written": ("instance.count := 0, where count is a VAR of the block", "an error", "written"),
+    "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is", "an error that names the conversion",
+                  "cut to the width; without its fraction, the nearest number that there is; 1 and 0"),
+    "sums_in_dint": ("+ - * / MOD of INT, SINT, UINT, USINT: 30000 + 30000, USINT#0 - 1", "in their own type, which wraps",
+                     "as DINT"),
+    "reals_saturate": ("REAL_TO_INT(70000.0), TRUNC of what does not fit", "stops the program (R0105)",
+                       "the nearest number that there is; 0 for NAN"),
     "libraries": ("blocks that begin or end another way; whether actions of charts have a final scan",
                   "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
@@ -65,10 +78,11 @@ _ROWS = (
     Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
             lenient_positions=True, real_bits_by_value=True, arithmetic_of_bits=True, integers_and_bits=True,
             numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, bare_actions=True,
-            locals_are_read=True),
+            locals_are_read=True, programs_are_written=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True),
     Dialect("rusty", "programs for RuSTy", loop_ends_each_pass=True, arithmetic_of_bits=True, integers_and_bits=True,
-            numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True),
+            numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, locals_are_read=True,
+            programs_are_written=True, locals_are_written=True, narrowing=True, sums_in_dint=True, reals_saturate=True),
     Dialect("omron", "programs that shall run in Sysmac Studio",
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

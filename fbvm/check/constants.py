@@ -130,6 +130,17 @@ def unary(op: str, kind: Type, a: Value) -> Value:
     return -a if isinstance(a, float) or kind is UNTYPED_INT else wrap(kind, -a)
 
 
+def cut(value: Value, kind: Type) -> Value:
+    """A constant number as one of `kind`, which may not hold it: cut to its width, a real to the nearest that there is."""
+    form = machine(kind)
+    if form[0] not in "iu" or not isinstance(value, int | float):
+        return convert(value, kind)
+    if isinstance(value, float):
+        low, high = limits(kind) or (0, 0)
+        return 0 if math.isnan(value) else low if value <= low else high if value >= high else int(value)
+    return arithmetic.wrap(int(value), form)
+
+
 def convert(value: Value, kind: Type) -> Value:
     """A constant of one type as a constant of `kind`, to which it converts implicitly."""
     form = machine(kind)

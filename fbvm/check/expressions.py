@@ -33,7 +33,7 @@ from fbvm.base.types import (
     string,
 )
 from fbvm.check import anything, qualified, unknown
-from fbvm.check.constants import convert, limits
+from fbvm.check.constants import convert, cut, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
 from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, is_untyped, lent, literal_hint
 from fbvm.check.operators import Operators
@@ -113,6 +113,8 @@ class Expressions:
             value = self.facts.constants.get(expr)
             return value is None or self._in_range(expr, value, target, code)
         if lent(kind, target, self.project.dialect):
+            if expr in self.facts.constants:
+                self.facts.constants[expr] = cut(self.facts.constants[expr], base(target))
             return True
         known = code in _KNOWN and not is_block(kind)
         self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
@@ -153,6 +155,8 @@ class Expressions:
             return target
         if isinstance(kind, EnumType) and self.project.dialect.numbers_of_enumerations:
             kind = kind.base
+        if self.project.dialect.narrowing and untyped is UNTYPED_REAL and is_any(kind, "ANY_INT"):
+            untyped, value = UNTYPED_INT, int(value)
         if untyped is UNTYPED_REAL and not is_any(kind, "ANY_REAL") or \
                 not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_REAL"):
             self.error(code, expr, f"{untyped} does not fit {target}", literal_hint(value, kind))

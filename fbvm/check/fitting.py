@@ -52,6 +52,8 @@ def lent(kind: Type, target: Type, dialect: Dialect) -> bool:
         if kind == target or converts(kind, target):
             return True
     kind, target = base(kind), base(target)
+    if dialect.narrowing and is_any(kind, "ANY_NUM", "ANY_BIT") and is_any(target, "ANY_NUM", "ANY_BIT") and target != BOOL:
+        return True
     if not dialect.integers_and_bits or not isinstance(kind, Elementary) or not isinstance(target, Elementary) or \
             BOOL in (kind, target):
         return False

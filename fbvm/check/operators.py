@@ -119,6 +119,7 @@ class Operators:
                 return lent
             self._undefined(expr, left, right, want)
             return None
+        kind = self._widened(expr.op, kind)
         if kind not in (UNTYPED_INT, UNTYPED_REAL):
             for side, side_kind in ((expr.left, left), (expr.right, right)):
                 if side_kind in (UNTYPED_INT, UNTYPED_REAL) and self.expressions.adopt(side, kind) is None:
@@ -160,6 +161,7 @@ class Operators:
         kind = self._operand_type(expr, a, b, want)
         if kind is None or not self._defined(expr, kind):
             return None
+        kind = self._widened(expr.op, kind)
         for side, side_kind in ((expr.left, a), (expr.right, b)):
             if side_kind in (UNTYPED_INT, UNTYPED_REAL) and self.expressions.adopt(side, kind) is None:
                 return None
@@ -233,6 +235,11 @@ class Operators:
         if kind is UNTYPED_REAL:
             return _FAMILY[op] == ("ANY_NUM",)
         return is_any(kind, *self._family(op))
+
+    def _widened(self, op: str, kind: Type) -> Type:
+        """The type in which a dialect computes: DINT for what is smaller, where it takes sums so."""
+        small = op in ("+", "-", "*", "/", "MOD") and is_any(kind, "ANY_INT") and 0 < kind.size < DINT.size
+        return DINT if small and self.expressions.project.dialect.sums_in_dint else kind
 
     def _family(self, op: str) -> tuple[str, ...]:
         """The generic types that an operator works on; dialects take the bits of integers too."""

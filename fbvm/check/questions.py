@@ -93,18 +93,17 @@ def _bound(expressions: Expressions, call: tree.Call, name: str, value: tree.Exp
     if kind is None or counted is None:
         return None
     number = expressions.facts.constants.get(dimension)
-    if isinstance(number, bool) or not isinstance(number, int) or not is_any(counted, "ANY_INT"):
-        expressions.error("S0701", dimension, f"{name} needs its dimension as a constant integer",
-                          "write a number, or declare the name in a VAR CONSTANT section")
+    if isinstance(number, bool) or not is_any(counted, "ANY_INT"):
+        expressions.error("S0405", dimension, f"{name} needs its dimension as an integer, this is {counted}")
         return None
     if not isinstance(kind, ArrayType | OpenArrayType):
         expressions.error("S0405", value, f"{name} needs an array, this is {kind}")
         return None
     count = kind.dimensions if isinstance(kind, OpenArrayType) else len(kind.bounds)
-    if not 1 <= number <= count:
+    if isinstance(number, int) and not 1 <= number <= count:
         expressions.error("S0405", dimension, f"{kind} has dimensions 1 to {count}, not {number}")
         return None
-    if isinstance(kind, ArrayType):
+    if isinstance(number, int) and isinstance(kind, ArrayType):
         expressions.facts.constants[call] = kind.bounds[number - 1][name == "UPPER_BOUND"]
     else:
         expressions.facts.calls[call] = StandardCall(name, [(value, kind), (dimension, DINT)], (kind,))

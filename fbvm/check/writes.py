@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import AREAS, Address
-from fbvm.base.types import fold
+from fbvm.base.types import Field, StructType, fold
 from fbvm.check.facts import Facts, Variable
 from fbvm.syntax import tree
 
@@ -29,7 +29,8 @@ def writable(expressions: Expressions, expr: tree.Expr, purpose: str, bound: boo
         if inner in facts.followed and not (bound and inner is expr):
             return True
         member = facts.fields.get(inner)
-        if member is not None and (member.constant or member.kind in ("VAR", "VAR_OUTPUT")):
+        if member is not None and (member.constant or member.kind in ("VAR", "VAR_OUTPUT")) and \
+                not _written_from_outside(expressions, inner, member):
             what = "a constant" if member.constant else _OWN[member.kind]
             expressions.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here")
             return False
@@ -53,6 +54,15 @@ def writable(expressions: Expressions, expr: tree.Expr, purpose: str, bound: boo
         expressions.error("S0501", expr, f"{address} is read-only for programs and cannot {purpose}")
         return False
     return True
+
+
+def _written_from_outside(expressions: Expressions, expr: tree.Expr, member: Field) -> bool:
+    """True for a member of an instance that the dialect lets others write."""
+    dialect, whole = expressions.project.dialect, expressions.facts.types.get(expr.of) if isinstance(expr, tree.Member) else None
+    if member.constant or not isinstance(whole, StructType) or not whole.block:
+        return False
+    program = expressions.checker.block_of(whole).kind == "PROGRAM"
+    return dialect.programs_are_written if program else dialect.locals_are_written
 
 
 def _is_read_only(expressions: Expressions, address: Address) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -180,7 +181,7 @@ def _convert(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -
         return _from_time(node, source, target, site, _tick(body, source))
     if timed[1]:
         return _to_time(node, source, target, site, _tick(body, target))
-    return number(node, source, target, site, body.dialect.real_bits_by_value)
+    return number(body, node, source, target, site)
 
 
 def to_text(source: Type, node: Node, body: BodyLowering) -> Node:
@@ -227,9 +228,10 @@ def _narrow(body: BodyLowering, node: Node) -> Node:
             ("const", "u8", ord("?")))
 
 
-def number(node: Node, source: Type, target: Type, site: int, by_value: bool = False) -> Node:
+def number(body: BodyLowering, node: Node, source: Type, target: Type, site: int) -> Node:
     """Among BOOL, integers, bit strings, enumerations and reals; the latter give bit strings their bits or their value."""
     a, b = machine(source), machine(target)
+    by_value = body.dialect.real_bits_by_value
     if a == b:
         return node
     if b == "b":
@@ -237,10 +239,25 @@ def number(node: Node, source: Type, target: Type, site: int, by_value: bool = F
     if a in FLOATS and b not in FLOATS:
         if is_any(target, "ANY_BIT") and not by_value:
             return ("bits", b, a, node)
-        return ("nearest", b, a, node, site)
+        return saturated(body, "nearest", node, b) if body.dialect.reals_saturate else ("nearest", b, a, node, site)
     if b in FLOATS and is_any(source, "ANY_BIT") and a != "b" and not by_value:
         return ("bits", b, a, node)
     return ("convert", b, a, node)
+
+
+def saturated(body: BodyLowering, name: str, node: Node, form: str) -> Node:
+    """A real as an integer by `nearest` or `truncate`: the nearest that there is where it does not fit, 0 for NaN."""
+    bits = SIZES[form] * 8
+    low, high = (-2.0 ** (bits - 1), 2.0 ** (bits - 1)) if form[0] == "i" else (0.0, 2.0 ** bits)
+    kept = body.keep(node if node[1] == "f64" else ("convert", "f64", "f32", node))
+    last = high - 1 if bits < 64 else math.nextafter(high, 0)
+    inside = ("min", "f64", ("max", "f64", kept, ("const", "f64", low)), ("const", "f64", last))
+    there = ("select", "f64", ("eq", "b", "f64", kept, kept), ("const", "f64", 0.0), inside)
+    number: Node = (name, form, "f64", there, 0)
+    if bits < 64:
+        return number
+    most = ("const", form, int(high) - 1)
+    return ("select", form, ("ge", "b", "f64", kept, ("const", "f64", high)), number, most)
 
 
 def _tick(body: BodyLowering, kind: Type) -> int:
@@ -280,6 +297,8 @@ def _date_part(body: BodyLowering, node: Node, source: Type, target: Type) -> No
 
 def _truncate(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
     target = call.detail[1] if len(call.detail) > 1 else DINT
+    if body.dialect.reals_saturate:
+        return saturated(body, "truncate", a[0], machine(target))
     return ("truncate", machine(target), machine(call.detail[0]), a[0], site)
 
 

@@ -205,10 +205,22 @@ class Places:
         return ("load", "i64", slot.moved(kind.bound_offset(dimension, upper), LINT).address)
 
     def bound(self, called: StandardCall, constants: dict[tree.Expr, Value]) -> Node:
-        """LOWER_BOUND or UPPER_BOUND of ARRAY [*], as i64."""
+        """LOWER_BOUND or UPPER_BOUND, as i64, of ARRAY [*] or of a dimension that is worked out."""
         (array, kind), (dimension, _) = called.arguments
-        assert isinstance(kind, OpenArrayType)
-        return self._bound_at(array, kind, int(constants[dimension]) - 1, called.key == "UPPER_BOUND")
+        upper = called.key == "UPPER_BOUND"
+        if isinstance(kind, OpenArrayType):
+            bounds = [self._bound_at(array, kind, number, upper) for number in range(kind.dimensions)]
+        else:
+            assert isinstance(kind, ArrayType)
+            bounds = [("const", "i64", pair[upper]) for pair in kind.bounds]
+        if dimension in constants:
+            return bounds[int(constants[dimension]) - 1]
+        site = self.body.site(dimension)
+        number = self.body.keep(("check", "i64", self.body.as_i64(dimension), 1, len(bounds), "R0102", site), always=True)
+        found = bounds[0]
+        for place, bound in enumerate(bounds[1:], start=2):
+            found = ("select", "i64", ("eq", "b", "i64", number, ("const", "i64", place)), found, bound)
+        return found
 
     def bounds(self, expr: tree.Expr) -> list[Node]:
         """The bounds of an array that is passed to ARRAY [*], as i64: lower and upper of each dimension."""

@@ -21,7 +21,7 @@ from fbvm.base.types import (
 from fbvm.check.constants import convert as convert_constant
 from fbvm.check.facts import Guard, PouCall, StandardCall, Value
 from fbvm.check.values import is_any
-from fbvm.code.functions import FUNCTIONS
+from fbvm.code.functions import FUNCTIONS, saturated
 from fbvm.code.operations import FLOATS, TEXT_UNITS, Node
 from fbvm.syntax import ladder, tree
 
@@ -75,6 +75,8 @@ class ValueLowering:
             return node
         if wanted in TEXT_UNITS:
             return ("character", wanted, node)
+        if source in FLOATS and wanted not in FLOATS:
+            return saturated(self.body, "truncate", node, wanted)
         return ("convert", wanted, source, node)
 
     def sequence(self, thunks: list[Callable[[], Node]]) -> list[Node]:
