@@ -29,6 +29,7 @@ VERBS = {
     "check": "Say what is wrong with a program; silent when nothing is.",
     "fmt": "Rewrite a program in canonical Structured Text.",
     "ladder": "Draw the rungs of a program.",
+    "sfc": "Draw the sequential function charts of a program.",
     "import": "Make sources of a project in PLCopen XML.",
     "list": "Print the compiled program, readable.",
     "explain": "Print the page of a diagnostic.",

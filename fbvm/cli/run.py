@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from fbvm.cli import status
+from fbvm.cli import sfc, status
 from fbvm.cli.banks import banks_in, with_banks
 from fbvm.cli.breakpoints import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.journals import start_journal
@@ -56,6 +56,8 @@ CYCLE_NS = 10_000_000
 @click.option("--show", "shown", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST", help="Print this at the end.")
 @click.option("--chart", "charted", multiple=True, metavar="NAME|ADDRESS,...", help="Draw these, a column a scan.")
 @click.option("--ladder", "rungs", metavar="SCANS", help="Draw the rungs with their power in these scans: 3 or 3,5..7.")
+@click.option("--sfc", "charts", metavar="SCANS",
+              help="Draw the charts with their active steps and tested transitions in these scans.")
 @click.option("--net", type=click.Choice(["loop", "tcp"]), default="loop", show_default=True,
               help="loop: in memory, virtual time.  tcp: real connections, real time.")
 @click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=HOST:PORT|peer",
@@ -114,7 +116,8 @@ def command(
             plc.attach(unit, network)
         _tell_doors(plc, network, options["mappings"])
         with tracing(plc, options["trace"], options["depth"], options["selected"], files, libraries), \
-                paging(plc, options["html"], files, libraries), drawing(plc, options["rungs"]):  # fmt: skip
+                paging(plc, options["html"], files, libraries), drawing(plc, options["rungs"]), \
+                sfc.drawing(plc, options["charts"]):  # fmt: skip
             outcome = _run(plc, as_json, **options)
         outcome.print()
         _tell_unused(plc, network)

@@ -23,7 +23,7 @@ from fbvm.check.silence import Silence, Wanted
 from fbvm.code import image_cache
 from fbvm.code.damage import Damage
 from fbvm.code.evaluation import evaluate
-from fbvm.code.image import Image, Objects, ProgramRun, RungPicture, Site, TaskRow
+from fbvm.code.image import Image, Objects, ProgramRun, RungPicture, SfcPicture, Site, TaskRow
 from fbvm.code.initial_references import InitialReferences
 from fbvm.code.layout import Placed, place
 from fbvm.code.lower import BodyLowering
@@ -63,6 +63,7 @@ class Program:
         self.areas: dict[str, Area] = placed.layout.areas
         self.sites: list[Site] = []
         self.rungs: list[RungPicture] = []
+        self.charts: list[SfcPicture] = []
         self.late_starts: dict[Pou, list[tuple[int, Start]]] = {}
         """References in frames that bodies make when they start, by POU, and where in the buffer they lie."""
         self.leases_at, self.held_bits = placed.objects.leases_at, placed.objects.held_bits
@@ -228,7 +229,7 @@ def _image(checker: Checker, progress: Progress) -> Image:
         if entry.resolved is not None:
             types.setdefault(name, entry.resolved[0])
     return Image(placed.layout, bodies, tuple(tasks), placed.symbols, (*placed.initial, *held.in_slots()), tuple(placed.retained),
-                 tuple(program.sites), types, program.objects, tuple(program.rungs))
+                 tuple(program.sites), types, program.objects, tuple(program.rungs), tuple(program.charts))
 
 
 def _told(pous: Sequence[Pou], reached: Callable[[int, int], None]) -> Iterator[Pou]:

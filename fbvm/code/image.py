@@ -130,6 +130,21 @@ class RungPicture:
 
 
 @dataclass(frozen=True)
+class SfcPicture:
+    """A sequential function chart as it was written, for those who draw it: the number of its body, the place at which
+    each call of it begins, its steps and its transitions.
+
+    A step is its name, whether it is an initial one, where in an instance its flag lies, and (qualifier with time, action,
+    indicators) of each association.  A transition is the place that observations of it name, its name, its priority (0
+    for none), the numbers of the steps before and behind it, and its condition."""
+
+    body: int
+    site: int
+    steps: tuple[tuple[str, bool, int, tuple[tuple[str, str, str], ...]], ...]
+    transitions: tuple[tuple[int, str, int, tuple[int, ...], tuple[int, ...], str], ...]
+
+
+@dataclass(frozen=True)
 class Image:
     """A compiled program."""
 
@@ -147,6 +162,7 @@ class Image:
     """Derived types and blocks by folded name."""
     objects: Objects = field(default_factory=Objects)
     rungs: tuple[RungPicture, ...] = ()
+    charts: tuple[SfcPicture, ...] = ()
 
     @cached_property
     def fingerprint(self) -> str:

@@ -15,6 +15,7 @@ from fbvm.code.functions import FUNCTIONS
 from fbvm.code.image import Body, RungPicture
 from fbvm.code.loops import LoopLowering
 from fbvm.code.operations import Block, Node
+from fbvm.code.pictures import sfc_picture
 from fbvm.code.places import Place, Places, detail
 from fbvm.code.pointers import PointerLowering
 from fbvm.code.pou_calls import CallLowering
@@ -334,6 +335,8 @@ class BodyLowering:
         self.block_into(node.body)
 
     def _sfc(self, node: sfc.Sfc, site: int) -> None:
+        self.program.charts.append(sfc_picture(node, self.pou, self.site))
+        self.out.append(("observe", "statement", self.program.charts[-1].site, None))
         self.block_into(node.body)
 
     def _return(self, node: tree.Return, site: int) -> None:

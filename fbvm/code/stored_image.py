@@ -26,7 +26,7 @@ from fbvm.base.types import (
     Type,
     string,
 )
-from fbvm.code.image import Body, Image, Layout, Objects, ProgramRun, Retained, RungPicture, Site, TaskRow
+from fbvm.code.image import Body, Image, Layout, Objects, ProgramRun, Retained, RungPicture, SfcPicture, Site, TaskRow
 from fbvm.code.operations import Block
 
 
@@ -45,6 +45,7 @@ def encode(image: Image) -> bytes:
         "sites": [astuple(site) for site in image.sites],
         "objects": astuple(image.objects),
         "rungs": [astuple(rung) for rung in image.rungs],
+        "charts": [astuple(chart) for chart in image.charts],
         "derived": [[name, types.number(kind)] for name, kind in image.types.items()],
     }
     return _dump({**document, "types": types.rows}).encode("utf-8", "surrogatepass")
@@ -67,6 +68,7 @@ def decode(content: bytes) -> Image:
         {name: types.type(number) for name, number in stored["derived"]},
         Objects(*_tuples(stored["objects"])),
         tuple(RungPicture(*row) for row in _tuples(stored["rungs"])),
+        tuple(SfcPicture(*row) for row in _tuples(stored["charts"])),
     )
     vars(image)["fingerprint"] = stored["fingerprint"]
     return image

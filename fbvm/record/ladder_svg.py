@@ -1,14 +1,16 @@
-"""Ladder as SVG: the same drawing as the one of characters, its lines drawn as lines, power in colour."""
+"""Rungs and charts as SVG: the same drawing as the one of characters, its lines drawn as lines, power in colour."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from xml.sax.saxutils import escape
 
-from fbvm.syntax.box_lines import DOWN, LEFT, RIGHT, THICK, Surface
+from fbvm.syntax.box_lines import DOUBLE, DOWN, LEFT, RIGHT, THICK, UP, Surface
 
 CELL_WIDTH, CELL_HEIGHT = 9, 18
 """Pixels of a character."""
+APART = 2.0
+"""Pixels from the middle of a double line to its halves."""
 _STYLE = """
     text { font: 14px ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace; fill: #1f2430; white-space: pre; }
     text.head { font-weight: bold; }
@@ -19,7 +21,11 @@ _STYLE = """
         text { fill: #e5e7eb; } path { stroke: #9ca3af; } path.power { stroke: #34d26b; } rect { fill: #16181d; }
     }
 """
-_ENDS = {LEFT: (-0.5, 0.0), RIGHT: (0.5, 0.0), DOWN: (0.0, 0.5)}
+_ENDS = {LEFT: (-0.5, 0.0), RIGHT: (0.5, 0.0), DOWN: (0.0, 0.5), UP: (0.0, -0.5)}
+_TURNS = {**dict.fromkeys((LEFT, RIGHT), ((UP, -1), (DOWN, 1))), **dict.fromkeys((UP, DOWN), ((LEFT, -1), (RIGHT, 1)))}
+"""The ways that turn off a way, and on which side."""
+_OPPOSITE = {LEFT: RIGHT, RIGHT: LEFT, UP: DOWN, DOWN: UP}
+SINGLE = ((0.0, 0.0),)
 Drawn = tuple[str, Surface]
 """The headline of a rung and its drawing."""
 
@@ -44,13 +50,32 @@ def _lines(surface: Surface, row: int) -> list[str]:
     """One path for all lines without power and one for those with it; each way out of a cell is half a cell long."""
     found: dict[bool, list[str]] = {False: [], True: []}
     for (x, y), weights in surface.lines.items():
-        covered = (x, y) in surface.texts
+        if (x, y) in surface.texts:
+            continue
         for way, weight in enumerate(weights):
-            if weight and not covered:
-                dx, dy = _ENDS.get(way, (0.0, -0.5))
-                found[weight == THICK].append(f"M{_across(x)} {_down(y + row)}L{_across(x + dx)} {_down(y + row + dy)}")
+            if weight:
+                halves = _halves(way, weights) if weight == DOUBLE else SINGLE
+                found[weight == THICK] += (_line(x, y + row, way, *half) for half in halves)
     return [f'<path{" class=" + chr(34) + "power" + chr(34) if power else ""} d="{"".join(pieces)}"/>'
             for power, pieces in found.items() if pieces]
+
+
+def _halves(way: int, weights: Sequence[int]) -> tuple[tuple[float, float], ...]:
+    """The two lines of a double one: how far each lies beside the middle, and how far from it it begins.  At a corner the
+    inner one begins later and the outer one earlier."""
+    across = [(other, sign) for other, sign in _TURNS[way] if weights[other] == DOUBLE]
+    if len(across) != 1 or weights[_OPPOSITE[way]]:
+        return (-APART, 0.0), (APART, 0.0)
+    turn = across[0][1]
+    return (turn * APART, APART), (-turn * APART, -APART)
+
+
+def _line(x: int, y: int, way: int, beside: float, start: float) -> str:
+    dx, dy = _ENDS[way]
+    right, down = (0.0, beside) if dx else (beside, 0.0)
+    begin_x, begin_y = 2 * dx * start, 2 * dy * start
+    first = f"M{_pixels(x, CELL_WIDTH, right + begin_x)} {_pixels(y, CELL_HEIGHT, down + begin_y)}"
+    return f"{first}L{_pixels(x + dx, CELL_WIDTH, right)} {_pixels(y + dy, CELL_HEIGHT, down)}"
 
 
 def _texts(surface: Surface, row: int) -> list[str]:
@@ -74,8 +99,13 @@ def _text(x: int, y: int, text: str, kind: str = "") -> str:
 
 
 def _across(x: float) -> str:
-    return f"{(x + 0.5) * CELL_WIDTH:g}"
+    return _pixels(x, CELL_WIDTH)
 
 
 def _down(y: float) -> str:
-    return f"{(y + 0.5) * CELL_HEIGHT:g}"
+    return _pixels(y, CELL_HEIGHT)
+
+
+def _pixels(place: float, size: int, more: float = 0.0) -> str:
+    """Where the middle of a cell lies."""
+    return f"{(place + 0.5) * size + more:g}"

@@ -7,8 +7,8 @@ from functools import cache
 
 LEFT, RIGHT, UP, DOWN = range(4)
 _WAYS = {"LEFT": (LEFT,), "RIGHT": (RIGHT,), "UP": (UP,), "DOWN": (DOWN,), "HORIZONTAL": (LEFT, RIGHT), "VERTICAL": (UP, DOWN)}
-THIN, THICK = 1, 2
-_WEIGHTS = {"LIGHT": THIN, "HEAVY": THICK}
+THIN, THICK, DOUBLE = 1, 2, 3
+_WEIGHTS = {"LIGHT": THIN, "SINGLE": THIN, "HEAVY": THICK, "DOUBLE": DOUBLE}
 
 
 @cache
@@ -50,21 +50,23 @@ class Surface:
         self.lines: dict[tuple[int, int], list[int]] = {}
         self.texts: dict[tuple[int, int], str] = {}
 
-    def _leave(self, x: int, y: int, way: int, thick: bool) -> None:
+    def _leave(self, x: int, y: int, way: int, weight: int) -> None:
         cell = self.lines.setdefault((x, y), [0, 0, 0, 0])
-        cell[way] = max(cell[way], THICK if thick else THIN)
+        cell[way] = max(cell[way], weight)
 
-    def across(self, x: int, until: int, y: int, thick: bool = False) -> None:
+    def across(self, x: int, until: int, y: int, thick: bool = False, double: bool = False) -> None:
         """A line from the middle of one cell to that of another in its row."""
+        weight = DOUBLE if double else THICK if thick else THIN
         for at in range(x, until):
-            self._leave(at, y, RIGHT, thick)
-            self._leave(at + 1, y, LEFT, thick)
+            self._leave(at, y, RIGHT, weight)
+            self._leave(at + 1, y, LEFT, weight)
 
-    def down(self, x: int, y: int, until: int, thick: bool = False) -> None:
+    def down(self, x: int, y: int, until: int, thick: bool = False, double: bool = False) -> None:
         """A line from the middle of one cell to that of another in its column."""
+        weight = DOUBLE if double else THICK if thick else THIN
         for at in range(y, until):
-            self._leave(x, at, DOWN, thick)
-            self._leave(x, at + 1, UP, thick)
+            self._leave(x, at, DOWN, weight)
+            self._leave(x, at + 1, UP, weight)
 
     def write(self, x: int, y: int, text: str) -> None:
         """Text over whatever is there."""
@@ -77,9 +79,16 @@ class Surface:
 
     def rows(self) -> list[str]:
         """What was drawn, spaces at the ends left out."""
-        cells = {place: _characters()[(a, b, c, d)] for place, (a, b, c, d) in self.lines.items()} | self.texts
+        cells = {place: _character(ways) for place, ways in self.lines.items()} | self.texts
         if not cells:
             return []
         depth = max(y for _, y in cells) + 1
         width = max(x for x, _ in cells) + 1
         return ["".join(cells.get((x, y), " ") for x in range(width)).rstrip() for y in range(depth)]
+
+
+def _character(ways: list[int]) -> str:
+    """The character of a cell.  Where a double line meets a thick one there is none, and the thick one is drawn thin; nor
+    is there one for the end of a double line."""
+    a, b, c, d = (THIN if way == THICK and DOUBLE in ways else way for way in ways)
+    return _characters().get((a, b, c, d), "═")

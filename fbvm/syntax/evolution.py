@@ -68,7 +68,7 @@ class Evolution:
     # --- steps and transitions --------------------------------------------------------------------------------------
 
     def _begun_or_evolved(self) -> Statement:
-        begun = self._keep("chart begun", "BOOL")
+        begun = self._keep("$chart begun", "BOOL")
         evolved = (*map(self._time, self.steps), *self._tested())
         first = (self._set(begun, True), *(self._set(self._entered(s), True) for s in self.steps if s.initial))
         return self._if(begun, evolved, first)
@@ -207,16 +207,16 @@ class Evolution:
         return self._name(name)
 
     def _since(self, step: Step) -> NameRef:
-        return self._keep(f"{step.name.text} since", "TIME")
+        return self._keep(f"${step.name.text} since", "TIME")
 
     def _entered(self, step: Step) -> NameRef:
-        return self._temporary(f"{step.name.text} entered")
+        return self._temporary(f"${step.name.text} entered")
 
     def _left(self, step: Step) -> NameRef:
-        return self._temporary(f"{step.name.text} left")
+        return self._temporary(f"${step.name.text} left")
 
     def _control(self, action: Name) -> NameRef:
-        return self._keep(f"{self.shown.setdefault(fold(action.text), action.text)} control", CONTROL)
+        return self._keep(f"${self.shown.setdefault(fold(action.text), action.text)} control", CONTROL)
 
     # --- statements and expressions ---------------------------------------------------------------------------------
 

@@ -59,7 +59,8 @@ def _check(plc: Plc, model: Model, scan: int) -> None:
         assert plc.read(f"Main.{name}_f") == model.finals.get(name, 0), f"final scans of {name} in {where}"
 
 
-@settings(deadline=None, max_examples=60)
+@pytest.mark.slow
+@settings(deadline=None, max_examples=150)
 @given(random=st.randoms(use_true_random=False), dialect=st.sampled_from(("standard", "matiec")))
 def test_charts_do_what_the_model_does(random: Random, dialect: str) -> None:
     chart = random_chart(random)

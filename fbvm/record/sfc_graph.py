@@ -1,0 +1,117 @@
+"""The order in which a chart is drawn: what stands below what, and which links are jumps.
+
+Steps and transitions are the nodes.  A link that leads back, or to a step that is drawn somewhere else, is a jump.  Of
+all others, a node with several of them in front of it, where ways meet again, stands below the node at which these ways
+have parted: its immediate dominator.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fbvm.code.image import SfcPicture
+
+
+@dataclass(frozen=True)
+class Node:
+    """A step or a transition by its number."""
+
+    is_step: bool
+    number: int
+
+
+class Graph:
+    """The links of a chart.  Steps in `apart` are drawn by themselves: links to them are jumps."""
+
+    def __init__(self, picture: SfcPicture, apart: frozenset[int] = frozenset()) -> None:
+        self.picture = picture
+        self.apart = apart
+        self.following: dict[Node, list[Node]] = {}
+        """What stands behind a node, jumps included, those transitions first that go first."""
+        order = sorted(range(len(picture.transitions)), key=lambda n: (not picture.transitions[n][2], picture.transitions[n][2]))
+        for number in range(len(picture.steps)):
+            self.following[Node(True, number)] = [Node(False, n) for n in order if number in picture.transitions[n][3]]
+        for number, (_, _, _, _, targets, _) in enumerate(picture.transitions):
+            self.following[Node(False, number)] = [Node(True, step) for step in targets]
+        self.roots: list[Node] = []
+        self.order: list[Node] = []
+        """All nodes, each behind those in front of it."""
+        self._back: set[tuple[Node, Node]] = set()
+        self._walk()
+        self.before: dict[Node, list[Node]] = {node: [] for node in self.order}
+        for node in self.order:
+            for follower in self.following[node]:
+                if not self.is_jump(node, follower):
+                    self.before[follower].append(node)
+        self.met = {follower for node, follower in self._back if node.is_step}
+        """Transitions to which a jump leads."""
+        self.above: dict[Node, Node | None] = {}
+        self._dominate()
+
+    def is_jump(self, node: Node, follower: Node) -> bool:
+        """Whether a link is drawn as a jump: it leads back, or to what is drawn apart."""
+        return (node, follower) in self._back or follower.is_step and follower.number in self.apart
+
+    def _walk(self) -> None:
+        """Order the nodes: initial steps are roots, then what is drawn apart, then what nothing leads to."""
+        steps = self.picture.steps
+        begins = [n for n, step in enumerate(steps) if step[1]]
+        others = [n for n in range(len(steps)) if n not in begins]
+        done: set[Node] = set()
+        left: list[list[Node]] = []
+        for number in [*begins, *(n for n in others if n in self.apart), *others]:
+            root = Node(True, number)
+            if root not in done:
+                self.roots.append(root)
+                left.append(self._from(root, done))
+        self.order = [node for part in left for node in part]
+
+    def _from(self, root: Node, done: set[Node]) -> list[Node]:
+        """What can be reached from a root, in an order; links to nodes that are still open lead back."""
+        open_: set[Node] = {root}
+        path = [(root, iter(self.following[root]))]
+        finished: list[Node] = []
+        while path:
+            node, followers = path[-1]
+            for follower in followers:
+                if follower.is_step and follower.number in self.apart:
+                    continue
+                if follower in open_:
+                    self._back.add((node, follower))
+                elif follower not in done:
+                    open_.add(follower)
+                    path.append((follower, iter(self.following[follower])))
+                    break
+            else:
+                path.pop()
+                open_.discard(node)
+                if node not in done:
+                    done.add(node)
+                    finished.append(node)
+        for node in finished:
+            for follower in self.following[node]:
+                if follower in done and follower not in finished and follower not in open_:
+                    self._back.add((node, follower))
+        return finished[::-1]
+
+    def _dominate(self) -> None:
+        """For each node the last one through which all ways from its root lead."""
+        depth: dict[Node, int] = {}
+        for node in self.order:
+            fathers = self.before[node]
+            above: Node | None = fathers[0] if fathers else None
+            for father in fathers[1:]:
+                other: Node | None = father
+                while above != other:
+                    if above is None or other is None:
+                        above = other = None
+                    elif depth[above] >= depth[other]:
+                        above = self.above[above]
+                    else:
+                        other = self.above[other]
+            self.above[node] = above
+            depth[node] = depth[above] + 1 if above is not None else 0
+
+    def below(self, node: Node) -> list[Node]:
+        """Nodes where ways meet again that have parted at a node, in order."""
+        return [other for other in self.order if self.above[other] == node and len(self.before[other]) > 1]
