@@ -216,6 +216,22 @@ class Features(Values):
         index = self.value("INT", 1) if self.one_in(3) else ("literal", "INT", int(array[1].split()[self.pick((1, 2))]))
         return self.said("open", self.pick(targets), pou.name, array, index)
 
+    def of_anything(self, name: str) -> Pou:
+        """A function block that looks at bytes of any variable."""
+        rows = (Variable("VAR_IN_OUT", "x", "ANY", "ANY"), Variable("VAR_INPUT", "p0", "DINT", "DINT"),
+                Variable("VAR_INPUT", "p1", "BYTE", "BYTE"), Variable("VAR_OUTPUT", "q0", "DINT", "DINT"),
+                Variable("VAR_OUTPUT", "q1", "BYTE", "BYTE"))
+        return Pou("FUNCTION_BLOCK", name, "", rows, (self.said("any"),))
+
+    def whole(self) -> list[Node]:
+        raise NotImplementedError
+
+    def anything(self) -> Node | None:
+        """A variable of numbers, or an array of them."""
+        found = [place for place in self.whole() if place[0] == "name" and place[1].split()[-1] in (*INTEGERS, *DURATIONS)
+                 and place[1].partition(" ")[0] in ("ARRAY", place[1])]
+        return self.pick(found) if found else None
+
     def ladder(self, name: str) -> Pou:
         """A function block of rungs."""
         rows = [Variable("VAR_INPUT", f"p{n}", "BOOL", "BOOL") for n in range(3)]
@@ -255,4 +271,6 @@ class Features(Values):
             return "literal", "TIME", self.pick(PRESETS_NS)
         if row.name == "PV":
             return "literal", "INT", self.pick((0, 1, 2, 3, -1, 32767))
+        if row.kind == "DINT" and self.one_in(2):
+            return "literal", "DINT", self.random.randrange(9)
         return self.fitting(row.kind.split()[0], 2)

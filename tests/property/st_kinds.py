@@ -21,6 +21,8 @@ NUMBERS = INTEGERS + BIT_STRINGS + REALS
 COMMON = ("BOOL", *NUMBERS, "TIME", "STRING")
 RARE = ("LTIME", *DATES, *CHARACTERS, "WSTRING")
 ELEMENTARY = COMMON + RARE
+MEMBERS = {0: "Red", 5: "Green", 6: "Blue"}
+"""Of the enumeration E0."""
 DAY_NS = 86_400 * 10**9
 
 WIDER = {"SINT": ("INT", "DINT", "LINT", "REAL", "LREAL"), "INT": ("DINT", "LINT", "REAL", "LREAL"), "DINT": ("LINT", "LREAL"),
@@ -50,7 +52,7 @@ def limits(kind: str) -> tuple[int, int]:
 class Variable:
     """A declaration: section, name, type as written and its type here, initial value or None, where it is located.
 
-    A location is (area, byte, bit): bit None for what fills bytes."""
+    A location is (area, byte, bit): bit None for what fills bytes; a span is that of a subrange."""
 
     section: str
     name: str
@@ -58,6 +60,7 @@ class Variable:
     kind: str
     initial: Any = None
     at: tuple[str, int, int | None] | None = None
+    span: tuple[int, int] | None = None
 
 
 @dataclass(frozen=True)

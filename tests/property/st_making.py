@@ -52,6 +52,8 @@ class Maker(Features):
             self.pous.append(self.open_function("Whole"))
         if self.one_in(3):
             self.pous.append(self.ladder("L0"))
+        if self.one_in(3):
+            self.pous.append(self.of_anything("Any0"))
         for number in range(self.random.randrange(3)):
             self.pou("FUNCTION_BLOCK", f"B{number}", "")
         self.pou("PROGRAM", "Main", "")
@@ -66,7 +68,7 @@ class Maker(Features):
         shared = self.globals if kind != "FUNCTION" else ()
         self.places = [place for row in (*rows, *shared) for place in self.parts(("name", row.kind, row.name))]
         self.located = {row.name for row in rows if row.at}
-        written = [row for row in (*rows, *shared) if row.section != "VAR_INPUT" and not row.name.startswith(("i", "k", "j"))]
+        written = [row for row in (*rows, *shared) if row.section != "VAR_INPUT" and row.name[0] not in "ikjuc"]
         self.writable = [place for row in written for place in self.parts(("name", row.kind, row.name))]
         self.counters = [row.name for row in rows if row.name.startswith("i")]
         self.actions = ()
@@ -116,7 +118,10 @@ class Maker(Features):
         rows += [Variable("VAR", f"{pou.name.lower()}{n}", pou.name, pou.name)
                  for pou in self.pous if pou.kind == "FUNCTION_BLOCK" for n in range(2)]
         rows += [Variable("VAR", f"n{n}", name, name) for n, name in enumerate(self.random.sample(sorted(STANDARD), 2))]
+        rows += [Variable("VAR", f"e{n}", "E0", "E0") for n in range(2)]
+        rows.append(Variable("VAR", "u0", "INT(-5..20)", "INT", None, None, (-5, 20)))
         if kind == "PROGRAM":
+            rows += self.rows_of_many()
             rows += [self.variable("VAR_TEMP", "t0", self.kind()), *self.references(rows), *self.located_variables()]
         return rows
 
@@ -157,6 +162,9 @@ class Maker(Features):
                 continue
             elif sort == "ARRAY" and plain(place[1].split(" ", 3)[3]) == kind:
                 found.append(lambda place=place: self.element(place))  # type: ignore[misc]
+            elif sort == "ARRAY":
+                found += [lambda place=place, row=row: ("member", here(row[1]), self.element(place), row[0])  # type: ignore[misc]
+                          for row in self.members(place[1].split(" ", 3)[3]) if plain(row[1]) == kind]
             elif sort in ("REF", "PTR", "REFERENCE") and inner == kind and self.risky(1):
                 found.append(lambda place=place, sort=sort: self.behind(place, sort))  # type: ignore[misc]
             elif kind in PARTS and sort in PARTED and BITS[sort] > BITS[kind] and self.one_in(4):
@@ -164,10 +172,27 @@ class Maker(Features):
                     "part", kind, place, self.random.randrange(BITS[sort] // BITS[kind])))
         return self.random.choice(found)() if found else None
 
+    def members(self, kind: str) -> Iterable[tuple[str, str]]:
+        """Members of a structure, or outputs of a block, with their types."""
+        pou = self.block_of(kind)
+        outputs = [(row.name, row.kind) for row in pou.variables if row.section == "VAR_OUTPUT"] if pou else []
+        return self.structs.get(kind, outputs)
+
+    def rows_of_many(self) -> list[Variable]:
+        """Arrays of structures and of instances."""
+        kinds = [f"ARRAY 0 {self.random.randrange(3)} {self.pick(names)}" for names in (
+            [name for name in self.structs if name[0] == "S"],
+            [*(pou.name for pou in self.pous if pou.kind == "FUNCTION_BLOCK"), "TON", "CTU"]) if names]
+        return [Variable("VAR", f"{'c' if self.block_of(kind.split()[3]) else 'o'}0", array_text(kind), kind) for kind in kinds]
+
+    def unknown(self) -> Node:
+        """A number that no compiler can tell."""
+        return "binary", "INT", "+", ("get", "INT", ("name", "INT", "k0")), self.value("INT", 1)
+
     def element(self, array: Node) -> Node:
         _, low, high, kind = array[1].split(" ", 3)
         if self.risky(6):
-            index: Node = ("widen", "INT", self.value("SINT", 1)) if self.one_in(2) else self.value("INT", 1)
+            index: Node = self.unknown()
         else:
             count = int(high) - int(low) + 1
             rest = ("binary", "INT", "MOD", self.value("INT", 1), ("literal", "INT", count))
@@ -216,6 +241,13 @@ class Maker(Features):
         return self.block(self.random.randrange(1, 4), depth - 1, loop)
 
     def assignment(self) -> Node:
+        if self.one_in(12):
+            named = next((place for place in self.writable if place[1] == "E0"), None)
+            if named and self.one_in(2):
+                return self.said("assign", named, self.enumerated(2))
+            if self.traps and named:
+                self.risks = 0
+                return self.said("range", ("name", "INT", "u0"), ("binary", "INT", "MOD", self.unknown(), ("literal", "INT", 30)))
         risks, self.risks = self.risks, 0
         if risks and self.one_in(3):
             self.risks, risks = 1, 0
@@ -236,7 +268,10 @@ class Maker(Features):
             if last - first > 2 and self.one_in(3):
                 labels = (first, first), (last - 1, last - 1)
             rows.append((labels, self.inner(depth, loop)))
-        return self.said("case", self.value(kind, 3), tuple(rows), self.pick(((), self.inner(depth, loop))))
+        chosen = self.value(kind, 3)
+        if chosen[0] == "get":  # of a subrange all labels would have to lie in it
+            chosen = "binary", kind, "+", chosen, ("literal", kind, 0)
+        return self.said("case", chosen, tuple(rows), self.pick(((), self.inner(depth, loop))))
 
     def counted(self, depth: int) -> Node:
         """FOR over a variable that nothing else writes."""
@@ -274,11 +309,12 @@ class Maker(Features):
 
     def block_call(self) -> Node | None:
         """A call of an instance, some inputs left out, some outputs taken."""
+        self.risks = 0  # no rule says whether an input is stored before the next one traps
         instances = {place[2] for place in self.places if place[0] == "member" and self.block_of(place[2][1])}
+        rows = [place for place in self.places if place[1].startswith("ARRAY") and self.block_of(place[1].split(" ", 3)[3])]
         if not instances:
             return None
-        instance = self.pick(sorted(instances))
-        self.risks = 0  # no rule says whether an input is stored before the next one traps
+        instance = self.element(self.pick(rows)) if rows and self.one_in(4) else self.pick(sorted(instances))
         pou = self.block_of(instance[1])
         assert pou
         inputs: list[tuple[str, Node]] = []
@@ -287,10 +323,10 @@ class Maker(Features):
             if row.section == "VAR_INPUT" and not self.one_in(4):
                 inputs.append((row.name, self.pin(row)))
             if row.section == "VAR_IN_OUT":
-                place = self.place(row.kind, self.whole(), whole=True)
+                place = self.place(row.kind, self.whole(), whole=True) if row.kind != "ANY" else self.anything()
                 if place is None:
                     return None
-                inputs.append((row.name, ("at", row.kind, place)))
+                inputs.append((row.name, ("at", place[1], place)))
             if row.section == "VAR_OUTPUT" and self.one_in(2):
                 self.risks = 0
                 place = self.target(plain(row.kind))

@@ -8,9 +8,9 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any
 
-from st_kinds import BITS, CHARACTERS, GENERIC, REALS, STANDARD, TEXTS, Node, Pou, Program, Task, Variable, limits
+from st_kinds import BITS, CHARACTERS, GENERIC, MEMBERS, REALS, STANDARD, TEXTS, Node, Pou, Program, Task, Variable, limits
 from st_oracle_blocks import BLOCKS, Rungs
-from st_oracle_places import Part, Place, Pointer, Shared, SharedRow, Temporaries, Union
+from st_oracle_places import Part, Place, Pointer, Shared, SharedRow, Temporaries, Union, reach_byte
 from st_oracle_values import (
     COMPARED,
     Trapped,
@@ -85,6 +85,8 @@ class Oracle:
         return {row.name: self._first(row) for row in rows}
 
     def _first(self, row: Variable) -> Any:
+        if row.span:
+            return row.span[0]
         if row.initial is None:
             return self._made(row.kind)
         return rounded(row.kind, row.initial) if row.kind in REALS else row.initial
@@ -172,6 +174,13 @@ class Oracle:
         place = self._place(target, frame)
         self._store(place, target[1], self._value(node, frame))
 
+    def _do_range(self, frame: Any, number: int, target: Node, node: Node) -> None:
+        place, value = self._place(target, frame), self._value(node, frame)
+        low, high = next(row.span for row in frame[2].variables if row.name == target[2])
+        if not low <= value <= high:
+            raise Trapped("R0103")
+        place[0][place[1]] = value
+
     def _store(self, place: Place, kind: str, value: Any) -> None:
         if kind.startswith(TEXTS):
             value = value[:int(kind.split()[1])]
@@ -199,6 +208,8 @@ class Oracle:
         for name, node in inputs:
             if node[0] == "at":
                 passed[name] = self._place(node[2], frame)
+                if kinds[name] == "ANY":
+                    passed["kind"] = {"": node[1]}, ""
             else:
                 self._store((inside, name), kinds[name], self._value(node, frame))
         if pou.name in STANDARD:
@@ -224,6 +235,11 @@ class Oracle:
 
     def _do_label(self, frame: Any, number: int, name: str) -> None:
         """Nothing."""
+
+    def _do_any(self, frame: Any, number: int) -> None:
+        variables, places, _ = frame
+        variables["q0"], was = reach_byte(places["x"], places["kind"][0][""], variables["p0"], variables["p1"])
+        variables["q1"] = variables["q1"] if was is None else was
 
     def _do_ladder(self, frame: Any, number: int, steps: Any) -> None:
         Rungs(frame[0]).run(steps)
@@ -356,6 +372,14 @@ class Oracle:
         low = frame[1]["low"][0][""]
         holder, key = frame[1][name]
         return low if side == "LOWER" else low + len(holder[key]) - 1
+
+    def _of_named(self, frame: Any, kind: str, node: Node) -> Any:
+        number = self._value(node, frame)
+        return MEMBERS[number] if kind in TEXTS else number
+
+    def _of_enabled(self, frame: Any, kind: str, name: str, operands: tuple[Node, ...]) -> Any:
+        enable, *values = [self._value(operand, frame) for operand in operands]
+        return self._called(self._pous[name], values, {}) if enable else default(kind)
 
     def _of_unary(self, frame: Any, kind: str, sign: str, node: Node) -> Any:
         value = self._value(node, frame)

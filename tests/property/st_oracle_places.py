@@ -126,3 +126,17 @@ class Pointer:
         if isinstance(self.holder, list):
             return (self.holder, self.key + steps) if 0 <= self.key + steps < len(self.holder) else None
         return (self.holder, self.key) if steps == 0 else None
+
+
+def reach_byte(place: Place, kind: str, number: int, byte: int) -> tuple[int, int | None]:
+    """Size of a number or an array of numbers in bytes; and one of the bytes, which is replaced, if there is that many."""
+    element = kind.split()[-1]
+    each = BITS[element] // 8
+    holder, key = (place[0][place[1]], number // each) if kind.startswith("ARRAY") else place
+    size = each * (len(holder) if kind.startswith("ARRAY") else 1)
+    if not 0 <= number < size:
+        return size, None
+    part = Part((holder, key), element, 8 * (number % each), 8)
+    was = part[""]
+    part[""] = byte
+    return size, was

@@ -22,7 +22,7 @@ from st_oracle_values import Trapped
 from st_shrinking import smallest
 from st_text import text_of
 
-from fbvm.base.types import RefType, StructType, base
+from fbvm.base.types import ArrayType, RefType, StructType, base
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.engine import native
@@ -134,6 +134,9 @@ def _values(variables: dict[Any, Any], plc: Plc, path: str) -> Iterator[tuple[st
         kind = base(place.type)
         if isinstance(kind, StructType) and kind.block:
             yield from _values(wanted, plc, where)
+        elif isinstance(kind, ArrayType) and isinstance(base(kind.element), StructType) and base(kind.element).block:
+            for number, one in enumerate(wanted):
+                yield from _values(one, plc, f"{where}[{number}]")
         elif not isinstance(kind, RefType) and not isinstance(wanted, Pointer) and wanted is not None:
             yield where, wanted, plc.read(place)
 

@@ -60,7 +60,8 @@ def _is_statement(item: Any) -> bool:
 
 def _is_value(item: Any) -> bool:
     return isinstance(item, tuple) and len(item) > 2 and item[0] in (
-        "get", "widen", "convert", "truncate", "bcd", "to_bcd", "binary", "compare", "unary", "call", "user", "moved", "apart")
+        "get", "widen", "convert", "truncate", "bcd", "to_bcd",
+        "binary", "compare", "unary", "call", "user", "enabled", "named", "moved", "apart")
 
 
 def _smaller_blocks(block: tuple[Node, ...]) -> Iterator[tuple[Node, ...]]:

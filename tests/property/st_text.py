@@ -6,7 +6,23 @@ from collections.abc import Callable, Sequence
 from datetime import date, timedelta
 from typing import Any
 
-from st_kinds import BITS, DATES, DAY_NS, DAYS, DAYTIMES, DURATIONS, LEVEL, PARTS, REALS, Node, Pou, Program, Task, Variable
+from st_kinds import (
+    BITS,
+    DATES,
+    DAY_NS,
+    DAYS,
+    DAYTIMES,
+    DURATIONS,
+    LEVEL,
+    MEMBERS,
+    PARTS,
+    REALS,
+    Node,
+    Pou,
+    Program,
+    Task,
+    Variable,
+)
 
 Lines = dict[tuple[int, int], int]
 """The line of each statement by its number, and by the number of the part of it that stands on a line of its own."""
@@ -20,6 +36,8 @@ def text_of(program: Program) -> tuple[str, Lines]:
         rows = " ".join(f"{member} : {kind};" for member, kind in members)
         word = "UNION" if name[0] == "U" else "STRUCT"
         out.append(f"TYPE {name} : {word} {rows} END_{word}; END_TYPE")
+    if "'E0'" in repr(program.pous):
+        out.append("TYPE E0 : (" + ", ".join(f"{name} := {number}" for number, name in MEMBERS.items()) + "); END_TYPE")
     _section("VAR_GLOBAL", program.variables, out)
     for pou in program.pous:
         _pou(pou, out, lines)
@@ -85,12 +103,15 @@ def _statement(statement: Node, depth: int, out: list[str], lines: Lines) -> Non
     def inner(block: tuple[Node, ...]) -> None:
         _block(block, depth + 1, out, lines)
 
-    if kind == "assign":
+    if kind in ("assign", "range"):
         say(f"{place(operands[0])} := {value(operands[1])};")
     elif kind == "copy":
         say(f"{place(operands[0])} := {place(operands[1])};")
     elif kind in SIMPLE:
         say(SIMPLE[kind](*operands))
+    elif kind == "any":
+        say("q0 := x.diSize;")
+        out.append("  IF p0 >= 0 AND p0 <= UPPER_BOUND(x.BYTES, 1) THEN q1 := x.BYTES[p0]; x.BYTES[p0] := p1; END_IF;")
     elif kind == "ladder":
         say("LADDER")
         for mnemonic, operand in operands[0]:
@@ -195,6 +216,11 @@ def _value(node: Node) -> tuple[str, float]:
     if what in ("moved", "apart"):
         sign, left, right = node[2:] if what == "moved" else ("-", *node[2:])
         return f"{_at_least(left, 5)} {sign} {_at_least(right, 5.25)}", 5
+    if what == "named":
+        return f"TO_{kind}({value(node[2])})", 9
+    if what == "enabled":
+        pins = ", ".join(f"{'EN' if n == 0 else f'p{n - 1}'} := {value(operand)}" for n, operand in enumerate(node[3]))
+        return f"{node[2]}({pins})", 9
     if what == "bound":
         return f"{node[2]}_BOUND({node[3]}, 1)", 9
     return f"{node[2]}({', '.join(value(operand) for operand in node[3])})", 9
@@ -216,6 +242,8 @@ def _at_least(node: Node, level: float) -> str:
 def literal(kind: str, number: Any) -> str:
     if kind == "BOOL":
         return "TRUE" if number else "FALSE"
+    if kind == "E0":
+        return f"E0#{MEMBERS[number]}"
     if kind in ("STRING", "CHAR", "WSTRING", "WCHAR"):
         quote, width = ('"', 4) if kind[0] == "W" else ("'", 2)
         inside = "".join(f"${c}" if c in ("$", quote) else c if " " <= c <= "~" else f"${ord(c):0{width}X}" for c in number)

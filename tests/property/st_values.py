@@ -20,6 +20,7 @@ from st_kinds import (
     GENERIC,
     INTEGERS,
     MATH,
+    MEMBERS,
     MOMENTS,
     NUMBERS,
     RARE,
@@ -80,6 +81,8 @@ class Values:
     def literal(self, kind: str) -> Node:
         if kind == "BOOL":
             return "literal", kind, self.one_in(2)
+        if kind == "E0":
+            return "literal", kind, self.pick(MEMBERS)
         if kind in TEXTS:
             return "literal", kind, self.pick((*TEXT_LITERALS, *(("\u20ac1",) if kind == "WSTRING" else ())))
         if kind in CHARACTERS:
@@ -122,8 +125,10 @@ class Values:
         if functions and self.one_in(3):
             pou = self.pick(functions)
             taken = [row for row in pou.variables if row.section == "VAR_INPUT"]
-            return "user", kind, pou.name, tuple(
-                self.value(kind if row.kind in GENERIC else plain(row.kind), depth - 2) for row in taken)
+            operands = tuple(self.value(kind if row.kind in GENERIC else plain(row.kind), depth - 2) for row in taken)
+            if pou.result not in GENERIC and self.one_in(4):
+                return "enabled", kind, pou.name, (self.value("BOOL", 1), *operands)
+            return "user", kind, pou.name, operands
         return self.made(kind, depth - 1)
 
     def made(self, kind: str, d: int) -> Node:
@@ -152,6 +157,15 @@ class Values:
         index: Node = ("call", "INT", "ABS", (("binary", "INT", "MOD", self.value("INT", d), ("literal", "INT", 3)),))
         return "call", kind, "MUX", (self.value("INT", d) if self.risky(4) else index, *choices)
 
+    def enumerated(self, d: int) -> Node:
+        """A value of the enumeration."""
+        place = self.place("E0", self.places)
+        if place is None or self.one_in(3):
+            return self.literal("E0")
+        if d > 0 and self.one_in(2):
+            return "call", "E0", "SEL", (self.value("BOOL", d), self.enumerated(d - 1), self.enumerated(d - 1))
+        return "get", "E0", place
+
     # --- numbers
 
     def number(self, kind: str, d: int) -> Node:
@@ -159,7 +173,7 @@ class Values:
         if what == 12 and (read := self.numeral(kind)):
             return read
         if what == 13:
-            return self.of_times(kind, d)
+            return ("named", kind, self.enumerated(d)) if kind == "INT" and self.one_in(2) else self.of_times(kind, d)
         if kind in BIT_STRINGS:
             return self.bits(kind, d)
         if what < 4:
@@ -234,7 +248,9 @@ class Values:
         return self.converted(kind, (*INTEGERS, "BOOL", *REALS), d)
 
     def truth(self, d: int) -> Node:
-        v, what = self.value, self.random.randrange(9)
+        v, what = self.value, self.random.randrange(10)
+        if what == 9:
+            return "compare", "BOOL", self.pick(("=", "<>")), self.enumerated(1), self.enumerated(1)
         if what < 4:
             kind = self.kind()
             return "compare", "BOOL", self.pick(("=", "<>", "<", "<=", ">", ">=")), v(kind, d), self.fitting(kind, d)
@@ -293,6 +309,8 @@ class Values:
             return "call", kind, "INSERT", (v(kind, d), v(kind, d), length)
         if what == 3:
             return "call", kind, "REPLACE", (v(kind, d), v(kind, d), length, place)
+        if what == 8 and self.one_in(3):
+            return "named", kind, self.enumerated(1)
         if what < 6:
             return "call", kind, "CONCAT", (v(kind, d), v(kind, d))
         sources = (*INTEGERS, *BIT_STRINGS, "BOOL", *REALS, *DURATIONS, *DATES, *TEXTS, "WCHAR" if kind == "WSTRING" else "CHAR")
