@@ -46,10 +46,10 @@ def test_a_picture_goes_to_a_file(file: Path, tmp_path: Path) -> None:
 
 
 def test_a_run_draws_each_instance_in_some_scans(file: Path) -> None:
-    result = CliRunner().invoke(main, ["run", str(file), "--scans", "5", "--set", "Main.switch=TRUE@30ms", "--sfc", "2,4"])
+    result = CliRunner().invoke(main, ["run", str(file), "--scans", "5", "--set", "Main.switch=TRUE@20ms", "--sfc", "1,3"])
     assert result.exit_code == 0
     drawn = result.output.split("scan ")[1:]
-    assert [part.splitlines()[0] for part in drawn] == ["2, Main.left", "2, Main.right", "4, Main.left", "4, Main.right"]
+    assert [part.splitlines()[0] for part in drawn] == ["1, Main.left", "1, Main.right", "3, Main.left", "3, Main.right"]
     assert ["● Bright" in part for part in drawn] == [False, True, True, False]
     assert "on → TRUE" in drawn[1] and "NOT on → FALSE" in drawn[2]
 
