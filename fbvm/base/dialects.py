@@ -34,6 +34,7 @@ class Dialect:
     locals_are_read: bool = False
     programs_are_written: bool = False
     locals_are_written: bool = False
+    initial_variables: bool = False
     narrowing: bool = False
     sums_in_dint: bool = False
     reals_saturate: bool = False
@@ -60,6 +61,8 @@ QUESTIONS = {
     "locals_are_read": ("a VAR of a function block, read through an instance", "an error", "its value"),
     "programs_are_written": ("Prog.count := 0, where count is a VAR of the PROGRAM", "an error", "written"),
     "locals_are_written": ("instance.count := 0, where count is a VAR of the block", "an error", "written"),
+    "initial_variables": ("VAR x : INT := y, where y is a variable", "an error",
+                          "the value that y begins with; in a FUNCTION, and for VAR_TEMP, what y has when the body starts"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is", "an error that names the conversion",
                   "cut to the width; without its fraction, the nearest number that there is; 1 and 0"),
     "sums_in_dint": ("+ - * / MOD of INT, SINT, UINT, USINT: 30000 + 30000, USINT#0 - 1", "in their own type, which wraps",
@@ -78,11 +81,12 @@ _ROWS = (
     Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
             lenient_positions=True, real_bits_by_value=True, arithmetic_of_bits=True, integers_and_bits=True,
             numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, bare_actions=True,
-            locals_are_read=True, programs_are_written=True),
+            locals_are_read=True, programs_are_written=True, initial_variables=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True),
     Dialect("rusty", "programs for RuSTy", loop_ends_each_pass=True, arithmetic_of_bits=True, integers_and_bits=True,
             numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, locals_are_read=True,
-            programs_are_written=True, locals_are_written=True, narrowing=True, sums_in_dint=True, reals_saturate=True),
+            programs_are_written=True, initial_variables=True, locals_are_written=True, narrowing=True, sums_in_dint=True,
+            reals_saturate=True),
     Dialect("omron", "programs that shall run in Sysmac Studio",
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

@@ -9,7 +9,7 @@ from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import RefType, StructType, Type, fold
-from fbvm.check import references
+from fbvm.check import beginnings, references
 from fbvm.check.calls import Calls
 from fbvm.check.configurations import Configurations
 from fbvm.check.expressions import Expressions
@@ -152,7 +152,12 @@ class Checker:
         self.specs.types = before.types if before is not None else {}
 
     def _fit(self, expr: tree.Expr, source: Source, kind: Type) -> bool:
-        return self._constants(source).fit(expr, kind, "S0705", "the initial value")
+        expressions = self._constants(source)
+        good = expressions.fit(expr, kind, "S0705", "the initial value")
+        if good and self.project.dialect.initial_variables and expr not in self.project.facts.constants and \
+                beginnings.worked_out(expressions, expr):
+            return expressions.fit(expr, kind, "S0705", "the initial value")
+        return good
 
     def _variable(self, name: str, source: Source) -> Variable | None:
         return self.expressions(source, self._scope).variable(name)

@@ -33,6 +33,18 @@ def encode(kind: Type, value: Value) -> bytes:
     return struct.pack(_FORMATS[form], value)
 
 
+def decode(kind: Type, data: bytes) -> Value:
+    """The value that bytes of memory are as a `kind` (see `encode`)."""
+    if isinstance(kind, StringType):
+        if not kind.wide:
+            return data.partition(b"\0")[0]
+        units = [data[at:at + 2] for at in range(0, len(data), 2)]
+        text = units[:units.index(b"\0\0")] if b"\0\0" in units else units
+        return b"".join(text).decode("utf-16-le", "surrogatepass")
+    value: Value = struct.unpack(_FORMATS[machine(kind)], data)[0]
+    return bool(value) if machine(kind) == "b" else value
+
+
 def default(kind: Type) -> bytes:
     """The bytes of a variable of `kind` that nobody initialises, for types without initial values of their own."""
     if isinstance(kind, SubrangeType):

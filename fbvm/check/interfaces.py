@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, AnyType, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold, on_bits
+from fbvm.check import beginnings
 from fbvm.check.facts import Edge, Pou, Variable, holds_block, is_block, is_open
 from fbvm.check.names import refuse_reserved
 from fbvm.check.specs import MAX_SIZE
@@ -49,17 +50,23 @@ class Interfaces:
         self.project = checker.project
         self.report = checker.project.report
         self._identifiers = 0
+        self._begun: list[tree.VarDecl] = []
+        """What begins with a value that is worked out at each start of the body."""
         self._early: dict[tree.VarDecl, tuple[Type, bytes] | None] = {}
         """What was asked for before its turn came; None while it is being worked out."""
 
     def resolve(self, pou: Pou) -> None:
         """Fill in the variables and the layout of a POU."""
+        mark = len(self._begun)
         pou.later = {fold(name.text): (declared, section) for section in pou.tree.sections if section.kind != "VAR_EXTERNAL"
                      for declared in section.variables for name in declared.names}
         for section in pou.tree.sections:
             if self._section_allowed(section, pou):
                 self._section(section, pou)
         pou.later = {}
+        if begun := self._begun[mark:]:
+            pou.tree = beginnings.with_assignments(pou, begun)
+            del self._begun[mark:]
         if pou.tree.result is not None:
             self._result(pou, pou.tree.result)
         if "ENO" not in pou.variables and assigns_to(pou.tree.body, "ENO"):
@@ -116,7 +123,7 @@ class Interfaces:
                 self._external(declared, section, pou)
                 continue
             inner = section.kind in ("VAR", "VAR_OUTPUT") and pou.is_function
-            late = inner or section.kind == "VAR_TEMP"
+            late = (inner or section.kind == "VAR_TEMP") and all(fold(word.text) != "CONSTANT" for word in section.qualifiers)
             resolved = self._early.get(declared) or self.typed(declared, pou.source, pou, late)
             borrowed = resolved is not None and section.kind == "VAR_INPUT" and isinstance(resolved[0], AnyType)
             for name in declared.names:
@@ -161,7 +168,10 @@ class Interfaces:
             if resolved is None:
                 return None
             kind, initial = resolved
-            if declared.initial is not None:
+            if declared.initial is not None and late and pou is not None and self.project.dialect.initial_variables and \
+                    beginnings.varies(self.checker.expressions(source, pou), declared.initial):
+                self._begun.append(declared)
+            elif declared.initial is not None:
                 with self.checker.scope(pou, late):
                     initial = self.checker.values.initial(kind, declared.initial, source, initial)
         return kind, initial

@@ -1,0 +1,119 @@
+"""Initial values that name variables, in dialects that take them.
+
+In a block, a program or a list of globals such a name stands for what its variable begins with, which is known before the
+program runs.  Variables of a FUNCTION and VAR_TEMP begin anew at each start of their body, so there the expression becomes an
+assignment in front of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import ArrayType, Type, machine
+from fbvm.check.constants import decode
+from fbvm.check.facts import Pou
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.expressions import Expressions
+
+
+def worked_out(expressions: Expressions, expr: tree.Expr) -> bool:
+    """True if all places that an initial value names begin with a known value, which stands in the facts then."""
+    facts = expressions.facts
+    known = {}
+    for place in _places(expr):
+        if place in facts.constants:
+            continue
+        found = _begins(expressions, place)
+        if found is None or machine(found[0]) in ("", "ref"):
+            return False
+        known[place] = decode(*found)
+    for node in _nodes(expr):
+        facts.types.pop(node, None)
+    facts.constants.update(known)
+    return bool(known)
+
+
+def varies(expressions: Expressions, initial: tree.Initial) -> bool:
+    """True for an initial value that names a variable, or calls a function of the program's own."""
+    if not isinstance(initial, tree.Expr):
+        return False
+    for node in _nodes(initial):
+        if isinstance(node, tree.NameRef):
+            variable = expressions.variable(node.text)
+            if variable is not None and not variable.constant:
+                return True
+        called = node.callee if isinstance(node, tree.Call) else None
+        if isinstance(called, tree.NameRef) and expressions.project.pou(called.text, expressions.source) is not None:
+            return True
+    return False
+
+
+def with_assignments(pou: Pou, declared: list[tree.VarDecl]) -> tree.Pou:
+    """The tree of a POU whose body begins with the initial values of some declarations."""
+    assigned: list[tree.Statement] = []
+    for each in declared:
+        assert isinstance(each.initial, tree.Expr)
+        targets = [tree.NameRef(name.start, name.end, name.text) for name in each.names]
+        assigned += [tree.Assign(target.start, each.initial.end, (target,), ":=", each.initial) for target in targets]
+    old = pou.tree
+    return tree.Pou(old.start, old.end, old.kind, old.name, old.result, old.sections, (*assigned, *old.body), old.refused,
+                    old.actions, old.accesses)
+
+
+def _begins(expressions: Expressions, place: tree.Expr) -> tuple[Type, bytes] | None:
+    """Type and bytes of what a place begins with, None if that is not known."""
+    facts = expressions.facts
+    variable = facts.variables.get(place)
+    if variable is not None:
+        return None if variable.reference else (variable.type, variable.initial)
+    if isinstance(place, tree.Member) and place in facts.fields:
+        outer, field = _begins(expressions, place.of), facts.fields[place]
+        if outer is None or field.reference or field.absolute or field.bit is not None:
+            return None
+        return field.type, outer[1][field.offset:field.offset + field.type.size]
+    if isinstance(place, tree.Index):
+        outer = _begins(expressions, place.of)
+        subscripts = [facts.constants.get(subscript) for subscript in place.subscripts]
+        if outer is None or not isinstance(outer[0], ArrayType) or len(subscripts) != len(outer[0].bounds):
+            return None
+        at = 0
+        for subscript, (low, high) in zip(subscripts, outer[0].bounds, strict=True):
+            if not isinstance(subscript, int) or not low <= subscript <= high:
+                return None
+            at = at * (high - low + 1) + subscript - low
+        size = outer[0].element.size
+        return outer[0].element, outer[1][at * size:(at + 1) * size]
+    return None
+
+
+def _places(expr: tree.Expr) -> Iterator[tree.Expr]:
+    """The places that an expression reads, each as a whole."""
+    if isinstance(expr, tree.NameRef | tree.Member | tree.Index):
+        yield expr
+    elif isinstance(expr, tree.Unary):
+        yield from _places(expr.operand)
+    elif isinstance(expr, tree.Binary):
+        yield from _places(expr.left)
+        yield from _places(expr.right)
+    elif isinstance(expr, tree.Call):
+        for argument in expr.arguments:
+            if argument.value is not None:
+                yield from _places(argument.value)
+
+
+def _nodes(expr: tree.Expr) -> Iterator[tree.Expr]:
+    """An expression and those that it is made of."""
+    yield expr
+    if isinstance(expr, tree.Member | tree.Deref | tree.Part):
+        yield from _nodes(expr.of)
+    elif isinstance(expr, tree.Index):
+        yield from _nodes(expr.of)
+        for subscript in expr.subscripts:
+            yield from _nodes(subscript)
+    else:
+        parts = (expr.operand,) if isinstance(expr, tree.Unary) else (expr.left, expr.right) if isinstance(expr, tree.Binary) \
+            else tuple(a.value for a in expr.arguments if a.value is not None) if isinstance(expr, tree.Call) else ()
+        for part in parts:
+            yield from _nodes(part)
