@@ -32,6 +32,7 @@ class Dialect:
     mixed_arguments: bool = False
     bare_actions: bool = False
     locals_are_read: bool = False
+    written_out: bool = False
     programs_are_written: bool = False
     locals_are_written: bool = False
     initial_variables: bool = False
@@ -58,6 +59,8 @@ QUESTIONS = {
     "mixed_arguments": ("F(1, b := 2): some arguments named, some not", "an error",
                         "those without a name are for the parameters that none names, in order"),
     "bare_actions": ("Reset; where Reset is an ACTION", "an error", "a call of it"),
+    "written_out": ("a := [1, 2, 3], F((x := 1, y := 2)): arrays and structures written out in statements", "an error (S0903)",
+                    "taken; what is left out has the first value of its type"),
     "locals_are_read": ("a VAR of a function block, read through an instance", "an error", "its value"),
     "programs_are_written": ("Prog.count := 0, where count is a VAR of the PROGRAM", "an error", "written"),
     "locals_are_written": ("instance.count := 0, where count is a VAR of the block", "an error", "written"),
@@ -86,7 +89,7 @@ _ROWS = (
     Dialect("rusty", "programs for RuSTy", loop_ends_each_pass=True, arithmetic_of_bits=True, integers_and_bits=True,
             numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, locals_are_read=True,
             programs_are_written=True, initial_variables=True, locals_are_written=True, narrowing=True, sums_in_dint=True,
-            reals_saturate=True),
+            reals_saturate=True, written_out=True),
     Dialect("omron", "programs that shall run in Sysmac Studio",
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

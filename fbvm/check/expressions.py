@@ -33,6 +33,7 @@ from fbvm.base.types import (
     string,
 )
 from fbvm.check import anything, qualified, unknown
+from fbvm.check.aggregates import Aggregates
 from fbvm.check.constants import convert, cut, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
 from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, is_untyped, lent, literal_hint
@@ -389,6 +390,9 @@ class Expressions:
             return None
         return kind.target
 
+    def _aggregate(self, expr: tree.ArrayInit | tree.StructInit, want: Type | None) -> Type | None:
+        return Aggregates(self).kind(expr, want)
+
     def _null(self, expr: tree.NullLiteral, want: Type | None) -> Type | None:
         return NULL
 
@@ -420,6 +424,7 @@ _INFER: dict[type, Callable[..., Type | None]] = {
     tree.Literal: Expressions._literal, tree.EnumLiteral: Expressions._enum_literal, tree.NameRef: Expressions._name,
     tree.Direct: Expressions._direct, tree.Member: Expressions._member, tree.Index: Expressions._index,
     tree.Part: Expressions._part, tree.Deref: Expressions._deref, tree.NullLiteral: Expressions._null,
+    tree.ArrayInit: Expressions._aggregate, tree.StructInit: Expressions._aggregate,
     tree.Call: Expressions._call, tree.Unary: Expressions._unary, tree.Binary: Expressions._binary,
     ladder.Edge: Expressions._edge, ladder.Element: Expressions._element,
 }

@@ -193,6 +193,26 @@ class Holder:
 
 
 @dataclass(frozen=True, eq=False)
+class AggregatePart:
+    """A value of something written out in a statement that is worked out when the program runs: where it lies, several times
+    if it is repeated, its bit, its type and what gives it."""
+
+    places: tuple[int, ...]
+    bit: int | None
+    kind: Type
+    value: tree.Expr
+
+
+@dataclass(frozen=True, eq=False)
+class Aggregate:
+    """An array or structure that is written out in a statement: its place in the frame, what is known of it, and the rest."""
+
+    place: Variable
+    content: bytes
+    parts: tuple[AggregatePart, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Start:
     """What a reference is made to before anything runs: `place` is the variable that REF(x) or ADR(x) names.
 
@@ -235,6 +255,7 @@ class Facts:
     """Calls whose result is the whole value of an assignment."""
     turned: set[tree.Call] = field(default_factory=set)
     """Calls whose result is what lies in memory, its bytes in another order."""
+    aggregates: dict[tree.Expr, Aggregate] = field(default_factory=dict)
     bare: dict[tree.CallStatement, tree.Call] = field(default_factory=dict)
     """Statements that name an ACTION without (), and the calls that they mean."""
     text_cases: set[tree.Case] = field(default_factory=set)

@@ -93,6 +93,7 @@ _BELOW: dict[type, Callable[[Any], Iterable[tree.Node | None]]] = {
     tree.Part: lambda n: (n.of,),
     tree.Index: lambda n: (n.of, *n.subscripts),
     tree.Deref: lambda n: (n.of,),
+    tree.ArrayInit: lambda n: (value for _, value in n.items), tree.StructInit: lambda n: (value for _, value in n.fields),
     tree.Literal: _nothing, tree.EnumLiteral: _nothing, tree.NullLiteral: _nothing, tree.NameRef: _nothing,
     tree.Direct: _nothing,
     ladder.Ladder: lambda n: n.body, ladder.Rung: lambda n: n.body, sfc.Sfc: lambda n: n.body,

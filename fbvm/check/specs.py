@@ -17,6 +17,7 @@ from fbvm.base.types import (
     Elementary,
     EnumType,
     RefType,
+    StructType,
     SubrangeType,
     Type,
     array,
@@ -85,7 +86,7 @@ class Specs:
         if isinstance(spec, tree.EnumSpec):
             return self._enumeration(spec, source, name)
         if isinstance(spec, tree.ConstructedSpec):
-            return self._constructed(spec, spec.base, source)
+            return self._constructed(spec, spec.base, None, source)
         if isinstance(spec, tree.UnionSpec | tree.StructSpec):
             return self._structure(spec, source, name)
         assert isinstance(spec, tree.RefSpec)
@@ -222,6 +223,20 @@ class Specs:
 
     # --- forms ------------------------------------------------------------------------------------------------------
 
+    def fresh(self, kind: Type) -> bytes:
+        """The first value of a type, as its declaration gives it."""
+        if isinstance(kind, ArrayType):
+            return self.fresh(kind.element) * kind.count
+        known = next((entry.resolved[1] for entry in self.project.types.values()
+                      if entry.resolved is not None and entry.resolved[0] is kind), None)
+        if known is not None or not isinstance(kind, StructType):
+            return default(kind) if known is None else known
+        content = bytearray(kind.size)
+        for member in kind.fields.values():
+            if member.bit is None and not any(content[member.offset:member.offset + member.type.size]):
+                content[member.offset:member.offset + member.type.size] = self.fresh(member.type)
+        return bytes(content)
+
     def _string(self, spec: tree.StringSpec, source: Source) -> Resolved | None:
         if spec.length is None:
             kind: Type = string(wide=spec.wide)
@@ -251,16 +266,34 @@ class Specs:
         made = SubrangeType(name or f"{kind} ({low}..{high})", kind.size, kind.align, kind, low, high)
         return made, default(made)
 
-    def _constructed(self, spec: tree.TypeSpec, base: tree.NamedType, source: Source) -> Resolved | None:
-        """A type with arguments in parentheses: those of FB_init, or a subrange or enumeration that is written wrongly."""
+    def _constructed(self, spec: tree.TypeSpec, base: tree.NamedType, values: tree.StructInit | None,
+                     source: Source) -> Resolved | None:
+        """A type with something in parentheses: initial values of an instance, arguments of FB_init, or a subrange or
+        enumeration that is written wrongly."""
         resolved = self.resolve(base, source)
+        if resolved is not None and values is not None and _has_inputs(resolved[0], values):
+            return resolved[0], self.values.initial(resolved[0], values, source, resolved[1])
         if resolved is not None and is_block(resolved[0]):
-            self.report.add("S0902", source, spec, f"arguments for FB_init of {base.text} are object-oriented text, which fbvm "
-                            "does not execute", f"initial values of its variables are written {base.text} := (name := value)")
+            self._refuse_arguments(spec, base, source)
         elif resolved is not None:
             self.report.add("S0704", source, spec, f"{resolved[0]} takes no arguments",
                             f"a subrange is written {base.text} (0..9), an initial value {base.text} := 5")
         return resolved
+
+    def _instances(self, spec: tree.ConstructedSpec, source: Source) -> Resolved | None:
+        """The type of the elements of an array that have initial values behind their type."""
+        resolved = self.resolve(spec.base, source)
+        if resolved is None or spec.values is None:
+            return self._constructed(spec, spec.base, None, source)
+        given = [value for _, value in spec.values.items if value is not None]
+        if is_block(resolved[0]) and not all(isinstance(v, tree.StructInit) and _has_inputs(resolved[0], v) for v in given):
+            self._refuse_arguments(spec, spec.base, source)
+            return None
+        return resolved
+
+    def _refuse_arguments(self, spec: tree.TypeSpec, base: tree.NamedType, source: Source) -> None:
+        self.report.add("S0902", source, spec, f"arguments for FB_init of {base.text} are object-oriented text, which fbvm "
+                        "does not execute", f"initial values of its inputs are written {base.text} := (name := value)")
 
     def _array(self, spec: tree.ArraySpec, source: Source) -> Resolved | None:
         if None in spec.dimensions:
@@ -275,7 +308,8 @@ class Specs:
                 self.report.add("S0704", source, dimension[0], f"the lower bound {low} is above the upper bound {high}")
                 return None
             bounds.append((low, high))
-        element = self.resolve(spec.element, source)
+        given = spec.element if isinstance(spec.element, tree.ConstructedSpec) else None
+        element = self._instances(given, source) if given is not None else self.resolve(spec.element, source)
         if element is None:
             return None
         count = 1
@@ -286,7 +320,8 @@ class Specs:
             return None
         kind = array(tuple(bounds), element[0])
         assert isinstance(kind, ArrayType)
-        return kind, element[1] * kind.count
+        content = element[1] * kind.count
+        return kind, self.values.initial(kind, given.values, source, content) if given and given.values else content
 
     def _open_array(self, spec: tree.ArraySpec, source: Source) -> Resolved | None:
         """ARRAY [*], which only an in-out can be; who declares the variable looks after that."""
@@ -306,7 +341,7 @@ class Specs:
             if resolved is None:
                 return None
             if is_block(resolved[0]):
-                return self._constructed(spec, spec.base, source)
+                return self._constructed(spec, spec.base, _given(spec), source)
             if not isinstance(resolved[0], Elementary) or not {"ANY_INT", "ANY_BIT"} & resolved[0].families:
                 self.report.add("S0704", source, spec.base, "an enumeration is based on an integer or bit string type")
                 return None
@@ -362,3 +397,15 @@ class Specs:
             self._anonymous += 1
             name = f"STRUCT {self._anonymous}"
         return made.structure(name)
+
+
+def _given(spec: tree.EnumSpec) -> tree.StructInit | None:
+    """What looks like an enumeration as initial values of an instance; None if one of its names has no value."""
+    fields = tuple((name, value) for name, value in spec.members if value is not None)
+    return tree.StructInit(spec.start, spec.end, fields) if len(fields) == len(spec.members) else None
+
+
+def _has_inputs(kind: Type, values: tree.StructInit) -> bool:
+    """True if a block has an input of each of the names."""
+    found = [kind.member(name.text) for name, _ in values.fields] if isinstance(kind, StructType) and kind.block else [None]
+    return all(member is not None and member.kind == "VAR_INPUT" for member in found)

@@ -96,6 +96,10 @@ class Statements:
         if isinstance(node.call, tree.Call):
             self.calls.statement(node.call)
             return
+        if isinstance(node.call, tree.StructInit):
+            self.error("S0101", node.call, "the name of an instance is missing in front of `(`",
+                       "write the name of the instance that is called")
+            return
         if self.calls.action(node.call) is not None:
             self._bare_action(node)
             return

@@ -103,7 +103,7 @@ class Values:
         if len(kind.bounds) > 1:
             init = flattened(init)
         for repetition, value in init.items:
-            repetition, value = self._repeated(repetition, value, source)
+            repetition, value = self.repeated(repetition, value, source)
             count = 1
             if repetition is not None:
                 times = self.integer(repetition, source)
@@ -131,9 +131,11 @@ class Values:
                 made[before] = self.initial(kind, value, source, before)
             content[start:start + kind.size] = made[before]
 
-    def _repeated(self, repetition: tree.Expr | None, value: tree.Initial | None,
-                  source: Source) -> tuple[tree.Expr | None, tree.Initial | None]:
-        """`N(0)` reads as a call: where N is a constant it is a repetition."""
+    def repeated(self, repetition: tree.Expr | None, value: tree.Initial | None,
+                 source: Source) -> tuple[tree.Expr | None, tree.Initial | None]:
+        """How often an element of an array is repeated, and its value.
+
+        `N(0)` reads as a call: where N is a constant it is a repetition."""
         if repetition is None and isinstance(value, tree.Call) and isinstance(value.callee, tree.NameRef) and \
                 len(value.arguments) < 2 and all(not argument.kind for argument in value.arguments):
             variable = self._variable(value.callee.text, source)

@@ -64,6 +64,7 @@ class Program:
         self.sites: list[Site] = []
         self.rungs: list[RungPicture] = []
         self.charts: list[SfcPicture] = []
+        self.held: InitialReferences
         self.late_starts: dict[Pou, list[tuple[int, Start]]] = {}
         """References in frames that bodies make when they start, by POU, and where in the buffer they lie."""
         self.leases_at, self.held_bits = placed.objects.leases_at, placed.objects.held_bits
@@ -219,7 +220,7 @@ def _deep() -> Iterator[None]:
 def _image(checker: Checker, progress: Progress) -> Image:
     placed = place(checker)
     program = Program(placed)
-    held = InitialReferences(program, checker, placed.initial)
+    program.held = held = InitialReferences(program, checker, placed.initial)
     held.in_frames()
     bodies = tuple(BodyLowering(program, checker, pou).body()
                    for pou in _told(checker.bodies, partial(progress, "compiled")))

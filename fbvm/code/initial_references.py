@@ -43,6 +43,11 @@ class InitialReferences:
                 for at, start, around in self._marked(variable.type, variable.initial, 0, variable.offset, {}):
                     yield variable.offset + at, self._made(start, around)
 
+    def within(self, kind: Type, content: bytes) -> Iterator[tuple[int, Start]]:
+        """Those in a value that a body makes, which are to global variables."""
+        for at, start, _ in self._marked(kind, content, 0, 0, {}) if self.starts else ():
+            yield at, start
+
     def in_frames(self) -> None:
         """Put those into the values at the start of functions that are known now; the others are made when a body starts."""
         for pou in self.checker.bodies if self.starts else ():

@@ -220,7 +220,8 @@ class BodyLowering:
                 return self.calls.aggregate(expr, called)
             return self._chosen(called, expr)
         place = self.places.of(expr)
-        self.note_read(place, expr)
+        if expr not in self.facts.aggregates:
+            self.note_read(place, expr)
         return place
 
     def _chosen(self, called: StandardCall, call: tree.Call) -> Place:

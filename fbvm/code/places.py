@@ -27,6 +27,7 @@ from fbvm.base.types import (
 )
 from fbvm.check.anything import NUMBERS, VIEWS
 from fbvm.check.facts import StandardCall, Value, Variable
+from fbvm.code import aggregates
 from fbvm.code.layout import variable_bit
 from fbvm.code.operations import SIZES, WHOLE_BYTES, Address, Node
 from fbvm.syntax import tree
@@ -101,6 +102,8 @@ class Places:
             return self._part(expr, kind)
         if isinstance(expr, tree.Call):
             return self.body.aggregate(expr)
+        if isinstance(expr, tree.ArrayInit | tree.StructInit):
+            return aggregates.written_out(self.body, expr)
         if isinstance(expr, tree.Index) and isinstance(self.facts.types.get(expr.of), RefType):
             return self.body.pointers.element(expr, kind)
         if isinstance(expr, tree.Deref):

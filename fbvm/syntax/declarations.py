@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fbvm.syntax.expressions import Item
 from fbvm.syntax.jumps import Jumps, Tangled
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
@@ -36,7 +37,6 @@ from fbvm.syntax.tree import (
     RefusedStatement,
     Resource,
     SourceText,
-    StructInit,
     Task,
     TypeSpec,
     VarDecl,
@@ -44,14 +44,10 @@ from fbvm.syntax.tree import (
 )
 
 Head = tuple[Name, list[Refused]]
-Item = tuple[Expr | None, Initial | None]
 Settings = AccessVars | ConfigVars
 Section = VarSection | Refused | Settings
 Element = Action | Step | Transition | Refused
 ConfigItem = VarSection | Task | ProgramInstance | Refused | Settings
-
-REPEATED_LIMIT = 1_000_000
-"""Most values that one `n(a, b)` of an array may stand for."""
 
 
 class Declarations(SfcElements):
@@ -192,10 +188,6 @@ class Declarations(SfcElements):
 
     # --- initial values ---
 
-    def array_init(self, opener: Token, items: list[list[Item]] | None, closer: Token) -> ArrayInit:
-        flat = tuple(item for group in items or () for item in group)
-        return ArrayInit(opener.start, closer.end, flat)
-
     def array_bare(self, first: list[Item], comma: Token, items: list[list[Item]]) -> ArrayInit:
         flat = (*first, *(item for group in items for item in group))
         parts = [part for item in flat for part in item if part is not None]
@@ -203,27 +195,6 @@ class Declarations(SfcElements):
 
     def array_bare_repeated(self, count: Token, opener: Token, values: list[Initial] | None, closer: Token) -> ArrayInit:
         return ArrayInit(count.start, closer.end, tuple(self.array_repeated(count, opener, values, closer)))
-
-    def array_item(self, value: Initial) -> list[Item]:
-        return [(None, value)]
-
-    def array_repeated(self, count: Token, opener: Token, values: list[Initial] | None, closer: Token) -> list[Item]:
-        """`3(0)`; with several values in the parentheses they are written out, since each repetition has one value."""
-        times = self.number(count)
-        if values is None or len(values) == 1:
-            return [(times, values[0] if values else None)]
-        if not isinstance(times.value, int) or times.value * len(values) > REPEATED_LIMIT:
-            self.report("S0108", times.start, times.end,
-                        f"`{count.text}` repetitions of {len(values)} values are too many")
-            return []
-        group: list[Item] = [(None, value) for value in values]
-        return group * times.value
-
-    def struct_init(self, opener: Token, fields: list[tuple[Name, Initial]], closer: Token) -> StructInit:
-        return StructInit(opener.start, closer.end, tuple(fields))
-
-    def struct_field(self, token: Token, sign: Token, value: Initial) -> tuple[Name, Initial]:
-        return self.name(token), value
 
     # --- configuration ---
 

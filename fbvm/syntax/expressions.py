@@ -9,6 +9,7 @@ from fbvm.syntax.builder import Builder
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.tree import (
     Argument,
+    ArrayInit,
     Binary,
     Call,
     Deref,
@@ -22,9 +23,14 @@ from fbvm.syntax.tree import (
     NameRef,
     NullLiteral,
     Part,
+    StructInit,
     Unary,
 )
 
+Item = tuple[Expr | None, Expr | None]
+"""Repetition and value of an element of an array."""
+REPEATED_LIMIT = 1_000_000
+"""Most values that one `n(a, b)` of an array may stand for."""
 Decode = Callable[[], literals.Decoded]
 
 
@@ -143,3 +149,40 @@ class Expressions(Builder):
         node = Binary(left.start, right.end, op, left, right, operator.start)
         self.deepen(node, left, right)
         return node
+
+    # --- arrays and structures ---
+
+    def array_init(self, opener: Token, items: list[list[Item]] | None, closer: Token) -> ArrayInit:
+        flat = tuple(item for group in items or () for item in group)
+        node = ArrayInit(opener.start, closer.end, flat)
+        self.deepen_over(node, [value for _, value in flat if value is not None])
+        return node
+
+    def array_item(self, value: Expr) -> list[Item]:
+        return [(None, value)]
+
+    def array_repeated(self, count: Token, opener: Token, values: list[Expr] | None, closer: Token) -> list[Item]:
+        """`3(0)`; with several values in the parentheses they are written out, since each repetition has one value."""
+        times = self.number(count)
+        if values is None or len(values) == 1:
+            return [(times, values[0] if values else None)]
+        if not isinstance(times.value, int) or times.value * len(values) > REPEATED_LIMIT:
+            self.report("S0108", times.start, times.end,
+                        f"`{count.text}` repetitions of {len(values)} values are too many")
+            return []
+        group: list[Item] = [(None, value) for value in values]
+        return group * times.value
+
+    def struct_init(self, opener: Token, fields: list[tuple[Name, Expr]], closer: Token) -> StructInit:
+        node = StructInit(opener.start, closer.end, tuple(fields))
+        self.deepen_over(node, [value for _, value in fields])
+        return node
+
+    def deepen_over(self, node: Expr, values: list[Expr]) -> None:
+        """Note the depth of a new node over any number of parts."""
+        deepest = max(values, key=self.depth, default=None)
+        if deepest is not None:
+            self.deepen(node, deepest)
+
+    def struct_field(self, token: Token, sign: Token, value: Expr) -> tuple[Name, Expr]:
+        return self.name(token), value

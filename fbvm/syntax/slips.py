@@ -172,7 +172,8 @@ def _no_instance(automaton: Automaton, token: Token, following: list[Token]) -> 
     if token.type not in ("ASSIGN", "OUTPUT") or opener is None or automaton.before.type != "NAME":
         return None
     at = automaton.values.index(opener)
-    if anchor(automaton.states, at + 2) != Anchor(at + 1, "ended_list") or len(automaton.values) != at + 2:
+    behind = len(automaton.values) - at  # `(name`, or `(`, the fields of a structure, a comma and a name
+    if anchor(automaton.states, at + 2) != Anchor(at + 1, "ended_list") or behind not in (2, 4):
         return None
     depth = 1
     while depth and token.type not in ("SEMICOLON", "$END"):

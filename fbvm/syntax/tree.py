@@ -10,6 +10,7 @@ from __future__ import annotations
 from fbvm.syntax.node import Node as Node
 from fbvm.syntax.node import node as _node
 from fbvm.syntax.tree_expressions import Argument as Argument
+from fbvm.syntax.tree_expressions import ArrayInit as ArrayInit
 from fbvm.syntax.tree_expressions import Binary as Binary
 from fbvm.syntax.tree_expressions import Call as Call
 from fbvm.syntax.tree_expressions import Deref as Deref
@@ -23,26 +24,14 @@ from fbvm.syntax.tree_expressions import Name as Name
 from fbvm.syntax.tree_expressions import NameRef as NameRef
 from fbvm.syntax.tree_expressions import NullLiteral as NullLiteral
 from fbvm.syntax.tree_expressions import Part as Part
+from fbvm.syntax.tree_expressions import StructInit as StructInit
 from fbvm.syntax.tree_expressions import Unary as Unary
 
 # --- initial values (6.4.4, 6.5.1.4) -------------------------------------------------------------------------------
 
 
-@_node
-class ArrayInit(Node):
-    """`[1, 2, 3(0)]`: pairs of repetition (None = once) and value; a value None in `3()` takes the default."""
-
-    items: tuple[tuple[Expr | None, Initial | None], ...]
-
-
-@_node
-class StructInit(Node):
-    """`(a := 1, b := [..])`."""
-
-    fields: tuple[tuple[Name, Initial], ...]
-
-
-Initial = Expr | ArrayInit | StructInit
+Initial = Expr
+"""What may stand behind `:=` in a declaration."""
 
 
 # --- type specifications (6.4.4) -----------------------------------------------------------------------------------
@@ -104,9 +93,11 @@ class EnumSpec(TypeSpec):
 
 @_node
 class ConstructedSpec(TypeSpec):
-    """`FB (25)`, `FB [(n := 1), (n := 2)]`: a block with arguments of FB_init, which are understood and refused."""
+    """`FB (25)`, `FB [(n := 1), 3((n := 2))]`: a block with initial values for its inputs, for each element of an array its
+    own, or with other arguments of FB_init, which are understood and refused; `values` None for those without a name."""
 
     base: NamedType
+    values: ArrayInit | None
 
 
 @_node

@@ -44,6 +44,20 @@ class EnumLiteral(Expr):
 
 
 @_node
+class ArrayInit(Expr):
+    """`[1, 2, 3(0)]`: pairs of repetition (None = once) and value; a value None in `3()` takes the default."""
+
+    items: tuple[tuple[Expr | None, Expr | None], ...]
+
+
+@_node
+class StructInit(Expr):
+    """`(a := 1, b := [..])`."""
+
+    fields: tuple[tuple[Name, Expr], ...]
+
+
+@_node
 class NullLiteral(Expr):
     """`NULL`."""
 

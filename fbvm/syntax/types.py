@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.declarations import Declarations, Item
+from fbvm.syntax.declarations import Declarations
+from fbvm.syntax.expressions import Item
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.tree import (
     Argument,
@@ -81,11 +82,11 @@ class Types(Declarations):
             elif each.kind == "" and isinstance(each.value, NameRef):
                 members.append((Name(each.start, each.end, each.value.text), None))
             else:
-                return ConstructedSpec(base.start, closer.end, base)
+                return ConstructedSpec(base.start, closer.end, base, None)
         return EnumSpec(base.start, closer.end, base, tuple(members))
 
     def constructed_elements(self, base: NamedType, opener: Token, items: list[list[Item]], closer: Token) -> ConstructedSpec:
-        return ConstructedSpec(base.start, closer.end, base)
+        return ConstructedSpec(base.start, closer.end, base, self.array_init(opener, items, closer))
 
     def enum_based_behind(self, opener: Token, members: list[EnumMember], closer: Token, base: NamedType) -> EnumSpec:
         return EnumSpec(opener.start, base.end, base, tuple(members))

@@ -166,7 +166,8 @@ def test_names_the_standard_forbids_are_warned_of_where_they_are_declared(name: 
 
 @pytest.mark.parametrize(("pragma", "known"), [
     ("{region 'x'}", True), ("{ENDREGION}", True), ("{attribute 'qualified_only'}", True), ("{ }", True),
-    ("{attribute 'pack_mode' := '1'}", False), ("{IF defined(x)}", False), ("{??}", False)])
+    ("{attribute 'pack_mode' := '1'}", True), ("{attribute 'pack_mode' := '3'}", False), ("{IF defined(x)}", False),
+    ("{??}", False)])
 def test_pragmas_that_might_matter_are_warned_of(pragma: str, known: bool) -> None:
     tree, diagnostics = parse(Source("x", f"{pragma} PROGRAM p END_PROGRAM"))
     assert [d.code for d in diagnostics] == ([] if known else ["S0190"])
