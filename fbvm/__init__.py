@@ -33,6 +33,8 @@ if TYPE_CHECKING:
     from fbvm.plc import Mode as Mode
     from fbvm.plc import Plc as Plc
     from fbvm.plc import Stopped as Stopped
+    from fbvm.plcopen.exporting import Exported as Exported
+    from fbvm.plcopen.exporting import export_xml as export_xml
     from fbvm.plcopen.importing import Imported as Imported
     from fbvm.plcopen.importing import import_xml as import_xml
     from fbvm.record.chart import chart as chart
@@ -57,6 +59,7 @@ _HOMES = {
     "net.peers": ("ModbusPeer",),
     "net.tcp": ("TcpNetwork",),
     "plc": ("Mode", "Plc", "Stopped"),
+    "plcopen.exporting": ("Exported", "export_xml"),
     "plcopen.importing": ("Imported", "import_xml"),
     "record.chart": ("chart", "draw"),
     "record.pcapng": ("Capture",),

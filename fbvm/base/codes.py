@@ -93,6 +93,7 @@ CODES: dict[str, Code] = {
         "X0201": "wire that leads nowhere",
         "X0202": "diagram that cannot be executed",
         "X0203": "part of a program that is not taken over",
+        "X0301": "cannot be said in PLCopen XML",
     }),
     **_table("warning", {
         "S0190": "pragma is not known and has no effect",
@@ -122,6 +123,7 @@ CODES: dict[str, Code] = {
         "X0290": "loop of wires",
         "X0291": "element without effect",
         "X0292": "read in one of several ways",
+        "X0390": "only this program understands it in PLCopen XML",
     }),
     **_table("trap", {
         "R0101": "division by zero",

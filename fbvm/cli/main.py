@@ -31,6 +31,7 @@ VERBS = {
     "ladder": "Draw the rungs of a program.",
     "sfc": "Draw the sequential function charts of a program.",
     "import": "Make sources of a project in PLCopen XML.",
+    "export": "Write programs as a project in PLCopen XML.",
     "list": "Print the compiled program, readable.",
     "explain": "Print the page of a diagnostic.",
     "serve": "Serve the memory of a PLC by Modbus TCP, through its server program.",

@@ -46,7 +46,13 @@ class Calls:
         arguments = self._arguments(item, [pin for pin in item.inputs if pin.connected])
         root = statements.scope.root(item.instance)
         writes = {root, SHARED, *(statements.scope.root(text) for text in self._in_outs(item, arguments))}
-        eno = self._eno(item, arguments)
+        enabled = any(text.startswith("EN :=") for text in arguments)
+        if enabled:
+            for sink, wire in self._next_sinks(item):
+                arguments.append(f"{wire.pin} => {sink.text}")
+                writes.add(statements.drop(sink, wire))
+        held = enabled and any(statements.uses[item, pin.name] for pin in item.outputs if pin.name.upper() != "ENO")
+        eno = self._eno(item, arguments, held)
         if eno:
             statements.effect(f"{eno.text} := FALSE;", eno.reads)
         statements.effect(f"{item.instance}({', '.join(arguments)});", frozenset(writes))
@@ -55,13 +61,29 @@ class Calls:
             if pin.name.upper() == "ENO":
                 statements.give(wire, eno or TRUE)
             else:
+                if eno and enabled:
+                    self.guards[item, pin.name] = eno
                 value = Value(f"{item.instance}.{pin.name}", ATOM, frozenset((root,)))
                 statements.give(wire, statements.changed(item, value, pin.negated, pin.edge))
 
-    def _eno(self, item: Object, arguments: list[str]) -> Value | None:
+    def _next_sinks(self, item: Object) -> list[tuple[Object, Wire]]:
+        """The plain variables that get outputs of a block, if they are the next in the order."""
+        objects = self.statements.network.objects
+        found = []
+        for other in objects[objects.index(item) + 1:]:
+            wires = other.inputs[0].wires if other.kind == "outVariable" else []
+            if len(wires) == 1 and wires[0].source is item and not (other.negated or other.edge or other.storage):
+                if item.pin(wires[0].pin) or wires[0].pin.upper() == "ENO":
+                    break
+                found.append((other, wires[0]))
+            elif other.kind != "inVariable":
+                break
+        return found
+
+    def _eno(self, item: Object, arguments: list[str], wanted: bool = False) -> Value | None:
         """A variable for ENO, if somebody uses it."""
         statements = self.statements
-        if not statements.uses[item, "ENO"]:
+        if not statements.uses[item, "ENO"] and not wanted:
             return None
         name = statements.scope.new(f"Enabled_{item.id}", "BOOL", False)
         arguments.append(f"ENO => {name}")
@@ -145,7 +167,9 @@ class Calls:
         """A result that is worked out only while EN is ON, and otherwise stays what it was."""
         statements, scope = self.statements, self.statements.scope
         sinks = [(sink, pin) for sink in statements.network.objects for pin in sink.pins if pin.wires == [wire]]
-        if statements.uses[wire.source, wire.pin]:
+        if (sink := self._next_sink(item, wire)) is not None:
+            statements.assign(sink, value, condition)
+        elif statements.uses[wire.source, wire.pin]:
             eno = scope.new(f"Enabled_{item.id}", "BOOL", False)
             enabled = Value(eno, ATOM, frozenset((eno.upper(),)))
             name = self._result(item, wire, sinks)
@@ -156,6 +180,12 @@ class Calls:
             statements.give(Wire(item, "ENO"), enabled)
         else:
             statements.give(Wire(item, "ENO"), condition, keep=True)
+
+    def _next_sink(self, item: Object, wire: Wire) -> Object | None:
+        """The variable that gets a result, if it is the only one who does, and the next in the order."""
+        if self.statements.uses[item, wire.pin] != 1 or self.statements.uses[item, "ENO"]:
+            return None
+        return next((sink for sink, found in self._next_sinks(item) if found == wire), None)
 
     def _result(self, item: Object, wire: Wire, sinks: list[tuple[Object, Pin]]) -> str:
         """A variable that keeps a result from pass to pass."""

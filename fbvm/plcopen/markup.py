@@ -208,10 +208,10 @@ class _Builder:
 STEP = "  "
 
 
-def element(name: str, *content: Element | str | None, **attributes: str | int) -> Element:
-    """A new element; None among the contents is left out, an attribute's trailing `_` too (`type_` is `type`)."""
-    written = {key.rstrip("_"): str(value) for key, value in attributes.items()}
-    return Element(name, "", written, 0, [part for part in content if part is not None])
+def element(tag: str, /, *content: Element | str | None, **attributes: str | int) -> Element:
+    """A new element; None among the contents is left out."""
+    written = {key: str(value) for key, value in attributes.items()}
+    return Element(tag, "", written, 0, [part for part in content if part is not None])
 
 
 def written(root: Element) -> str:

@@ -23,7 +23,7 @@ from fbvm.plcopen.document import (
     VarList,
 )
 from fbvm.plcopen.markup import Element
-from fbvm.plcopen.read_types import duration, note, type_text, value_text
+from fbvm.plcopen.read_types import LOCATION, duration, location, note, type_text, value_text
 
 TC6 = "http://www.plcopen.org/xml/tc6"
 IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"
@@ -33,8 +33,6 @@ SECTIONS = {"localVars": "VAR", "tempVars": "VAR_TEMP", "inputVars": "VAR_INPUT"
             "inOutVars": "VAR_IN_OUT", "externalVars": "VAR_EXTERNAL", "globalVars": "VAR_GLOBAL"}
 QUALIFIERS = {"constant": "CONSTANT", "retain": "RETAIN", "nonretain": "NON_RETAIN", "persistent": "PERSISTENT"}
 LANGUAGES = ("ST", "IL", "LD", "FBD", "SFC")
-LOCATION = "urn:fbvm:location"
-"""Our `addData`: an address that is no IEC location."""
 OBJECT_ORIENTED = {"method", "property", "interface", "getaccessor", "setaccessor", "pouinheritance", "itf", "namespace"}
 """Last words of names of `addData` that hold parts of programs (CODESYS)."""
 READ = {"pou", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location", "action"}
@@ -96,7 +94,7 @@ def _data_type(reading: Reading, element: Element) -> Iterator[DataType]:
     name = identifier(reading, element)
     kind = type_text(reading, element.one("baseType"), element)
     if name and kind:
-        yield DataType(name, kind, value_text(reading, element.one("initialValue"), kind), note(element))
+        yield DataType(name, kind, value_text(element.one("initialValue")), note(element))
 
 
 # --- variables --------------------------------------------------------------------------------------------------------
@@ -118,9 +116,7 @@ def _variable(reading: Reading, element: Element) -> Iterator[Variable]:
     name = identifier(reading, element)
     kind = type_text(reading, element.one("type"), element)
     if name and kind:
-        own = next((d.text.strip() for d in _data(element) if d.get("name") == LOCATION), "")
-        yield Variable(name, kind, value_text(reading, element.one("initialValue"), kind),
-                       own or element.get("address").strip(), note(element))
+        yield Variable(name, kind, value_text(element.one("initialValue")), location(element), note(element))
 
 
 # --- POUs -------------------------------------------------------------------------------------------------------------

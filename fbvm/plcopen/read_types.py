@@ -12,6 +12,8 @@ _WORDS = (
     "CHAR WCHAR ANY ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE")
 ELEMENTARY = frozenset(_WORDS.split())
 """Empty elements that are types (TC6 2.01 elementaryTypes; the long forms and CHAR are extensions)."""
+LOCATION = "urn:fbvm:location"
+"""Our `addData`: an address that is no IEC location."""
 _NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _DURATION = re.compile(r"P(?:(\d+)D)?(?:T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?)?")
 
@@ -58,8 +60,8 @@ def _struct(reading: Reading, element: Element) -> str:
     members = []
     for variable in element.all("variable"):
         kind = type_text(reading, variable.one("type"), variable)
-        initial = value_text(reading, variable.one("initialValue"), kind)
-        address = f" AT {variable.get('address')}" if variable.get("address") else ""
+        initial = value_text(variable.one("initialValue"))
+        address = f" AT {place}" if (place := location(variable)) else ""
         members.append(f"    {variable.get('name')}{address} : {kind}{initial and f' := {initial}'};{remark(variable)}\n")
     return f"STRUCT\n{''.join(members)}END_STRUCT"
 
@@ -77,30 +79,28 @@ _WRITERS = {"array": _array, "derived": _derived, "enum": _enum, "struct": _stru
             "subrangeUnsigned": _subrange, "pointer": _pointer}
 
 
-def value_text(reading: Reading, holder: Element | None, kind: str) -> str:
-    """The value in `initialValue` and its like for a variable of a type; "" if there is none."""
+def value_text(holder: Element | None) -> str:
+    """The value in `initialValue` and its like; "" if there is none."""
     inner = next((part for part in holder.children if part.name.endswith("Value")), None) if holder else None
     if inner is None:
         return ""
     if inner.name == "arrayValue":
         items = []
-        element_kind = kind.split(" OF ", 1)[-1] if kind.startswith("ARRAY") else ""
         for value in inner.all("value"):
-            text, times = value_text(reading, value, element_kind), value.get("repetitionValue", "1")
+            text, times = value_text(value), value.get("repetitionValue", "1")
             items.append(f"{times}({text})" if times != "1" else text)
         return f"[{', '.join(items)}]" if items else ""
     if inner.name == "structValue":
-        fields = [f"{v.get('member')} := {value_text(reading, v, '')}" for v in inner.all("value")]
+        fields = [f"{v.get('member')} := {value_text(v)}" for v in inner.all("value")]
         return f"({', '.join(fields)})" if fields else ""
-    return _simple(inner.get("value").strip(), kind)
+    return inner.get("value").strip()
 
 
-def _simple(text: str, kind: str) -> str:
-    """A simple value; strings are found with and without quotes."""
-    if kind.startswith(("STRING", "WSTRING")) and text and text[0] not in "'\"" and "#" not in text:
-        sign = '"' if kind.startswith("W") else "'"
-        return sign + text.replace("$", "$$").replace(sign, "$" + sign) + sign
-    return text
+def location(element: Element) -> str:
+    """Where a variable lies: its address, or one that is no IEC location, which we keep as data of our own."""
+    added = element.one("addData")
+    own = next((d.text.strip() for d in added.all("data") if d.get("name") == LOCATION), "") if added else ""
+    return own or element.get("address").strip()
 
 
 def duration(text: str) -> str:

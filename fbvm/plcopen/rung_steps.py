@@ -153,7 +153,7 @@ class _Rung:
                 moved = False
             else:
                 self._part(part[0], bool(self.order))
-                self._branch(part[1], depth + 1)
+                self._branch(part[1], depth + keeps)
                 moved = True
 
     def _first(self, part: Object | Parallel) -> Object:

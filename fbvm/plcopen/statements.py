@@ -48,7 +48,10 @@ class Statements:
         for consumer, wire in network.cut:
             self.uses[wire.source, wire.pin] -= 1
             self._remember(consumer, wire)
+        self.done: set[Object] = set()
         for item in network.objects:
+            if item in self.done:
+                continue
             _WRITERS.get(item.kind, Statements._strange)(self, item)
         for item in network.objects:
             if item.kind in ("jump", "return"):
@@ -212,6 +215,18 @@ class Statements:
             self.effect(_when(guard, f"{target} := {value.text};"), writes)
         else:
             self.effect(f"{target} := {value.text};", writes)
+
+    def drop(self, sink: Object, wire: Wire) -> str:
+        """Take a variable out of the order that gets its value otherwise, and say what memory it is."""
+        self.done.add(sink)
+        self.uses[wire.source, wire.pin] -= 1
+        return self.scope.root(self._target(sink)[0])
+
+    def assign(self, sink: Object, value: Value, condition: Value) -> None:
+        """Write a variable under a condition, before its turn."""
+        target, writes = self._target(sink)
+        self.done.add(sink)
+        self.effect(_when(condition, f"{target} := {value.text};"), writes)
 
     def _in_out_variable(self, item: Object) -> None:
         if item.inputs[0].connected:

@@ -1,0 +1,36 @@
+"""`fbvm export`: programs to PLCopen XML, which CODESYS, Beremiz and OpenPLC Editor open."""
+
+from __future__ import annotations
+
+import sys
+from datetime import UTC, datetime
+from pathlib import Path
+
+import click
+
+from fbvm.cli import status
+from fbvm.cli.sources import report
+from fbvm.plcopen.exporting import export_xml
+
+
+@click.command("export")
+@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.option("-o", "--output", "document", metavar="OUT.xml", required=True, type=click.Path(dir_okay=False, path_type=Path),
+              help="The document that is written.")
+@click.option("--json", "as_json", is_flag=True, help="Print messages as one JSON object.")
+def command(files: tuple[Path, ...], document: Path, as_json: bool) -> None:
+    """Write the files as a project in PLCopen XML (TC6 2.01), and say what it does not hold.
+
+    Structured Text stays as it is, LADDER .. END_LADDER becomes ladder diagrams. Status 3 if something is left out."""
+    latest = max(file.stat().st_mtime for file in files)
+    created = datetime.fromtimestamp(int(latest), UTC).strftime("%Y-%m-%dT%H:%M:%S")
+    made = export_xml(files, document.stem, created)
+    if made.diagnostics or as_json:
+        report(made.diagnostics, as_json)
+    if made.text is not None:
+        try:
+            document.write_text(made.text, encoding="utf-8")
+        except OSError as error:
+            raise click.UsageError(f"{document} cannot be written: {(error.strerror or str(error)).lower()}") from None
+    if made.errors:
+        sys.exit(status.PROGRAM_ERRORS)

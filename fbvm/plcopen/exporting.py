@@ -1,0 +1,153 @@
+"""Export to PLCopen TC6 XML 2.01: sources of ours in, a document and a list of what it does not hold out."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from fbvm.base.diagnostics import Diagnostic, Source, errors
+from fbvm.plcopen.markup import Element, element, written
+from fbvm.plcopen.write_pous import pou
+from fbvm.plcopen.write_types import Types, Unsayable
+from fbvm.syntax import tree
+from fbvm.syntax.parser import parse
+from fbvm.syntax.pragmas import harmless
+from fbvm.syntax.text import read
+
+NAMESPACE = "http://www.plcopen.org/xml/tc6_0201"
+XHTML = "http://www.w3.org/1999/xhtml"
+BEGINNING = "1970-01-01T00:00:00"
+"""When a document was made, if nobody says it."""
+_NAME = re.compile(r"[^\W\d]\w*")
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A document, None if the sources cannot be read, and messages in order of place."""
+
+    text: str | None
+    diagnostics: list[Diagnostic]
+
+    @property
+    def errors(self) -> list[Diagnostic]:
+        """Those about what the document lacks."""
+        return errors(self.diagnostics)
+
+
+@dataclass
+class _Parts:
+    """What goes where in the document."""
+
+    types: list[Element] = field(default_factory=list)
+    pous: list[Element] = field(default_factory=list)
+    globals: list[Element] = field(default_factory=list)
+    configurations: list[Element] = field(default_factory=list)
+    diagnostics: list[Diagnostic] = field(default_factory=list)
+
+
+def export_xml(sources: Sequence[Source | Path | str], name: str = "project", created: str = BEGINNING) -> Exported:
+    """Export files, given by their paths, or texts.
+
+    `created` is the time that the document names, as 2024-03-01T08:00:00.  Never raises for what sources contain."""
+    parts = _Parts()
+    for given in sources:
+        source = given if isinstance(given, Source) else read(Path(given), str(given))
+        if isinstance(source, Diagnostic):
+            parts.diagnostics.append(source)
+        else:
+            _source(parts, source)
+    unread = [d for d in parts.diagnostics if d.code[0] == "S" and d.severity == "error"]
+    found = sorted(parts.diagnostics, key=Diagnostic.order)
+    return Exported(None if unread else written(_project(parts, name, created)), found)
+
+
+def _source(parts: _Parts, source: Source) -> None:
+    text, diagnostics = parse(source)
+    refused = {"S0901", "S0902"}
+    parts.diagnostics += [d for d in errors(diagnostics) if d.code not in refused]
+    types = Types(source)
+    named = Path(source.name).stem
+    for declared in text.declarations:
+        try:
+            _declaration(parts, types, declared, named if _NAME.fullmatch(named) else "")
+        except Unsayable as unsayable:
+            node, message, hint = unsayable.args
+            what = f"{declared.name.text}: " if isinstance(declared, tree.Pou | tree.TypeDecl | tree.Configuration) else ""
+            parts.diagnostics.append(Diagnostic("X0301", source, node.start, node.end, f"{what}{message}", hint))
+    for pragma in text.pragmas:
+        if any(start <= pragma.start < end for start, end in types.kept):
+            continue
+        parts.diagnostics.append(Diagnostic("X0301" if _matters(pragma.text) else "X0190", source, pragma.start, pragma.end,
+                                            f"the pragma {{{pragma.text.strip()}}} is not exported"))
+    parts.diagnostics += [Diagnostic("X0390", source, node.start, node.end, message) for node, message in types.foreign]
+
+
+def _declaration(parts: _Parts, types: Types, declared: tree.Declaration, name: str) -> None:
+    if isinstance(declared, tree.Pou):
+        parts.pous.append(pou(types, declared))
+    elif isinstance(declared, tree.TypeDecl):
+        initial = element("initialValue", types.value(declared.initial)) if declared.initial is not None else None
+        parts.types.append(element("dataType", element("baseType", types.spec(declared.spec)), initial, name=declared.name.text))
+    elif isinstance(declared, tree.GlobalVars):
+        parts.globals.append(types.section(declared.section, name))
+    elif isinstance(declared, tree.Configuration):
+        parts.configurations.append(_configuration(types, declared))
+    elif isinstance(declared, tree.Refused):
+        raise Unsayable(declared, f"{declared.what} is not exported", "")
+    else:
+        raise Unsayable(declared, "what stands outside of its POU is not exported", "put ACTIONs into their POU")
+
+
+def _matters(pragma: str) -> bool:
+    """Whether the program means something else without a pragma in front of a declaration."""
+    return not harmless(pragma) or bool(re.search(r"(?i)'(pack_mode|qualified_only|strict)'", pragma))
+
+
+# --- configurations ---------------------------------------------------------------------------------------------------
+
+
+def _configuration(types: Types, declared: tree.Configuration) -> Element:
+    for unsaid in (*declared.refused, *declared.settings):
+        raise Unsayable(unsaid, "VAR_ACCESS and VAR_CONFIG are not exported", "")
+    resources = [_resource(types, resource) for resource in declared.resources]
+    lists = [types.section(section) for section in declared.sections]
+    return element("configuration", *resources, *lists, name=declared.name.text)
+
+
+def _resource(types: Types, resource: tree.Resource) -> Element:
+    for unsaid in (*resource.refused, *resource.settings):
+        raise Unsayable(unsaid, "this part of a RESOURCE is not exported", "")
+    instances: dict[str, list[Element]] = {}
+    for program in resource.programs:
+        if program.connections or program.refused or program.qualifiers:
+            raise Unsayable(program, "connections and qualifiers of programs are not exported", "assign in the program")
+        task = program.task.text.upper() if program.task else ""
+        instances.setdefault(task, []).append(element("pouInstance", name=program.name.text, typeName=program.type_name.text))
+    tasks = [_task(types, task, instances.get(task.name.text.upper(), [])) for task in resource.tasks]
+    lists = [types.section(section) for section in resource.sections]
+    return element("resource", *tasks, *lists, *instances.get("", []), name=resource.name.text if resource.name else "Res0")
+
+
+def _task(types: Types, task: tree.Task, programs: Iterable[Element]) -> Element:
+    marks = {key: types.text(value) for key, value in (("single", task.single), ("interval", task.interval)) if value is not None}
+    return element("task", *programs, name=task.name.text, **marks,
+                   priority=types.text(task.priority) if task.priority is not None else "0")
+
+
+def _project(parts: _Parts, name: str, created: str) -> Element:
+    """The frame, in the order of the schema."""
+    if parts.globals and not parts.configurations:
+        parts.configurations.append(element("configuration", element("resource", name="Res0"), name="Config0"))
+    if parts.globals:
+        parts.configurations[0].content += parts.globals
+    scaling: Callable[[str], Element] = lambda kind: element(kind, element("scaling", x=1, y=1))  # noqa: E731
+    header = element("coordinateInfo", scaling("fbd"), scaling("ld"), scaling("sfc"))
+    return element(
+        "project",
+        element("fileHeader", companyName="", productName="fbvm", productVersion="1", creationDateTime=created),
+        element("contentHeader", header, name=name, modificationDateTime=created),
+        element("types", element("dataTypes", *parts.types), element("pous", *parts.pous)),
+        element("instances", element("configurations", *parts.configurations)),
+        **{"xmlns": NAMESPACE, "xmlns:xhtml": XHTML})

@@ -1,0 +1,152 @@
+"""Elements of a ladder diagram with their places: contacts in columns, branches in rows, wires with corners."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fbvm.plcopen.markup import Element, element
+
+LEFT, COLUMN, ROW, GAP = 20, 110, 60, 40
+"""Places in the drawing, in its units: where the rail stands, and how far apart columns, rows and networks are."""
+SYMBOL_WIDTH, SYMBOL_HEIGHT = 21, 15
+"""Size of a contact and of a coil, as Beremiz draws them."""
+RAIL_WIDTH, VARIABLE_WIDTH, VARIABLE_HEIGHT, BLOCK_WIDTH, PIN = 3, 80, 25, 90, 25
+AXIS = 20
+"""How far below a row's top its wire runs."""
+
+
+@dataclass(frozen=True)
+class End:
+    """An output that wires may come from: its element, pin, and place."""
+
+    id: int
+    pin: str
+    x: int
+    y: int
+
+
+Ends = tuple[End, ...]
+
+
+class Drawing:
+    """One body of ladder on its way."""
+
+    def __init__(self) -> None:
+        self.elements: list[Element] = []
+        self.top = GAP
+        self.number = 0
+
+    def next_id(self) -> int:
+        self.number += 1
+        return self.number
+
+    def y(self, row: int) -> int:
+        """Where the wire of a row runs."""
+        return self.top + row * ROW + AXIS
+
+    def x(self, column: int) -> int:
+        return LEFT + 60 + column * COLUMN
+
+    # --- elements ---
+
+    def comment(self, text: str) -> None:
+        lines = text.splitlines() or [""]
+        self.elements.append(element("comment", _position(LEFT, self.top), element("content", element("xhtml:p", text)),
+                                     localId=self.next_id(), height=20 * len(lines), width=600))
+        self.top += 20 * len(lines) + 20
+
+    def rail(self) -> tuple[Element, End]:
+        """The left rail of a network; its outputs are counted when the network is finished."""
+        made = element("leftPowerRail", _position(LEFT, self.top), localId=self.next_id(), height=ROW, width=RAIL_WIDTH)
+        self.elements.append(made)
+        return made, End(self.number, "", LEFT + RAIL_WIDTH, self.y(0))
+
+    def symbol(self, kind: str, variable: str, ends: Ends, column: int, row: int, **marks: str) -> End:
+        """A contact or a coil."""
+        x, y = self.x(column), self.y(row)
+        made = element(kind, _position(x, y - SYMBOL_HEIGHT // 2), wired(ends, x, y, 0, SYMBOL_HEIGHT // 2),
+                       element("connectionPointOut", _relative(SYMBOL_WIDTH, SYMBOL_HEIGHT // 2)), element("variable", variable),
+                       localId=self.next_id(), height=SYMBOL_HEIGHT, width=SYMBOL_WIDTH, **{"negated": "false", **marks})
+        self.elements.append(made)
+        return End(self.number, "", x + SYMBOL_WIDTH, y)
+
+    def in_variable(self, text: str, x: int, y: int) -> End:
+        """A value; `x` is where it ends."""
+        made = element("inVariable", _position(x - VARIABLE_WIDTH, y - VARIABLE_HEIGHT // 2),
+                       element("connectionPointOut", _relative(VARIABLE_WIDTH, VARIABLE_HEIGHT // 2)),
+                       element("expression", text), localId=self.next_id(), height=VARIABLE_HEIGHT, width=VARIABLE_WIDTH,
+                       negated="false")
+        self.elements.append(made)
+        return End(self.number, "", x, y)
+
+    def out_variable(self, text: str, end: End) -> None:
+        """A variable right of an output."""
+        x = end.x + 30
+        self.elements.append(element(
+            "outVariable", _position(x, end.y - VARIABLE_HEIGHT // 2), wired((end,), x, end.y, 0, VARIABLE_HEIGHT // 2),
+            element("expression", text), localId=self.next_id(), height=VARIABLE_HEIGHT, width=VARIABLE_WIDTH, negated="false"))
+
+    def block(self, kind: str, instance: str, inputs: list[tuple[str, Ends | str]], outputs: list[tuple[str, str]], column: int,
+              row: int) -> dict[str, End]:
+        """A block: each input is a name with the wires or the text that it takes, each output a name with the variable that
+        gets it, or "".  The ends of its outputs by name."""
+        x, y = self.x(column), self.y(row) - PIN
+        pins: list[Element] = []
+        values = [(name, (self.in_variable(what, x - 20, y + PIN * (at + 1)),) if isinstance(what, str) else what)
+                  for at, (name, what) in enumerate(inputs)]
+        number = self.next_id()
+        for at, (name, ends) in enumerate(values, 1):
+            pins.append(element("variable", wired(ends, x, y + PIN * at, 0, PIN * at), formalParameter=name))
+        made_ends, outs = {}, []
+        for at, (name, _) in enumerate(outputs, 1):
+            point = element("connectionPointOut", _relative(BLOCK_WIDTH, PIN * at))
+            outs.append(element("variable", point, formalParameter=name))
+            made_ends[name] = End(number, name, x + BLOCK_WIDTH, y + PIN * at)
+        named = {"typeName": kind, **({"instanceName": instance} if instance else {})}
+        height = PIN * (max(len(inputs), len(outputs)) + 1)
+        made = element("block", _position(x, y), element("inputVariables", *pins), element("inOutVariables"),
+                       element("outputVariables", *outs), localId=number, **named, height=height, width=BLOCK_WIDTH)
+        self.elements.append(made)
+        for name, variable in outputs:
+            if variable:
+                self.out_variable(variable, made_ends[name])
+        return made_ends
+
+    def close(self, rail: Element, coils: list[End], columns: int, rows: int) -> None:
+        """Finish a network: the right rail, and as many outputs of the left one as it needs."""
+        height = max(rows, 1) * ROW
+        rail.attributes["height"] = str(height)
+        wired_rows = sorted({int(position.get("y")) for made in self.elements for point in made.walk()
+                             for wire in point.all("connection") if wire.get("refLocalId") == rail.get("localId")
+                             for position in wire.all("position")[-1:]})
+        rail.content += [element("connectionPointOut", _relative(RAIL_WIDTH, y - self.top), formalParameter="")
+                         for y in wired_rows or [self.y(0)]]
+        if coils:
+            x = self.x(columns)
+            points = [wired((end,), x, end.y, 0, end.y - self.top) for end in coils]
+            self.elements.append(element("rightPowerRail", _position(x, self.top), *points, localId=self.next_id(), height=height,
+                                         width=RAIL_WIDTH))
+        self.top += height + GAP
+
+    def skip(self, rows: int) -> None:
+        """Go on below a network that has no rails."""
+        self.top += rows * ROW + GAP
+
+
+def _position(x: int, y: int) -> Element:
+    return element("position", x=x, y=y)
+
+
+def _relative(x: int, y: int) -> Element:
+    return element("relPosition", x=x, y=y)
+
+
+def wired(ends: Ends, x: int, y: int, in_x: int, in_y: int) -> Element:
+    """A connectionPointIn at a place, with a wire from each end."""
+    wires = []
+    for end in ends:
+        corner = [(x - 15, y), (x - 15, end.y)] if end.y != y else []
+        path = [(x, y), *corner, (end.x, end.y)]
+        named = {"formalParameter": end.pin} if end.pin else {}
+        wires.append(element("connection", *(_position(*point) for point in path), refLocalId=end.id, **named))
+    return element("connectionPointIn", _relative(in_x, in_y), *wires)

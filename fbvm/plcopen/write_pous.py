@@ -1,0 +1,103 @@
+"""POUs of the tree as elements of PLCopen XML 2.01: Structured Text as it is, ladder as ladder diagrams."""
+
+from __future__ import annotations
+
+import re
+
+from fbvm.plcopen.layout import Drawing
+from fbvm.plcopen.markup import Element, element
+from fbvm.plcopen.write_rungs import RungWriter
+from fbvm.plcopen.write_statements import StatementWriter
+from fbvm.plcopen.write_types import Types, Unsayable
+from fbvm.syntax import tree
+from fbvm.syntax.ladder import Ladder
+from fbvm.syntax.sfc import Sfc
+
+KINDS = {"FUNCTION": "function", "FUNCTION_BLOCK": "functionBlock", "PROGRAM": "program"}
+_END = re.compile(r"(?i)END_(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|ACTION)\s*$")
+_COLON = re.compile(r"\s*:(?!=)")
+_JUMP = re.compile(r"(?i)\bJMP\b")
+_LABEL = re.compile(r"(?m)^[ \t]*[^\W\d]\w*[ \t]*:(?!=)")
+
+
+def pou(types: Types, declared: tree.Pou) -> Element:
+    """The element of a POU.  Raises Unsayable if it has something for which the format has no form."""
+    for refused in declared.refused:
+        raise Unsayable(refused, f"{refused.what} is not exported", "")
+    if declared.accesses:
+        raise Unsayable(declared.accesses[0], "VAR_ACCESS of a POU is not exported", "")
+    sections = [section for section in declared.sections if not section.hidden]
+    types.instances = {name.text.upper(): variable.spec.text for section in sections for variable in section.variables
+                       for name in variable.names if isinstance(variable.spec, tree.NamedType)}
+    lists = [types.section(section) for section in sections if section.variables]
+    taken = {name.text.upper() for section in sections for variable in section.variables for name in variable.names}
+    inner, instances = _body(types, declared.body, *_span(types, declared), taken)
+    actions = [_action(types, action, taken, instances) for action in declared.actions]
+    if instances:
+        lists.append(element("localVars", *(element("variable", element("type", element("derived", name=kind)), name=name)
+                                            for name, kind in instances.items())))
+    result = element("returnType", types.spec(declared.result)) if declared.result is not None else None
+    return element("pou", element("interface", result, *lists), element("actions", *actions) if actions else None,
+                   element("body", inner), name=declared.name.text, pouType=KINDS[declared.kind])
+
+
+def _span(types: Types, declared: tree.Pou) -> tuple[int, int]:
+    """Where the body of a POU stands in the text."""
+    heads: list[tree.Node] = [declared.name, *(s for s in declared.sections if not s.hidden)]
+    if declared.result is not None:
+        heads.append(declared.result)
+    start = max(node.end for node in heads)
+    text = types.source.text
+    while text[start:start + 1] in (" ", "\t", ";"):
+        start += 1
+    found = _END.search(text, start, declared.end)
+    end = found.start() if found else declared.end
+    written = [action.start for action in declared.actions if start <= action.start < end]
+    return start, min([end, *written])
+
+
+def _action(types: Types, action: tree.Action, taken: set[str], instances: dict[str, str]) -> Element:
+    text = types.source.text
+    start = action.name.end
+    if colon := _COLON.match(text, start):
+        start = colon.end()
+    found = _END.search(text, start, action.end)
+    inner, more = _body(types, action.body, start, found.start() if found else action.end, taken)
+    instances |= more
+    return element("action", element("body", inner), name=action.name.text)
+
+
+def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str]) -> tuple[Element, dict[str, str]]:
+    """The element of a body, and the instances that it needs besides."""
+    for statement in body:
+        if isinstance(statement, Sfc):
+            raise Unsayable(statement, "a sequential function chart is not exported", "")
+        if isinstance(statement, tree.RefusedStatement):
+            raise Unsayable(statement, f"{statement.what} is not exported", "")
+    text = types.source.text[start:end]
+    if not any(isinstance(statement, Ladder) for statement in body):
+        types.kept.append((start, end))
+        return element("ST", element("xhtml:p", _dedented(text))), {}
+    if len(body) > 1 and (_JUMP.search(text) or _LABEL.search(_without_ladder(text))):
+        raise Unsayable(body[0], "jumps between rungs are not exported", "put the statements into a POU of Structured Text")
+    drawing = Drawing()
+    rungs, statements = RungWriter(drawing, taken), StatementWriter(drawing, types)
+    for statement in body:
+        if isinstance(statement, Ladder):
+            rungs.ladder(statement)
+        else:
+            statements.write(statement)
+    return element("LD", *drawing.elements), rungs.instances
+
+
+def _without_ladder(text: str) -> str:
+    return re.sub(r"(?is)^[ \t]*LADDER\b.*?^[ \t]*END_LADDER\b", "", text, flags=re.M)
+
+
+def _dedented(text: str) -> str:
+    """Lines moved to the left as a whole, without empty ones around them."""
+    lines = text.expandtabs(4).split("\n")
+    first, *more = lines
+    margin = min((len(line) - len(line.lstrip()) for line in more if line.strip()), default=0)
+    moved = [first.strip(), *(line[margin:].rstrip() for line in more)]
+    return "\n".join(moved).strip("\n")

@@ -1,0 +1,316 @@
+"""Rungs as ladder diagrams: the steps of mnemonics, followed with the stack of those who execute them.
+
+Power is a place, which is a set of outputs that are joined, and what was put behind it and has not been drawn yet.
+An instruction that ladder of the standard does not have cannot be said.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from fbvm.plcopen.layout import Drawing, End, Ends
+from fbvm.plcopen.markup import Element
+from fbvm.plcopen.write_types import Unsayable
+from fbvm.syntax import tree
+from fbvm.syntax.ladder import Ladder, Rung, Step
+from fbvm.syntax.operands import SYMBOLS, Operands, Wrong
+
+COILS = {"OUT": {}, "OUTNOT": {"negated": "true"}, "SET": {"storage": "set"}, "RSET": {"storage": "reset"},
+         "DIFU": {"edge": "rising"}, "DIFD": {"edge": "falling"}}
+EDGES = {"@": {"edge": "rising"}, "%": {"edge": "falling"}}
+ALWAYS = "P_ON"
+
+
+@dataclass(eq=False)
+class Contact:
+    """A contact that is still to be drawn."""
+
+    variable: str
+    marks: dict[str, str]
+
+
+@dataclass(eq=False)
+class Ways:
+    """Series side by side."""
+
+    series: list[list[Contact | Ways]]
+
+
+Series = list[Contact | Ways]
+
+
+@dataclass
+class Power:
+    """A place, None for the rail, and what follows it; `column` and `row` say where the next element goes."""
+
+    ends: Ends | None = None
+    series: Series = field(default_factory=list)
+    column: int = 0
+    row: int = 0
+
+
+class RungWriter:
+    """Draws the rungs of one POU; `instances` are blocks that it adds, by name with their types."""
+
+    def __init__(self, drawing: Drawing, taken: set[str]) -> None:
+        self.drawing, self.taken = drawing, taken
+        self.instances: dict[str, str] = {}
+
+    def ladder(self, ladder: Ladder) -> None:
+        """Draw LADDER .. END_LADDER.  Raises Unsayable."""
+        for instance in ladder.instances:
+            name, kind = instance.names[0].text, instance.spec
+            if name.upper() not in self.taken and isinstance(kind, tree.NamedType):
+                self.instances.setdefault(name, kind.text)
+        for rung in ladder.rungs:
+            notes = [text.lstrip("'/ ").rstrip() for _, text in rung.notes]
+            if comment := "\n".join(filter(None, [rung.comment, *notes])):
+                self.drawing.comment(comment)
+            if rung.steps and rung.steps[0].mnemonic != "END":
+                self._rung(rung)
+
+    def _rung(self, rung: Rung) -> None:
+        self.rail, self.start = self.drawing.rail()
+        self.now: Power | None = None
+        self.saved: list[Power] = []
+        self.kept: dict[str, Power] = {}
+        self.coils: list[End] = []
+        self.columns, self.rows = 1, 0
+        for step in rung.steps:
+            self.step = step
+            self._step(step)
+        self.drawing.close(self.rail, self.coils, self.columns, self.rows)
+
+    def _step(self, step: Step) -> None:
+        join = re.fullmatch(r"(LD|AND|OR)(NOT)?", step.mnemonic)
+        if step.prefix.replace("!", "") and step.mnemonic not in ("SET", "RSET") and not join:
+            raise self._unsayable(f"{step.prefix}{step.mnemonic}")
+        if join:
+            self._join(join[1], bool(join[2]), step)
+        elif step.mnemonic in ("ANDLD", "ORLD"):
+            self._block(step.mnemonic)
+        elif step.mnemonic in COILS:
+            self._coil(step)
+        elif step.mnemonic in _OTHERS:
+            _OTHERS[step.mnemonic](self)
+        else:
+            raise self._unsayable(step.mnemonic)
+
+    def _unsayable(self, what: str) -> Unsayable:
+        return Unsayable(self.step, f"ladder of PLCopen XML has no {what}", "write that rung in Structured Text")
+
+    @property
+    def power(self) -> Power:
+        assert self.now is not None
+        return self.now
+
+    # --- contacts ---
+
+    def _join(self, how: str, negated: bool, step: Step) -> None:
+        name = step.operands[0]
+        if how == "LD" and name.upper() in self.kept:
+            kept = self.kept[name.upper()]
+            self.now = Power(kept.ends, [], kept.column, self.rows)
+            return
+        part = self._contact(name, negated, step.prefix.replace("!", ""))
+        if how == "LD":
+            if self.now is not None:
+                self.saved.append(self.now)
+            self.now = Power(None, part)
+        elif how == "AND":
+            self.power.series += part
+        else:
+            self._beside(Power(None, part))
+
+    def _contact(self, name: str, negated: bool, edge: str) -> Series:
+        if name.upper() == ALWAYS and not negated and not edge:
+            return []
+        marks = dict(EDGES.get(edge, {}))
+        if negated:
+            if edge:
+                raise self._unsayable("contact that is negated and has an edge")
+            marks["negated"] = "true"
+        return [Contact(self._symbol(name), marks)]
+
+    def _symbol(self, name: str) -> str:
+        """A variable that other tools can name."""
+        try:
+            meant = Operands().expression(name, "b", self.step.start, self.step.end)
+        except Wrong as wrong:
+            raise Unsayable(self.step, wrong.args[0], "") from None
+        if not isinstance(meant, tree.NameRef | tree.Member | tree.Index) or name.upper() in SYMBOLS:
+            raise Unsayable(self.step, f"{name} is an address, for which other tools have no name",
+                            "declare a variable AT that address and use its name")
+        return name
+
+    def _beside(self, other: Power) -> None:
+        """OR: another way to the same place."""
+        power = self.power
+        if power.ends is None and other.ends is None:
+            if not power.series or not other.series:
+                raise self._unsayable("wire that bridges contacts")
+            known = power.series[0] if len(power.series) == 1 and isinstance(power.series[0], Ways) else None
+            ways = known.series if known else [power.series]
+            self.now = Power(None, [Ways([*ways, other.series])])
+            return
+        first = self._drawn(power)
+        other.row = self.rows
+        second = self._drawn(other)
+        self.now = Power((*first, *second), [], max(power.column, other.column), power.row)
+
+    def _block(self, how: str) -> None:
+        second = self.power
+        first = self.saved.pop()
+        if how == "ORLD":
+            self.now = first
+            self._beside(second)
+        elif second.ends is not None:
+            raise self._unsayable("AND of two places from which something else hangs")
+        else:
+            first.series += second.series
+            self.now = first
+
+    # --- drawing ---
+
+    def _drawn(self, power: Power) -> Ends:
+        """Draw what is still to be drawn of a power, and keep its place."""
+        if power.ends is None and power.column == 0:
+            power.row = max(power.row, self.rows)
+        ends = (self._rail_end(power.row),) if power.ends is None else power.ends
+        ends, power.column, used = self._series(power.series, ends, power.column, power.row)
+        self.rows = max(self.rows, power.row + used if power.series else self.rows)
+        self.columns = max(self.columns, power.column + 1)
+        power.ends, power.series = ends, []
+        return ends
+
+    def _rail_end(self, row: int) -> End:
+        return End(self.start.id, "", self.start.x, self.drawing.y(row))
+
+    def _series(self, series: Series, ends: Ends, column: int, row: int) -> tuple[Ends, int, int]:
+        """Draw contacts one behind the other: what comes out, the next column, and the rows that they take."""
+        rows = 1
+        for part in series:
+            if isinstance(part, Contact):
+                ends = (self.drawing.symbol("contact", part.variable, ends, column, row, **part.marks),)
+                column += 1
+                continue
+            joined: list[End] = []
+            widest, used = column, 0
+            for way in part.series:
+                start = (self._rail_end(row + used),) if ends[0].id == self.start.id else ends
+                outs, end_column, taken = self._series(way, start, column, row + used)
+                joined += outs
+                widest, used = max(widest, end_column), used + taken
+            ends, column, rows = tuple(joined), widest, max(rows, used)
+        return ends, column, rows
+
+    def _output(self) -> tuple[Ends, int, int]:
+        """The power for an output, and where that goes: a row of its own.  What was saved is drawn first, in its order."""
+        for saved in self.saved:
+            if saved.series:
+                self._drawn(saved)
+        power = self.power
+        ends = self._drawn(power)
+        row = power.row
+        power.row = self.rows = max(self.rows, row + 1)
+        self.columns = max(self.columns, power.column + 1)
+        return ends, power.column, row
+
+    def _coil(self, step: Step) -> None:
+        name = step.operands[0]
+        if re.fullmatch(r"(?i)TR\d+", name):
+            power = self.power
+            self._drawn(power)
+            self.kept[name.upper()] = Power(power.ends, [], power.column, power.row)
+            return
+        marks = {**COILS[step.mnemonic], **EDGES.get(step.prefix.replace("!", ""), {})}
+        self._draw_coil(self._symbol(name), marks)
+
+    def _draw_coil(self, name: str, marks: dict[str, str]) -> None:
+        ends, column, row = self._output()
+        self.coils.append(self.drawing.symbol("coil", name, ends, column, row, **marks))
+
+    # --- others ---
+
+    def _nothing(self) -> None:
+        """END and NOP."""
+
+    def _keep(self) -> None:
+        """KEEP: a coil that sets and, stronger, one that resets."""
+        name = self._symbol(self.step.operands[0])
+        reset, set_ = self.power, self.saved.pop()
+        if name.upper() in {c.variable.upper() for c in _contacts(reset.series)} or reset.ends is not None:
+            raise self._unsayable("KEEP whose reset asks for its own bit")
+        self.now = set_
+        self._draw_coil(name, COILS["SET"])
+        self.now = Power(None, reset.series, 0, self.rows)
+        self._draw_coil(name, COILS["RSET"])
+
+    def _function(self, kind: str, pin: str, output: str, instance: str = "") -> None:
+        """A block that stands in the way of the power."""
+        ends, column, row = self._output()
+        made = self.drawing.block(kind, instance, [(pin, ends)], [(output, "")], column, row)
+        self.now = Power((made[output],), [], column + 1, row)
+
+    def _edge(self, kind: str) -> None:
+        name, number = "Edge", 1
+        while f"{name}{number}".upper() in self.taken | {known.upper() for known in self.instances}:
+            number += 1
+        self.instances[f"{name}{number}"] = kind
+        self._function(kind, "CLK", "Q", f"{name}{number}")
+
+    def _call(self) -> None:
+        kind, instance, *pins = self.step.operands
+        ends, column, row = self._output()
+        inputs: list[tuple[str, Ends | str]] = [("EN", ends)]
+        outputs = [("ENO", "")]
+        for pin in pins:
+            name, sign, text = re.split(r"(:=|=>)", pin, maxsplit=1)
+            if sign == ":=":
+                inputs.append((name, self._operand(text)))
+            else:
+                outputs.append((name, self._symbol(text)))
+        made = self.drawing.block(kind, instance, inputs, outputs, column + 1, row)
+        self.rows = max(self.rows, row + len(inputs) // 2 + 1)
+        self.columns = max(self.columns, column + 4)
+        below = self.rows if len(outputs) > 1 else row
+        self.now = Power((made["ENO"],), [], column + 3, below)
+
+    def _operand(self, text: str) -> str:
+        """What enters a pin, as Structured Text."""
+        if text.upper() in ("P_ON", "P_OFF"):
+            return "TRUE" if text.upper() == "P_ON" else "FALSE"
+        if re.fullmatch(r"&\d+", text):
+            return text[1:]
+        if re.fullmatch(r"#[0-9A-Fa-f]+", text):
+            return f"16#{text[1:]}"
+        if re.fullmatch(r"[+-][\d.]+", text):
+            return text.lstrip("+")
+        if text[0] in "'\"" or "#" in text or text.upper() in ("TRUE", "FALSE"):
+            return text
+        return self._symbol(text)
+
+
+def _contacts(series: Series) -> list[Contact]:
+    found: list[Contact] = []
+    for part in series:
+        found += [part] if isinstance(part, Contact) else [c for way in part.series for c in _contacts(way)]
+    return found
+
+
+_OTHERS: dict[str, Callable[[RungWriter], None]] = {
+    "END": RungWriter._nothing, "NOP": RungWriter._nothing, "KEEP": RungWriter._keep, "FBCALL": RungWriter._call,
+    "NOT": lambda writer: writer._function("NOT", "IN", "OUT"), "UP": lambda writer: writer._edge("R_TRIG"),
+    "DOWN": lambda writer: writer._edge("F_TRIG"),
+}
+
+
+def draw_rungs(ladders: list[Ladder], taken: set[str]) -> tuple[list[Element], dict[str, str]]:
+    """The elements of an LD body, and the blocks that it needs besides."""
+    drawing = Drawing()
+    writer = RungWriter(drawing, taken)
+    for ladder in ladders:
+        writer.ladder(ladder)
+    return drawing.elements, writer.instances

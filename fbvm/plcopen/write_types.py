@@ -1,0 +1,165 @@
+"""Types, values and sections of the tree as elements of PLCopen XML 2.01."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from fbvm.base.diagnostics import Source
+from fbvm.plcopen.markup import Element, element
+from fbvm.plcopen.read_project import QUALIFIERS, SECTIONS
+from fbvm.plcopen.read_types import LOCATION
+from fbvm.syntax import tree
+
+_NAMES = ("BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD "
+          "ANY ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE")
+ELEMENTARY = set(_NAMES.split())
+"""Types that are empty elements of their name (TC6 2.01 elementaryTypes)."""
+LONG = {"DATE_AND_TIME": "DT", "TIME_OF_DAY": "TOD"}
+UNSIGNED = {"USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD"}
+LISTS = {word: name for name, word in SECTIONS.items()}
+WORDS = {word: name for name, word in QUALIFIERS.items()}
+_TEXTS = r"""'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*\"|\(\*.*?\*\)|//[^\n]*"""
+_SIGNS = re.compile(rf"(?s)({_TEXTS})|[()]")
+_BLANKS = re.compile(rf"(?s)({_TEXTS})|\s+")
+_REMARK = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\n]*)")
+
+
+class Unsayable(Exception):
+    """The format has no way to say it; the arguments are the node, a message and a hint."""
+
+
+class Types:
+    """Writes the types of one source; `foreign` are (node, message) of what only we understand."""
+
+    def __init__(self, source: Source) -> None:
+        self.source = source
+        self.foreign: list[tuple[tree.Node, str]] = []
+        self.kept: list[tuple[int, int]] = []
+        """Parts of the text that are exported as they are."""
+        self.instances: dict[str, str] = {}
+        """Types of the variables of the POU at work that have a type by name, by names in capitals."""
+
+    def text(self, node: tree.Node) -> str:
+        """What was written, with the brackets around parts of it, which the tree does not have."""
+        text, start, end = self.source.text, node.start, node.end
+        while any(open_ends := _brackets(text[start:end])):
+            if open_ends[1]:
+                start = text.rindex("(", 0, start)
+            else:
+                end = text.index(")", end) + 1
+        return _squeezed(text[start:end])
+
+    # --- types ---
+
+    def spec(self, spec: tree.TypeSpec) -> Element:
+        """The element of a type.  Raises Unsayable."""
+        if isinstance(spec, tree.NamedType):
+            name = LONG.get(spec.text.upper(), spec.text.upper())
+            return element(name) if name in ELEMENTARY else element("derived", name=spec.text)
+        if isinstance(spec, tree.StringSpec):
+            length = {"length": self.text(spec.length)} if spec.length is not None else {}
+            return element("wstring" if spec.wide else "string", **length)
+        if isinstance(spec, tree.SubrangeSpec):
+            name = "subrangeUnsigned" if spec.base.text.upper() in UNSIGNED else "subrangeSigned"
+            return element(name, element("range", lower=self.text(spec.low), upper=self.text(spec.high)),
+                           element("baseType", self.spec(spec.base)))
+        if isinstance(spec, tree.ArraySpec):
+            return self._array(spec)
+        if isinstance(spec, tree.EnumSpec):
+            values = [element("value", name=name.text, **({"value": self.text(value)} if value is not None else {}))
+                      for name, value in spec.members]
+            return element("enum", element("values", *values), element("baseType", self.spec(spec.base)) if spec.base else None)
+        if isinstance(spec, tree.StructSpec) and not spec.overlap:
+            return element("struct", *(made for member in spec.members for made in self.variables(member)))
+        if isinstance(spec, tree.RefSpec) and spec.kind == "POINTER TO":
+            return element("pointer", element("baseType", self.spec(spec.target)))
+        raise Unsayable(spec, f"the format has no type for {self.text(spec).split('(')[0][:40]}", "")
+
+    def _array(self, spec: tree.ArraySpec) -> Element:
+        dimensions = []
+        for dimension in spec.dimensions:
+            if dimension is None:
+                raise Unsayable(spec, "the format has no arrays of any length", "")
+            low, high = dimension
+            dimensions.append(element("dimension", lower=self.text(low), upper=self.text(high)))
+        return element("array", *dimensions, element("baseType", self.spec(spec.element)))
+
+    # --- values ---
+
+    def value(self, value: tree.Initial) -> Element:
+        """The element of a value."""
+        if isinstance(value, tree.ArrayInit):
+            items = []
+            for times, inner in value.items:
+                repeated = {"repetitionValue": self.text(times)} if times is not None else {}
+                if inner is None:
+                    raise Unsayable(value, "the format cannot repeat a default value", "")
+                items.append(element("value", self.value(inner), **repeated))
+            return element("arrayValue", *items)
+        if isinstance(value, tree.StructInit):
+            return element("structValue", *(element("value", self.value(inner), member=name.text)
+                                            for name, inner in value.fields))
+        return element("simpleValue", value=self.text(value))
+
+    # --- variables ---
+
+    def variables(self, declared: tree.VarDecl) -> Iterator[Element]:
+        """One element for each name of a declaration."""
+        if declared.edge:
+            raise Unsayable(declared, "the format has no R_EDGE and F_EDGE", "use R_TRIG or F_TRIG")
+        for name in declared.names:
+            made = element("variable", element("type", self.spec(declared.spec)), name=name.text)
+            if declared.location is not None:
+                self._location(made, declared.location)
+            if declared.initial is not None:
+                made.content.insert(1, element("initialValue", self.value(declared.initial)))
+            if remark := _REMARK.match(self.source.text, declared.end):
+                made.content.append(documentation(remark[1].strip()))
+            yield made
+
+    def _location(self, made: Element, location: tree.Location) -> None:
+        text = location.text.strip()
+        if re.fullmatch(r"%[IQMiqm][XBWDLxbwdl]?[\d.*]*", text):
+            made.attributes["address"] = text
+            return
+        self.foreign.append((location, f"the address {text} is kept as data of this program; other tools place the variable"))
+        made.content.append(element("addData", element("data", element("location", text), name=LOCATION,
+                                                       handleUnknown="discard")))
+
+    def section(self, section: tree.VarSection, name: str = "") -> Element:
+        """The list that a section is."""
+        kind = LISTS.get(section.kind)
+        if kind is None:
+            raise Unsayable(section, f"the format has no {section.kind}", "")
+        marks = {}
+        for qualifier in section.qualifiers:
+            word = qualifier.text.upper()
+            if word not in WORDS:
+                raise Unsayable(qualifier, f"the format has no {word}", "")
+            marks[WORDS[word]] = "true"
+        named = {"name": name} if name else {}
+        return element(kind, *(made for declared in section.variables for made in self.variables(declared)), **named, **marks)
+
+
+def _brackets(text: str) -> tuple[int, int]:
+    """How many brackets are open at the end of a text, and how many are closed that nothing opened."""
+    opened = closed = 0
+    for match in _SIGNS.finditer(text):
+        if match[0] == "(":
+            opened += 1
+        elif match[0] == ")" and opened:
+            opened -= 1
+        elif match[0] == ")":
+            closed += 1
+    return opened, closed
+
+
+def _squeezed(text: str) -> str:
+    """One blank for many and for line ends, but not within strings; without comments."""
+    return _BLANKS.sub(lambda match: match[1] if match[1] and match[1][0] in "'\"" else " ", text).strip()
+
+
+def documentation(text: str) -> Element:
+    """Text for people."""
+    return element("documentation", element("xhtml:p", text))

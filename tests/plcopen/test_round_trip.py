@@ -1,0 +1,249 @@
+"""Export and import: what comes back means the same, and the document keeps the rules of the schema."""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import pytest
+from schema_rules import breaches, wires_lead_somewhere
+
+from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.code.compiler import compile_sources
+from fbvm.plc import Plc
+from fbvm.plcopen.exporting import Exported, export_xml
+from fbvm.plcopen.importing import Imported, import_xml
+from fbvm.plcopen.markup import Element, parse_markup
+from fbvm.syntax.text import read
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "tests" / "lang"))
+
+from lang_check import _at, _place, _value  # noqa: E402
+from lang_corpus import Program, programs  # noqa: E402
+
+BUDGET = 100_000
+
+
+def document(made: Exported) -> Element:
+    assert made.text is not None
+    found = parse_markup(made.text.encode(), "made.xml")
+    assert not isinstance(found, Diagnostic)
+    return found[1]
+
+
+def lawful(made: Exported) -> None:
+    root = document(made)
+    assert breaches(root) == []
+    assert wires_lead_somewhere(root) == []
+
+
+def there_and_back(text: str) -> Imported:
+    """A text of ours after export and import, without a loss."""
+    made = export_xml([Source("Main.st", text)])
+    assert not made.errors, "\n".join(d.render() for d in made.errors)
+    lawful(made)
+    assert made.text is not None
+    back = import_xml(made.text.encode())
+    assert not back.errors, "\n".join(d.render() for d in back.errors)
+    return back
+
+
+def same(before: Any, after: Any) -> bool:
+    """Whether values are equal; names that nobody wrote, and what the import added, do not count."""
+    if isinstance(before, dict):
+        return isinstance(after, dict) and all(
+            name.startswith("$") or (name in after and same(value, after[name])) for name, value in before.items())
+    return repr(before) == repr(after)
+
+
+def machine(files: dict[str, str], program: Program) -> Plc:
+    sources = [Source(name, text) for name, text in files.items()]
+    made = compile_sources(sources, runnable=True, dialect=program.dialect, lint=False)
+    assert made.image is not None, "\n".join(d.render() for d in made.diagnostics)
+    return Plc(made.image, program.cycle_ns, budget=BUDGET)
+
+
+def compare(program: Program, back: Imported) -> None:
+    """Run both, and compare every variable and every word of the areas after each scan."""
+    plcs = machine({program.name: program.text}, program), machine(back.files, program)
+    for scan in range(1, program.scans + 1):
+        for plc in plcs:
+            for item in _at(program.written, scan):
+                plc.write(place := _place(plc, item), _value(place, item.value))
+            plc.scan()
+        first, second = plcs
+        for name in first.image.symbols:
+            assert same(first.read(name), second.read(name)), f"{program.name}:{program.line}: {name} after scan {scan}"
+        for name, area in first.memory.areas.items():
+            other = second.memory.areas.get(name)
+            assert other is None or (bytes(first.memory.u8[area.offset:area.offset + area.size_bytes])
+                                     == bytes(second.memory.u8[other.offset:other.offset + other.size_bytes])), name
+
+
+def round_trips(folder: str, each: int = 1) -> Counter[str]:
+    """The programs of a folder of the corpus there and back, or every so many of them; how many are the same, and how many
+    cannot be said."""
+    count: Counter[str] = Counter()
+    for program in list(programs(ROOT / "tests" / "lang" / folder))[::each]:
+        if not program.runs or program.trap:
+            continue
+        made = export_xml([Source(program.name, program.text)])
+        lawful(made)
+        if made.errors:
+            count["unsaid"] += 1
+            continue
+        assert made.text is not None
+        back = import_xml(made.text.encode())
+        assert not back.errors, "\n".join(d.render() for d in back.errors)
+        compare(program, back)
+        count["same"] += 1
+    return count
+
+
+def test_ladder_of_the_corpus_there_and_back() -> None:
+    count = round_trips("ladder")
+    assert count["same"] >= 8
+    assert count["unsaid"] > 0
+
+
+@pytest.mark.slow
+def test_a_fifth_of_the_corpus_there_and_back() -> None:
+    count = round_trips("", each=5)
+    assert count["same"] >= 100
+    assert count["unsaid"] <= count["same"] // 4
+
+
+@pytest.mark.slow
+def test_examples_there_and_back() -> None:
+    said = 0
+    for path in sorted((ROOT / "examples").glob("*.st")):
+        source = read(path, path.name)
+        assert isinstance(source, Source)
+        made = export_xml([source])
+        lawful(made)
+        if made.errors:
+            assert path.stem == "ladder"
+            continue
+        assert made.text is not None
+        back = import_xml(made.text.encode())
+        assert not back.errors
+        compare(Program(path, 1, path.stem, source.text), back)
+        said += 1
+    assert said >= 3
+
+
+RUNGS = """PROGRAM Main
+VAR a, b, c, d, e, x, y, z : BOOL; t : TON; n : INT; v : ARRAY [0..3] OF BOOL; END_VAR
+LADDER
+RUNG 1 Nested blocks
+    LD      a
+    LD      b
+    AND     c
+    OR NOT  d
+    AND LD
+    LD      e
+    AND     a
+    OR LD
+    OUT     x
+RUNG 2 Branches of branches
+    LD      a
+    OUT     TR0
+    AND     b
+    OUT     TR1
+    AND     c
+    OUT     x
+    LD      TR1
+    ANDNOT  c
+    OUT     y
+    LD      TR0
+    @AND    d
+    SET     z
+RUNG 3
+    LD      a
+    OR      v[2]
+    NOT
+    DIFU    y
+    LD      b
+    UP
+    @RSET   z
+    LD      a
+    LD      b
+    KEEP    e
+RUNG 4 A block between
+    LD      a
+    AND     b
+    FBCALL  TON t IN:=TRUE PT:=T#20ms Q=>c
+    AND     b
+    OUT     d
+END_LADDER
+n := n + 1;
+IF a AND n > 2 THEN b := TRUE; END_IF;
+t(IN := e, PT := T#30ms, Q => v[1]);
+END_PROGRAM
+"""
+
+
+def test_rungs_and_statements_between_them_mean_the_same_for_all_inputs() -> None:
+    back = there_and_back(RUNGS)
+    assert "RUNG 1 Nested blocks" in back.files["Main.st"]
+    program = Program(Path("Main.st"), 1, "", RUNGS)
+    plcs = machine({"Main.st": RUNGS}, program), machine(back.files, program)
+    for scan in range(96):
+        bits = scan * 0x9E3779B1 >> 3
+        for plc in plcs:
+            for at, name in enumerate("abcde"):
+                plc.write(f"Main.{name}", bool(bits >> at & 1))
+            plc.scan()
+        assert same(plcs[0].read("Main"), plcs[1].read("Main")), scan
+
+
+def test_a_rung_comes_back_as_it_was() -> None:
+    text = RUNGS[:RUNGS.index("RUNG 3")] + "END_LADDER\nEND_PROGRAM\n"
+    again = there_and_back(text).files["Main.st"]
+    steps = [line.split() for line in text.splitlines() if line.startswith("    ")]
+    assert [line.split() for line in again.splitlines() if line.startswith("        ")] == [
+        ["ORNOT", "d"] if step[:2] == ["OR", "NOT"] else ["".join(step)] if step[1] == "LD" else step for step in steps]
+
+
+def test_exporting_what_was_imported_gives_the_same_document() -> None:
+    text = RUNGS[:RUNGS.index("RUNG 3")] + "END_LADDER\nEND_PROGRAM\n"
+    first = export_xml([Source("Main.st", text)])
+    assert first.text is not None
+    again = export_xml([Source(name, made) for name, made in import_xml(first.text.encode()).files.items()])
+    assert again.text == first.text
+
+
+def test_an_address_that_is_no_iec_location_is_kept_for_ourselves_and_named() -> None:
+    made = export_xml([Source("Main.st", "PROGRAM Main VAR a AT D100 : UINT; b AT %MW4 : UINT; END_VAR a := b; END_PROGRAM")])
+    assert [(d.code, d.severity) for d in made.diagnostics] == [("X0390", "warning")]
+    assert made.text is not None
+    assert "a AT D100 : UINT" in import_xml(made.text.encode()).files["Main.st"].replace("  ", " ")
+    assert [element.get("address") for element in document(made).walk() if element.name == "variable"] == ["", "%MW4"]
+
+
+def test_every_loss_is_named_and_the_rest_is_there() -> None:
+    made = export_xml([Source("Main.st", "PROGRAM A VAR p : REF_TO INT; END_VAR END_PROGRAM\nPROGRAM B END_PROGRAM\n"
+                                         "TYPE U : UNION a : INT; b : WORD; END_UNION END_TYPE")])
+    assert [d.code for d in made.diagnostics] == ["X0301", "X0301"]
+    assert made.diagnostics[0].message.startswith("A: ")
+    names = [element.get("name") for element in document(made).walk() if element.name in ("pou", "dataType")]
+    assert names == ["B"]
+
+
+def test_a_source_with_syntax_errors_gives_no_document() -> None:
+    made = export_xml([Source("Main.st", "PROGRAM Main x := ; END_PROGRAM")])
+    assert made.text is None
+    assert [d.code for d in made.errors] == ["S0101"]
+
+
+def test_coordinates_of_networks_go_down_and_elements_do_not_lie_on_each_other() -> None:
+    root = document(export_xml([Source("Main.st", RUNGS)]))
+    [body] = [element for element in root.walk() if element.name == "LD"]
+    places = [(child.one("position").get("x"), child.one("position").get("y"))  # type: ignore[union-attr]
+              for child in body.children if child.name in ("contact", "coil", "block")]
+    assert len(set(places)) == len(places)
+    rails = [int(child.one("position").get("y")) for child in body.children if child.name == "leftPowerRail"]  # type: ignore[union-attr]
+    assert rails == sorted(rails)
