@@ -67,6 +67,13 @@ def e_bank(name: str, offset: int) -> Area:
     return Area(name, offset, E_WORDS, 16, 0, True)
 
 
+PLC_ADDRESSES = {"TF": 0xBE00, "CNF": 0xBF00, "CIO": 0xC000, "A": 0xD800, "H": 0xDC00, "W": 0xDE00, "T": 0xE000, "C": 0xF000,
+                 "D": 0x10000}
+"""PLC memory addresses of words, where index registers point (from memory of the family, assumed; those of flags count
+16 of them).  Of H the first 512 words have one."""
+E_PLC_ADDRESS = 0x18000
+"""That of the first word of E bank 0; the other banks follow."""
+
 E_NAMES = tuple(f"E{bank:X}" for bank in range(E_BANKS))
 
 

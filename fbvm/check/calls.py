@@ -136,7 +136,7 @@ class Calls:
         return ""
 
     def _function(self, call: tree.Call, generic: Pou, want: Type | None) -> Type | str | None:
-        pou = Generics(self).function(call, generic, want) if is_generic(generic) else generic
+        pou = Generics(self).function(call, generic, want) if is_generic(generic, self.project) else generic
         if pou is None:
             return None
         if not self.checker.interface(pou, self.expressions.source, call):

@@ -72,7 +72,7 @@ class Checker:
         while self.project.new_pous:
             self.progress(len(self.bodies), len(self.bodies) + len(self.project.new_pous))
             pou = self.project.new_pous.popleft()
-            if not pou.source.library and not is_generic(pou):
+            if not pou.source.library and not is_generic(pou, self.project):
                 self._body(pou)
         configurations.resolve(program)
         self.globals.declare()

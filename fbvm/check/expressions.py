@@ -18,6 +18,7 @@ from fbvm.base.types import (
     LREAL,
     LWORD,
     NULL,
+    UDINT,
     ULINT,
     WORD,
     AnyType,
@@ -370,7 +371,8 @@ class Expressions:
 
     def _is_variable(self, expr: tree.Expr) -> bool:
         expr = self.facts.root(expr)
-        return isinstance(expr, tree.Deref | tree.Index) or expr in self.facts.variables or expr in self.facts.directs or \
+        places = tree.Deref | tree.Index | ladder.Memory
+        return isinstance(expr, places) or expr in self.facts.variables or expr in self.facts.directs or \
             expr in self.facts.followed
 
     def is_variable(self, expr: tree.Expr) -> bool:
@@ -378,8 +380,8 @@ class Expressions:
         if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
             return anything.is_array(expr)
         return expr not in self.facts.rewritten and self._is_variable(expr) and \
-            (expr in self.facts.followed or
-             isinstance(expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part | tree.Deref))
+            (expr in self.facts.followed or isinstance(
+                expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part | tree.Deref | ladder.Memory))
 
     def _deref(self, expr: tree.Deref, want: Type | None) -> Type | None:
         kind = self.infer(expr.of)
@@ -408,6 +410,10 @@ class Expressions:
         self.condition(expr.value, "a contact")
         return BOOL
 
+    def _memory(self, expr: ladder.Memory, want: Type | None) -> Type | None:
+        self.fit(expr.address, UDINT)
+        return ELEMENTARY[expr.kind] if expr.kind else anything.VIEWS["WORDS"]
+
     def _unary(self, expr: tree.Unary, want: Type | None) -> Type | None:
         return self.operators.unary(expr, want)
 
@@ -419,12 +425,11 @@ _KNOWN = ("S0503", "S0705", "S0801")
 """Codes of places whose values must be known before the program runs: a conversion does not help there."""
 READABLE = ("", "VAR_INPUT", "VAR_OUTPUT")
 """Kinds of members that may be named from outside."""
-
 _INFER: dict[type, Callable[..., Type | None]] = {
     tree.Literal: Expressions._literal, tree.EnumLiteral: Expressions._enum_literal, tree.NameRef: Expressions._name,
     tree.Direct: Expressions._direct, tree.Member: Expressions._member, tree.Index: Expressions._index,
     tree.Part: Expressions._part, tree.Deref: Expressions._deref, tree.NullLiteral: Expressions._null,
     tree.ArrayInit: Expressions._aggregate, tree.StructInit: Expressions._aggregate,
     tree.Call: Expressions._call, tree.Unary: Expressions._unary, tree.Binary: Expressions._binary,
-    ladder.Edge: Expressions._edge, ladder.Element: Expressions._element,
+    ladder.Edge: Expressions._edge, ladder.Element: Expressions._element, ladder.Memory: Expressions._memory,
 }

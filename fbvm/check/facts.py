@@ -114,6 +114,8 @@ class Pou:
     """The POU that an ACTION belongs to."""
     types: dict[str, Type] = field(default_factory=dict)
     """What generic types stand for in a function that was made for one call."""
+    looked: frozenset[str] | None = None
+    """Folded names of the parameters of generic type that are taken as they are passed, once somebody asked."""
     leases: list[int] = field(default_factory=list)
     """Leases that its body holds until it ends."""
 

@@ -56,6 +56,8 @@ IS_VALID_BCD                           IN:T                         -> BOOL   AN
 TO_BIG_ENDIAN TO_LITTLE_ENDIAN         IN:T                         -> T      ANY
 FROM_BIG_ENDIAN FROM_LITTLE_ENDIAN     IN:T                         -> T      ANY
 __DUE                                  AT:TIME                      ->
+__STOP                                                              ->
+__PLC_WORDS                            AT:UDINT                     -> UDINT
 """
 
 OTHER_NAMES = {

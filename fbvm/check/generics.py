@@ -1,7 +1,8 @@
 """Functions with parameters of generic type: one text, made anew for each set of types that it is called with.
 
 All places of one generic type in the head of a function have the same type in a call, ANY_NUM and ANY_INT are two.  What
-looks into a parameter instead (x.pValue, x.diSize, x.BYTES ...) takes it as it is passed, whatever its type.
+looks into a parameter instead (x.pValue, x.diSize, x.BYTES ...), or passes it on to what does, takes it as it is passed,
+whatever its type.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from fbvm.syntax.node import copied, walk
 
 if TYPE_CHECKING:
     from fbvm.check.calls import Calls
+    from fbvm.check.project import Project
 
 RESULT_STRING = 255
 """Characters of a generic STRING, which takes texts of any length."""
@@ -31,13 +33,46 @@ def variables(declared: tree.Pou) -> dict[str, str]:
             for name in variable.names}
 
 
-def looks_into(declared: tree.Pou) -> set[str]:
-    """Names of which the body asks what only a parameter of type ANY tells."""
-    return {fold(node.of.text) for node in walk(declared.body)
-            if isinstance(node, tree.Member) and isinstance(node.of, tree.NameRef) and fold(node.name.text) in MEMBERS}
+def looks_into(pou: Pou, project: Project) -> frozenset[str]:
+    """Names of which the body asks what only a parameter of type ANY tells, or another function that it calls."""
+    if pou.looked is None:
+        pou.looked = frozenset()
+        found: set[str] = set()
+        for node in walk(pou.tree.body):
+            if isinstance(node, tree.Member) and isinstance(node.of, tree.NameRef) and fold(node.name.text) in MEMBERS:
+                found.add(fold(node.of.text))
+            elif isinstance(node, tree.Call) and isinstance(node.callee, tree.NameRef):
+                found |= _passed_on(node, project.pou(node.callee.text, pou.source), project)
+        pou.looked = frozenset(found)
+    return pou.looked
 
 
-def is_generic(pou: Pou) -> bool:
+def _passed_on(call: tree.Call, called: Pou | None, project: Project) -> set[str]:
+    """Names that are passed to a function which looks into them."""
+    if called is None or not called.is_function:
+        return set()
+    looked = looks_into(called, project)
+    return {fold(value.text) for name, value, _ in _given(call, called)
+            if name in looked and isinstance(value, tree.NameRef)}
+
+
+def _given(call: tree.Call, called: Pou) -> Iterator[tuple[str, tree.Expr, str]]:
+    """Folded name of the parameter, argument and kind of section for each argument of a call."""
+    parameters = [(fold(name.text), section.kind) for section in called.tree.sections
+                  if section.kind in ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
+                  for variable in section.variables for name in variable.names]
+    kinds = dict(parameters)
+    for position, argument in enumerate(call.arguments):
+        if argument.value is None:
+            continue
+        if argument.name is not None:
+            name = fold(argument.name.text)
+            yield name, argument.value, kinds.get(name, "")
+        elif position < len(parameters):
+            yield parameters[position][0], argument.value, parameters[position][1]
+
+
+def is_generic(pou: Pou, project: Project) -> bool:
     """True for a function that is made anew for the types of each call."""
     if not pou.is_function or pou.types:
         return False
@@ -45,7 +80,7 @@ def is_generic(pou: Pou) -> bool:
     names = variables(pou.tree)
     if isinstance(result, tree.NamedType) and fold(result.text) in ANYTHING:
         return True
-    return bool(names.keys() - looks_into(pou.tree)) if names else False
+    return bool(names.keys() - looks_into(pou, project)) if names else False
 
 
 class Generics:
@@ -97,21 +132,10 @@ class Generics:
     def _arguments(self, call: tree.Call, pou: Pou) -> Iterator[tuple[str, Type | None, tree.Expr, bool]]:
         """Generic type, type, argument, and whether it has to be of exactly that type, for each generic parameter."""
         names = variables(pou.tree)
-        parameters = [(fold(name.text), section.kind) for section in pou.tree.sections
-                      if section.kind in ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
-                      for variable in section.variables for name in variable.names]
-        kinds = dict(parameters)
-        looked = looks_into(pou.tree)
-        for position, argument in enumerate(call.arguments):
-            if argument.name is not None:
-                name = fold(argument.name.text)
-            elif position < len(parameters):
-                name = parameters[position][0]
-            else:
-                continue
-            if name in names and name not in looked and argument.value is not None:
-                kind = self.expressions.infer(argument.value)
-                yield names[name], kind, argument.value, kinds.get(name) != "VAR_INPUT"
+        looked = looks_into(pou, self.calls.project)
+        for name, value, section in _given(call, pou):
+            if name in names and name not in looked:
+                yield names[name], self.expressions.infer(value), value, section != "VAR_INPUT"
 
     def _settled(self, call: tree.Call, pou: Pou, name: str, kind: Type | None, want: Type | None) -> Type | None:
         """The type that a generic type stands for, if it belongs to it."""

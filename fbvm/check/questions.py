@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
 
 _PARAMETERS = {"SIZEOF": ["IN"], "XSIZEOF": ["IN"], "LOWER_BOUND": ["ARR", "DIM"], "UPPER_BOUND": ["ARR", "DIM"],
-               "__ISVALIDREF": ["REF"], "__POUNAME": [], "BITADR": ["IN"]}
+               "__ISVALIDREF": ["REF"], "__POUNAME": [], "BITADR": ["IN"], "__PLC_ADDRESS": ["IN"]}
 _NO_HEAP = "makes and ends variables while the program runs, and here each has its place before that"
 _QUERY = "asks for the type of an object, and there are none"
 REFUSED = {
@@ -54,6 +54,8 @@ def answer(expressions: Expressions, call: tree.Call, name: str) -> Type | None:
         return _is_bound(expressions, call, values[0])
     if name == "BITADR":
         return _bit_address(expressions, call, values[0])
+    if name == "__PLC_ADDRESS":
+        return _plc_address(expressions, call, values[0])
     if name in ("SIZEOF", "XSIZEOF"):
         return _size(expressions, call, values[0])
     return _bound(expressions, call, name, values[0], values[1])
@@ -69,6 +71,18 @@ def _is_bound(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Ty
         return None
     expressions.facts.calls[call] = StandardCall("__ISVALIDREF", [(value, kind)])
     return BOOL
+
+
+def _plc_address(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:
+    """__PLC_ADDRESS(x): where a variable lies for the index registers of ladder, 0 if they cannot point there."""
+    kind = expressions.infer(value)
+    if kind is None:
+        return None
+    if not expressions.is_variable(value):
+        expressions.error("S0407", value, "this is no variable, and has no address")
+        return None
+    expressions.facts.calls[call] = StandardCall("__PLC_ADDRESS", [(value, kind)])
+    return UDINT
 
 
 def _bit_address(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:

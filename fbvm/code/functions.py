@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import DAY_NS, DINT, EnumType, StringType, Type, base, machine
 from fbvm.check.facts import StandardCall
 from fbvm.check.values import is_any
+from fbvm.code import plc_addresses
 from fbvm.code.operations import FLOATS, SIZES, Node
 
 if TYPE_CHECKING:
@@ -148,6 +149,11 @@ def _swapped(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -
             node = ("or", word, ("and", word, ("shr", word, node, count, site), lower),
                     ("shl", word, ("and", word, node, lower), count, site))
     return node if form == word else ("convert", form, word, node)
+
+
+def _stop(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
+    body.out.append(("stop", "R0120", site))
+    return ("const", "b", 0)
 
 
 def _due(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
@@ -312,7 +318,8 @@ FUNCTIONS: dict[str, Lowering] = {
     "MAX": _chain("max"), "MIN": _chain("min"), "CONCAT": _chain("concat"),
     "LEN": lambda body, a, call, site: ("length", "i16", a[0]),
     "FIND": lambda body, a, call, site: ("find", "i16", a[0], a[1]),
-    **dict.fromkeys(("TIME", "LTIME"), lambda body, a, call, site: ("now", "i64")), "__DUE": _due,
+    **dict.fromkeys(("TIME", "LTIME"), lambda body, a, call, site: ("now", "i64")), "__DUE": _due, "__STOP": _stop,
+    "__PLC_WORDS": lambda body, a, call, site: plc_addresses.words_from(body, a[0]),
     "IS_VALID": lambda body, a, call, site: _finite(body, a[0], _form(call)),
     "IS_VALID_BCD": _valid_bcd,
     "TO_BIG_ENDIAN": _swapped, "FROM_BIG_ENDIAN": _swapped,

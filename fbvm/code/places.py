@@ -27,10 +27,10 @@ from fbvm.base.types import (
 )
 from fbvm.check.anything import NUMBERS, VIEWS
 from fbvm.check.facts import StandardCall, Value, Variable
-from fbvm.code import aggregates
+from fbvm.code import aggregates, plc_addresses
 from fbvm.code.layout import variable_bit
 from fbvm.code.operations import SIZES, WHOLE_BYTES, Address, Node
-from fbvm.syntax import tree
+from fbvm.syntax import ladder, tree
 
 if TYPE_CHECKING:
     from fbvm.code.lower import BodyLowering
@@ -108,6 +108,8 @@ class Places:
             return self.body.pointers.element(expr, kind)
         if isinstance(expr, tree.Deref):
             return Place((("ref", self.body.value(expr.of), self.body.site(expr)), 0, ()), kind)
+        if isinstance(expr, ladder.Memory):
+            return plc_addresses.place_at(self.body, expr, kind)
         assert isinstance(expr, tree.Index)
         whole = self.facts.types[expr.of]
         if whole is VIEWS["BITS"]:
@@ -202,6 +204,8 @@ class Places:
         return Place((start, offset, (*terms, (kind.element.size, distance))), kind.element)
 
     def _bound_at(self, expr: tree.Expr, kind: OpenArrayType, dimension: int, upper: bool) -> Node:
+        if isinstance(expr, ladder.Memory):
+            return plc_addresses.bound(self.body, expr, upper)
         if isinstance(expr, tree.Member):
             return self._last_of_any(expr, kind) if upper else ("const", "i64", 0)
         slot = self.slot(self.facts.variables[expr])

@@ -187,8 +187,8 @@ KINDS: dict[str, _Kind] = {
     AnyType.__name__: _Kind(lambda kind, w: [], lambda common, parts, r: ANYTHING[common["name"]]),
     StringType.__name__: _Kind(lambda kind, w: [kind.capacity, kind.wide], lambda common, parts, r: string(*parts)),
     ArrayType.__name__: _Kind(
-        lambda kind, w: [kind.bounds, w.number(kind.element)],
-        lambda common, parts, r: ArrayType(**common, bounds=_tuples(parts[0]), element=r.type(parts[1]))),
+        lambda kind, w: [kind.bounds, w.number(kind.element), kind.packed],
+        lambda common, parts, r: ArrayType(**common, bounds=_tuples(parts[0]), element=r.type(parts[1]), packed=parts[2])),
     OpenArrayType.__name__: _Kind(
         lambda kind, w: [kind.dimensions, w.number(kind.element)],
         lambda common, parts, r: OpenArrayType(**common, dimensions=parts[0], element=r.type(parts[1]))),

@@ -21,6 +21,7 @@ from fbvm.base.types import (
 from fbvm.check.constants import convert as convert_constant
 from fbvm.check.facts import Guard, PouCall, StandardCall, Value
 from fbvm.check.values import is_any
+from fbvm.code import plc_addresses
 from fbvm.code.functions import FUNCTIONS, saturated
 from fbvm.code.operations import FLOATS, TEXT_UNITS, Node
 from fbvm.syntax import ladder, tree
@@ -173,6 +174,8 @@ class ValueLowering:
             return self.body.pointers.to(called.arguments[0][0])
         if called.key == "__ISVALIDREF":
             return ("ne", "b", "ref", self.body.pointers.bound(called.arguments[0][0]), ("const", "ref", 0))
+        if called.key == "__PLC_ADDRESS":
+            return plc_addresses.address_of(self.body, called.arguments[0][0])
         if called.key == "SIZEOF":
             return ("convert", "u32", "i64", self.body.places.any_number(called.arguments[0][0], ANY_SIZE))
         if called.key in ("LOWER_BOUND", "UPPER_BOUND"):

@@ -50,6 +50,8 @@ class Builder:
         """THIS and SUPER seen since the last statement."""
         self.ladders: list[Ladder] = []
         """LADDERs of the POU that is being read."""
+        self.numbered: dict[str, str] = {}
+        """Symbols of timers and counters, in capitals, and what they are declared AT."""
         self.targets: dict[Statement, str] = {}
         """Its JMPs, each with the label that it names."""
         self.labels: dict[Statement, str] = {}

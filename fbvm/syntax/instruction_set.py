@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from difflib import get_close_matches
 from functools import cache
 from typing import NamedTuple
 
@@ -10,6 +11,15 @@ from fbvm.base.data import data_folder
 
 JOINS = ("LD", "AND", "OR")
 """What stands in front of a comparison or a bit test to say how it joins the rung."""
+
+
+KINDS = {
+    "b": "a bit", "B": "a bit", "w": "a word or constant", "W": "a word", "d": "two words or a constant",
+    "q": "four words or a constant", "r": "a REAL in two words or a constant", "l": "an LREAL in four words or a constant",
+    "a": "words", "k": "words or a constant", "A": "words",
+    "n": "a number", "t": "the number of a timer", "c": "the number of a counter",
+    "m": "a timer or counter, as in T0005 or C0005", "v": "an address or symbol", "x": "an index register"}
+"""What an instruction may want in a place, in words."""
 
 
 class Instruction(NamedTuple):
@@ -21,8 +31,28 @@ class Instruction(NamedTuple):
     variations: str
     inputs: int
     operands: str
+    """A letter for each: what the instruction wants there."""
+    names: tuple[str, ...]
+    """What the manual calls them."""
+    least: int
+    """How many have to be there."""
+    join: str
+    """LD, AND or OR in front of a comparison."""
     kind: str
     does: str
+    words: str
+    """What it does or why it is refused, where the library does not say it."""
+
+    def role(self, position: int) -> str:
+        """What an operand is, for messages."""
+        name = self.names[position]
+        return self.mnemonic if name == "B" else f"{name} of {self.mnemonic}"
+
+    @property
+    def described(self) -> str:
+        """What it wants in each place."""
+        wanted = [f"{name} is {KINDS[kind]}" for name, kind in zip(self.names, self.operands, strict=True) if name != "B"]
+        return ", ".join(wanted)
 
 
 class InstructionSet(NamedTuple):
@@ -40,11 +70,16 @@ def instruction_set() -> InstructionSet:
     for line in text.splitlines():
         if not line.strip() or line.startswith("#"):
             continue
-        name, code, variations, inputs, operands, what = (part.strip() for part in line.split("|", 5))
+        name, code, variations, inputs, operands, what, words = (part.strip() for part in f"{line}||".split("|", 6))
         kind, does = _kind(what)
+        wanted = [operand.partition(":") for operand in operands.split()]
         for join in JOINS if kind == "?" else ("",):
             taken = {"": int(inputs or 1), "LD": 0, "AND": 1, "OR": 1}[join]
-            rows[join + name] = Instruction(join + name, code, variations, taken, operands.replace(" ", ""), kind, does)
+            rows[join + name] = Instruction(
+                join + name, code, variations, taken, "".join(kind_[0] for _, _, kind_ in wanted),
+                tuple(word for word, _, _ in wanted), sum(not kind_.endswith("?") for _, _, kind_ in wanted),
+                join, kind, does,
+                words.strip(" |"))
     return InstructionSet(rows, _pattern(rows))
 
 
@@ -62,6 +97,11 @@ def _pattern(rows: dict[str, Instruction]) -> re.Pattern[str]:
     """Longest first; a blank may stand where manuals have one."""
     words = [_SPACED.sub(r"\1 ?\2", re.escape(name)) for name in rows]
     return re.compile(rf"(?:{'|'.join(sorted(words, key=len, reverse=True))})(?![A-Za-z0-9+*/<>=$-])", re.I)
+
+
+def meant(name: str) -> list[str]:
+    """The instructions that are written most like this."""
+    return get_close_matches(name, instruction_set().rows, 2, 0.6)
 
 
 def spelling(text: str) -> str:

@@ -31,6 +31,15 @@ class Element(Expr):
 
 
 @_node
+class Memory(Expr):
+    """What lies at a PLC memory address, where index registers and indirect addresses point: a place of the type `kind`,
+    or with "" the words from there to the end of their area.  The address of a BOOL counts bits."""
+
+    address: Expr
+    kind: str
+
+
+@_node
 class Step(Node):
     """One instruction as a programming tool writes it: `prefix` is made of `!`, `@` and `%`, `operands` are as written."""
 

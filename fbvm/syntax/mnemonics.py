@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from fbvm.syntax.automaton import Automaton, Mender
-from fbvm.syntax.instruction_set import Instruction, instruction_set, spelling
+from fbvm.syntax.instruction_set import Instruction, instruction_set, meant, spelling
 from fbvm.syntax.ladder import Step
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.tables import tables
@@ -153,7 +153,9 @@ class _LineReader:
         name = spelling(mnemonic.text)
         row = instruction_set().rows.get(name)
         if row is None:
+            near = meant(name)
             raise Refusal(mnemonic.start, mnemonic.end, f"`{mnemonic.text}` is no instruction of this instruction set",
+                          f"did you mean {' or '.join(near)}?" if near else
                           "an unknown instruction is never left out: say what it does with others")
         if code and int(code.text[1:-1]) != int(row.code or 1000):
             raise Refusal(code.start, code.end, f"{name} has the function code {row.code or 'none'}, not {code.text[1:-1]}",

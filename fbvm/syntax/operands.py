@@ -7,10 +7,22 @@ word, the number of a timer or a part of a bit's address.  Forms and marks: W451
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Mapping
 
-from fbvm.base.areas import AREAS, E_NAMES, E_WORDS, FLAG_AREAS, Address, AddressError, parse_address
+from fbvm.base.areas import (
+    AREAS,
+    E_NAMES,
+    E_PLC_ADDRESS,
+    E_WORDS,
+    FLAG_AREAS,
+    PLC_ADDRESSES,
+    Address,
+    AddressError,
+    parse_address,
+)
 from fbvm.syntax import tree
-from fbvm.syntax.tree import Argument, Call, Direct, Expr, Index, Literal, Member, Name, NameRef
+from fbvm.syntax.ladder import Memory
+from fbvm.syntax.tree import Argument, Binary, Call, Direct, Expr, Index, Literal, Member, Name, NameRef
 
 SYMBOLS = {
     "P_GE": "CF000", "P_NE": "CF001", "P_LE": "CF002", "P_ER": "CF003", "P_CY": "CF004", "P_GT": "CF005", "P_EQ": "CF006",
@@ -20,28 +32,56 @@ SYMBOLS = {
 """Symbols that every program knows (W473 6-21 p6-43; numbers of flags from memory of the family, assumed)."""
 
 _TYPES = {"w": "WORD", "W": "WORD", "d": "DWORD", "q": "LWORD", "n": "UINT"}
+_REALS = {"r": "REAL", "l": "LREAL"}
 _BITS = {"WORD": 16, "DWORD": 32, "LWORD": 64, "UINT": 16}
 _OLD = re.compile(r"\d{5,6}")
 _SYMBOL = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*|\[\d+\])*")
 _REAL = re.compile(r"[+-]\d+[.,]\d+(?:[Ee][+-]?\d+)?")
-_REGISTER = re.compile(r"(?:[IDd][Rr]\d+|TK\d+|[^\[\]]*,-{0,2}IR\d+\+{0,2})", re.I)
+_TASK = re.compile(r"TK\d+", re.I)
+_REGISTER = re.compile(r"([ID]R)(\d+)", re.I)
+_POINTED = re.compile(r"([+-]?\d+|DR\d+)?,(-{0,2})IR(\d+)(\+{0,2})", re.I)
+"""An index register that points: with an offset in front, counted down before its use or up after it."""
+REGISTERS = 16
+"""Index registers, and data registers."""
+WORDS = {"d": 2, "r": 2, "q": 4, "l": 4}
+"""How many words an instruction reads where it wants more than one."""
+
+Reach = Callable[[Expr, int, bool], NameRef]
+"""Keeps a PLC memory address that a step works out, for so many words, read or written; gives its name."""
 
 
 class Wrong(Exception):
-    """An operand that cannot stand where it stands; the arguments are a message and a hint."""
+    """An operand that cannot stand where it stands; the arguments are a message and a hint, `place` is where it is."""
+
+    place: tuple[int, int] | None = None
+
+
+def _nowhere(address: Expr, words: int, written: bool) -> NameRef:
+    raise Wrong("an address that is worked out cannot stand here", "")
 
 
 class Operands:
     """Makes expressions of the operands of one LADDER.  `located` fills with the variables that they need at addresses
-    of the PLC's memory: (area and number, letter) -> declaration."""
+    of the PLC's memory: (area and number, letter) -> declaration.  `numbered` are symbols of timers and counters."""
 
-    def __init__(self) -> None:
+    def __init__(self, reach: Reach = _nowhere, numbered: Mapping[str, str] | None = None) -> None:
+        self.reach = reach
+        self.numbered = {} if numbered is None else numbered
+        self.role = ""
         self.located: dict[tuple[str, str], tree.VarDecl] = {}
 
-    def expression(self, text: str, wanted: str, start: int, end: int) -> Expr:
-        """What `text` stands for where an instruction wants `wanted`.  Raises Wrong."""
-        if _REGISTER.fullmatch(text):
-            raise Wrong(f"{text} is understood but not executed by this version", "index and data registers are not emulated")
+    def expression(self, text: str, wanted: str, start: int, end: int, role: str = "a pin") -> Expr:
+        """What `text` stands for where an instruction wants `wanted`, as its operand `role`.  Raises Wrong."""
+        self.role = role
+        text = self.numbered.get(text.upper(), text)
+        if wanted == "x" and not _REGISTER.fullmatch(text):
+            raise Wrong(f"{text} cannot be {role}", "write IR0 to IR15")
+        if _TASK.fullmatch(text):
+            raise Wrong(f"{text} is understood and not executed", "tasks have names here, and no flags")
+        if register := _REGISTER.fullmatch(text):
+            return self._register(register, wanted, start, end)
+        if "," in text and not _REAL.fullmatch(text):
+            return self._pointed(text, wanted, start, end)
         if text[:1] in "#&+-":
             return self._constant(text, wanted, start, end)
         if text[:1] in "@*":
@@ -57,6 +97,7 @@ class Operands:
             real = _REAL.fullmatch(text)
             value = float(text.replace(",", ".")) if real else _number(text, 64)
             return Literal(start, end, "real" if real else "int", value, None, text)
+        text = self.numbered.get(text.upper(), text)
         wanted = "b" if "." in text and not _SYMBOL.fullmatch(text) or text.upper() in SYMBOLS else "w"
         if text[:1] not in "@*" and _SYMBOL.fullmatch(text) and not _is_address(text) and text.upper() not in SYMBOLS:
             return self._symbol(text, "b", start, end)
@@ -65,29 +106,34 @@ class Operands:
     # --- constants ---
 
     def _constant(self, text: str, wanted: str, start: int, end: int) -> Expr:
-        kind = "REAL" if wanted == "r" else _TYPES.get(wanted)
+        kind = _REALS.get(wanted) or _TYPES.get(wanted)
         if kind is None or wanted == "W":
-            raise Wrong(f"the constant {text} cannot stand here", "write an address or a symbol")
-        if kind == "REAL":
+            raise Wrong(f"the constant {text} cannot be {self.role}", "write an address or a symbol")
+        if wanted in _REALS:
             if not _REAL.fullmatch(text):
                 raise Wrong(f"{text} is no REAL constant", "write its sign and a point, as in +1.5")
-            return Literal(start, end, "real", float(text.replace(",", ".")), "REAL", text)
+            return Literal(start, end, "real", float(text.replace(",", ".")), kind, text)
         return Literal(start, end, "int", _number(text, _BITS[kind]), kind, text)
 
     # --- addresses ---
 
     def _direct(self, address: Address, wanted: str, start: int, end: int) -> Expr:
         is_bit = address.bit is not None or address.area in FLAG_AREAS
-        if is_bit != (wanted in "bB"):
-            raise Wrong(f"{address} is a {'bit' if is_bit else 'word'}, and the instruction wants a "
+        if wanted == "m":
+            if address.area not in ("T", "C"):
+                raise Wrong(f"{address} is no present value", "write T0005 or C0005")
+            wanted = "w"
+        if is_bit != (wanted in "bB") and wanted != "v":
+            raise Wrong(f"{address} is a {'bit' if is_bit else 'word'}, and {self.role} is a "
                         f"{'bit' if wanted in 'bB' else 'word'}", "a bit is written as word.bit, as in 0.05 or W3.15")
-        if wanted in "bBwWn":
+        if wanted in "bBwWnv":
             shown = f"{address.area}{address.number}" if address.area in FLAG_AREAS else str(address).replace(" ", "")
             return Direct(start, end, f"%{shown}")
         return NameRef(start, end, self._at(address, wanted, start, end))
 
     def _at(self, address: Address, wanted: str, start: int, end: int) -> str:
         """The name of a variable at an address, for what is longer than a word."""
+        wanted = wanted.upper() if wanted == "a" else wanted
         key = str(address), wanted
         if key not in self.located:
             name = Name(start, end, f"${address}:{wanted}")
@@ -96,17 +142,74 @@ class Operands:
         return self.located[key].names[0].text
 
     def _indirect(self, text: str, wanted: str, start: int, end: int) -> Expr:
-        """`@D100`: the word of D whose number is in D100; `*D100`: likewise in BCD."""
-        if wanted not in "wWn":
-            raise Wrong(f"{text} is understood but not executed here by this version",
-                        "indirect addresses are executed where one word is wanted")
+        """`@D100`: the word of D whose number is in D100, behind the last the words of E bank 0; `*D100`: likewise in
+        BCD.  What is no number of a word leads nowhere."""
         pointer = _address(text[1:], "w")
         if pointer.area not in ("D", *E_NAMES):
             raise Wrong(f"{text} does not point anywhere: only D and E words do", "write @D.. or *D..")
-        base = Address(pointer.area, 0)
-        number = Call(start, end, NameRef(start, end, "BCD_TO_UINT" if text[0] == "*" else "WORD_TO_UINT"),
-                      (Argument(start, end, "", None, self._direct(pointer, "w", start, end)),))
-        return Index(start, end, NameRef(start, end, self._at(base, "A", start, end)), (number,))
+        if wanted in "bBtcm":
+            raise Wrong(f"{text} is a word, and {self.role} is a {'bit' if wanted in 'bB' else 'number'}", "")
+        base = PLC_ADDRESSES["D"] if pointer.area == "D" else E_PLC_ADDRESS + E_WORDS * E_NAMES.index(pointer.area)
+        name = "CX_Decimal" if text[0] == "*" else "WORD_TO_UDINT"
+        number = self._called(name, start, end, self._direct(pointer, "w", start, end))
+        return self._memory(Binary(start, end, "+", self._number(base, start, end), number, start), wanted, start, end)
+
+    # --- index and data registers ---
+
+    def _register(self, register: re.Match[str], wanted: str, start: int, end: int) -> Expr:
+        """IR0 as two words, DR0 as one."""
+        kind, number = register[1].upper(), int(register[2])
+        if number >= REGISTERS:
+            raise Wrong(f"there is no {register[0]}", f"{kind}0 to {kind}{REGISTERS - 1} are there")
+        if wanted not in ("dAax" if kind == "IR" else "wWAa"):
+            raise Wrong(f"{register[0]} cannot be {self.role}", "an index register has two words, a data register one")
+        if wanted in "dw":
+            return self._called("CX_Pointed" if kind == "IR" else "CX_Offset", start, end, self._index(number, start, end))
+        return Index(start, end, NameRef(start, end, f"CX_{kind}"), (self._index(number, start, end),))
+
+    def _pointed(self, text: str, wanted: str, start: int, end: int) -> Expr:
+        """`,IR0` and its forms: what lies where an index register points; of a bit the register counts bits."""
+        found = _POINTED.fullmatch(text)
+        if not found or int(found[3]) >= REGISTERS:
+            raise Wrong(f"{text} is no operand", f"write ,IR0 +5,IR0 DR0,IR0 ,IR0+ or ,-IR0, with IR0 to IR{REGISTERS - 1}")
+        if wanted in "tcmx":
+            raise Wrong(f"{text} cannot be {self.role}", "numbers of timers and counters are known before the program runs")
+        offset, down, register, up = found[1] or "", len(found[2]), int(found[3]), len(found[4])
+        if down and up or offset and (down or up):
+            raise Wrong(f"{text} has more than one offset", "a register is counted up, or down, or has an offset")
+        if down or up:
+            step = [Literal(start, end, "int", value, "DINT", str(value)) for value in (-down, up)]
+            stepped = self._called("CX_Step", start, end, self._index(register, start, end), *step)
+            return self._memory(stepped, wanted, start, end)
+        pointed = self._called("CX_Pointed", start, end, self._index(register, start, end))
+        place: Expr = self._called("DWORD_TO_UDINT", start, end, pointed)
+        if offset[:2].upper() == "DR":
+            data = self._register(_REGISTER.fullmatch(offset) or found, "w", start, end)
+            more = self._called("INT_TO_UDINT", start, end, self._called("WORD_TO_INT", start, end, data))
+            place = Binary(start, end, "+", place, more, start)
+        elif offset:
+            if not -2048 <= int(offset) <= 2047:
+                raise Wrong(f"{text} leads too far", "offsets are -2048 to +2047")
+            place = Binary(start, end, "+", place, self._number(int(offset) & 0xFFFF_FFFF, start, end), start)
+        return self._memory(place, wanted, start, end)
+
+    def _memory(self, address: Expr, wanted: str, start: int, end: int) -> Expr:
+        """What an instruction wants at a PLC memory address that is worked out."""
+        if wanted in "bB":
+            return Memory(start, end, self.reach(address, 0, wanted == "B"), "BOOL")
+        if wanted == "v":
+            raise Wrong("the address of what is pointed at is in the register already", "copy that with MOVL")
+        kept = self.reach(address, WORDS.get(wanted, 1), wanted in "WA")
+        return Memory(start, end, kept, "" if wanted in "aA" else _REALS.get(wanted) or _TYPES[wanted])
+
+    def _index(self, register: int, start: int, end: int) -> Expr:
+        return Literal(start, end, "int", register, "UINT", str(register))
+
+    def _number(self, value: int, start: int, end: int) -> Expr:
+        return Literal(start, end, "int", value, "UDINT", str(value))
+
+    def _called(self, function: str, start: int, end: int, *values: Expr) -> Expr:
+        return Call(start, end, NameRef(start, end, function), tuple(Argument(start, end, "", None, v) for v in values))
 
     # --- symbols ---
 
@@ -149,7 +252,7 @@ def _address(text: str, wanted: str) -> Address:
     """The address that a text means where `wanted` is wanted.  Raises Wrong."""
     if _OLD.fullmatch(text) and wanted in "bB":
         text = f"{int(text[:-2])}.{text[-2:]}"
-    if wanted in "bB" and re.fullmatch(r"[TC]\d+", text, re.I):
+    if wanted in "bBv" and re.fullmatch(r"[TC]\d+", text, re.I):
         text = ("TF" if text[0] in "Tt" else "CNF") + text[1:]
     try:
         return parse_address(text)
@@ -159,8 +262,8 @@ def _address(text: str, wanted: str) -> Address:
 
 def _spec(address: Address, wanted: str, start: int, end: int) -> tree.TypeSpec:
     """The type of a variable at an address: words up to the end of the area, or the number that begins there."""
-    if wanted != "A":
-        return tree.NamedType(start, end, {"d": "DWORD", "q": "LWORD", "r": "REAL"}[wanted])
+    if wanted not in "aA":
+        return tree.NamedType(start, end, _REALS.get(wanted) or _TYPES[wanted])
     count = AREAS[address.area].count if address.area in AREAS else E_WORDS
     bounds = tuple(Literal(start, end, "int", value, None, str(value)) for value in (0, count - 1 - address.number))
     return tree.ArraySpec(start, end, ((bounds[0], bounds[1]),), tree.NamedType(start, end, "WORD"))

@@ -6,14 +6,31 @@ from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 from fbvm.syntax.instruction_set import Instruction
+from fbvm.syntax.mnemonics import RungText
 from fbvm.syntax.operands import Wrong
-from fbvm.syntax.tree import Argument, Call, CallStatement, Direct, Expr, Name, NamedType, NameRef, VarDecl, VarSection
+from fbvm.syntax.tree import (
+    Argument,
+    Call,
+    CallStatement,
+    Direct,
+    Expr,
+    Name,
+    NamedType,
+    NameRef,
+    Statement,
+    VarDecl,
+    VarSection,
+)
 
 if TYPE_CHECKING:
     from fbvm.syntax.rungs import Rungs
 
 TIMERS = 4096
 """Numbers of timers, and of counters."""
+REFRESHED = 2048
+"""Timers below this number count on while a jump passes over them (etn21 9.4, from memory of the family)."""
+FAILURES = 512
+"""Numbers of failures."""
 
 
 class LadderBlocks:
@@ -21,6 +38,16 @@ class LadderBlocks:
 
     def __init__(self, rungs: Rungs) -> None:
         self.rungs = rungs
+        self._timers: dict[int, Instruction] = {}
+        """Timers of this LADDER by their numbers."""
+
+    def look(self, texts: list[RungText]) -> None:
+        """Find out which timers there are."""
+        for line in (line for text in texts for line in text.lines):
+            if line.row.operands[:1] == "t" and line.row.kind and line.step.operands:
+                number = self._timer(line.step.operands[0])
+                if number is not None:
+                    self._timers.setdefault(number, line.row)
 
     def execute(self, row: Instruction) -> None:
         """A step that the table gives to a function or block."""
@@ -29,7 +56,8 @@ class LadderBlocks:
             return
         rungs = self.rungs
         call = rungs.call()
-        rungs.emit(rungs.when(rungs.variation(rungs.power()), CallStatement(call.start, call.end, call)))
+        done = rungs.reaching(CallStatement(call.start, call.end, call))
+        rungs.emit(rungs.when(rungs.variation(rungs.power()), *done))
 
     # --- blocks that have a state -----------------------------------------------------------------------------------
 
@@ -41,12 +69,28 @@ class LadderBlocks:
         numbered = first in ("t", "c")
         operands = self._numbered(first) if numbered else [rungs.operand(0)]
         operands += [rungs.operand(position) for position in range(1, len(row.operands))]
-        name = f"${first.upper()}{self._number(first)}" if numbered else rungs.name("block")
+        name = self._named(row, self._number(first)) if numbered else rungs.name("block")
         conditions = rungs.inputs(row.inputs)
         instance = rungs.variable(name, row.does)
         off = (rungs.truth(False),) * row.inputs
-        inhibited = (self._called(instance, [*off, *operands]),) if row.kind == "FB" else ()
-        rungs.emit(self._called(instance, [*conditions, *operands]), inhibited=inhibited)
+        inhibited = rungs.reaching(self._called(instance, [*off, *operands])) if row.kind == "FB" else ()
+        passed: tuple[Statement, ...] = ()
+        if first == "t" and row.kind == "FB" and self._number(first) < REFRESHED:
+            passed = (self._gone_on(instance, operands[:2]),)
+        rungs.emit(*rungs.reaching(self._called(instance, [*conditions, *operands])), inhibited=inhibited, passed=passed)
+
+    def _gone_on(self, instance: Expr, flag_and_value: list[Expr], **pins: bool) -> CallStatement:
+        """A call of a timer with these conditions, everything else as it was."""
+        rungs = self.rungs
+        start, end = rungs.start, rungs.end
+        arguments = [_named(start, end, pin, ":=", rungs.truth(value)) for pin, value in pins.items()]
+        arguments += [_named(start, end, pin, ":=", value)
+                      for pin, value in zip(("Flag", "PV"), flag_and_value, strict=True)]
+        return CallStatement(start, end, Call(start, end, instance, tuple(arguments)))
+
+    def _named(self, row: Instruction, number: int) -> str:
+        """The instance of a timer or counter: what defines a number twice has two."""
+        return f"${row.mnemonic}{number}"
 
     def _called(self, instance: Expr, arguments: list[Expr]) -> CallStatement:
         rungs = self.rungs
@@ -55,11 +99,18 @@ class LadderBlocks:
 
     def _number(self, letter: str) -> int:
         text = self.rungs.line.step.operands[0]
-        digits = text[1:] if text[:1].upper() == letter.upper() else text
-        if not digits.isdigit() or int(digits) >= TIMERS:
+        number = self._timer(text, letter)
+        if number is None:
             what = "timer" if letter == "t" else "counter"
-            raise Wrong(f"{text} is no number of a {what}", f"numbers are 0 to {TIMERS - 1}")
-        return int(digits)
+            raise Wrong(f"{text} is no number of a {what}",
+                        f"numbers are 0 to {TIMERS - 1}; a symbol is declared AT {letter.upper()}0005 before the rungs")
+        return number
+
+    def _timer(self, text: str, letter: str = "t") -> int | None:
+        """The number of a timer or counter as it is written, or of its symbol; None if there is none."""
+        text = self.rungs.operands.numbered.get(text.upper(), text)
+        digits = text[1:] if text[:1].upper() == letter.upper() else text
+        return int(digits) if digits.isdigit() and int(digits) < TIMERS else None
 
     def _numbered(self, letter: str) -> list[Expr]:
         """Completion flag and present value of the timer or counter."""
@@ -67,6 +118,56 @@ class LadderBlocks:
         flag, value = ("TF", "T") if letter == "t" else ("CNF", "C")
         number = self._number(letter)
         return [Direct(start, end, f"%{flag}{number}"), Direct(start, end, f"%{value}{number}")]
+
+    def reset_timer(self) -> None:
+        """TRSET: the timer begins again, as if its condition had been OFF for a moment."""
+        rungs, number = self.rungs, self._number("t")
+        row = self._timers.get(number)
+        if row is None:
+            raise Wrong(f"there is no timer {number} in these rungs", "TRSET stands in the rungs of its timer")
+        instance = rungs.variable(self._named(row, number), row.does)
+        pins = {"In": False, "Reset": True} if row.inputs == 2 else {"In": False}
+        rungs.emit(rungs.when(rungs.variation(rungs.power()), self._gone_on(instance, self._numbered("t"), **pins)))
+
+    def reset_numbers(self) -> None:
+        """CNR and CNRX: timers or counters from one number to another are OFF, with the highest present value."""
+        rungs = self.rungs
+        texts = [rungs.operands.numbered.get(text.upper(), text).upper() for text in rungs.line.step.operands]
+        kinds, digits = {text[0] for text in texts}, [text[1:] for text in texts]
+        if len(kinds) > 1 or not kinds <= {"T", "C"} or not all(each.isdigit() and int(each) < TIMERS for each in digits):
+            raise Wrong(f"{' and '.join(rungs.line.step.operands)} are no timers and no counters",
+                        f"write T0000 T0009 or C0000 C0009, up to {TIMERS - 1}")
+        highest = 0x9999 if rungs.line.step.mnemonic == "CNR" else 0xFFFF
+        values = [rungs.truth(kinds == {"C"}), *(rungs.number(int(each)) for each in digits), rungs.number(highest)]
+        rungs.emit(rungs.when(rungs.variation(rungs.power()), rungs.called("CX_CNR", *values)))
+
+    # --- addresses and failures -------------------------------------------------------------------------------------
+
+    def address(self) -> None:
+        """MOVR and MOVRW: where a bit, a word or a present value lies, for an index register."""
+        rungs = self.rungs
+        place, register = rungs.operand(0), rungs.line.step.operands[1]
+        rungs.operand(1)
+        at = Call(rungs.start, rungs.end, NameRef(rungs.start, rungs.end, "__PLC_ADDRESS"),
+                  (Argument(place.start, place.end, "", None, place),))
+        rungs.emit(rungs.when(rungs.variation(rungs.power()), rungs.called("CX_Point", rungs.number(int(register[2:])), at)))
+
+    def failure(self, function: str) -> None:
+        """FAL and FALS: the number of a failure, and a constant or the words of a message."""
+        rungs, (number, message) = self.rungs, self.rungs.line.step.operands
+        digits = number.lstrip("#&")
+        least = 0 if function == "CX_FAL" else 1
+        if not digits.isdigit() or not least <= int(digits) < FAILURES:
+            raise Wrong(f"{number} is no number of a failure", f"numbers are {least} to {FAILURES - 1}")
+        code, done = rungs.number(int(digits)), []
+        if message[0] in "#&":
+            done.append(rungs.called(function, code, rungs.operand(1)))
+        else:
+            words = rungs.operands.expression(message, "a", *rungs.line.places[1], rungs.line.row.role(1))
+            done += [rungs.called("CX_MSG", rungs.number(8), words), rungs.called(function, code, rungs.number(0))]
+        if function == "CX_FALS":
+            done.append(rungs.called("__STOP"))
+        rungs.emit(rungs.when(rungs.variation(rungs.power()), *rungs.reaching(*done)))
 
     # --- function blocks of the user --------------------------------------------------------------------------------
 

@@ -16,6 +16,7 @@ from fbvm.syntax.lexer import Token
 from fbvm.syntax.mnemonics import Line, RungText, is_input, read_rungs
 from fbvm.syntax.operands import Operands, Wrong
 from fbvm.syntax.rung_blocks import LadderBlocks
+from fbvm.syntax.rung_sequences import Steps
 from fbvm.syntax.rung_spans import Spans
 from fbvm.syntax.tree import Assign, Binary, Expr, If, NameRef, Statement, Unary
 
@@ -33,11 +34,12 @@ class Rungs:
     def __init__(self, builder: Expressions) -> None:
         self.builder = builder
         self.report = builder.report
-        self.operands = Operands()
+        self.operands = Operands(self.reach, builder.numbered)
         self.variables: dict[str, tree.VarDecl] = {}
         self.temporaries: dict[str, tree.VarDecl] = {}
         self.spans = Spans(self)
         self.blocks = LadderBlocks(self)
+        self.steps = Steps(self)
         self.out: list[Statement] = []
         self.condition: Expr | None = None
         self.saved: list[Expr] = []
@@ -47,6 +49,9 @@ class Rungs:
         """Which rung of the POU it is, whatever number was written."""
         self.step = 0
         self.line: Line
+        self._position = 0
+        self.reached: dict[str, tuple[Statement, Expr]] = {}
+        """Addresses that the step works out, by the names under which they are kept: how, and whether they lead anywhere."""
         self.instances: list[tree.VarDecl] = []
 
     # --- the whole --------------------------------------------------------------------------------------------------
@@ -54,6 +59,7 @@ class Rungs:
     def ladder(self, texts: list[RungText], start: int, end: int) -> Ladder:
         """The LADDER of these rungs."""
         self.spans.look(texts)
+        self.blocks.look(texts)
         rungs = []
         before = sum(len(ladder.rungs) for ladder in self.builder.ladders)
         for position, text in enumerate(texts, 1):
@@ -69,11 +75,12 @@ class Rungs:
     def _rung(self, text: RungText, number: int) -> Rung:
         self.out, self.condition, self.saved, self.used = [], None, [], set()
         for step, line in enumerate(text.lines):
-            self.line, self.step = line, step
+            self.line, self.step, self.reached = line, step, {}
             try:
                 self._step(line.row)
             except (Refused, Wrong) as refusal:
-                self.report("S0110", self.start, self.end, *refusal.args)
+                start, end = refusal.place if isinstance(refusal, Wrong) and refusal.place else (self.start, self.end)
+                self.report("S0110", start, end, *refusal.args)
                 text.damaged = True
                 if is_input(line.row):
                     break
@@ -95,10 +102,10 @@ class Rungs:
 
     def _step(self, row: Instruction) -> None:
         if not row.does:
-            raise Refused(f"{row.mnemonic} is understood but not executed by this version", "")
+            raise Refused(f"{row.mnemonic} is understood and not executed", row.words)
         self._count(row)
         if row.kind == "?":
-            self._join(row.mnemonic[: -len(row.mnemonic.lstrip("LDANOR")) or None] or "LD", self.contact(self.call()))
+            self._join(row.join, self.contact(self.seen(self.call())))
         elif row.does.startswith("."):
             _NATIVE[row.does](self)
         else:
@@ -108,8 +115,10 @@ class Rungs:
         """The number of operands, and that there is a condition for who wants one."""
         given = len(self.line.step.operands)
         wanted = len(row.operands)
-        if row.does != ".call" and given != wanted:
-            raise Refused(f"{row.mnemonic} takes {wanted} operand{'s' * (wanted != 1)}, not {given}", "")
+        if row.does != ".call" and not row.least <= given <= wanted:
+            names = f" ({', '.join(row.names)})" if wanted else ""
+            raise Refused(f"{row.mnemonic} takes {wanted or 'no'} operand{'s' * (wanted != 1)}{names}, not {given}",
+                          row.described)
         if row.inputs and self.condition is None:
             raise Refused(f"{row.mnemonic} needs an execution condition", "write LD in front of it; LD P_On is always ON")
 
@@ -125,8 +134,54 @@ class Rungs:
 
     def operand(self, position: int) -> Expr:
         """An operand of the step as an expression."""
-        start, end = self.line.places[position]
-        return self.operands.expression(self.line.step.operands[position], self.line.row.operands[position], start, end)
+        row, (start, end) = self.line.row, self.line.places[position]
+        text, wanted = self.line.step.operands[position], row.operands[position]
+        self._position = position
+        try:
+            if wanted == "k":
+                return self._words(text, start, end, row.role(position))
+            return self.operands.expression(text, wanted, start, end, row.role(position))
+        except Wrong as wrong:
+            wrong.place = start, end
+            raise
+
+    def _words(self, text: str, start: int, end: int, role: str) -> Expr:
+        """Words that are read, or the one word of a constant."""
+        if text[:1] not in "#&+-" or "," in text:
+            return self.operands.expression(text, "a", start, end, role)
+        kept = self.temporary(self.name(f"word{self._position}"), "WORD")
+        self.out.append(self.assign(kept, self.operands.expression(text, "w", start, end, role)))
+        return self.temporary(kept.text, "WORD")
+
+    def reach(self, address: Expr, words: int, written: bool) -> NameRef:
+        """Keep an address that the step works out: what it does is done only if so many words lie there."""
+        kept = self.temporary(self.name(f"at{self._position}"), "UDINT")
+        if kept.text not in self.reached:
+            values = (self.temporary(kept.text, "UDINT"), self.number(words), self.truth(written))
+            found = tree.Call(self.start, self.end, NameRef(self.start, self.end, "CX_Reachable"),
+                              tuple(tree.Argument(self.start, self.end, "", None, value) for value in values))
+            self.reached[kept.text] = self.assign(kept, address), found
+        return self.temporary(kept.text, "UDINT")
+
+    def reaching(self, *statements: Statement) -> tuple[Statement, ...]:
+        """Statements that are executed if all addresses that the step works out lead somewhere."""
+        if not self.reached:
+            return statements
+        made = [assign for assign, _ in self.reached.values()]
+        return (*made, self.when(self._found(), *statements))
+
+    def seen(self, value: Expr) -> Expr:
+        """The state of a contact: OFF if an address that it works out leads nowhere."""
+        if not self.reached:
+            return value
+        self.emit(*(assign for assign, _ in self.reached.values()))
+        return self.binary("AND_THEN", self._found(), value)
+
+    def _found(self) -> Expr:
+        first, *more = (found for _, found in self.reached.values())
+        for found in more:
+            first = self.binary("AND", first, found)
+        return first
 
     def value(self, text: str, start: int, end: int) -> Expr:
         """What enters a pin of a block: an operand, or a literal of Structured Text."""
@@ -143,6 +198,12 @@ class Rungs:
         arguments = [self.operand(position) for position in range(len(self.line.row.operands))]
         return tree.Call(self.start, self.end, NameRef(self.start, self.end, self.line.row.does),
                          tuple(tree.Argument(a.start, a.end, "", None, a) for a in arguments))
+
+    def called(self, function: str, *values: Expr) -> Statement:
+        """A call of a function for what it does."""
+        arguments = tuple(tree.Argument(value.start, value.end, "", None, value) for value in values)
+        call = tree.Call(self.start, self.end, NameRef(self.start, self.end, function), arguments)
+        return tree.CallStatement(self.start, self.end, call)
 
     def variable(self, name: str, kind: str = "BOOL") -> NameRef:
         """A variable that is kept from cycle to cycle."""
@@ -178,6 +239,9 @@ class Rungs:
     def negated(self, value: Expr) -> Expr:
         return Unary(self.start, self.end, "NOT", value)
 
+    def number(self, value: int) -> Expr:
+        return tree.Literal(self.start, self.end, "int", value, None, str(value))
+
     def truth(self, value: bool) -> Expr:
         return tree.Literal(self.start, self.end, "bool", value, None, "TRUE" if value else "FALSE")
 
@@ -190,7 +254,7 @@ class Rungs:
         self._settle()
         kept = self.temporary(self.name("on"))
         self.used.add(kept.text)
-        self.emit(self.assign(kept, self.contact(self.condition)))
+        self.emit(self.assign(kept, self.contact(self.condition)), always=True)
         self.condition = kept
         return kept
 
@@ -199,17 +263,27 @@ class Rungs:
         for position, saved in enumerate(self.saved):
             if not isinstance(saved, NameRef):
                 kept = self.temporary(f"{self.name('saved')}{position}")
-                self.emit(self.assign(kept, saved))
+                self.emit(self.assign(kept, saved), always=True)
                 self.saved[position] = kept
 
-    def emit(self, *statements: Statement, inhibited: tuple[Statement, ...] = ()) -> None:
-        """Write statements; inside an interlock that inhibits, `inhibited` in their place."""
-        self.out += self.spans.guarded(statements, inhibited)
+    def emit(self, *statements: Statement, inhibited: tuple[Statement, ...] = (), passed: tuple[Statement, ...] = (),
+             always: bool = False) -> None:
+        """Write statements; inside an interlock that inhibits, `inhibited` in their place, under a jump `passed`.  What is
+        done `always` is done in an interlock that forgets edges, too."""
+        self.out += self.spans.guarded(statements, inhibited, passed, always)
 
     def variation(self, condition: Expr) -> Expr:
         """The condition under which the step is executed: its prefix may want an edge of it."""
         prefix = self.line.step.prefix.replace("!", "")
-        return self.edge(condition, prefix == "%") if prefix else condition
+        return self.noticed(self.edge(condition, prefix == "%")) if prefix else condition
+
+    def noticed(self, edge: Edge) -> Expr:
+        """An edge that is worked out in an interlock that forgets edges, too."""
+        if not self.spans.forgetful:
+            return edge
+        kept = self.temporary(self.name("edge"))
+        self.emit(self.assign(kept, edge), always=True)
+        return self.temporary(kept.text)
 
     # --- conditions -------------------------------------------------------------------------------------------------
 
@@ -218,7 +292,7 @@ class Rungs:
         value = self.operand(0)
         if step.prefix.replace("!", ""):
             value = self.edge(value, "%" in step.prefix)
-        return self.contact(self.negated(value) if step.mnemonic.endswith("NOT") else value)
+        return self.contact(self.seen(self.negated(value) if step.mnemonic.endswith("NOT") else value))
 
     def _join(self, how: str, contact: Expr) -> None:
         if how == "LD":
@@ -269,7 +343,8 @@ class Rungs:
             return
         target, power = self.operand(0), self.power()
         value = self.negated(power) if self.line.step.mnemonic == "OUTNOT" else power
-        self.emit(self.assign(target, value), inhibited=(self.assign(target, self.truth(False)),))
+        self.emit(*self.reaching(self.assign(target, value)),
+                  inhibited=self.reaching(self.assign(self.operand(0), self.truth(False))))
 
     def _branch(self, text: str) -> None:
         if int(text[2:]) > 15:
@@ -277,7 +352,7 @@ class Rungs:
         assert self.condition is not None
         self._settle()
         kept = self.temporary(f"${text}")
-        self.emit(self.assign(kept, self.contact(self.condition)))
+        self.emit(self.assign(kept, self.contact(self.condition)), always=True)
         self.condition = kept
 
     def inputs(self, count: int) -> list[Expr]:
@@ -294,14 +369,16 @@ class Rungs:
     def _keep(self) -> None:
         target = self.operand(0)
         set_, reset = self.inputs(2)
-        self.emit(self.assign(target, self.binary("AND", self.binary("OR", set_, self.operand(0)), self.negated(reset))))
+        kept = self.binary("AND", self.binary("OR", set_, self.operand(0)), self.negated(reset))
+        self.emit(*self.reaching(self.assign(target, kept)))
 
     def _pulse(self, falling: bool) -> None:
-        self.emit(self.assign(self.operand(0), self.edge(self.power(), falling)))
+        edge = self.noticed(self.edge(self.power(), falling))
+        self.emit(*self.reaching(self.assign(self.operand(0), edge)))
 
     def _set(self, value: bool) -> None:
         target = self.operand(0)
-        self.emit(self.when(self.variation(self.power()), self.assign(target, self.truth(value))))
+        self.emit(self.when(self.variation(self.power()), *self.reaching(self.assign(target, self.truth(value)))))
 
     def _nothing(self) -> None:
         """NOP."""
@@ -321,6 +398,15 @@ _NATIVE: dict[str, Callable[[Rungs], None]] = {
     ".for": lambda rungs: rungs.spans.loop(), ".next": lambda rungs: rungs.spans.next(),
     ".break": lambda rungs: rungs.spans.leave(), ".call_subroutine": lambda rungs: rungs.spans.visit(),
     ".subroutine": lambda rungs: rungs.spans.subroutine(), ".return": lambda rungs: rungs.spans.go_back(),
+    ".macro": lambda rungs: rungs.spans.visit_with_words(),
+    ".interlock_number": lambda rungs: rungs.spans.interlock_number(),
+    ".interlock_end": lambda rungs: rungs.spans.clear_number(),
+    ".step": lambda rungs: rungs.steps.step(), ".next_step": lambda rungs: rungs.steps.next_step(),
+    ".reset_numbers": lambda rungs: rungs.blocks.reset_numbers(),
+    ".reset_timer": lambda rungs: rungs.blocks.reset_timer(),
+    ".address": lambda rungs: rungs.blocks.address(), ".value_address": lambda rungs: rungs.blocks.address(),
+    ".failure": lambda rungs: rungs.blocks.failure("CX_FAL"),
+    ".fatal_failure": lambda rungs: rungs.blocks.failure("CX_FALS"),
 }
 
 

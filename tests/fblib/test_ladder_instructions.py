@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -35,83 +36,8 @@ def execute(instruction: str, before: dict[int, int], carry: bool = False) -> tu
     return {n: words[n] for n in range(20) if words[n]}, {name for name, at in FLAGS.items() if plc.read(at)}
 
 
-ROWS = """
-MOV #1234 D0              |                     | 0=1234              |
-MOV #0 D0                 | 0=1                 |                     | EQ
-MOV #8000 D0              |                     | 0=8000              | N
-MOVL #12345678 D0         |                     | 0=5678 1=1234       |
-MVN D0 D1                 | 0=FFFF              | 0=FFFF              | EQ
-MOVB D0 #0403 D1          | 0=0008              | 0=0008 1=0010       |
-MOVB D0 #1003 D1          | 0=0008              | 0=0008              | ER
-MOVD D0 #0210 D1          | 0=4321 1=FFFF       | 0=4321 1=21FF       |
-MOVD D0 #0013 D1          | 0=4321              | 0=4321 1=0014       |
-XFER #3 D0 D1             | 0=1 1=2 2=3 3=4     | 0=1 1=1 2=2 3=3     |
-XFER #3 D1 D0             | 1=1 2=2 3=3         | 0=1 1=2 2=3 3=3     |
-XFER &3 D32766 D0         | 0=1                 | 0=1                 | ER
-BSET #7 D1 D3             |                     | 1=7 2=7 3=7         |
-BSET #7 D3 D1             |                     |                     | ER
-XCHG D0 D1                | 0=1 1=2             | 0=2 1=1             |
-DIST #5 D0 D10            | 10=3                | 3=5 10=3            |
-COLL D0 D10 D11           | 3=5 10=3            | 3=5 10=3 11=5       |
-ASL D0                    | 0=8001              | 0=2                 | CY
-ASLL D0                   | 0=8000 1=8000       | 1=1                 | CY
-ASR D0                    | 0=1                 |                     | CY EQ
-ROL D0                    | 0=4000              | 0=8000              | N
-ROR D0                    | 0=3                 | 0=1                 | CY
-RLNC D0                   | 0=8001              | 0=3                 | CY
-RRNC D0                   | 0=1                 | 0=8000              | CY N
-WSFT #9 D0 D2             | 0=1 1=2 2=3         | 0=9 1=1 2=2         |
-SLD D0 D1                 | 0=1234 1=5678       | 0=2340 1=6781       |
-SRD D0 D1                 | 0=1234 1=5678       | 0=8123 1=0567       |
-++ D0                     | 0=FFFF              |                     | CY EQ
--- D0                     |                     | 0=FFFF              | CY N
-++L D0                    | 0=FFFF 1=1          | 1=2                 |
-++B D0                    | 0=9999              |                     | CY EQ
-++B D0                    | 0=00FA              | 0=00FA              | ER
---B D0                    | 0=1000              | 0=0999              |
-+ D0 D1 D2                | 0=7FFF 1=1          | 0=7FFF 1=1 2=8000   | N OF
-+ D0 D1 D2                | 0=FFFF 1=1          | 0=FFFF 1=1          | CY EQ
-+ D0 D1 D2                | 0=8000 1=FFFF       | 0=8000 1=FFFF 2=7FFF | CY UF
-- D0 D1 D2                | 0=1 1=2             | 0=1 1=2 2=FFFF      | CY N
-+B D0 D1 D2               | 0=9999 1=1          | 0=9999 1=1          | CY EQ
--B D0 D1 D2               | 0=1 1=2             | 0=1 1=2 2=9999      | CY
-+B D0 D1 D2               | 0=A 1=1             | 0=A 1=1             | ER
-* D0 D1 D2                | 0=FFFF 1=2          | 0=FFFF 1=2 2=FFFE 3=FFFF | N
-*U D0 D1 D2               | 0=FFFF 1=FFFF       | 0=FFFF 1=FFFF 2=1 3=FFFE | N
-/ D0 D1 D2                | 0=FFF9 1=2          | 0=FFF9 1=2 2=FFFD 3=FFFF | N
-/ D0 D1 D2                | 0=8000 1=FFFF       | 0=8000 1=FFFF 2=8000 | N
-/U D0 D1 D2               | 0=7 1=2             | 0=7 1=2 2=3 3=1     |
-/U D0 D1 D2               | 0=7                 | 0=7                 | ER
-*B D0 D1 D2               | 0=9999 1=9999       | 0=9999 1=9999 2=1 3=9998 |
-/B D0 D1 D2               | 0=7 1=2             | 0=7 1=2 2=3 3=1     |
-BIN D0 D1                 | 0=9999              | 0=9999 1=270F       |
-BCD D0 D1                 | 0=270F              | 0=270F 1=9999       |
-BCD D0 D1                 | 0=2710              | 0=2710              | ER
-NEG D0 D1                 | 0=1                 | 0=1 1=FFFF          | N
-SIGN D0 D1                | 0=8000              | 0=8000 1=8000 2=FFFF | N
-ANDW D0 D1 D2             | 0=FF0F 1=0FFF       | 0=FF0F 1=0FFF 2=0F0F |
-XNRW D0 D1 D2             | 0=FFFF 1=FFFF       | 0=FFFF 1=FFFF 2=FFFF | N
-ORWL D0 D2 D4             | 0=1 3=8000          | 0=1 3=8000 4=1 5=8000 | N
-COM D0                    | 0=FFFF              |                     | EQ
-BCNT #2 D0 D2             | 0=FFFF 1=1          | 0=FFFF 1=1 2=11     |
-+F D0 D2 D4               | 1=3F80 3=4000       | 1=3F80 3=4000 5=4040 |
-/F D0 D2 D4               | 1=3F80              | 1=3F80 5=7F80       | OF
-/F D0 D2 D4               |                     |                     | ER
-FIX D0 D2                 | 1=C020              | 1=C020 2=FFFE       | N
-FIX D0 D2                 | 1=4780              | 1=4780              | ER
-FLT D0 D1                 | 0=FFFF              | 0=FFFF 2=BF80       | N
-SETB D0 #F                |                     | 0=8000              |
-RSTB D0 &0                | 0=3                 | 0=2                 |
-SETB D0 &16               |                     |                     | ER
-SETA D0 &14 &4            |                     | 0=C000 1=3          |
-RSTA D0 &4 &8             | 0=FFFF              | 0=F00F              |
-CMP D0 #5                 | 0=6                 | 0=6                 | GT
-CPS D0 #5                 | 0=FFFF              | 0=FFFF              | LT
-ZCP #5 #5 #9              |                     |                     | EQ
-ZCP #A #5 #9              |                     |                     | GT
-ZCP #5 #9 #5              |                     |                     | ER
-STC                       |                     |                     | CY
-"""
+ROWS = [row for path in sorted((Path(__file__).parent / "ladder").glob("*.txt"))
+        for row in path.read_text(encoding="utf-8").splitlines() if row and not row.startswith("#")]
 
 
 def words(text: str) -> dict[int, int]:
@@ -119,7 +45,7 @@ def words(text: str) -> dict[int, int]:
     return {int(number): int(value, 16) for number, value in pairs}
 
 
-@pytest.mark.parametrize("row", [row for row in ROWS.splitlines() if row], ids=lambda row: row.split("|")[0].strip())
+@pytest.mark.parametrize("row", ROWS, ids=lambda row: row.split("|")[0].strip())
 def test_result_and_flags(row: str) -> None:
     instruction, before, after, flags = (part.strip() for part in row.split("|"))
     assert execute(instruction, words(before)) == (words(after), set(flags.split()))
@@ -134,7 +60,8 @@ def test_nothing_is_done_with_the_condition_off() -> None:
 @pytest.mark.slow
 def test_every_instruction_that_is_not_refused_compiles() -> None:
     """With operands of the kinds that it takes; those that are refused say so."""
-    shown = {"b": "0.00", "w": "D0", "d": "D0", "r": "D0", "B": "W0.00", "W": "D20", "A": "D20", "t": "5", "c": "5"}
+    shown = {"b": "0.00", "w": "D0", "d": "D0", "r": "D0", "l": "D0", "a": "D0", "k": "D0",
+             "B": "W0.00", "W": "D20", "A": "D20", "t": "5", "c": "5"}
     for row in instruction_set().rows.values():
         if not row.does or row.does.startswith("."):
             continue
@@ -147,7 +74,8 @@ def test_every_instruction_that_is_not_refused_compiles() -> None:
 def test_what_is_known_and_not_built_is_refused_by_name() -> None:
     made = compile_text("PROGRAM Main\nLADDER\nLD P_On\nSEND(090) D0 D1 D2\nEND_LADDER\nEND_PROGRAM")
     assert [(d.code, d.message) for d in made.diagnostics] == [
-        ("S0110", "SEND is understood but not executed by this version")]
+        ("S0110", "SEND is understood and not executed")]
+    assert "no FINS network" in made.diagnostics[0].hint
 
 
 # --- beside Python --------------------------------------------------------------------------------------------------
