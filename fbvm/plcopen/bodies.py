@@ -3,6 +3,7 @@ statements."""
 
 from __future__ import annotations
 
+from fbvm.plcopen.charts import Chart, Incomplete
 from fbvm.plcopen.diagram import read_diagram
 from fbvm.plcopen.document import Body, Document, Pou, Reading
 from fbvm.plcopen.networks import Network, networks
@@ -27,15 +28,25 @@ class Bodies:
         if body.language in ("ST", "IL"):
             return _text(body.element.text)
         if body.language == "SFC":
-            counts = ", ".join(f"{len(found)} {what}s" for what in ("step", "transition") if (found := body.element.all(what)))
-            self.reading.report("X0203", body.element, f"the sequential function chart ({counts or 'empty'}) is not taken over")
-            return [f"{NOTE} the sequential function chart was not taken over"]
+            return self._chart(body)
         return self._diagram(body)
+
+    def _lose_places(self, body: Body) -> None:
+        self.reading.count("positions and sizes of drawings are not taken over", body.element)
+
+    def _chart(self, body: Body) -> list[str]:
+        if len({tuple(p.attributes.values()) for child in body.element.children for p in child.all("position")}) > 1:
+            self._lose_places(body)
+        try:
+            return Chart(self.reading, self.scope, self.pou, self.lines).lines(body.element)
+        except Incomplete as refusal:
+            self.reading.report("X0203", *refusal.args)
+            return [f"{NOTE} the sequential function chart was not taken over: {refusal.args[1]}"]
 
     def _diagram(self, body: Body) -> list[str]:
         diagram = read_diagram(self.reading, body.element)
         if len({(item.x, item.y) for item in diagram.objects}) > 1:
-            self.reading.count("positions and sizes of drawings are not taken over", body.element)
+            self._lose_places(body)
         lines: list[str] = []
         labels = {item.text.upper() for item in diagram.objects if item.kind == "label"}
         for item in diagram.objects:

@@ -7,6 +7,7 @@ on the power that reaches it, so a wire from a coil is one from what feeds the c
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import inf
 from typing import NamedTuple
 
 from fbvm.plcopen.document import Reading
@@ -87,8 +88,9 @@ class Diagram:
     comments: list[Object]
 
 
-def read_diagram(reading: Reading, body: Element) -> Diagram:
-    """The diagram in an element LD or FBD; what cannot be understood has a diagnostic."""
+def read_diagram(reading: Reading, body: Element, chart: bool = False) -> Diagram:
+    """The diagram in an element LD or FBD; what cannot be understood has a diagnostic.  Of a chart, what is drawn besides
+    steps: an object of kind "condition" stands for each transition whose condition is drawn."""
     objects: list[Object] = []
     comments: list[Object] = []
     known: dict[str, Object] = {}
@@ -99,6 +101,9 @@ def read_diagram(reading: Reading, body: Element) -> Diagram:
         made = _object(reading, element, place)
         if made.kind == "comment":
             comments.append(made)
+            continue
+        if chart and element.name in SFC_OBJECTS:
+            objects += _conditions(element, place)
             continue
         if element.name in SFC_OBJECTS:
             made.broken = True
@@ -171,6 +176,18 @@ def _followed(wires: list[Wire], seen: set[Object]) -> list[Wire]:
         elif wire not in found:
             found.append(wire)
     return [wire for at, wire in enumerate(found) if wire not in found[:at]]
+
+
+def _conditions(element: Element, place: int) -> list[Object]:
+    """What asks for the condition of a transition, if that is drawn."""
+    condition = element.one("condition")
+    points = condition.all("connectionPointIn") if condition else []
+    if not points:
+        return []
+    made = Object("condition", element.get("localId"), place, inf, inf, 0, "", element, inputs=[Pin("")])
+    for point in points:
+        _wire_in(made.inputs[0], point)
+    return [made]
 
 
 # --- one element ------------------------------------------------------------------------------------------------------

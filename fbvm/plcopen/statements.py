@@ -228,6 +228,11 @@ class Statements:
         self.done.add(sink)
         self.effect(_when(condition, f"{target} := {value.text};"), writes)
 
+    def _condition(self, item: Object) -> None:
+        """The condition of a transition, by the name in its text."""
+        value = self.take(item, item.inputs[0])
+        self.lines.append(f"{item.text} := {(negation(value) if item.negated else value).text};")
+
     def _in_out_variable(self, item: Object) -> None:
         if item.inputs[0].connected:
             target, writes = self._target(item)
@@ -269,4 +274,5 @@ def _when(condition: Value, statement: str) -> str:
 
 _WRITERS = {"contact": Statements._contact, "coil": Statements._sink, "outVariable": Statements._sink,
             "inOutVariable": Statements._in_out_variable, "inVariable": Statements._in_variable, "label": Statements._label,
-            "jump": Statements._power, "return": Statements._power, "block": Statements._block}
+            "jump": Statements._power, "return": Statements._power, "block": Statements._block,
+            "condition": Statements._condition}

@@ -1,0 +1,260 @@
+"""Sequential function charts of a document as steps, transitions and actions of the textual form.
+
+A chart is found by its wires: upwards from a transition to the steps that must be active, downwards to those that follow.
+Divergences, convergences and jumps are wires, and are gone behind this.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from fbvm.plcopen.diagram import Diagram, Object, read_diagram
+from fbvm.plcopen.document import Body, Pou, Reading
+from fbvm.plcopen.markup import Element
+from fbvm.plcopen.networks import Network, networks
+from fbvm.plcopen.read_types import duration
+from fbvm.plcopen.scope import Scope
+from fbvm.plcopen.statements import Statements
+from fbvm.plcopen.values import Unexecutable
+from fbvm.syntax.sfc import QUALIFIERS
+
+PASSING = ("selectionDivergence", "selectionConvergence", "simultaneousDivergence", "simultaneousConvergence")
+_ASSIGNED = re.compile(r"(?s)\s*([^\W\d]\w*)?\s*:=\s*(.*?);?\s*\Z")
+
+
+class Incomplete(Exception):
+    """The chart cannot be taken over; the arguments are an element, a message and a hint."""
+
+
+@dataclass(eq=False)
+class Arrow:
+    """A transition with the steps before and behind it."""
+
+    element: Element
+    sources: list[str]
+    targets: list[str]
+
+
+class Chart:
+    """One chart on its way.  `write` makes the lines of a body, for inline actions."""
+
+    def __init__(self, reading: Reading, scope: Scope, pou: Pou, write: Callable[[Body], list[str]]) -> None:
+        self.reading, self.scope, self.pou, self.write = reading, scope, pou, write
+        self.actions: list[str] = []
+
+    def lines(self, body: Element) -> list[str]:
+        """Steps, transitions and inline actions.  Raises Incomplete."""
+        self.known = {child.get("localId"): child for child in body.children if child.get("localId")}
+        self.followers: dict[str, list[Element]] = {}
+        for child in body.children:
+            for reference in _references(child):
+                self.followers.setdefault(reference, []).append(child)
+        for child in body.all("macroStep"):
+            raise Incomplete(child, f"the macro step {child.get('name')} is not taken over", "draw its steps in the chart")
+        steps = body.all("step")
+        if not any(step.get("initialStep") == "true" for step in steps):
+            raise Incomplete(body, "the chart has no initial step", "")
+        self.scope.taken |= {step.get("name").upper() for step in steps}
+        diagram = read_diagram(self.reading, body, chart=True)
+        arrows = [self._arrow(transition) for transition in body.all("transition")]
+        blocks = {reference: block for block in body.all("actionBlock") for reference in _references(block)}
+        lines = []
+        for step in steps:
+            lines += self._step(step, blocks.get(step.get("localId")))
+        for arrow in sorted(arrows, key=_order(arrows)):
+            lines += self._transition(arrow, diagram)
+        used = {item for asked in diagram.objects if asked.kind == "condition" for item in _feeding(asked)}
+        for item in diagram.objects:
+            if item not in used and item.kind != "rightPowerRail":
+                self.reading.report("X0203", item.element, f"{item.text or item.kind} belongs to no transition of the chart, "
+                                    "and is not taken over")
+        return [*lines, *self.actions]
+
+    # --- steps ---
+
+    def _step(self, step: Element, block: Element | None) -> list[str]:
+        word = "INITIAL_STEP" if step.get("initialStep") == "true" else "STEP"
+        if not step.get("name"):
+            raise Incomplete(step, "a step has no name", "")
+        associations = []
+        for number, action in enumerate(block.all("action") if block else [], 1):
+            associations.append(self._association(step, action, number))
+        return [f"{word} {step.get('name')}:", *(f"    {text}" for text in associations), "END_STEP"]
+
+    def _association(self, step: Element, action: Element, number: int) -> str:
+        qualifier = action.get("qualifier") or "N"
+        if qualifier not in QUALIFIERS:
+            raise Incomplete(action, f"the qualifier {qualifier} is not executed", f"there are {', '.join(QUALIFIERS)}")
+        reference, inline = action.one("reference"), action.one("inline")
+        name = reference.get("name").strip() if reference else ""
+        if inline is not None and (language := _language(inline)) is not None:
+            name = self._free(f"{step.get('name')}_{number}")
+            self.actions += [f"ACTION {name}:", *self.write(Body(language.name, language)), "END_ACTION"]
+        if not name:
+            raise Incomplete(action, f"an action of step {step.get('name')} names nothing", "")
+        given = [qualifier]
+        if QUALIFIERS[qualifier]:
+            given.append(duration(action.get("duration")) or action.get("duration") or "T#0s")
+        if action.get("indicator"):
+            given.append(action.get("indicator"))
+        return f"{name}({', '.join(given)});"
+
+    def _free(self, stem: str) -> str:
+        name, number = stem, 1
+        while name.upper() in self.scope.taken:
+            number += 1
+            name = f"{stem}_{number}"
+        self.scope.taken.add(name.upper())
+        return name
+
+    # --- transitions ---
+
+    def _arrow(self, transition: Element) -> Arrow:
+        sources = self._above(transition, set())
+        targets = self._below(transition, set())
+        for found, where in ((sources, "above"), (targets, "below")):
+            if not found:
+                raise Incomplete(transition, f"no step stands {where} transition {transition.get('localId')}", "")
+        return Arrow(transition, sources, targets)
+
+    def _above(self, element: Element, seen: set[str]) -> list[str]:
+        """Names of the steps from which wires lead to an element."""
+        found: list[str] = []
+        for reference in _references(element):
+            other = self.known.get(reference)
+            if other is None or reference in seen:
+                continue
+            if other.name == "step":
+                found.append(other.get("name"))
+            elif other.name in PASSING:
+                found += self._above(other, seen | {reference})
+        return list(dict.fromkeys(found))
+
+    def _below(self, element: Element, seen: set[str]) -> list[str]:
+        """Names of the steps to which wires lead from an element; a jump is one to its target."""
+        found: list[str] = []
+        for other in self.followers.get(element.get("localId"), ()):
+            number = other.get("localId")
+            if other.name == "step":
+                found.append(other.get("name"))
+            elif other.name == "jumpStep":
+                found += self._jumped(other)
+            elif other.name in PASSING and number not in seen:
+                found += self._below(other, seen | {number})
+        return list(dict.fromkeys(found))
+
+    def _jumped(self, jump: Element) -> list[str]:
+        """The step that a jump names, or those behind the simultaneous divergence of that name."""
+        name = jump.get("targetName").upper()
+        for element in self.known.values():
+            if element.get("name").upper() == name:
+                return [element.get("name")] if element.name == "step" else self._below(element, set())
+        raise Incomplete(jump, f"there is no step {jump.get('targetName')} to jump to", "")
+
+    def _transition(self, arrow: Arrow, diagram: Diagram) -> list[str]:
+        element = arrow.element
+        priority = element.get("priority")
+        marked = f" (PRIORITY := {priority})" if priority.isdigit() and int(priority) else ""
+        way = f"{marked} FROM {_names(arrow.sources)} TO {_names(arrow.targets)}"
+        name, condition, body = self._condition(element, diagram)
+        if body:
+            return [f"TRANSITION {name}{way}:", *(f"    {line}" for line in body), "END_TRANSITION"]
+        return [f"TRANSITION{way} := {condition};", "END_TRANSITION"]
+
+    def _condition(self, element: Element, diagram: Diagram) -> tuple[str, str, list[str]]:
+        """A name, and either an expression or the lines that assign to the name."""
+        condition = element.one("condition")
+        negated = condition is not None and condition.get("negated") == "true"
+        name = self._free(f"T{element.get('localId')}")
+        if condition is None:
+            raise Incomplete(element, f"transition {element.get('localId')} has no condition", "")
+        if (reference := condition.one("reference")) is not None:
+            name = reference.get("name").strip()
+            body = next((body for known, body in self.pou.transitions if known.upper() == name.upper()), None)
+            return self._bodied(name, body, negated) if body else (name, _turned(name, negated), [])
+        if (inline := condition.one("inline")) is not None:
+            name = inline.get("name") if re.fullmatch(r"[^\W\d]\w*", inline.get("name")) else name
+            language = _language(inline)
+            if language is None:
+                raise Incomplete(inline, "the condition is empty", "")
+            return self._bodied(name, Body(language.name, language), negated)
+        return self._drawn(name, element, diagram, negated)
+
+    def _bodied(self, name: str, body: Body, negated: bool) -> tuple[str, str, list[str]]:
+        """A condition that has a body: an expression, with or without `:=`, or statements that assign to its name."""
+        if body.language == "ST":
+            text = body.element.text.strip()
+            match = _ASSIGNED.fullmatch(text)
+            plain = match[2] if match else text.rstrip("; \n")
+            if ";" not in plain and ":=" not in plain and (not match or not match[1] or match[1].upper() == name.upper()):
+                return name, _turned(" ".join(plain.split()) or "TRUE", negated), []
+        lines = self.write(body)
+        return name, "", [*lines, f"{name} := NOT {name};"] if negated else lines
+
+    def _drawn(self, name: str, element: Element, diagram: Diagram, negated: bool) -> tuple[str, str, list[str]]:
+        """A condition that is drawn: the objects that feed it."""
+        number = element.get("localId")
+        asked = next((item for item in diagram.objects if item.kind == "condition" and item.id == number), None)
+        if asked is None or not asked.inputs[0].connected:
+            raise Incomplete(element, f"transition {number} has no condition", "")
+        asked.text, asked.negated = name, negated
+        part = networks(Diagram(_feeding(asked), []))
+        network = Network([item for one in part for item in one.objects], {wire for one in part for wire in one.cut})
+        if network.broken:
+            raise Incomplete(element, f"the condition of transition {number} was not understood", "")
+        try:
+            lines = Statements(self.reading, self.scope).write(network)
+        except Unexecutable as refusal:
+            item, message, hint = refusal.args
+            raise Incomplete(item.element, message, hint) from None
+        if len(lines) == 1:
+            return name, lines[0].removeprefix(f"{name} := ").removesuffix(";"), []
+        return name, "", lines
+
+
+def _language(body: Element) -> Element | None:
+    return next((child for child in body.children if child.name not in ("addData", "documentation")), None)
+
+
+def _turned(expression: str, negated: bool) -> str:
+    return f"NOT ({expression})" if negated else expression
+
+
+def _names(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"({', '.join(names)})"
+
+
+def _references(element: Element) -> list[str]:
+    """Where the wires into an element of a chart come from, those of a condition left out."""
+    return [wire.get("refLocalId") for point in element.all("connectionPointIn") for wire in point.all("connection")]
+
+
+def _place(element: Element) -> tuple[float, float]:
+    position = element.one("position")
+    return (float(position.get("y") or 0), float(position.get("x") or 0)) if position else (0.0, 0.0)
+
+
+def _order(arrows: list[Arrow]) -> Callable[[Arrow], tuple[float, tuple[str, ...], float, int]]:
+    """From top to bottom; those of one step from left to right, which is their order if none has a priority."""
+    top = {tuple(arrow.sources): min(_place(other.element)[0] for other in arrows if other.sources == arrow.sources)
+           for arrow in arrows}
+
+    def key(arrow: Arrow) -> tuple[float, tuple[str, ...], float, int]:
+        return top[tuple(arrow.sources)], tuple(arrow.sources), _place(arrow.element)[1], arrows.index(arrow)
+
+    return key
+
+
+def _feeding(asked: Object) -> list[Object]:
+    """An object and all that feeds it, in the order of writing."""
+    found = {asked}
+    todo = [asked]
+    while todo:
+        for pin in todo.pop().pins:
+            for wire in pin.wires:
+                if wire.source not in found:
+                    found.add(wire.source)
+                    todo.append(wire.source)
+    return sorted(found, key=lambda item: item.place)
