@@ -202,7 +202,7 @@ def _deep() -> Iterator[None]:
     """Room for deep trees; the parser limits how deep they get.
 
     Nobody looks for garbage meanwhile: nodes and facts live until the end, and to visit them all again and again takes a
-    third of the time.  Then what is alive counts as old, so that it is not visited at once."""
+    third of the time."""
     before, collects = sys.getrecursionlimit(), gc.isenabled()
     sys.setrecursionlimit(max(before, _FRAMES))
     gc.disable()
@@ -211,9 +211,6 @@ def _deep() -> Iterator[None]:
     finally:
         sys.setrecursionlimit(before)
         if collects:
-            if not gc.get_freeze_count():
-                gc.freeze()
-                gc.unfreeze()
             gc.enable()
 
 

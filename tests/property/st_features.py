@@ -104,18 +104,19 @@ class Features(Values):
         """What a reference leads to; of a pointer also elements beside it."""
         kind = place[1].partition(" ")[2]
         if sort == "PTR" and self.one_in(3):
-            return "beside", kind, place, self.random.randrange(-2, 4)
+            return "beside", kind, place, self.random.randrange(-1, 2)
         return "through" if sort == "REFERENCE" else "deref", kind, place
 
-    def point(self) -> Node | None:
+    def point(self, wanted: Node | None = None) -> Node | None:
         """A pointer to a variable or an element of it, moved now and then, or to what ends with the call."""
-        pointers = [place for place in self.writable if place[1].startswith("PTR ") and place[0] == "name"]
+        pointers = [place for place in self.writable if place[1].startswith("PTR ") and place[0] == "name"
+                    and wanted in (None, place)]
         if not pointers:
             return None
         pointer = self.pick(pointers)
         kind = pointer[1][4:]
-        if self.one_in(3):
-            return self.said("move", pointer, self.random.randrange(-2, 4))
+        if wanted is None and self.one_in(3):
+            return self.said("move", pointer, self.random.randrange(-1, 2))
         own = [place for place in self.writable if place[0] == "name" and place[2] not in self.located]
         found: list[Node] = [place for place in own if place[1] == kind]
         for place in own:

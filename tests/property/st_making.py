@@ -78,7 +78,8 @@ class Maker(Features):
         if kind != "FUNCTION" and self.one_in(3):
             self.actions = (("Act0", self.block(self.random.randrange(1, 4), 0)),)
         size = self.random.randrange(2, 5) if kind != "PROGRAM" else self.random.randrange(4, 14)
-        bound = (self.bind() if self.one_in(2) else self.point() for _ in range(6 if kind == "PROGRAM" else 0))
+        bound = [self.bind(place) or self.point(place) for place in self.writable if kind == "PROGRAM" and not self.one_in(6)
+                 and place[1].startswith(("REF", "PTR"))]
         body = tuple(node for node in bound if node) + self.block(size, 2 if kind != "PROGRAM" else 3)
         if self.one_in(3):
             body = self.jumping(body)
@@ -231,6 +232,10 @@ class Maker(Features):
             made = self.pick((self.block_call, self.block_call, self.bind, self.point, self.open_call, self.through))()
             if made:
                 return made
+        if what == 16 and self.traps:
+            self.risks = 1
+            if used := self.through():
+                return used
         if what == 12 and self.actions and not loop:
             return self.said("act", self.actions[0][0])
         if what in (11, 15) and (copied := self.copy()):
@@ -334,9 +339,10 @@ class Maker(Features):
                     outputs.append((row.name, place))
         return self.said("run", instance, tuple(inputs), tuple(outputs))
 
-    def bind(self) -> Node | None:
-        """A reference to a variable that stays."""
-        references = [place for place in self.writable if place[1].startswith(("REF ", "REFERENCE "))]
+    def bind(self, wanted: Node | None = None) -> Node | None:
+        """A reference to a variable that stays; the one that is wanted, or any."""
+        references = [place for place in self.writable if place[1].startswith(("REF ", "REFERENCE "))
+                      and wanted in (None, place)]
         if not references:
             return None
         reference = self.pick(references)

@@ -177,5 +177,7 @@ if __name__ == "__main__":
         if told := report(seed):
             differing += 1
             print(told, flush=True)
+        if (done := seed - first + 1) % 100 == 0 and done < count:
+            print(f"{done} programs compared so far, {differing} differ", flush=True)
     print(f"{count} programs compared, {differing} differ")
     sys.exit(differing > 0)
