@@ -131,6 +131,9 @@ class Calls:
         if as_value:
             return ""
         bound = PouCall(pou, call.callee)
+        variable = self.facts.variables.get(call.callee)
+        if variable is not None and variable.owner is not None:
+            bound.tasked = variable.owner.tasked.get(variable)
         self._bind(call, pou, bound)
         self.facts.calls[call] = bound
         return ""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.diagnostics import Source
-from fbvm.base.types import BOOL, TIME, UINT, Type, base, fold
-from fbvm.check.facts import Pou, TaskFact, Variable
+from fbvm.base.types import BOOL, TIME, UINT, StructType, Type, base, fold
+from fbvm.check.facts import Pou, Run, TaskFact, Variable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ class Configurations:
         other = self.project.globals.get(key)
         if other is not None and other.type is pou.type and other not in self._run:
             self._run.append(other)
-            task.programs.append((other, pou))
+            task.runs.append(Run(other, pou))
             return
         if other is not None:
             self.report.add("S0202", source, node, f"{name} is the name of a program and of a global variable", "",
@@ -83,7 +83,7 @@ class Configurations:
         self.checker.global_order.append(instance)
         self.project.globals[key] = instance
         self._run.append(instance)
-        task.programs.append((instance, pou))
+        task.runs.append(Run(instance, pou))
 
     def _unconnected(self, pou: Pou, source: Source, node: tree.Node, connection: str) -> None:
         """Complain about an in-out of a program that nothing is connected to."""
@@ -111,18 +111,43 @@ class Configurations:
             tasks[fold(declared.name.text)] = self._task(declared, source)
         untasked = TaskFact("", LOWEST, 0)
         for program in resource.programs:
-            task: TaskFact | None = untasked
-            if program.task is not None:
-                task = tasks.get(fold(program.task.text))
-                if task is None:
-                    self.report.add("S0801", source, program.task, f"there is no task {program.task.text}",
-                                    self.project.nearest(program.task.text, (t.name for t in tasks.values())))
-            self._program(program, task or untasked, source)
-        self.checker.tasks += [t for t in (*tasks.values(), untasked) if t.programs]
+            task = self._named(program.task, tasks, source) if program.task is not None else untasked
+            if self._program(program, task or untasked, source):
+                self._blocks(program, (task or untasked).runs[-1].instance, tasks, source)
+        self.checker.tasks += [t for t in (*tasks.values(), untasked) if t.runs]
 
-    def _program(self, program: tree.ProgramInstance, task: TaskFact, source: Source) -> None:
-        for refused in program.refused:
-            self._refuse(refused, source)
+    def _named(self, name: tree.Name, tasks: dict[str, TaskFact], source: Source) -> TaskFact | None:
+        """The task of that name, or None after a diagnostic."""
+        task = tasks.get(fold(name.text))
+        if task is None:
+            self.report.add("S0801", source, name, f"there is no task {name.text}",
+                            self.project.nearest(name.text, (t.name for t in tasks.values())))
+        return task
+
+    def _blocks(self, program: tree.ProgramInstance, instance: Variable, tasks: dict[str, TaskFact], source: Source) -> None:
+        """Instances in a program that other tasks run: calls give them inputs and read outputs, and run nothing."""
+        pou = self.project.pou(program.type_name.text, source)
+        assert pou is not None
+        for row in program.blocks:
+            task = self._named(row.task, tasks, source)
+            block = pou.variables.get(fold(row.instance.text)) if isinstance(row.instance, tree.NameRef) else None
+            flag = pou.tasked.get(block) if block is not None else None
+            if block is None or flag is None or not isinstance(block.type, StructType):
+                self.report.add("S0801", source, row.instance,
+                                f"a task runs an instance that {pou.name} declares in VAR; this is none",
+                                "name the instance alone:  valve WITH slow")
+                continue
+            body = self.checker.block_of(block.type)
+            in_outs = body.parameters("VAR_IN_OUT")
+            if in_outs:
+                self.report.add("S0404", source, row.instance, f"the in-out {in_outs[0].name} of {block.name} is missing: "
+                                f"the task {row.task.text} runs it", "let it have inputs and outputs only")
+            elif task is not None:
+                task.runs.append(Run(instance, body, block))
+                instance.initial = instance.initial[:flag.offset] + b"\x01" + instance.initial[flag.offset + 1:]
+
+    def _program(self, program: tree.ProgramInstance, task: TaskFact, source: Source) -> bool:
+        """Make an instance of a program that the task runs; False if there is none."""
         pou = self.project.pou(program.type_name.text, source)
         if pou is None or pou.kind != "PROGRAM":
             names = [p.name for p in self.project.pous.values() if p.kind == "PROGRAM"]
@@ -134,6 +159,8 @@ class Configurations:
                 self._connect(program, task, source)
             else:
                 self._unconnected(pou, source, program.name, f"{program.type_name.text}({{}} := ...)")
+            return True
+        return False
 
     def _connect(self, program: tree.ProgramInstance, task: TaskFact, source: Source) -> None:
         """Connections are copied before and after each run: the task runs a body that calls the instance with them."""
@@ -143,8 +170,7 @@ class Configurations:
                           (tree.CallStatement(name.start, program.end, call),))
         pou = Pou(runner.name.text, "PROGRAM", source, runner)
         self.checker.check_body(pou)
-        instance, _ = task.programs[-1]
-        task.programs[-1] = instance, pou
+        task.runs[-1] = Run(task.runs[-1].instance, pou)
 
     def _task(self, declared: tree.Task, source: Source) -> TaskFact:
         priority = self._constant(declared.priority, UINT, source) if declared.priority is not None else None

@@ -118,6 +118,9 @@ class Pou:
     """Folded names of the parameters of generic type that are taken as they are passed, once somebody asked."""
     leases: list[int] = field(default_factory=list)
     """Leases that its body holds until it ends."""
+    tasked: dict[Variable, Variable] = field(default_factory=dict)
+    """Instances of a program that a CONFIGURATION gives tasks of their own, and the variable that says whether it does so
+    for this instance of the program: calls do not run them then."""
 
     @property
     def is_function(self) -> bool:
@@ -165,6 +168,8 @@ class PouCall:
     outputs: list[tuple[Variable, tree.Expr, bool]] = field(default_factory=list)
     enable: tree.Expr | None = None
     enabled: list[tuple[tree.Expr, bool]] = field(default_factory=list)
+    tasked: Variable | None = None
+    """The variable that says whether the body is run by a task of its own, and not by calls."""
 
 
 @dataclass(eq=False)
@@ -318,6 +323,24 @@ class AccessPath:
     writable: bool
 
 
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What a task runs: an instance of a program, or a block in it."""
+
+    instance: Variable
+    pou: Pou
+    block: Variable | None = None
+
+    @property
+    def name(self) -> str:
+        return self.instance.name if self.block is None else f"{self.instance.name}.{self.block.name}"
+
+    @property
+    def offset(self) -> int:
+        """Where in the buffer it lies, after layout."""
+        return self.instance.offset + (self.block.offset if self.block is not None else 0)
+
+
 @dataclass
 class TaskFact:
     """A task of the configuration, or the one task that runs everything."""
@@ -326,7 +349,7 @@ class TaskFact:
     priority: int
     interval_ns: int
     single: str = ""
-    programs: list[tuple[Variable, Pou]] = field(default_factory=list)
+    runs: list[Run] = field(default_factory=list)
 
 
 class Report:

@@ -64,6 +64,8 @@ class Interfaces:
             if self._section_allowed(section, pou):
                 self._section(section, pou)
         pou.later = {}
+        for name in sorted(self.project.tasked(pou.name)) if pou.kind == "PROGRAM" else ():
+            self._tasked(name, pou)
         if begun := self._begun[mark:]:
             pou.tree = beginnings.with_assignments(pou, begun)
             del self._begun[mark:]
@@ -80,6 +82,14 @@ class Interfaces:
             self._instance(pou)
         for action, source in pou.written_actions:
             self._action(action, source, pou)
+
+    def _tasked(self, name: str, pou: Pou) -> None:
+        """A variable that says whether a task of its own runs an instance of this instance of a program."""
+        block = pou.variables.get(name)
+        if block is not None and block.kind == "VAR" and is_block(block.type):
+            flag = Variable(f"{block.name} task", BOOL, "VAR", pou.source, block.node, pou, initial=b"\0")
+            pou.order.append(flag)
+            pou.tasked[block] = flag
 
     def _action(self, action: tree.Action, source: Source, pou: Pou) -> None:
         """An ACTION is a body of its own over the variables of its POU."""

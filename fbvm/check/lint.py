@@ -55,7 +55,7 @@ def _globals(checker: Checker, uses: lint_declared.Uses) -> None:
 
 def _tasks(checker: Checker, own: list[Pou]) -> None:
     """Warn of programs that a CONFIGURATION forgets."""
-    run = {instance.type for task in checker.tasks for instance, _ in task.programs}
+    run = {run.instance.type for task in checker.tasks for run in task.runs if run.block is None}
     called = {callee for pou in own for callee in pou.calls}
     for pou in own:
         if pou.kind == "PROGRAM" and pou.type not in run and pou not in called:

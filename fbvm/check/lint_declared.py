@@ -43,7 +43,8 @@ def unused(report: Report, pou: Pou, uses: Uses) -> None:
 def never_called(report: Report, variable: Variable, uses: Uses) -> None:
     """Warn of an instance that is declared and never called: its outputs never change."""
     kind = _instance(variable.type)
-    if kind and variable not in uses.called and not variable.reference:
+    tasked = variable.owner is not None and variable in variable.owner.tasked
+    if kind and variable not in uses.called and not variable.reference and not tasked:
         use = f"call it: {variable.name}{'[...]' if isinstance(variable.type, ArrayType) else ''}(...)"
         report.add("S0291", variable.source, variable.node, f"the instance {variable.name} of {kind} is never called",
                    use if variable in uses.variables else f"{use}, or remove it")

@@ -208,6 +208,12 @@ class Project:
         """The global variables of a list."""
         return [v.name for v in self.globals.values() if list_name(v.source) == fold(space)]
 
+    def tasked(self, program: str) -> set[str]:
+        """Folded names of the instances in a program that some CONFIGURATION gives a task of their own."""
+        return {fold(row.instance.text) for configuration, _ in self.configurations for resource in configuration.resources
+                for run in resource.programs if fold(run.type_name.text) == fold(program)
+                for row in run.blocks if isinstance(row.instance, tree.NameRef)}
+
     def completes(self, name: str) -> bool:
         """True if a VAR_CONFIG gives places to variables of that name."""
         return any(isinstance(last, tree.Member) and fold(last.name.text) == fold(name) and row.location is not None

@@ -238,5 +238,5 @@ def _told(pous: Sequence[Pou], reached: Callable[[int, int], None]) -> Iterator[
 
 
 def _task(task: TaskFact) -> TaskRow:
-    runs = tuple(ProgramRun(instance.name, pou.number, instance.offset) for instance, pou in task.programs)
+    runs = tuple(ProgramRun(run.name, run.pou.number, run.offset) for run in task.runs)
     return TaskRow(task.name, task.priority, task.interval_ns, task.single, runs)

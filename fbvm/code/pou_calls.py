@@ -109,12 +109,21 @@ class CallLowering:
         if eno is not None and (called.pou.enables_itself or not called.pou.writes_eno):
             self.body.out.append(self.body.places.store(self._place(called, eno, instance), TRUE, site))
         address: Address | None = instance.address if instance is not None else None
-        self.body.out.append(("call", called.pou.number, address))
+        self._execute(called, address)
         self._outputs(called.outputs, called, instance, site)
         for variable, expr in called.in_outs if called.pou.actions else ():
             if self._ends(expr):  # an ACTION that is called later finds nothing instead of what has ended
                 body = self.body
                 body.out.append(("store", "ref", self._place(called, variable, instance).address, ("const", "ref", 0)))
+
+    def _execute(self, called: PouCall, address: Address | None) -> None:
+        """Run the body, unless a task of its own does."""
+        run: Node = ("call", called.pou.number, address)
+        if called.tasked is None:
+            self.body.out.append(run)
+            return
+        places = self.body.places
+        self.body.out.append(("if", ((("not", "b", places.load(places.slot(called.tasked))), (run,)),), ()))
 
     def _ends(self, expr: tree.Expr) -> bool:
         """True for what an in-out is bound to and may end with the body that passes it."""

@@ -121,7 +121,7 @@ def _resource(types: Types, resource: tree.Resource) -> Element:
         raise Unsayable(unsaid, "this part of a RESOURCE is not exported", "")
     instances: dict[str, list[Element]] = {}
     for program in resource.programs:
-        if program.connections or program.refused or program.qualifiers:
+        if program.connections or program.blocks or program.qualifiers:
             raise Unsayable(program, "connections and qualifiers of programs are not exported", "assign in the program")
         task = program.task.text.upper() if program.task else ""
         instances.setdefault(task, []).append(element("pouInstance", name=program.name.text, typeName=program.type_name.text))

@@ -19,6 +19,7 @@ from fbvm.syntax.tree import (
     Argument,
     ArrayInit,
     Block,
+    BlockTask,
     Configuration,
     ConfigVar,
     ConfigVars,
@@ -231,13 +232,13 @@ class Declarations(SfcElements):
 
     def program_connected(self, word: Token, qualifiers: list[Name], token: Token, with_: Token | None,
                           task: Token | None, colon: Token, type_name: NamedType, opener: Token | None,
-                          connections: list[Argument | Refused] | None, closer: Token | None,
+                          connections: list[Argument | BlockTask] | None, closer: Token | None,
                           end: Token) -> ProgramInstance:
         given = connections or []
         return ProgramInstance(
             word.start, end.end, self.declared(token), tuple(qualifiers), self.name(task) if task else None,
             Name(type_name.start, type_name.end, type_name.text), tuple(c for c in given if isinstance(c, Argument)),
-            tuple(c for c in given if isinstance(c, Refused)))
+            tuple(c for c in given if isinstance(c, BlockTask)))
 
     def path_direct(self, of: Expr, dot: Token, address: Token) -> Member:
         return Member(of.start, address.end, of, Name(address.start, address.end, address.text))
@@ -257,8 +258,8 @@ class Declarations(SfcElements):
     def config_vars(self, word: Token, variables: list[ConfigVar], end: Token) -> ConfigVars:
         return ConfigVars(word.start, end.end, tuple(variables))
 
-    def fb_task(self, instance: Expr, with_: Token, task: Token) -> Refused:
-        return Refused(instance.start, task.end, "function block with a task of its own", "S0901")
+    def fb_task(self, instance: Expr, with_: Token, task: Token) -> BlockTask:
+        return BlockTask(instance.start, task.end, instance, self.name(task))
 
 
 def _resource(start: int, end: int, name: Name | None, processor: Name | None,

@@ -312,15 +312,23 @@ class Task(Node):
 
 
 @_node
+class BlockTask(Node):
+    """`valve WITH slow` among the connections of a program: an instance of its own that another task runs."""
+
+    instance: Expr
+    task: Name
+
+
+@_node
 class ProgramInstance(Node):
-    """`PROGRAM name RETAIN WITH task : type (connections)`; connections with `fb WITH task` are `refused`."""
+    """`PROGRAM name RETAIN WITH task : type (connections)`."""
 
     name: Name
     qualifiers: tuple[Name, ...]
     task: Name | None
     type_name: Name
     connections: tuple[Argument, ...]
-    refused: tuple[Refused, ...] = ()
+    blocks: tuple[BlockTask, ...] = ()
 
 
 @_node
