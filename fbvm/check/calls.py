@@ -128,6 +128,9 @@ class Calls:
                        f"an element is written {name}[...]" if isinstance(kind, ArrayType) else "")
             return None
         pou = self.checker.block_of(kind)
+        called = self.facts.variables.get(call.callee)
+        if called is not None and called.constant and not writable(self.expressions, call.callee, "be called here"):
+            return None
         if as_value:
             return ""
         bound = PouCall(pou, call.callee)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeGuard
 
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.base.types import ArrayType, Elementary, EnumType, Field, RefType, StructType, Type, fold
+from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, Field, RefType, StructType, Type, base, fold
 from fbvm.syntax import tree
 from fbvm.syntax.pragmas import shown_in_hexadecimal
 from fbvm.syntax.tree import Action, Node, VarDecl, VarSection
@@ -372,9 +373,16 @@ def is_block(kind: Type) -> bool:
     return isinstance(kind, StructType) and kind.block
 
 
-def is_open(location: tree.Location) -> bool:
-    """True for `%I*`, which VAR_CONFIG completes."""
-    return location.text.rstrip().endswith("*")
+def is_open(location: tree.Location, kind: Type) -> bool:
+    """True for `%I*`, which VAR_CONFIG completes, and for addresses of several levels, which mean a module to its maker."""
+    written = location.text.strip()
+    return written.endswith("*") or _LEVELS.fullmatch(written) is not None or \
+        base(kind) != BOOL and _WORD_LEVELS.fullmatch(written) is not None
+
+
+_LEVELS = re.compile(r"%[IQM](?:[BWDL]\d+(?:\.\d+){2,}|X?\d+(?:\.\d+){2,})", re.I)
+_WORD_LEVELS = re.compile(r"%[IQM][BWDL]\d+\.\d+", re.I)
+"""With a BOOL it is a bit of that byte or word."""
 
 
 def list_name(source: Source) -> str:

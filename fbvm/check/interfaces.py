@@ -135,7 +135,8 @@ class Interfaces:
             inner = section.kind in ("VAR", "VAR_OUTPUT") and pou.is_function
             late = (inner or section.kind == "VAR_TEMP") and all(fold(word.text) != "CONSTANT" for word in section.qualifiers)
             resolved = self._early.get(declared) or self.typed(declared, pou.source, pou, late)
-            borrowed = resolved is not None and section.kind == "VAR_INPUT" and isinstance(resolved[0], AnyType)
+            borrowed = resolved is not None and section.kind == "VAR_INPUT" and \
+                (isinstance(resolved[0], AnyType) or is_block(resolved[0]))
             for name in declared.names:
                 pou.later.pop(fold(name.text), None)
                 if resolved is None:
@@ -144,8 +145,9 @@ class Interfaces:
                 variable = self.variable(declared, name, section, pou.source, resolved)
                 variable.owner = pou
                 if borrowed:
-                    variable.kind = "VAR_IN_OUT"  # CODESYS passes an input of type ANY by its place
-                if is_block(variable.type) and variable.kind in ("VAR_INPUT", "VAR_OUTPUT"):
+                    variable.kind = "VAR_IN_OUT"  # ANY, as CODESYS has it, and an instance, whose outputs are read, go by place
+                    variable.constant = is_block(variable.type)
+                if is_block(variable.type) and variable.kind == "VAR_OUTPUT":
                     self.report.add("S0901", pou.source, name, f"an instance as {section.kind} is understood but not "
                                     "executed by this version", "pass it as VAR_IN_OUT")
                 self._place(variable, declared, pou)
@@ -200,7 +202,7 @@ class Interfaces:
         elif made.constant:
             if section.kind in ("VAR_INPUT", "VAR_IN_OUT"):
                 pass  # what the caller gives; the block may only read it
-            elif declared.initial is None:
+            elif declared.initial is None and not isinstance(kind, StructType | ArrayType):
                 self.report.add("S0701", source, name, f"the constant {name.text} has no value", "write := and its value")
             elif isinstance(declared.initial, tree.Expr):
                 made.wrong = declared.initial in self.project.facts.wrong
@@ -216,7 +218,7 @@ class Interfaces:
         """The address behind AT, checked against the type; None after a diagnostic."""
         node = declared.location
         assert node is not None
-        if is_open(node):
+        if is_open(node, kind):
             return None
         try:
             address = parse_address(node.text, self.checker.areas)
@@ -269,7 +271,7 @@ class Interfaces:
             variable.place = "self" if pou.is_function else "frame"
         if declared.location is not None:
             located = variable.kind in _LOCATED and not pou.is_function
-            if located and is_open(declared.location):
+            if located and is_open(declared.location, variable.type):
                 self._completed(variable, declared.location, pou)
             else:
                 variable.place = "area"
@@ -286,8 +288,9 @@ class Interfaces:
         variable.open = self.project.completes(variable.name)
         variable.reference = variable.reference or variable.open
         if not variable.open:
-            self.report.add("S0692", pou.source, location, f"no VAR_CONFIG says where {variable.name} AT {location.text} lies",
-                            "it keeps its value as a variable of its own; for a place in the area write the whole address")
+            said = "no VAR_CONFIG says" if location.text.rstrip().endswith("*") else "only its maker knows"
+            self.report.add("S0692", pou.source, location, f"{said} where {variable.name} AT {location.text} lies",
+                            "it keeps its value as a variable of its own; a place in the area is %MW10 or %IX0.3")
 
     def _open(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         """ARRAY [*] and ANY are parameters that borrow bounds, size and type from what is passed."""

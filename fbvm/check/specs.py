@@ -385,7 +385,7 @@ class Specs:
             kind, initial = resolved
             if declared.initial is not None:
                 initial = self.values.initial(kind, declared.initial, source, initial)
-            place = declared.location if declared.location is not None and not is_open(declared.location) else None
+            place = declared.location if declared.location is not None and not is_open(declared.location, kind) else None
             for member in declared.names:
                 if fold(member.text) in made.fields:
                     self.report.add("S0202", source, member, f"{member.text} stands twice in this structure")
