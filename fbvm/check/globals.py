@@ -100,7 +100,8 @@ class Globals:
             return
         for name, key in zip(turn.declared.names, keys, strict=True):
             variable = self.checker.interfaces.variable(turn.declared, name, turn.section, turn.source, resolved)
-            variable.place = "area" if turn.declared.location is not None and not is_open(turn.declared.location, variable.type) else "abs"
+            location = turn.declared.location
+            variable.place = "area" if location is not None and not is_open(location, variable.type) else "abs"
             other = self.project.globals.setdefault(key, variable)
             if other is variable:
                 self.order.append(variable)
