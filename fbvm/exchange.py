@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from fbvm.base.areas import Area
 from fbvm.base.memory import Memory
 from fbvm.net.journal import Journal
 from fbvm.units.unit import Unit
@@ -38,3 +39,20 @@ def wake_ns(units: Sequence[Attached], latest_ns: int) -> int:
         if (unit_ns := attached.unit.wake_ns) < latest_ns:
             latest_ns = unit_ns
     return latest_ns
+
+
+def watched(units: Sequence[Attached], areas: Mapping[str, Area]) -> list[int]:
+    """Offsets of what the units look at in each refresh, as far as they say so."""
+    return [areas[area].offset + 2 * word for attached in units for area, word in attached.unit.watched or ()]
+
+
+def is_idle(units: Sequence[Attached], now_ns: int) -> bool:
+    """True if the next refresh will change nothing unless what the units watch changes or one of them wakes."""
+    return all(attached.unit.wake_ns > now_ns and attached.unit.watched is not None and attached.link.is_quiet
+               for attached in units)  # fmt: skip
+
+
+def pass_by(units: Sequence[Attached], refreshes: int) -> None:
+    """So many refreshes have taken place in which nobody had anything to do."""
+    for attached in units:
+        attached.link.pass_by(refreshes)

@@ -13,11 +13,10 @@ from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
 from fbvm.base.memory import Memory, Snapshot
 from fbvm.breakpoints import Breakpoints, Halt
 from fbvm.code.image import Image
-from fbvm.engine.native import NativeEngine
-from fbvm.engine.native_scans import Series
 from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
-from fbvm.exchange import Attached, refresh, wake_ns
+from fbvm.exchange import Attached, wake_ns
+from fbvm.express import Express
 from fbvm.flags import CLOCKWORK, MOST, TENTH_MS_NS, Flags
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
@@ -83,14 +82,13 @@ class Plc:
         self.trap: Trap | None = None
         self._mode = RUN
         self._first = True
-        self._series: Series | None = None
-        self._series_of: NativeEngine | None = None
         self._forces: dict[Place, Value] = {}
         self._found: dict[str, Place | Span] = {}
         self._past: deque[State] = deque(maxlen=0)
         self._due: deque[int] = deque()
         self.breakpoints = Breakpoints(self)
         self._schedule = Schedule(image.tasks, lambda path: self.read(path) is True)
+        self._express = Express(self.units, self.memory, self._schedule)
         self._write_initial()
         self._journal = journal
         if journal:
@@ -108,8 +106,8 @@ class Plc:
             raise Stopped(self.trap)
         if not self.breakpoints.halted:
             now_ns = self._time(now_ns)
-            if (series := self._in_one_piece()) is not None:
-                return self._scan_at_once(series, now_ns)
+            if self._in_one_piece():
+                return self._scan_at_once(now_ns)
             self._begin(now_ns)
         if self._mode is RUN:
             self.trap = self._execute()
@@ -122,33 +120,24 @@ class Plc:
         self._end()
         return self.trap
 
-    def _in_one_piece(self) -> Series | None:
-        """What does the next scan up to its refresh; None if that is not machine code, or somebody has a part in it."""
+    def _in_one_piece(self) -> bool:
+        """Can machine code do the next scan up to its refresh?  Not if somebody has a part in it."""
         machine = self.engine.machine
         if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
-            return None
-        turns = self._schedule.turns()
-        if not turns or self.breakpoints.armed:
-            return None
-        if machine is not self._series_of:
-            self._series, self._series_of = machine.series(turns, CLOCKWORK), machine
-        return self._series
+            return False
+        return not self.breakpoints.armed and self._express.ready(machine)
 
-    def _scan_at_once(self, series: Series, now_ns: int) -> Trap | None:
-        """A scan whose time, flags and tasks are one call of machine code."""
-        step_ns = now_ns - self.now_ns
-        self.now_ns = now_ns
-        point = series.once(step_ns, self.budget, min(step_ns // TENTH_MS_NS, MOST))
+    def _scan_at_once(self, now_ns: int) -> Trap | None:
+        """A scan in one piece."""
+        before_ns, self.now_ns = self.now_ns, now_ns
+        self.trap = self._express.once(now_ns - before_ns, now_ns, self.budget)
         self.scans += 1
-        if point:
-            self.trap = self._series_of.trap_at(point) if self._series_of else None
-        else:
-            refresh(self.units, self.memory, now_ns, None)
         self._tell()
         return self.trap
 
     def _begin(self, now_ns: int) -> None:
         """A scan up to its program."""
+        self._express.idle = False
         if self._journal:
             self._journal.before(self.scans, now_ns, self.budget, self.forces)
         self._oversee(now_ns)
@@ -162,7 +151,7 @@ class Plc:
     def _end(self) -> None:
         """A scan from the end of its program on."""
         if not self.trap:
-            refresh(self.units, self.memory, self.now_ns, self._journal)
+            self._express.refresh(self.now_ns, self._journal)
             if self.phases:
                 self._over(Phase.REFRESH)
         self.scans += 1
@@ -248,26 +237,35 @@ class Plc:
         that stands at a breakpoint; the next run goes on there."""
         goal = Goal(self, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
         while not (reason := goal.reached()):
-            if (left := goal.scans_left) < 2 or not self._scan_many(left):
+            if (left := goal.scans_left) < 2 or not self.scan_many(left):
                 self.scan()
         return reason
 
-    def _scan_many(self, most: int) -> bool:
-        """Several scans inside machine code, if nobody has to be told between them; False if there was none."""
-        armed = self.breakpoints.armed
-        native = self.breakpoints.guarding(self.engine) if armed else self.engine.machine
-        outside = self.units or self.watchers or self.phases or self._forces or self._journal or self._past.maxlen
-        if native is None or outside or self._first or self._mode is not RUN or self.halted:
+    def scan_many(self, most: int) -> bool:
+        """Several scans in virtual time inside machine code, if nobody has to be told between them and the units have
+        nothing to do; False if there was none."""
+        if self.watchers or self._past.maxlen:
             return False
-        turns = self._schedule.turns()
-        if turns is None:
+        cycle_ns = self.cycle_ns
+        if self.breakpoints.armed:
+            done, self.trap = self._many_guarded(most)
+        elif self._in_one_piece() and self._express.idle and all(attached.network.virtual_time for attached in self.units):
+            done, self.trap = self._express.many(most, self.now_ns, cycle_ns, self.budget, STEP_BUDGET)
+        else:
             return False
-        self._system[BUDGET // 8] = self.budget
-        cycle_time = min(self.cycle_ns // TENTH_MS_NS, MOST)
-        done, self.trap = native.run_many(turns, most, self.cycle_ns, CLOCKWORK, cycle_time=cycle_time, spend=STEP_BUDGET)
         self.scans += done
-        self.now_ns += done * self.cycle_ns
+        self.now_ns += done * cycle_ns
         return done > 0
+
+    def _many_guarded(self, most: int) -> tuple[int, Trap | None]:
+        """How many scans there were before one that stops at a breakpoint."""
+        turns = self._schedule.turns()
+        outside = self.units or self.phases or self._forces or self._journal
+        if outside or not turns or self._first or self._mode is not RUN or self.halted:
+            return 0, None
+        self._system[BUDGET // 8] = self.budget
+        guarded, cycle_time = self.breakpoints.guarding(self.engine), min(self.cycle_ns // TENTH_MS_NS, MOST)
+        return guarded.run_many(turns, most, self.cycle_ns, CLOCKWORK, cycle_time=cycle_time, spend=STEP_BUDGET)
 
     # --- values -------------------------------------------------------------------------------------------------------
 
@@ -329,6 +327,7 @@ class Plc:
         attached = Attached(unit, network.attach(unit.address), network)
         with self._acting("unit", self._journal.unit(unit) if self._journal else None):
             self.units.append(attached)
+            self._express.forget()
             attached.link.submit(unit.reset(self.memory), self.now_ns)
 
     # --- start, stop and travel ---------------------------------------------------------------------------------------
@@ -374,6 +373,7 @@ class Plc:
         self._schedule.reset()
         self._leave()
         self._first = True
+        self._express.idle = False
         self.trap = None
 
     def _kept(self, held: Sequence[str]) -> list[tuple[int, bytes]]:

@@ -23,17 +23,17 @@ class Times:
         self._sorted: dict[int, int] = {}
         """How many there were, by a number that grows with the time: how many bits were dropped, and those left."""
 
-    def note(self, scan: int, time_ns: int) -> None:
-        """Take one in."""
-        self.count += 1
-        self._total_ns += time_ns
+    def note(self, scan: int, time_ns: int, times: int = 1) -> None:
+        """Take one in, or so many that nobody measured one by one, from this scan on."""
+        self.count += times
+        self._total_ns += time_ns * times
         if time_ns > self.longest_ns:
             self.longest_ns, self.longest_scan = time_ns, scan
         if time_ns > self._limit_ns:
-            self.beyond += 1
+            self.beyond += times
         dropped = time_ns.bit_length() - DIGIT_BITS
         kind = dropped << DIGIT_BITS | time_ns >> dropped if dropped > 0 else time_ns
-        self._sorted[kind] = self._sorted.get(kind, 0) + 1
+        self._sorted[kind] = self._sorted.get(kind, 0) + times
 
     @property
     def mean_ns(self) -> int:

@@ -75,9 +75,9 @@ class NativeEngine:
         point = self._calls[task_index]()
         return self.trap_at(point) if point else None
 
-    def series(self, turns: Sequence[Turn], clockwork: Clockwork = NOTHING) -> Series:
-        """Scans with the tasks in this order, which write the clockwork; nobody else's may be going on meanwhile."""
-        return Series(self._memory_at, self._context.at, self._entries, turns, clockwork)
+    def series(self, turns: Sequence[Turn], clockwork: Clockwork = NOTHING, watched: Sequence[int] = ()) -> Series:
+        """Scans with the tasks in this order, which write the clockwork and end when what is watched changes."""
+        return Series(self.memory, self._memory_at, self._context.at, self._entries, turns, clockwork, watched)
 
     def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork = NOTHING, *,
                  cycle_time: int = 0, spend: int = NO_LIMIT) -> tuple[int, Trap | None]:  # fmt: skip

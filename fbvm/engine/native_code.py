@@ -18,6 +18,8 @@ from fbvm.engine.native_worker import worker
 
 QUICK, FAST = 0, 2
 """Levels of optimisation."""
+_LOADING = threading.RLock()
+"""Held by who loads code: the library must not come twice, once for those who run and once for those who come later."""
 
 
 class Code:
@@ -97,13 +99,17 @@ class Code:
                 "parts": parts_of(made.routines)}
 
     def _load(self, level: int, stored: Stored) -> None:
-        facts = stored.facts
-        linked = Linked(stored.compiled, self._tasks, _addresses(facts["parts"]))
-        if not self.points:
-            self.points = tuple((code, site, tuple((kind, value) for kind, value in shown))
-                                for code, site, shown in facts["points"])
-            self.kept_bytes, self.context_bytes = facts["context"]
-        self._linked[level] = linked
+        """Take code into use.  What came first stays: somebody may be running it, and what it calls in the library."""
+        with _LOADING:
+            if level in self._linked:
+                return
+            facts = stored.facts
+            linked = Linked(stored.compiled, self._tasks, _addresses(facts["parts"]))
+            if not self.points:
+                self.points = tuple((code, site, tuple((kind, value) for kind, value in shown))
+                                    for code, site, shown in facts["points"])
+                self.kept_bytes, self.context_bytes = facts["context"]
+            self._linked[level] = linked
 
     def level_of(self, level: int | None) -> int:
         """The level of the code that runs for those who want `level`."""

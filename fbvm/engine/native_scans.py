@@ -13,6 +13,7 @@ from string import Template
 from weakref import finalize
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
+from fbvm.base.memory import Memory
 from fbvm.engine import native_cache
 from fbvm.engine.native_cache import Stored, name_of
 from fbvm.engine.native_compiler import Linked, compile_text
@@ -43,11 +44,14 @@ class Clockwork:
 
 
 NOTHING = Clockwork()
-MEMORY, CONTEXT, LEFT, STEP, BUDGETED, SPEND, DONE, CYCLE, ROWS = range(9)
-"""Parameters, 64 bits each, and then the rows of turns: the addresses of memory and context, how many scans, by how far
-time goes on, statements that a scan may execute and all of them together, how many scans there were, the cycle time."""
+MEMORY, CONTEXT, LEFT, STEP, BUDGETED, SPEND, DONE, CYCLE, CHANGED, ROWS = range(10)
+"""Parameters, 64 bits each, and then the rows of turns and of what is watched: the addresses of memory and context, how
+many scans, by how far time goes on, statements that a scan may execute and all of them together, how many scans there
+were, the cycle time, whether something that is watched has changed."""
 ROW = 4
 """Numbers of a turn: where the address of its function lies, interval, next time, whether it is due."""
+WATCHED_ROW, WATCHED_BYTES = 2, 8
+"""Numbers of what is watched: its offset in the memory, and the eight bytes that are expected there."""
 NO_LIMIT = 1 << 62
 _SCANS = Template(f"""
 define i32 @scans(ptr %p, ptr %unused) {{
@@ -65,6 +69,8 @@ entry:
 %spend_at = getelementptr inbounds i8, ptr %p, i64 {8 * SPEND}
 %done_at = getelementptr inbounds i8, ptr %p, i64 {8 * DONE}
 %cycle_at = getelementptr inbounds i8, ptr %p, i64 {8 * CYCLE}
+%changed_at = getelementptr inbounds i8, ptr %p, i64 {8 * CHANGED}
+store i64 0, ptr %changed_at
 %n = load i64, ptr %n_at
 %step = load i64, ptr %step_at
 %amount = load i64, ptr %amount_at
@@ -96,7 +102,12 @@ good:
 %s1 = add i64 %s, 1
 store i64 %s1, ptr %count_at
 %i1 = add i64 %i, 1
-br label %test
+$watched
+br i1 %changed, label %stop, label %test
+stop:
+store i64 %i1, ptr %done_at
+store i64 1, ptr %changed_at
+ret i32 0
 trap:
 %point = phi i32 $points
 %s2 = load i64, ptr %count_at
@@ -145,6 +156,18 @@ def _rows(count: int) -> Iterator[str]:
         yield from (f"%fs{n} = load ptr, ptr %fa{n}", f"%f{n} = load ptr, ptr %fs{n}")
 
 
+def _watched(first: int, count: int) -> Iterator[str]:
+    """Whether anything that is watched is not what is expected; its rows begin with parameter `first`."""
+    yield "%j0 = add i1 0, 0"
+    for n in range(count):
+        at = 8 * (first + WATCHED_ROW * n)
+        yield from (f"%joa{n} = getelementptr inbounds i8, ptr %p, i64 {at}", f"%jo{n} = load i64, ptr %joa{n}",
+                    f"%jea{n} = getelementptr inbounds i8, ptr %p, i64 {at + 8}", f"%je{n} = load i64, ptr %jea{n}",
+                    f"%jma{n} = getelementptr inbounds i8, ptr %m, i64 %jo{n}", f"%jm{n} = load i64, ptr %jma{n}, align 1",
+                    f"%jx{n} = icmp ne i64 %jm{n}, %je{n}", f"%j{n + 1} = or i1 %j{n}, %jx{n}")
+    yield f"%changed = or i1 %j{count}, 0"
+
+
 def _turns(intervals: Sequence[bool]) -> Iterator[str]:
     """Which are due is found before the first one runs."""
     for n in (n for n, has in enumerate(intervals) if has):
@@ -167,22 +190,42 @@ class Series:
     """Scans of one PLC: its memory and context by their addresses, its tasks by their entries, in the order of `turns`.
 
     In each scan time advances by a step, nothing is due, the budget is full, the clockwork is written with the cycle
-    time in its unit; then the tasks that are due take their turns, and the number of scans grows."""
+    time in its unit; then the tasks that are due take their turns, and the number of scans grows.  `watched` are offsets
+    of eight bytes each: a scan after which they are not as `expect` saw them last is the last one."""
 
-    def __init__(self, memory_at: int, context_at: int, tasks: Sequence[Entry], turns: Sequence[Turn],
-                 clockwork: Clockwork) -> None:  # fmt: skip
-        rows = [(tasks[turn.task].function_at, turn.interval_ns, turn.next_ns, 0) for turn in turns]
+    def __init__(self, memory: Memory, memory_at: int, context_at: int, tasks: Sequence[Entry], turns: Sequence[Turn],
+                 clockwork: Clockwork, watched: Sequence[int] = ()) -> None:  # fmt: skip
+        rows: list[tuple[int, ...]] = [
+            (tasks[turn.task].function_at, turn.interval_ns, turn.next_ns, 0) for turn in turns]  # fmt: skip
+        rows += [(offset, 0) for offset in watched]
         self._tasks = tasks  # which stay while machine code calls them
         self.turns = turns
         """These move on, or others of the same tasks."""
         self._timed = [(row, ROWS + ROW * row + 2) for row, turn in enumerate(turns) if turn.interval_ns]
         """Which turns have an interval, and where their next time is."""
-        self._numbers = array("q", (memory_at, context_at, 1, 0, 0, NO_LIMIT, 0, 0, *(number for row in rows for number in row)))
+        numbers = {MEMORY: memory_at, CONTEXT: context_at, LEFT: 1, SPEND: NO_LIMIT}
+        self._numbers = array("q", [numbers.get(number, 0) for number in range(ROWS)])
+        self._numbers.extend(number for row in rows for number in row)
+        first = ROWS + ROW * len(turns)
+        self._watched = [(memory.u8[offset : offset + WATCHED_BYTES].cast("q"), first + WATCHED_ROW * number + 1)
+                         for number, offset in enumerate(watched)]  # fmt: skip
+        """What is watched, and where what is expected of it is."""
         entered = entry()
         entered.bind(self._numbers.buffer_info()[0], 0)
-        entered.point_to(_scans(tuple(turn.interval_ns > 0 for turn in turns), clockwork).address("scans"))
+        shape = tuple(turn.interval_ns > 0 for turn in turns), clockwork, len(watched)
+        entered.point_to(_scans(*shape).address("scans"))
         finalize(self, entered.give_back)
         self._call: Callable[[], int] = entered.call
+
+    @property
+    def changed(self) -> bool:
+        """True if after the last scan something that is watched was not as expected."""
+        return self._numbers[CHANGED] != 0
+
+    def expect(self) -> None:
+        """From now on what is watched shall be as it is."""
+        for view, at in self._watched:
+            self._numbers[at] = view[0]
 
     def once(self, step_ns: int, budget: int, cycle_time: int) -> int:
         """One scan; the point of its trap, or 0."""
@@ -207,11 +250,12 @@ class Series:
 
 
 @cache
-def _scans(intervals: tuple[bool, ...], clockwork: Clockwork) -> Linked:
+def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int) -> Linked:
     """The code for a shape: its function takes the parameters and returns the point of a trap or 0."""
     points = ", ".join(f"[ %r{n}, %run{n} ]" for n in range(len(intervals)))
     text = _SCANS.substitute(rows="\n".join(_rows(len(intervals))), clockwork="\n".join(_clockwork(clockwork)),
-                             turns="\n".join(_turns(intervals)), points=points)  # fmt: skip
+                             turns="\n".join(_turns(intervals)), points=points,
+                             watched="\n".join(_watched(ROWS + ROW * len(intervals), watched)))  # fmt: skip
     name = name_of("scans", text)
     stored = native_cache.read(name)
     if stored is None:

@@ -101,6 +101,14 @@ class ChannelLink(ABC):
         told, self.told = self.told, []
         return told
 
+    @property
+    def is_quiet(self) -> bool:
+        """True if there is nothing to tell before the next `submit`: no channel is in use."""
+        return not self.told and not self.channels
+
+    def pass_by(self, refreshes: int) -> None:  # noqa: B027
+        """So many refreshes have taken place in which nobody asked: nothing to do where nobody counts them."""
+
     def _check(self, channel: int, error: str) -> None:
         if error:
             self.told.append(Failed(channel, "send", error))

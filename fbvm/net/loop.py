@@ -183,6 +183,14 @@ class LoopLink(MemoryLink):
                 if self.network.fault(end.local, end.remote).reset:
                     end.tear(now_ns)
 
+    @property
+    def is_quiet(self) -> bool:
+        return super().is_quiet and all(end.gone for end in self._ends.values())
+
+    def pass_by(self, refreshes: int) -> None:
+        self._refreshes += refreshes
+        self.scan = self._refreshes - 1
+
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
         channel = request.channel
         self._ends = {where: end for where, end in self._ends.items() if not end.gone}

@@ -50,7 +50,7 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     for run in runs:
         run.begin(start_ns + run.phase_ns if networks else start_ns)
         if not networks:  # nothing happens between two periods of virtual time
-            run.pace = CYCLIC
+            run.pace, run.alone = CYCLIC, len(runs) == 1
     clock = _Real(cast(list[RealNetwork], list(networks.values())), runs, start_ns) if networks else _Virtual()
     queue = _Queue(runs)
     told_ns = time.monotonic_ns()
@@ -76,9 +76,9 @@ def _scan_all(queue: _Queue, now_ns: int, real: bool) -> None:
     for number, run in queue.take(now_ns):
         plc, scan, due_ns = run.plc, run.plc.scans, run.due_ns
         run.scan(now_ns)
-        if plc.scans > scan:
+        if scans := plc.scans - scan:
             ended_ns = time.monotonic_ns()
-            plc.scan_times.note(scan, ended_ns - began_ns)
+            plc.scan_times.note(scan, (ended_ns - began_ns) // scans, scans)
             if real and run.pace == CYCLIC:
                 plc.lateness.note(scan, now_ns - due_ns + began_ns - first_ns)
             began_ns = ended_ns

@@ -30,6 +30,12 @@ class _Recorded:
         self.address = address
         return self
 
+    is_quiet = False
+    """The journal may tell something in any scan."""
+
+    def pass_by(self, refreshes: int) -> None:
+        """Never, as it is never quiet."""
+
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
         """What they led to stands in the journal."""
 

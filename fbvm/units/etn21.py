@@ -51,10 +51,7 @@ class Etn21:
         self.address = address
         self.faults = list(faults)
         """Each is used up by the first request that it fits."""
-        self.link_up = True
-        """Whether n+17 says that the cable is plugged; what the network does is the network's affair."""
-        self.error_status = 0
-        """What n+18 shows."""
+        self._link_up, self._error_status = True, 0
         choices = Choices(time_wait_ns, odd_filler)
         self._made = {"unit_number": unit_number, "address": address, "timing": timing, "seed": seed,
                       "time_wait_ns": time_wait_ns, "odd_filler": odd_filler}  # fmt: skip
@@ -66,6 +63,30 @@ class Etn21:
         self._seen = NO_SWITCHES
         """The request switches, as they were when the last refresh ended."""
         self.wake_ns = self._next_ns = NEVER_NS
+
+    @property
+    def watched(self) -> tuple[tuple[str, int], ...]:
+        """Force-close switch, unit status and request switches, restart bit."""
+        n = self.layout.n
+        return ("CIO", n), ("CIO", n + at.SERVICE_STATUS), ("CIO", n + at.SWITCHES), ("A", at.RESTART)
+
+    @property
+    def link_up(self) -> bool:
+        """Whether n+17 says that the cable is plugged; what the network does is the network's affair."""
+        return self._link_up
+
+    @link_up.setter
+    def link_up(self, up: bool) -> None:
+        self._link_up, self.wake_ns = up, 0
+
+    @property
+    def error_status(self) -> int:
+        """What n+18 shows."""
+        return self._error_status
+
+    @error_status.setter
+    def error_status(self, status: int) -> None:
+        self._error_status, self.wake_ns = status, 0
 
     @cached_property
     def descriptions(self) -> dict[str, str]:
@@ -126,8 +147,8 @@ class Etn21:
         if self._starting or words.a[at.RESTART] >> self.layout.bit & 1:
             return self._restart(words, events, now_ns)
         cio = words.cio
-        cio[n + at.SERVICE_STATUS] = at.LINK_UP if self.link_up else 0
-        cio[n + at.ERROR_STATUS] = self.error_status
+        cio[n + at.SERVICE_STATUS] = at.LINK_UP if self._link_up else 0
+        cio[n + at.ERROR_STATUS] = self._error_status
         switches, force = words.switches.tobytes(), cio[n] & at.FORCE_CLOSE
         if not events and not force and switches == self._seen and now_ns < self._next_ns:
             self.wake_ns = self._next_ns

@@ -67,6 +67,9 @@ class Noc:
         self.wake_ns = NEVER_NS
         self._port = Port(place + 1, at.PLACES * at.HEAD_WORDS, at.SLOTS, at.number_of)
 
+    watched = None
+    """Its mailbox is looked at in each refresh."""
+
     @property
     def configuration(self) -> dict[str, Any]:
         """The arguments with which `Noc` makes the same module."""

@@ -44,6 +44,9 @@ class Tianxing:
         self._port = Port(NUMBER, HEAD_WORDS, SLOTS, number_of)
         self._seen = b""
 
+    watched = None
+    """Its mailbox is looked at in each refresh."""
+
     @property
     def configuration(self) -> dict[str, Any]:
         """The arguments with which `Tianxing` makes the same port."""

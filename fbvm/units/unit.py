@@ -32,6 +32,11 @@ class Unit(Protocol):
     for, or a network tells, comes besides."""
 
     @property
+    def watched(self) -> Sequence[tuple[str, int]] | None:
+        """Area and first word of groups of four words: a refresh changes nothing while these are as the last one left
+        them, the network has nothing to tell and `wake_ns` has not come.  None if each refresh has to take place."""
+
+    @property
     def configuration(self) -> dict[str, Any]:
         """The arguments with which the unit's class makes the same unit; plain data, as a journal keeps it."""
 

@@ -178,6 +178,13 @@ class Link(Protocol):
     def events(self, now_ns: int) -> list[Event]:
         """What happened up to `now_ns`, in order, each once.  Never blocks."""
 
+    @property
+    def is_quiet(self) -> bool:
+        """True if there is nothing to tell before the next `submit`, and so no need to ask."""
+
+    def pass_by(self, refreshes: int) -> None:
+        """So many refreshes have taken place in which nobody asked."""
+
 
 class Network(Protocol):
     """Something that carries bytes: in memory (`net.loop`) or over the host's TCP (`net.tcp`)."""

@@ -9,10 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fbvm import Plc, compile_text
+from fbvm import Etn21, LoopNetwork, ModbusPeer, Peer, Plc, compile_text
 from fbvm.code.image import Image
 from fbvm.engine import native
+from fbvm.engine.native_scans import Series
+from fbvm.net.loop import LoopLink
 from fbvm.plc import Mode
+from fbvm.run import TimedWrite, loop
+from fbvm.wire import registers
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
@@ -120,13 +124,13 @@ def test_a_long_run_comes_back_now_and_then(monkeypatch: pytest.MonkeyPatch) -> 
     plc = Plc(IMAGE, engine="native")
     plc.run(scans=100)
     counts = []
-    run_many = native.NativeEngine.run_many
+    run_many = Series.run
 
-    def counted(self: native.NativeEngine, *operands: Any, **named: Any) -> Any:
+    def counted(self: Series, *operands: Any, **named: Any) -> Any:
         counts.append(plc.scans)
         return run_many(self, *operands, **named)
 
-    monkeypatch.setattr(native.NativeEngine, "run_many", counted)
+    monkeypatch.setattr(Series, "run", counted)
     assert plc.run(scans=2000) == "scans"
     assert len(counts) > 4 and all(later - earlier < 500 for earlier, later in pairwise(counts))
 
@@ -140,7 +144,7 @@ def test_who_wants_every_scan_gets_it(monkeypatch: pytest.MonkeyPatch, disturb: 
     plc = Plc(IMAGE, engine="native")
     plc.run(scans=10)
     disturb(plc)
-    monkeypatch.setattr(native.NativeEngine, "run_many", lambda *_: pytest.fail("not scan by scan"))
+    monkeypatch.setattr(Series, "run", lambda *_: pytest.fail("not scan by scan"))
     assert plc.run(scans=10) == "scans" and plc.scans == 20
 
 
@@ -196,3 +200,95 @@ def test_with_breakpoints_they_are_used(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(plc, "scan", counted)
     assert plc.run(scans=10_000) == "break"
     assert plc.halted and plc.halted.scan == scans[0] == 4999 and len(scans) == 1
+
+
+# --- with units -------------------------------------------------------------------------------------------------------
+
+OPENING = """
+PROGRAM Main
+VAR
+  n : UDINT; wanted : UDINT := {wanted}; opened : UDINT;
+  open AT %CIO1519.2 : BOOL; socket AT %D30018 : WORD; host AT %D30020 : ARRAY [0..1] OF WORD; port AT %D30022 : WORD;
+  link AT %CIO1517 : WORD; t : TON;
+END_VAR
+  n := n + 1;
+  t(IN := TRUE, PT := T#700ms);
+  IF n = wanted THEN
+    socket := 1; host[0] := 16#C0A8; host[1] := 16#FA01; port := 502; open := TRUE;
+  END_IF;
+  IF n = wanted / 2 THEN link := 0; END_IF;
+  IF n > wanted AND NOT open AND opened = 0 THEN opened := n; END_IF;
+END_PROGRAM
+"""
+
+
+def with_unit(engine: str, wanted: int, timing: str = "exact") -> Plc:
+    compilation = compile_text(OPENING.replace("{wanted}", str(wanted)))
+    assert compilation.image, [diagnostic.render() for diagnostic in compilation.diagnostics]
+    network = LoopNetwork()
+    network.place(Peer("192.168.250.1", 502), ModbusPeer(registers.server()))
+    plc = Plc(compilation.image, engine=engine)
+    plc.attach(Etn21(timing=timing), network)
+    return plc
+
+
+@pytest.mark.parametrize("timing", ["exact", "real"])
+@pytest.mark.parametrize("wanted", [2, 3, 40, 4000])
+def test_a_unit_with_nothing_to_do_does_not_hinder_them(wanted: int, timing: str) -> None:
+    many, one, python = (with_unit(engine, wanted, timing) for engine in ("native", "native", "python"))
+    single(one)
+    for count in (1, 30, wanted, 3000):
+        for plc in (many, one, python):
+            plc.run(scans=count)
+        assert state(many) == state(one) == state(python)
+    assert many.read("Main.opened") == python.read("Main.opened") != 0
+
+
+def test_with_an_idle_unit_they_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    plc = with_unit("native", 1_000_000)
+    plc.run(scans=10)
+    monkeypatch.setattr(plc, "scan", lambda: pytest.fail("a single scan"))
+    assert plc.run(scans=10_000) == "scans"
+
+
+def test_a_unit_that_something_is_done_to_takes_part_again() -> None:
+    plc = with_unit("native", 1_000_000)
+    plc.run(scans=100)
+    unit = plc.units[0].unit
+    assert isinstance(unit, Etn21)
+    unit.error_status = 0x4000
+    plc.run(scans=100)
+    assert plc.read("CIO1518") == 0x4000
+    plc.write("A501", 1)
+    plc.run(scans=1)
+    assert plc.read("A302") == 1
+    plc.run(scans=100)
+    assert plc.read("A302") == 0
+
+
+def test_faults_by_the_number_of_a_scan_count_all_scans() -> None:
+    plc = with_unit("native", 1_000_000)
+    plc.run(scans=5000)
+    link = plc.units[0].link
+    assert isinstance(link, LoopLink)
+    plc.write("D30018", 1)
+    plc.write("CIO1519.2", True)
+    plc.run(scans=1)
+    assert link.scan == 5000
+
+
+def test_the_loop_that_waits_for_nobody_uses_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    plc = with_unit("native", 4980)
+    begun: list[int] = []
+    scan = plc.scan
+
+    def counted(now_ns: int) -> None:
+        begun.append(plc.scans)
+        scan(now_ns)
+
+    monkeypatch.setattr(plc, "scan", counted)
+    write = TimedWrite(plc.find("D7"), 5, at_ns=1234 * plc.cycle_ns)
+    assert loop.run(plc, scans=5000, writes=[write]) == "scans"
+    assert (plc.scans, plc.now_ns, plc.read("D7")) == (5000, 4999 * plc.cycle_ns, 5)
+    assert len(begun) < 30  # from the open on each scan is one of its own
+    assert plc.scan_times.count == 5000

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from pathlib import Path
 
 import pytest
@@ -14,8 +15,11 @@ if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
 from fbvm.base import cache
-from fbvm.engine import native_cache
+from fbvm.code.compiler import compile_text
+from fbvm.engine import native_cache, native_code
 from fbvm.engine.native_cache import Stored
+from fbvm.engine.native_code import Code
+from fbvm.engine.native_compiler import Linked
 
 STORED = Stored({"points": [["R0101", 3, [["i64", None]]]], "context": 512}, b"object" * 100)
 NAME = "a" * 64
@@ -99,3 +103,42 @@ def test_switched_off_nothing_is_read_or_written(folder: Path) -> None:
     finally:
         cache.switch(True)
     assert not (folder / ("b" * 64)).exists()
+
+
+def test_code_that_comes_a_second_time_moves_nothing() -> None:
+    """From the compiler's helper, while it is running already: who runs it, and what it calls, would be gone."""
+    compilation = compile_text("PROGRAM Main VAR s : STRING := 'a'; n : INT; END_VAR n := LEN(CONCAT(s, 'b')); END_PROGRAM")
+    assert compilation.image
+    native_code._part.cache_clear()
+    code = Code(compilation.image)
+    code.prepare(2)
+    before = code.address(0, 2)
+    again = code._known(2)
+    assert again is not None
+    native_code._part.cache_clear()
+    code._load(2, again)
+    assert code.address(0, 2) == before
+
+
+def test_the_library_is_loaded_once_for_all_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    compilation = compile_text("PROGRAM Main VAR s : STRING := 'a'; n : INT; END_VAR n := LEN(CONCAT(s, 'b')); END_PROGRAM")
+    assert compilation.image
+    codes = [Code(compilation.image) for _ in range(4)]
+    codes[0].prepare(2)
+    stored = codes[0]._known(2)
+    assert stored is not None
+    native_code._part.cache_clear()
+    loaded, link = [], Linked
+
+    def counted(compiled: bytes, exports: list[str], others: dict[str, int] | None = None) -> object:
+        loaded.append(exports[0])
+        return link(compiled, exports, others or {})
+
+    monkeypatch.setattr(native_code, "Linked", counted)
+    threads = [threading.Thread(target=code._load, args=(2, stored)) for code in codes[1:]]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert loaded.count("task0") == 3
+    assert len(loaded) - 3 == len(stored.facts["parts"])
