@@ -76,7 +76,8 @@ def overlaps(report: Report, variables: Iterable[Variable]) -> None:
     Bits within words, and elements within arrays, structures and bit strings are such ways."""
     spans: dict[str, list[tuple[int, int, Variable]]] = {}
     for variable in variables:
-        if variable.location is not None and variable.location.area in AREAS:
+        hidden = variable.name.startswith("$")  # what rungs have at an address: others may have it as another type
+        if variable.location is not None and variable.location.area in AREAS and not hidden:
             first = _first_bit(variable.location)
             size = 1 if base(variable.type) == BOOL else variable.type.size * 8
             spans.setdefault(variable.location.area, []).append((first, first + size, variable))

@@ -1,4 +1,4 @@
-"""`fbvm explain`: the page of a diagnostic."""
+"""`fbvm explain`: the page of a diagnostic, or of an instruction of ladder."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ import click
 from fbvm.base import dialects
 from fbvm.base.codes import CODES
 from fbvm.base.pages import UnknownCode, page
+from fbvm.check import instructions
 
 
 @click.command("explain")
 @click.argument("code", metavar="CODE", required=False)
 def command(code: str | None) -> None:
     """Print the page of a diagnostic: a wrong program, the reason, the mend.  Without CODE: the list of all codes.
+
+    `fbvm explain MOV` says what an instruction of ladder does, with its operands and flags.
 
     `fbvm explain dialects` says what compilers disagree about, and which answers --dialect chooses."""
     if code is None:
@@ -21,6 +24,9 @@ def command(code: str | None) -> None:
         return
     if code.strip().lower() == "dialects":
         click.echo(dialects.page())
+        return
+    if (instruction := instructions.find(code)) is not None:
+        click.echo(instructions.page(instruction))
         return
     try:
         click.echo(page(code))

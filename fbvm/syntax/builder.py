@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,6 +22,9 @@ ERROR_LIMIT = 100
 
 LOSSLESS = {"S0101", "S0105", "S0108"}
 """Errors of single words that leave nothing out: an operator of another language, a literal without a value."""
+
+
+_NUMBERED = re.compile(r"%?\s*([TC]\d+)", re.I)
 
 
 class Stop(Exception):
@@ -51,13 +55,24 @@ class Builder:
         self.ladders: list[Ladder] = []
         """LADDERs of the POU that is being read."""
         self.numbered: dict[str, str] = {}
-        """Symbols of timers and counters, in capitals, and what they are declared AT."""
+        """Symbols of timers and counters that are known here, in capitals, and what they are declared AT."""
+        self.numbered_everywhere: dict[str, str] = {}
+        """Those among global variables."""
         self.targets: dict[Statement, str] = {}
         """Its JMPs, each with the label that it names."""
         self.labels: dict[Statement, str] = {}
         """Its labels for JMP."""
         self.depths: dict[Expr, int] = {}
         """Depth of the expressions under construction, where it is not 1."""
+
+    def note_numbered(self, names: Sequence[Name], place: str) -> None:
+        """Note whether names mean a timer or a counter in ladder: those that are declared AT one."""
+        found = _NUMBERED.fullmatch(place)
+        for name in names:
+            if found:
+                self.numbered[name.text.upper()] = found[1].upper()
+            else:
+                self.numbered.pop(name.text.upper(), None)
 
     def report(self, code: str, start: int, end: int, message: str, hint: str = "", lossless: bool = True) -> None:
         self.tell(Diagnostic(code, self.source, start, end, message, hint, lossless=lossless and code in LOSSLESS))

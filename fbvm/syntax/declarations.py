@@ -87,6 +87,7 @@ class Declarations(SfcElements):
         if self.ladders:
             own += [subroutine for ladder in self.ladders for subroutine in ladder.subroutines]
             declared += self.ladder_sections(declared)
+        self.numbered = dict(self.numbered_everywhere)
         body = self.without_jumps(body, declared)
         if any(isinstance(a, Step | Transition) for a in actions):
             body = self.chart(word, body, actions, declared)
@@ -159,6 +160,9 @@ class Declarations(SfcElements):
         return VarSection(word.start, end.end, word.text.upper(), tuple(qualifiers), tuple(variables))
 
     def global_vars(self, section: VarSection) -> GlobalVars:
+        for name in (name.text.upper() for variable in section.variables for name in variable.names):
+            if name in self.numbered:
+                self.numbered_everywhere[name] = self.numbered[name]
         return GlobalVars(section.start, section.end, section)
 
     def pass_over_variable(self, variables: list[VarDecl], semicolon: Token) -> list[VarDecl]:
@@ -167,6 +171,8 @@ class Declarations(SfcElements):
     def var_decl(self, names: list[Name], at: Token | None, location: Token | None, colon: Token, spec: TypeSpec,
                  edge: Token | None, sign: Token | None, initial: Initial | None, end: Token) -> VarDecl:
         place = self.location(location) if location else None
+        if place or self.numbered:
+            self.note_numbered(names, place.text if place else "")
         if sign and sign.text.upper() in ("S=", "R="):
             self.report("S0101", sign.start, sign.end, f"`{sign.text}` gives no initial value", "write `:=`")
         return VarDecl(names[0].start, end.end, tuple(names), place, spec, initial, edge.text.upper() if edge else "")

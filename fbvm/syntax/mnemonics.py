@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cache
+from typing import NamedTuple
 
 from fbvm.syntax.automaton import Automaton, Mender
 from fbvm.syntax.instruction_set import Instruction, instruction_set, meant, spelling
@@ -29,12 +30,23 @@ class Line:
     """The comment behind it."""
 
 
+class Symbol(NamedTuple):
+    """A row of a table of symbols as the programming tool exports it."""
+
+    start: int
+    end: int
+    name: str
+    address: str
+    type: str
+    comment: str
+
+
 @dataclass
 class RungText:
     """The lines of one rung, before anybody asked what they do."""
 
     start: int
-    number: int = 0
+    number: int | None = None
     comment: str = ""
     lines: list[Line] = field(default_factory=list)
     notes: list[tuple[int, str]] = field(default_factory=list)
@@ -42,6 +54,24 @@ class RungText:
     """Whether a line RUNG began it."""
     damaged: bool = False
     """Whether a line of it could not be read."""
+    section: str = ""
+    """The line SECTION in front of it."""
+    symbols: list[Symbol] = field(default_factory=list)
+    """Rows of a table of symbols in front of it."""
+
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing of it was read yet."""
+        return not (self.lines or self.declared or self.notes or self.section or self.symbols)
+
+    @property
+    def wants_more(self) -> bool:
+        """Whether the last instruction has less operands than it takes."""
+        if not self.lines:
+            return False
+        line = self.lines[-1]
+        return len(line.step.operands) < (line.row.least if line.row.does != ".call" else 0)
 
 
 class Refusal(Exception):
@@ -62,22 +92,26 @@ def read_rungs(text: str, start: int, end: int, report: Report) -> list[RungText
     for line in text[start:end].splitlines(keepends=True):
         reader = _LineReader(text, rungs)
         try:
-            Automaton(reader, _tokens(text, at, at + len(line.rstrip("\r\n"))), text, "mnemonics").run(_stuck)
+            tokens = _tokens(text, at, at + len(line.rstrip("\r\n")), rungs[-1].wants_more)
+            Automaton(reader, tokens, text, "mnemonics").run(_stuck)
         except Refusal as refusal:
             report("S0109", *refusal.args)
             rungs[-1].damaged = True
         at += len(line)
-    return [rung for rung in rungs if rung.lines or rung.declared or rung.notes]
+    return [rung for rung in rungs if not rung.is_empty]
 
 
 def _stuck(automaton: Automaton) -> Mender:
     raise Refusal(automaton.before.start, automaton.before.end, "this is no instruction", "")
 
 
-def _tokens(text: str, at: int, end: int) -> Iterator[Token]:
-    """The tokens of one line: what may stand where is said by the place."""
+def _tokens(text: str, at: int, end: int, more: bool) -> Iterator[Token]:
+    """The tokens of one line: what may stand where is said by the place.  If the instruction in front wants `more`
+    operands, a line without a mnemonic has them."""
     patterns = _patterns()
-    remark = None if patterns["RUNG"].match(text[at:end].lstrip()) else patterns["REMARK"].search(text, at, end)
+    bare = text[at:end].lstrip()
+    plain = patterns["RUNG"].match(bare) or patterns["SYMBOL"].match(bare) or patterns["SECTION"].match(bare)
+    remark = None if plain else patterns["REMARK"].search(text, at, end)
     end = remark.start() if remark else end
 
     def take(kind: str) -> Token | None:
@@ -91,7 +125,7 @@ def _tokens(text: str, at: int, end: int) -> Iterator[Token]:
         at = found.end()
         return token
 
-    if token := take("NOTE"):
+    if token := take("NOTE") or take("SYMBOL") or take("SECTION"):
         yield token
     elif token := take("RUNG"):
         yield token
@@ -102,7 +136,7 @@ def _tokens(text: str, at: int, end: int) -> Iterator[Token]:
         if known:
             yield Token("MNEMONIC", known[0], at, known.end())
             at = known.end()
-        elif token := take("MNEMONIC"):
+        elif not more and (token := take("MNEMONIC")):
             yield token
         if token := take("CODE"):
             yield token
@@ -139,13 +173,41 @@ class _LineReader:
         rung = self.rungs[-1]
         rung.notes.append((len(rung.lines), token.text.strip()))
 
+    def section(self, token: Token) -> None:
+        self._fresh(token).section = token.text.strip()
+
+    def symbol(self, token: Token) -> None:
+        name, address, kind, *rest = token.text.rstrip("; \t").split(",")
+        comment = ",".join(rest).strip(", ").strip('"')
+        self._fresh(token).symbols.append(
+            Symbol(token.start, token.end, name, address.strip(), kind.strip().upper(), comment))
+
+    def more(self, operand: Token, operands: list[Token], remark: Token | None) -> None:
+        """Operands of the instruction in front, as printed listings have them on lines of their own."""
+        rung = self.rungs[-1]
+        if not rung.wants_more:
+            raise Refusal(operand.start, operand.end, "this is no instruction", "operands stand behind their instruction")
+        line = rung.lines[-1]
+        given, step = [operand, *operands], line.step
+        line.step = Step(step.start, given[-1].end, step.prefix, step.mnemonic,
+                         (*step.operands, *(each.text for each in given)))
+        line.places += [(each.start, each.end) for each in given]
+        line.remark = line.remark or (remark.text.strip() if remark else "")
+
+    def _fresh(self, token: Token) -> RungText:
+        """The rung that what stands in front of rungs belongs to: another one if one has begun."""
+        last = self.rungs[-1]
+        if last.lines or last.declared or last.notes or last.section:
+            self.rungs.append(RungText(token.start))
+        return self.rungs[-1]
+
     def rung(self, word: Token, number: Token | None, comment: Token | None) -> None:
         before = self.rungs[-1]
         if before.lines or before.declared or before.notes:
             before = RungText(word.start)
             self.rungs.append(before)
         before.start, before.declared = word.start, True
-        before.number = int(number.text) if number else 0
+        before.number = int(number.text) if number else None
         before.comment = comment.text.strip() if comment else ""
 
     def step(self, number: Token | None, prefix: Token | None, mnemonic: Token, code: Token | None,

@@ -24,5 +24,6 @@ def ladder_lines(text: str, at: int) -> bool:
         if found is None or code[found.end():found.end() + 1] not in ("", " ", "\t", "(") or ":=" in code or ";" in code:
             break
         lines += 1
-        own = own or spelling(found[0]) not in INSTRUCTION_LIST
+        name = spelling(found[0])
+        own = own or name not in INSTRUCTION_LIST and bool(instruction_set().rows[name].does)
     return own and lines >= SURE

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.mnemonics import Line, RungText
+from fbvm.syntax.mnemonics import Line, RungText, Symbol
 
 STEP = "    "
 """What instructions stand further in than their RUNG."""
@@ -14,13 +14,21 @@ def rung_lines(rungs: list[RungText]) -> list[str]:
     """The lines between LADDER and END_LADDER.  Rungs without a line RUNG are set apart by an empty one."""
     lines: list[str] = []
     for rung in rungs:
+        if lines and (rung.section or rung.symbols):
+            lines.append("")
+        lines += [_symbol(symbol) for symbol in rung.symbols]
+        lines += ["", rung.section] if rung.section and rung.symbols else [rung.section] if rung.section else []
         if rung.declared:
-            number = str(rung.number) if rung.number else ""
+            number = "" if rung.number is None else str(rung.number)
             lines.append(" ".join(filter(None, ("RUNG", number, rung.comment))))
-        elif lines:
+        elif lines and not rung.section:
             lines.append("")
         lines += _steps(rung)
     return lines
+
+
+def _symbol(symbol: Symbol) -> str:
+    return f'{symbol.name},{symbol.address},{symbol.type},,,,"{symbol.comment}";'
 
 
 def _steps(rung: RungText) -> list[str]:

@@ -18,6 +18,7 @@ from fbvm.syntax.operands import Operands, Wrong
 from fbvm.syntax.rung_blocks import LadderBlocks
 from fbvm.syntax.rung_sequences import Steps
 from fbvm.syntax.rung_spans import Spans
+from fbvm.syntax.symbols import declaration, number
 from fbvm.syntax.tree import Assign, Binary, Expr, If, NameRef, Statement, Unary
 
 DEEPEST = 32
@@ -58,13 +59,18 @@ class Rungs:
 
     def ladder(self, texts: list[RungText], start: int, end: int) -> Ladder:
         """The LADDER of these rungs."""
+        for symbol in (symbol for text in texts for symbol in text.symbols):
+            if timer := number(symbol):
+                self.builder.numbered[symbol.name.upper()] = timer
+            else:
+                self.instances.append(declaration(symbol))
         self.spans.look(texts)
         self.blocks.look(texts)
         rungs = []
         before = sum(len(ladder.rungs) for ladder in self.builder.ladders)
         for position, text in enumerate(texts, 1):
             self.rung = before + position
-            rung = self._rung(text, text.number or position)
+            rung = self._rung(text, position if text.number is None else text.number)
             rungs.append(rung)
             self.spans.place(rung)
         body = self.spans.close(end)

@@ -1,0 +1,42 @@
+"""Tables of symbols as CX-Programmer exports them: name, address, type and comment in a row, in front of rungs.
+
+    Start_PB,0.00,BOOL,,,,"start button";
+    Level,D100,INT,,,,"";
+    Delay,T0005,TIMER,,,,"";
+"""
+
+from __future__ import annotations
+
+import re
+
+from fbvm.syntax.mnemonics import Symbol
+from fbvm.syntax.tree import ArraySpec, Literal, Location, Name, NamedType, TypeSpec, VarDecl
+
+_TYPES = {"CHANNEL": "WORD", "UINT_BCD": "WORD", "UDINT_BCD": "DWORD", "ULINT_BCD": "LWORD"}
+"""Types of the tool that are others here."""
+NUMBERED = ("TIMER", "COUNTER")
+_ARRAY = re.compile(r"([A-Z_]+)\[(\d+)\]")
+
+
+def number(symbol: Symbol) -> str:
+    """The timer or counter that a symbol means, as T5 or C5; "" if it means none."""
+    if symbol.type not in NUMBERED:
+        return ""
+    digits = symbol.address.lstrip("TtCc")
+    return f"{symbol.type[0]}{int(digits)}" if digits.isdigit() else ""
+
+
+def declaration(symbol: Symbol) -> VarDecl:
+    """The variable that a row declares; without an address it lies where there is room."""
+    start, end = symbol.start, symbol.start + len(symbol.name)
+    place = Location(start, end, symbol.address) if symbol.address else None
+    return VarDecl(start, end, (Name(start, end, symbol.name),), place, _spec(symbol.type, start, end), None)
+
+
+def _spec(kind: str, start: int, end: int) -> TypeSpec:
+    found = _ARRAY.fullmatch(kind)
+    named = NamedType(start, end, _TYPES.get(found[1] if found else kind, found[1] if found else kind))
+    if not found:
+        return named
+    bounds = tuple(Literal(start, end, "int", value, None, str(value)) for value in (0, int(found[2]) - 1))
+    return ArraySpec(start, end, ((bounds[0], bounds[1]),), named)

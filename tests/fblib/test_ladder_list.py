@@ -1,0 +1,59 @@
+"""The list of instructions, and what `fbvm explain` says of each: both are made of the table and the library."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from fbvm.base.data import data_folder
+from fbvm.check.instructions import find, flags, meaning, page
+from fbvm.cli.main import main
+from fbvm.syntax.instruction_set import instruction_set
+
+LIST = Path(__file__).parents[2] / "fblib/omron/ladder/INSTRUCTIONS.md"
+HEAD = """# The instructions of Omron CS/CJ ladder
+
+Those of `grammar/mnemonics.txt`, executed or refused by name; `fbvm explain MOV` says the same of one. Flags are those that an
+instruction writes or reads, P_ in front of each. This list is made by `FBVM_REWRITE=1 pytest tests/fblib/test_ladder_list.py`.
+"""
+
+
+def listed() -> str:
+    lines = [HEAD]
+    for line in (data_folder("grammar") / "mnemonics.txt").read_text(encoding="utf-8").splitlines():
+        if line.startswith("# ---"):
+            section = line.removeprefix("# ---").strip()
+            title = section.split(" ", 1)[1] if section[0].isdigit() else section
+            lines += ["", f"## {title[0].upper()}{title[1:]}", "", "| instruction | operands | flags | |", "|---|---|---|---|"]
+        elif line.strip() and not line.startswith("#"):
+            row = find(line.split("|")[0])
+            assert row is not None
+            name = (row.mnemonic.removeprefix("LD") if row.kind == "?" else row.mnemonic) + (f"({row.code})" if row.code else "")
+            shown = " ".join(flag.removeprefix("P_") for flag in flags(row))
+            said = meaning(row) if row.does else f"**refused**: {meaning(row)}"
+            lines.append(f"| `{name}` | {' '.join(row.names).strip()} | {shown} | {said} |")
+    return "\n".join(lines) + "\n"
+
+
+def test_the_list_is_as_the_table_and_the_library() -> None:
+    text = listed()
+    if os.environ.get("FBVM_REWRITE"):
+        LIST.write_text(text, encoding="utf-8")
+    assert LIST.read_text(encoding="utf-8") == text
+
+
+def test_everything_says_what_it_does_or_why_it_is_refused() -> None:
+    for row in instruction_set().rows.values():
+        assert len(meaning(row)) > 10, row.mnemonic
+        assert page(row).startswith(row.mnemonic)
+
+
+@pytest.mark.parametrize(("name", "part"), [
+    ("mov", "flags: P_ER P_EQ P_N"), ("=", "a contact"), ("SEND", "no FINS network"), ("SFT", "takes 3 conditions")])
+def test_explain(name: str, part: str) -> None:
+    result = CliRunner().invoke(main, ["explain", name])
+    assert result.exit_code == 0
+    assert part.lower() in result.output.lower()
