@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.dialects import Dialect, takers
 from fbvm.base.types import BOOL, fold
 from fbvm.check.facts import Guard
+from fbvm.check.foreign import comma_hint
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -66,7 +67,7 @@ class Arguments:
         """True if every parameter has a value; one that is named without a value has none."""
         least = len(self.names)
         if len(given) > least and not self.repeats:
-            self.error("S0402", self.call, self._takes(len(given)))
+            self.error("S0402", self.call, self._takes(len(given)), comma_hint(self.expressions.text(self.call)))
             return False
         count = max(least, 1 + max(given, default=0)) if least else 0
         missing = [self._name(i) for i in islice((i for i in range(count) if i not in values), NAMED)]

@@ -23,6 +23,7 @@ from fbvm.check import functions, qualified, references
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
 from fbvm.check.fitting import assignable, holds, lent, same
+from fbvm.check.foreign import comma_hint
 from fbvm.check.generics import Generics, is_generic
 from fbvm.check.standard import StandardCalls
 from fbvm.check.writes import note_count, writable
@@ -190,7 +191,8 @@ class Calls:
         if len(arguments) > len(parameters) and not pou.has_lost:
             plural = "" if len(parameters) == 1 else "s"
             self.error("S0402", arguments[len(parameters)],
-                       f"{pou.name} has {len(parameters) or 'no'} parameter{plural}, {len(arguments)} given")
+                       f"{pou.name} has {len(parameters) or 'no'} parameter{plural}, {len(arguments)} given",
+                       comma_hint(self.expressions.text(call)))
         for argument, variable in zip(arguments, parameters, strict=False):
             assert argument.value is not None
             given[fold(variable.name)] = argument

@@ -10,6 +10,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.types import ArrayType, Field, RefType, StructType, Type, families, fold
 from fbvm.check.constants import encode
 from fbvm.check.facts import UNTYPED_INT, Facts, Pou, Value, Variable
+from fbvm.check.foreign import comma_hint
 from fbvm.check.project import Project
 from fbvm.syntax import tree
 
@@ -95,7 +96,8 @@ class Values:
 
     def _array(self, kind: Type, init: tree.ArrayInit, source: Source, default: bytes) -> bytes:
         if not isinstance(kind, ArrayType):
-            self.report.add("S0705", source, init, f"[...] is an initial value of an array, not of {kind}")
+            self.report.add("S0705", source, init, f"[...] is an initial value of an array, not of {kind}",
+                            comma_hint(source.text[init.start:init.end]))
             return default
         size = kind.element.size
         content = bytearray(default)

@@ -24,10 +24,11 @@ from fbvm.syntax.frames import (
 )
 from fbvm.syntax.indentation import BLOCKS, advice, ends_alike
 from fbvm.syntax.lexer import Token
+from fbvm.syntax.mend import Mend
 from fbvm.syntax.mends import BRACKETS, best_mend
 from fbvm.syntax.phrases import found, hint, sign, unlike
 from fbvm.syntax.prospect import advance, expected
-from fbvm.syntax.slips import Mend, open_bracket
+from fbvm.syntax.slips import open_bracket
 
 LOOK = 4
 """Tokens by which a mend is judged."""

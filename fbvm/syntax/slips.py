@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from fbvm.syntax.automaton import Automaton
+from fbvm.syntax.foreign_forms import decimal_comma, infix
 from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, cut, frames
 from fbvm.syntax.lexer import Token, lexis, meant
 from fbvm.syntax.literals import ELEMENTARY
+from fbvm.syntax.mend import Mend
 from fbvm.syntax.pasted import INSTRUCTION_LIST, ladder_lines
 from fbvm.syntax.phrases import found
 from fbvm.syntax.prospect import advance, symbols
@@ -19,24 +20,6 @@ ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
 POU_ENDS = {ENDS[word] for word in POUS}
 BODY_ENDS = POU_ENDS | {"END_ACTION", "END_TRANSITION"}
 """Words behind which no statement of the same body stands."""
-
-
-@dataclass(frozen=True)
-class Mend:
-    """What to say and which tokens to go on with; `cut` gives up the statement's beginning first."""
-
-    tokens: list[Token]
-    start: int
-    end: int
-    message: str
-    hint: str = ""
-    opener: Token | None = None
-    cut: bool = False
-    code: str = "S0101"
-    lossless: bool | None = None
-    """Whether all that was written is read; None if that is so unless `cut`, or there being no tokens, says no."""
-    silent: int = 0
-    """Up to where nothing else is told, since the text is none of ours."""
 
 
 def slip(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -231,14 +214,6 @@ def _begin(automaton: Automaton, token: Token, following: list[Token]) -> Mend |
                 "leave it out: statements follow the VAR sections", cut=True, lossless=True)
 
 
-def _quotient(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """`a DIV b` of Pascal."""
-    if token.text.upper() != "DIV" or token.type != "NAME" or advance(automaton.states, "SLASH") is None:
-        return None
-    return Mend([Token("SLASH", "/", token.start, token.end)], token.start, token.end,
-                f"{found(token)} is no operator of Structured Text", "write `/`, which drops the fraction between integers")
-
-
 def _c_loop(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
     """`for (i = 0; i < 10; i++)`"""
     opener = open_bracket(automaton, "LPAR")
@@ -317,5 +292,5 @@ def _instruction_list(automaton: Automaton, token: Token, following: list[Token]
 SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
     _ladder, _misspelt, _statement_word, _nameless, _reserved_name, _end_of_section,
     _colon_behind_else, _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end,
-    _location_behind_type, _caret, _begin, _quotient, _c_loop, _declared_in_body, _instruction_list)
+    _location_behind_type, _caret, _begin, infix, decimal_comma, _c_loop, _declared_in_body, _instruction_list)
 """Asked one after the other; the first that knows the mistake mends it."""
