@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.check import lint_declared, lint_values
+from fbvm.check import lint_declared, lint_sfc, lint_values
 from fbvm.check.facts import Pou, Variable
 from fbvm.check.lint_body import Body
 from fbvm.check.lint_flow import flow
 from fbvm.check.lint_writes import Writes
+from fbvm.syntax import sfc
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
@@ -27,6 +28,8 @@ def lint(checker: Checker, program: str | None) -> None:
         body = Body(pou, facts, report)
         for node in body.nodes():
             lint_values.look_at(body, node)
+            if isinstance(node, sfc.Sfc):
+                lint_sfc.look_at(body, node)
         flow(body)
         writes.body(body)
         lint_declared.result(body)

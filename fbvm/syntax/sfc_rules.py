@@ -49,23 +49,31 @@ def _names(transitions: Iterable[Transition], known: dict[str, Step], tell: Call
                 seen.add(fold(name.text))
 
 
+def networks(steps: Sequence[Step], transitions: Iterable[Transition]) -> list[tuple[list[Step], list[Transition]]]:
+    """The steps and transitions that are connected, in the order of writing."""
+    known = {fold(step.name.text): position for position, step in enumerate(steps)}
+    number = list(range(len(steps)))
+    joined = [(one, {known[fold(name.text)] for name in (*one.sources, *one.targets)}) for one in transitions]
+    for _, together in joined:
+        old = {number[position] for position in together}
+        number = [min(old) if each in old else each for each in number]
+    found: dict[int, tuple[list[Step], list[Transition]]] = {}
+    for position, step in enumerate(steps):
+        found.setdefault(number[position], ([], []))[0].append(step)
+    for one, together in joined:
+        found[number[min(together)]][1].append(one)
+    return list(found.values())
+
+
 def _initial(steps: Sequence[Step], transitions: Iterable[Transition], tell: Callable[..., None]) -> None:
-    """Each network, which is what transitions connect, has one initial step."""
-    network = {fold(step.name.text): position for position, step in enumerate(steps)}
-    for transition in transitions:
-        joined = {network[fold(name.text)] for name in (*transition.sources, *transition.targets)}
-        network = {name: min(joined) if number in joined else number for name, number in network.items()}
-    begins: dict[int, Step] = {}
-    for step in steps:
-        number = network[fold(step.name.text)]
-        if step.initial and number in begins:
-            tell("S0111", step.name, f"{step.name.text} is a second initial step beside {begins[number].name.text}",
+    """Each network has one initial step."""
+    for connected, _ in networks(steps, transitions):
+        begins = [step for step in connected if step.initial]
+        for step in begins[1:]:
+            tell("S0111", step.name, f"{step.name.text} is a second initial step beside {begins[0].name.text}",
                  "a network begins with one step; begin several at once with a transition TO (a, b)")
-        elif step.initial:
-            begins[number] = step
-    for step in steps:
-        number = network[fold(step.name.text)]
-        if number not in begins:
-            tell("S0111", step.name, f"no initial step leads to {step.name.text}" if begins else "there is no initial step",
+        if not begins:
+            name = connected[0].name
+            alone = len(connected) == len(steps)
+            tell("S0111", name, "there is no initial step" if alone else f"no initial step leads to {name.text}",
                  "write INITIAL_STEP in place of STEP where the chart begins")
-            begins[number] = step
