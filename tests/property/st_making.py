@@ -77,10 +77,10 @@ class Maker(Features):
             self.places.append(("name", result, name))
         if kind != "FUNCTION" and self.one_in(3):
             self.actions = (("Act0", self.block(self.random.randrange(1, 4), 0)),)
-        size = self.random.randrange(2, 5) if kind != "PROGRAM" else self.random.randrange(4, 14)
+        size = self.random.randrange(2, 5) if kind != "PROGRAM" else self.random.randrange(3, 9)
         bound = [self.bind(place) or self.point(place) for place in self.writable if kind == "PROGRAM" and not self.one_in(6)
                  and place[1].startswith(("REF", "PTR"))]
-        body = tuple(node for node in bound if node) + self.block(size, 2 if kind != "PROGRAM" else 3)
+        body = tuple(node for node in bound if node) + self.block(size, 3 if kind == "PROGRAM" and self.one_in(3) else 2)
         if self.one_in(3):
             body = self.jumping(body)
         if result:

@@ -125,8 +125,11 @@ class Values:
         if functions and self.one_in(3):
             pou = self.pick(functions)
             taken = [row for row in pou.variables if row.section == "VAR_INPUT"]
+            enabled = pou.result not in GENERIC and self.one_in(4)
+            if enabled:
+                self.risks = 0  # no rule says whether operands are worked out where EN is FALSE
             operands = tuple(self.value(kind if row.kind in GENERIC else plain(row.kind), depth - 2) for row in taken)
-            if pou.result not in GENERIC and self.one_in(4):
+            if enabled:
                 return "enabled", kind, pou.name, (self.value("BOOL", 1), *operands)
             return "user", kind, pou.name, operands
         return self.made(kind, depth - 1)
