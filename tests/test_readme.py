@@ -68,6 +68,16 @@ def test_the_test_example_passes() -> None:
     assert plc.scans == 8
 
 
+def test_a_rung_may_be_drawn() -> None:
+    names = "Start AT CIO 0.00 : BOOL; Stop AT CIO 0.01 : BOOL; Motor AT CIO 100.00 : BOOL;"
+    plc = Plc(compile_text(f"PROGRAM Main VAR {names} END_VAR\n{block('iecst', 2)}END_PROGRAM\n").image)  # type: ignore[arg-type]
+    plc.write("Main.Start", True)
+    plc.run(scans=1)
+    plc.write("Main.Start", False)
+    plc.run(scans=1)
+    assert plc.read("Main.Motor") is True
+
+
 def test_words_are_read_and_written_by_number() -> None:
     text = f"PROGRAM Main\n{block('iecst', 3)}END_PROGRAM\n"
     plc = Plc(compile_text(text).image)  # type: ignore[arg-type]

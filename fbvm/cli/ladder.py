@@ -19,7 +19,7 @@ from fbvm.record.ladder_svg import ladder_svg
 from fbvm.record.ladder_text import ladder_surface, ladder_text
 from fbvm.record.names import Names
 from fbvm.record.power import Power
-from fbvm.syntax.rung_drawing import Sight
+from fbvm.syntax.rung_widths import Sight
 from fbvm.watch.paths import Place
 
 SVG_WIDTH = 120

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from fbvm.code.image import RungPicture
 from fbvm.syntax.box_lines import Surface
-from fbvm.syntax.rung_drawing import Sight, rung_surface
+from fbvm.syntax.rung_drawing import rung_surface
+from fbvm.syntax.rung_widths import Sight
 
 AT_REST = Sight()
 

@@ -9,7 +9,7 @@ from fbvm.code.image import Site
 from fbvm.record.inside import Frame
 from fbvm.record.ladder_text import ladder_text
 from fbvm.step.session import Session
-from fbvm.syntax.rung_drawing import Sight
+from fbvm.syntax.rung_widths import Sight
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import show, show_time
 

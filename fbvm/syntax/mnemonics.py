@@ -12,6 +12,8 @@ from fbvm.syntax.automaton import Automaton, Mender
 from fbvm.syntax.instruction_set import Instruction, instruction_set, meant, spelling
 from fbvm.syntax.ladder import Step
 from fbvm.syntax.lexer import Token
+from fbvm.syntax.rung_grid import Bad
+from fbvm.syntax.rung_reading import Picture, Placed, is_drawn, read_drawing, remark_of
 from fbvm.syntax.tables import tables
 
 Report = Callable[..., None]
@@ -54,11 +56,12 @@ class RungText:
     """Whether a line RUNG began it."""
     damaged: bool = False
     """Whether a line of it could not be read."""
+    picture: Picture | None = None
+    """What its drawing says besides, if it was drawn."""
     section: str = ""
     """The line SECTION in front of it."""
     symbols: list[Symbol] = field(default_factory=list)
     """Rows of a table of symbols in front of it."""
-
 
     @property
     def is_empty(self) -> bool:
@@ -84,21 +87,83 @@ def _patterns() -> dict[str, re.Pattern[str]]:
 
 
 def read_rungs(text: str, start: int, end: int, report: Report) -> list[RungText]:
-    """The rungs of the lines in `text[start:end]`; a line that cannot be read has a diagnostic and is left out.
+    """The rungs of the lines in `text[start:end]`; what cannot be read has a diagnostic and is left out.
 
-    Where no line RUNG says so, a rung begins with an instruction at the bus bar that follows an output."""
+    Where no line RUNG says so, a rung begins with a drawing, and with an instruction at the bus bar that follows an
+    output."""
     rungs = [RungText(start)]
-    at = start
-    for line in text[start:end].splitlines(keepends=True):
-        reader = _LineReader(text, rungs)
-        try:
-            tokens = _tokens(text, at, at + len(line.rstrip("\r\n")), rungs[-1].wants_more)
-            Automaton(reader, tokens, text, "mnemonics").run(_stuck)
-        except Refusal as refusal:
-            report("S0109", *refusal.args)
-            rungs[-1].damaged = True
-        at += len(line)
+    for lines in _groups(text, start, end):
+        if is_drawn([line for _, line in lines]):
+            _read_drawing(rungs, lines, report)
+            continue
+        for at, line in lines:
+            try:
+                tokens = _tokens(text, at, at + len(line), rungs[-1].wants_more)
+                Automaton(_LineReader(text, rungs), tokens, text, "mnemonics").run(_stuck)
+            except Refusal as refusal:
+                report("S0109", *refusal.args)
+                rungs[-1].damaged = True
     return [rung for rung in rungs if not rung.is_empty]
+
+
+APART = ("RUNG", "NOTE", "REMARK", "SECTION", "SYMBOL")
+"""Lines that are no part of a drawing."""
+
+
+def _groups(text: str, start: int, end: int) -> Iterator[list[tuple[int, str]]]:
+    """Lines that stand together, with their places: up to an empty line, one of a comment, or RUNG."""
+    patterns, group = _patterns(), []  # type: dict[str, re.Pattern[str]], list[tuple[int, str]]
+    for line in text[start:end].splitlines(keepends=True):
+        bare = line.strip()
+        if not bare or any(patterns[kind].match(bare) for kind in APART):
+            yield from filter(None, (group, [(start, line.rstrip("\r\n"))]))
+            group = []
+        else:
+            group.append((start, line.rstrip("\r\n")))
+        start += len(line)
+    yield from filter(None, (group,))
+
+
+def _read_drawing(rungs: list[RungText], lines: list[tuple[int, str]], report: Report) -> None:
+    """A rung that is drawn; its comments become notes in front of it."""
+    first = lines[0][0] + len(lines[0][1]) - len(lines[0][1].lstrip())
+    if rungs[-1].lines or rungs[-1].damaged:
+        rungs.append(RungText(first))
+    rung = rungs[-1]
+    rung.notes += [(0, remark) for _, line in lines if (remark := remark_of(line))]
+    try:
+        placed, rung.picture = read_drawing([line for _, line in lines], [at for at, _ in lines])
+        rung.lines = [_line(one) for one in placed]
+    except Bad as bad:
+        x, y, width, message, hint = bad.args
+        start = lines[min(y, len(lines) - 1)][0] + x
+        report("S0113", start, start + width, message, hint)
+        rung.damaged = True
+    except Refusal as refusal:
+        report("S0109", *refusal.args)
+        rung.damaged = True
+
+
+def _line(placed: Placed) -> Line:
+    """An instruction that was drawn.  Raises Refusal if there is none of that name."""
+    prefix, mnemonic, operands, _ = placed.coded
+    row = instruction(prefix, mnemonic, placed.start, placed.end)
+    return Line(row, Step(placed.start, placed.end, prefix, row.mnemonic, operands), placed.operands)
+
+
+def instruction(prefix: str, mnemonic: str, start: int, end: int) -> Instruction:
+    """The row of the table for an instruction that stands from `start` to `end`.  Raises Refusal."""
+    name = spelling(mnemonic)
+    row = instruction_set().rows.get(name)
+    if row is None:
+        near = meant(name)
+        raise Refusal(start, end, f"`{mnemonic}` is no instruction of this instruction set",
+                      f"did you mean {' or '.join(near)}?" if near else
+                      "an unknown instruction is never left out: say what it does with others")
+    if missing := [sign for sign in prefix if sign not in row.variations]:
+        raise Refusal(start, end, f"there is no {missing[0]}{name}",
+                      f"{name} has {', '.join(row.variations) or 'no variations'}")
+    return row
 
 
 def _stuck(automaton: Automaton) -> Mender:
@@ -212,23 +277,16 @@ class _LineReader:
 
     def step(self, number: Token | None, prefix: Token | None, mnemonic: Token, code: Token | None,
              operands: list[Token], remark: Token | None) -> None:
-        name = spelling(mnemonic.text)
-        row = instruction_set().rows.get(name)
-        if row is None:
-            near = meant(name)
-            raise Refusal(mnemonic.start, mnemonic.end, f"`{mnemonic.text}` is no instruction of this instruction set",
-                          f"did you mean {' or '.join(near)}?" if near else
-                          "an unknown instruction is never left out: say what it does with others")
-        if code and int(code.text[1:-1]) != int(row.code or 1000):
-            raise Refusal(code.start, code.end, f"{name} has the function code {row.code or 'none'}, not {code.text[1:-1]}",
-                          "leave the code out, or write the mnemonic that belongs to it")
         written = prefix.text if prefix else ""
-        if missing := [sign for sign in written if sign not in row.variations]:
-            raise Refusal(mnemonic.start - len(written), mnemonic.end, f"there is no {missing[0]}{name}",
-                          f"{name} has {', '.join(row.variations) or 'no variations'}")
+        row = instruction("", mnemonic.text, mnemonic.start, mnemonic.end)
+        if code and int(code.text[1:-1]) != int(row.code or 1000):
+            raise Refusal(code.start, code.end,
+                          f"{row.mnemonic} has the function code {row.code or 'none'}, not {code.text[1:-1]}",
+                          "leave the code out, or write the mnemonic that belongs to it")
+        instruction(written, mnemonic.text, mnemonic.start - len(written), mnemonic.end)
         if not (operands and _is_branch(operands[0].text)):
             self._begin(row, mnemonic)
-        step = Step(mnemonic.start - len(written), operands[-1].end if operands else mnemonic.end, written, name,
+        step = Step(mnemonic.start - len(written), operands[-1].end if operands else mnemonic.end, written, row.mnemonic,
                     tuple(operand.text for operand in operands))
         self.rungs[-1].lines.append(Line(row, step, [(o.start, o.end) for o in operands],
                                          code is not None, remark.text.strip() if remark else ""))
@@ -236,7 +294,7 @@ class _LineReader:
     def _begin(self, row: Instruction, mnemonic: Token) -> None:
         """Begin another rung if this instruction does."""
         rung = self.rungs[-1]
-        if rung.lines and not rung.declared and row.inputs == 0 and closes(rung.lines):
+        if rung.picture or rung.lines and not rung.declared and row.inputs == 0 and closes(rung.lines):
             self.rungs.append(RungText(mnemonic.start))
 
 

@@ -2,42 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from fbvm.syntax.box_lines import Surface
-from fbvm.syntax.rung_boxes import Shape, shape
-from fbvm.syntax.rung_diagram import Box, Coil, Contact, Out, Parallel, Part, Point, Series, StepText, Undrawable, diagram
+from fbvm.syntax.rung_boxes import Shape
+from fbvm.syntax.rung_diagram import Box, Coil, Contact, Parallel, Part, Point, Series, StepText, Undrawable, diagram
+from fbvm.syntax.rung_widths import LEAD, LINK, SLACK, Sight, Widths
 
-States = Mapping[int, Sequence[bool]]
-"""What was seen at the steps of a rung in one execution: of a contact its state, of an output the power that reached
-it, of a block the power into it and out of it."""
-LINK = 5
-"""Columns of the arrow with a number at the end of a line that goes on below."""
+ARROW = "►"
 LEAST = 24
 """Columns that a rung needs for anything to be drawn."""
-LEAD = 2
-"""Columns of line on either side of a box."""
-
-
-def _nothing(symbol: str) -> str:
-    return ""
-
-
-def _unseen(step: int, operand: str) -> str:
-    return ""
-
-
-class Sight(NamedTuple):
-    """What is known about a rung besides its steps.  No `states` draw it at rest."""
-
-    states: States | None = None
-    places: Callable[[str], str] = _nothing
-    """The address behind a symbol, "" if it has none."""
-    values: Callable[[int, str], str] = _unseen
-    """The value that an operand of a step had, "" if nobody has seen one."""
-
-
+STEP = 4
+"""Columns by which a rung becomes wider if an element does not fit."""
 AT_REST = Sight()
 
 
@@ -61,13 +38,15 @@ def rung_surface(steps: Sequence[StepText], width: int = 80, sight: Sight = AT_R
 
 def drawn(bar: Point, width: int = 80, sight: Sight = AT_REST) -> Surface:
     """The drawing of a diagram.  It is wider than `width` only if a single element is."""
-    width = max(LEAST, min(width, _reach(bar, sight)))
+    widths = Widths(sight)
+    reach = max(LEAST, widths.reach(bar))
+    width = max(LEAST, min(width, reach))
     while True:
-        drawing = _Drawing(width, sight)
+        drawing = _Drawing(width, widths)
         surface = drawing.drawn(bar)
         if drawing.need <= width:
             return surface
-        width = drawing.need
+        width = max(drawing.need, min(width + STEP, reach))
 
 
 class _Rest(NamedTuple):
@@ -81,9 +60,9 @@ class _Rest(NamedTuple):
 class _Drawing:
     """Draws one rung.  Power is True, False, or None at rest."""
 
-    def __init__(self, width: int, sight: Sight) -> None:
+    def __init__(self, width: int, widths: Widths) -> None:
         self.surface = Surface()
-        self.width, self.sight = width, sight
+        self.width, self.widths, self.sight = width, widths, widths.sight
         self.need = 0
         """Columns that would have been enough for what did not fit."""
         self._start = 0
@@ -93,11 +72,11 @@ class _Drawing:
 
     def drawn(self, bar: Point) -> Surface:
         alive = self.sight.states is not None
-        depth = self._outs(bar, 0, 0, alive, False, trunk=True)
+        depth = self._outs(bar, 0, 0, alive, trunk=True)
         while self._left:
             rest = self._left.pop(0)
             self._start = self._go_on(rest.number, 2, depth, bool(rest.power))
-            depth = self._point(rest.point, self._start, depth, rest.power, False)
+            depth = self._point(rest.point, self._start, depth, rest.power)
         for x, thick in ((0, alive), (self.width - 1, False)):
             self.surface.down(x, -1, depth, thick)
         self.surface.cut(depth)
@@ -110,25 +89,23 @@ class _Drawing:
         seen = self.sight.states.get(step)
         return bool(seen[which]) if seen else False
 
-    def _shape(self, box: Box) -> Shape:
-        return shape(box, self.sight.values)
-
     # --- branch points and outputs ----------------------------------------------------------------------------------
 
-    def _outs(self, point: Point, x: int, y: int, power: bool | None, is_open: bool, trunk: bool = False) -> int:
+    def _outs(self, point: Point, x: int, y: int, power: bool | None, is_open: bool = False, below: int = 0,
+              trunk: bool = False) -> int:
         """What hangs on a point in column x whose line is in the row below y; the row behind it all.
 
-        `is_open`: a line passes below what is drawn here, so nothing may come from the left."""
+        `is_open`: a line passes below what is drawn here, so nothing may come from the left; else it may below `below`."""
         first = last = y + 1
         for position, out in enumerate(point.outs):
             last = y + 1
             passed = is_open or not trunk and position + 1 < len(point.outs)
             if isinstance(out, Point):
-                y = self._point(out, x, y, power, passed)
+                y = self._point(out, x, y, power, passed, below)
             elif isinstance(out, Box) and out.inputs and passed:
                 y = self._leave(Point(Series(), [out]), x, y, power)
             else:
-                y = self._output(out, x, y, power)
+                y = self._output(out, x, y, power, below)
         if not trunk:
             self.surface.down(x, first, last, bool(power))
         if not point.outs:
@@ -136,18 +113,18 @@ class _Drawing:
             y += 2
         return y
 
-    def _point(self, point: Point, x: int, y: int, power: bool | None, is_open: bool) -> int:
+    def _point(self, point: Point, x: int, y: int, power: bool | None, is_open: bool = False, below: int = 0) -> int:
         """A path, and what hangs on its end; what does not fit is left for another line."""
         depth, parts = y, point.path.parts
         for at, part in enumerate(parts):
-            behind = LINK if at + 1 < len(parts) else _needed(point, self.sight)
-            if x + _part_width(part, self.sight) + behind > self.width and x > max(self._start, LINK):
+            behind = LINK if at + 1 < len(parts) else self.widths.needed(point) + SLACK
+            if x + self.widths.part(part) + behind > self.width and x > max(self._start, LINK):
                 return max(depth, self._leave(Point(Series(parts[at:]), point.outs), x, y, power))
             wide = self._fitting(part, self.width - behind - x)
             height, power = self._part(part, x, y, power, wide)
             x, depth = x + wide, max(depth, y + height)
-            self._take(x + behind)
-        return max(depth, self._outs(point, x, y, power, is_open))
+            self._take(x + behind - (SLACK if at + 1 == len(parts) else 0))
+        return max(depth, self._outs(point, x, y, power, is_open, max(depth, below)))
 
     def _leave(self, rest: Point, x: int, y: int, power: bool | None) -> int:
         """End a line with an arrow and a number; the rest of it begins with them, in a line below all that is begun."""
@@ -158,48 +135,50 @@ class _Drawing:
 
     def _arrow(self, number: int, x: int, y: int, power: bool) -> None:
         self.surface.across(x, x + 2, y + 1, power)
-        self.surface.write(x + 2, y + 1, f"►{number}")
+        self.surface.write(x + 2, y + 1, f"{ARROW}{number}")
         self._take(x + 4 + len(str(number)))
 
     def _go_on(self, number: int, x: int, y: int, power: bool) -> int:
         """Begin a line with an arrow in column x; the column behind it."""
-        mark = f"►{number}"
+        mark = f"{ARROW}{number}"
         self.surface.write(x, y + 1, mark)
-        self.surface.across(x + len(mark), x + len(mark) + 2, y + 1, power)
+        self.surface.across(x + len(mark) - 1, x + len(mark) + 2, y + 1, power)
         return x + len(mark) + 2
 
     def _take(self, columns: int) -> None:
         if columns > self.width:
             self.need = max(self.need, columns)
 
-    def _output(self, out: Coil | Box, x: int, y: int, power: bool | None) -> int:
+    def _output(self, out: Coil | Box, x: int, y: int, power: bool | None, below: int) -> int:
         seen = self._state(out.step, 0)
         on = bool(power if seen is None else seen)
         end = self.width - 1
-        self._take(x + _output_width(out, self.sight))
+        self._take(x + self.widths.output(out))
         if isinstance(out, Coil):
             mark, label = f"({out.mark})", " ".join(out.operands)
-            at = end - 2 - max(len(mark), (self._label_width(out) + len(mark)) // 2)
+            at = end - self.widths.mark_at(out)
             self.surface.across(x, at, y + 1, on)
             self.surface.across(at + len(mark) - 1, end, y + 1, on)
             self.surface.write(at, y + 1, mark)
             return y + 2 + self._labels(label, self.sight.places(label), at, len(mark), y)
-        made = self._shape(out)
+        made = self.widths.shape(out)
         at = end - made.right - made.wide - 2
         if out.entries or not out.instance:
             self.surface.across(x, at, y + 1, on)
-        return y + self._box(made, at, y, [1, *self._more_inputs(out, y, at, bool(on))])
+        rows, bottom = self._more_inputs(out, y, at, below)
+        return max(bottom, y + self._box(made, at, y, [1, *rows]))
 
-    def _more_inputs(self, box: Box, y: int, until: int, on: bool) -> list[int]:
-        """The conditions below the first one, each from the bus bar to the box; the rows of their lines, counted from y."""
-        rows, row = [], y + 2
+    def _more_inputs(self, box: Box, y: int, until: int, below: int) -> tuple[list[int], int]:
+        """The conditions below the first one, each from the bus bar to the box; the rows of their lines, counted from y,
+        and the row behind them all."""
+        rows, row = [], max(y + 2, below)
         for path in box.inputs:
             height, power, line, x = self._series(path, 0, row, self.sight.states is not None or None, until - 1)
             self.surface.across(x, until, line, bool(power))
             self._take(x + self.width - until + 1)
             rows.append(line - y)
             row += height
-        return rows
+        return rows, row if rows else y
 
     def _box(self, made: Shape, x: int, y: int, conditions: Sequence[int]) -> int:
         """A box whose first condition is on the line; how many rows it takes."""
@@ -215,10 +194,10 @@ class _Drawing:
             self.surface.write(x + made.inset, y + at, row.left)
             self.surface.write(x + made.wide - len(row.right), y + at, row.right)
             if row.entering:
-                self.surface.across(x - 1, x, y + at)
+                self.surface.across(x - 2, x, y + at)
                 self.surface.write(x - 1 - len(row.entering), y + at, row.entering)
             if row.leaving:
-                self.surface.across(x + made.wide, x + made.wide + 1, y + at)
+                self.surface.across(x + made.wide, x + made.wide + 2, y + at)
                 self.surface.write(x + made.wide + 2, y + at, row.leaving)
         return deep + 1
 
@@ -229,9 +208,6 @@ class _Drawing:
             self.surface.write(x + (wide - len(below)) // 2, y + 2, below)
         return bool(below)
 
-    def _label_width(self, drawn: Contact | Coil) -> int:
-        return _label_width(drawn, self.sight)
-
     # --- conditions: each gives the rows that it takes and the power behind it --------------------------------------
 
     def _series(self, path: Series, x: int, y: int, power: bool | None, limit: int) -> tuple[int, bool | None, int, int]:
@@ -240,7 +216,7 @@ class _Drawing:
         top, start, begin, height = y, x, x, 2
         for at, part in enumerate(path.parts):
             behind = LINK if at + 1 < len(path.parts) else 0
-            if x + _part_width(part, self.sight) + behind > limit and x > begin:
+            if x + self.widths.part(part) + behind > limit and x > begin:
                 self._links += 1
                 self._arrow(self._links, x, y, bool(power))
                 y, height = y + height, 2
@@ -253,7 +229,7 @@ class _Drawing:
 
     def _fitting(self, part: Part, room: int) -> int:
         """The columns for a part where there are so many: branches can be made to go on below."""
-        natural = _part_width(part, self.sight)
+        natural = self.widths.part(part)
         return max(room, LEAST // 2) if isinstance(part, Parallel) and room < natural else natural
 
     def _part(self, part: Part, x: int, y: int, power: bool | None, wide: int) -> tuple[int, bool | None]:
@@ -261,7 +237,7 @@ class _Drawing:
             return self._contact(part, x, y, power, wide)
         if isinstance(part, Parallel):
             return self._parallel(part, x, y, power, wide)
-        made = self._shape(part)
+        made = self.widths.shape(part)
         at = x + max(LEAD, made.left + 1)
         self.surface.across(x, at, y + 1, bool(power))
         height = self._box(made, at, y, [1])
@@ -277,7 +253,7 @@ class _Drawing:
         self.surface.across(x, at, y + 1, bool(power))
         self.surface.across(at + len(mark) - 1, x + wide, y + 1, bool(out))
         self.surface.write(at, y + 1, mark if not state else f"┫{contact.mark}┣")
-        below = _below(contact, self.sight)
+        below = self.widths.below(contact)
         return 2 + self._labels(" ".join(contact.operands), below, at, len(mark), y), out
 
     def _parallel(self, parallel: Parallel, x: int, y: int, power: bool | None, wide: int) -> tuple[int, bool | None]:
@@ -295,54 +271,3 @@ class _Drawing:
         self.surface.down(right, top + 1, ended, on)
         self.surface.across(right, x + wide, top + 1, on)
         return y - top, None if powers[0] is None else on
-
-
-# --- widths ---------------------------------------------------------------------------------------------------------
-
-
-def _reach(point: Point, sight: Sight) -> int:
-    """The columns that a rung takes on one line."""
-    behind = [_reach(out, sight) if isinstance(out, Point) else _output_width(out, sight) for out in point.outs]
-    return _series_width(point.path, sight) + 2 + max(behind, default=4)
-
-
-def _needed(point: Point, sight: Sight) -> int:
-    """The columns that must be left behind a path: for what ends the rung, or for an arrow."""
-    return max((_end_width(out, sight) for out in point.outs), default=2)
-
-
-def _end_width(out: Out, sight: Sight) -> int:
-    return LINK if isinstance(out, Point) else _output_width(out, sight)
-
-
-def _below(contact: Contact, sight: Sight) -> str:
-    """What stands below a contact: its address, or the values that it compares."""
-    if len(contact.operands) == 1:
-        return sight.places(contact.operands[0])
-    seen = [value for operand in contact.operands if (value := sight.values(contact.step, operand))]
-    return f"= {', '.join(seen)}" if seen else ""
-
-
-def _label_width(drawn: Contact | Coil, sight: Sight) -> int:
-    below = _below(drawn, sight) if isinstance(drawn, Contact) else sight.places(" ".join(drawn.operands))
-    return max(len(" ".join(drawn.operands)), len(below))
-
-
-def _part_width(part: Part, sight: Sight) -> int:
-    if isinstance(part, Contact):
-        return max(len(part.mark) + 6, _label_width(part, sight) + 2)
-    if isinstance(part, Box):
-        made = shape(part, sight.values)
-        return max(LEAD, made.left + 1) + made.wide + max(LEAD, made.right + 1)
-    return max(_series_width(branch, sight) for branch in part.branches) + 2
-
-
-def _series_width(path: Series, sight: Sight) -> int:
-    return sum(_part_width(part, sight) for part in path.parts)
-
-
-def _output_width(out: Coil | Box, sight: Sight) -> int:
-    if isinstance(out, Coil):
-        return max(len(out.mark) + 6, _label_width(out, sight) + 6)
-    made = shape(out, sight.values)
-    return max(1, made.left + 1) + made.wide + made.right + 3

@@ -1,11 +1,16 @@
-"""Steps to text: rungs as everybody would write them."""
+"""Rungs to text: instructions as everybody would write them, drawings as everybody would draw them."""
 
 from __future__ import annotations
 
 from fbvm.syntax.mnemonics import Line, RungText, Symbol
+from fbvm.syntax.rung_drawing import ARROW, drawn
+from fbvm.syntax.rung_reading import Picture
+from fbvm.syntax.rung_widths import Sight
 
 STEP = "    "
 """What instructions stand further in than their RUNG."""
+UNLIMITED = 10_000
+"""Columns for a drawing that was not made to go on below."""
 OPERANDS_AT = 8
 """Where operands begin, counted from the instruction."""
 
@@ -23,12 +28,22 @@ def rung_lines(rungs: list[RungText]) -> list[str]:
             lines.append(" ".join(filter(None, ("RUNG", number, rung.comment))))
         elif lines and not rung.section:
             lines.append("")
-        lines += _steps(rung)
+        lines += _drawing(rung, rung.picture) if rung.picture else _steps(rung)
     return lines
 
 
 def _symbol(symbol: Symbol) -> str:
     return f'{symbol.name},{symbol.address},{symbol.type},,,,"{symbol.comment}";'
+
+
+def _drawing(rung: RungText, picture: Picture) -> list[str]:
+    """A drawing anew, with the notes in front of it: as wide as it was, wider if lines would have to go on below that did
+    not."""
+    sight = Sight(places=lambda symbol: picture.places.get(symbol, ""))
+    rows = drawn(picture.bar, picture.width, sight).rows()
+    if not picture.is_broken and any(ARROW in row for row in rows):
+        rows = drawn(picture.bar, UNLIMITED, sight).rows()
+    return [STEP + text for text in (*(note for _, note in rung.notes), *rows)]
 
 
 def _steps(rung: RungText) -> list[str]:

@@ -34,8 +34,8 @@ def file(tmp_path: Path) -> Path:
 def test_rungs_are_drawn_with_addresses(file: Path) -> None:
     result = CliRunner().invoke(main, ["ladder", str(file), "--width", "60"])
     assert result.exit_code == 0
-    assert result.output.splitlines()[:3] == ["PROGRAM Main", "RUNG 1 Seal-in", "│  Start          Motor  │"]
-    assert "│ 100.00" in result.output
+    assert result.output.splitlines()[:3] == ["PROGRAM Main", "RUNG 1 Seal-in", "│  Start           Motor  │"]
+    assert "│  100.00" in result.output
 
 
 def test_a_picture_goes_to_a_file(file: Path, tmp_path: Path) -> None:
@@ -49,7 +49,7 @@ def test_a_run_draws_the_power_of_some_scans(file: Path) -> None:
     result = CliRunner().invoke(main, ["run", str(file), *options])
     first, second = result.output.split("scan 2, Main")
     assert first.startswith("scan 1, Main") and "┫ ┣" not in first
-    assert "┣┳━━┫ ┣━━┳" in second
+    assert "┣┳━━┫ ┣━━━┳" in second
 
 
 @pytest.mark.parametrize(("arguments", "said"), [

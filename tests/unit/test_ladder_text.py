@@ -14,7 +14,7 @@ from fbvm.record.history import looking
 from fbvm.record.ladder_svg import ladder_svg
 from fbvm.record.ladder_text import ladder_surface, ladder_text
 from fbvm.record.power import Executed, Power
-from fbvm.syntax.rung_drawing import Sight
+from fbvm.syntax.rung_widths import Sight
 
 
 def image(rungs: str, declarations: str = "a, b, c, d, e, f : BOOL;") -> Image:
@@ -29,22 +29,22 @@ def drawn(rungs: str, width: int = 80) -> str:
 
 DRAWINGS = {
     "series, parallel and coil": ("LD a\nOR b\nANDNOT c\nOUT d", """
-        │    a       c        d   │
-        ├┬──┤ ├─┬───┤/├──────( )──┤
-        ││   b  │                 │
-        │└──┤ ├─┘                 │
+        │    a        c        d   │
+        ├┬──┤ ├──┬───┤/├──────( )──┤
+        ││   b   │                 │
+        │└──┤ ├──┘                 │
     """),
     "blocks joined": ("LD a\nLD b\nAND c\nLD d\nANDNOT e\nORLD\nANDLD\nOUT f", """
-        │   a       b      c         f   │
-        ├──┤ ├──┬──┤ ├────┤ ├─┬─────( )──┤
-        │       │   d      e  │          │
-        │       └──┤ ├────┤/├─┘          │
+        │   a       b      c          f   │
+        ├──┤ ├──┬──┤ ├────┤ ├──┬─────( )──┤
+        │       │   d      e   │          │
+        │       └──┤ ├────┤/├──┘          │
     """),
     "branch points": ("LD a\nOUT TR0\nAND b\nOUT c\nLD TR0\nANDNOT d\n@SET e", """
-        │   a      b           c   │
-        ├──┤ ├─┬──┤ ├─────────( )──┤
-        │      │   d          e    │
-        │      └──┤/├────────(@S)──┤
+        │   a      b         c   │
+        ├──┤ ├─┬──┤ ├───────( )──┤
+        │      │   d        e    │
+        │      └──┤/├──────(@S)──┤
     """),
     "edges": ("@LD a\n%AND b\nUP\nDIFU c", """
         │   a      b    ┌────┐       c   │
@@ -61,15 +61,15 @@ DRAWINGS = {
     "a block that lets power on": ("LD a\nFBCALL TON t IN:=b PT:=T#1s Q=>c\nAND t.Q\nOUT c", """
         │   a        ┌─ t : TON ─┐     t.Q       c   │
         ├──┤ ├───────┤EN      ENO├─────┤ ├──────( )──┤
-        │          b╶┤IN         │                   │
-        │       T#1s╶┤PT        Q├╴c                 │
+        │          b─┤IN         │                   │
+        │       T#1s─┤PT        Q├─c                 │
         │            └───────────┘                   │
     """),
     "a comparison": ("LD=S D0 -5\nOR a\nOUT b", """
         │  D0 -5           b   │
-        ├┬──┤=S├─┬────────( )──┤
-        ││   a   │             │
-        │└──┤ ├──┘             │
+        ├┬──┤=S├──┬───────( )──┤
+        ││   a    │            │
+        │└──┤ ├───┘            │
     """),
 }
 
@@ -89,7 +89,7 @@ def test_a_long_rung_goes_on_below() -> None:
         │   a      b      c      d      e      │
         ├──┤ ├────┤ ├────┤ ├────┤ ├────┤ ├───►1│
         │         f                        a   │
-        │ ►1╶────┤ ├──────────────────────( )──┤
+        │ ►1─────┤ ├──────────────────────( )──┤
     """)
 
 
@@ -136,10 +136,10 @@ def lit(rungs: str, on: str) -> list[str]:
 
 def test_power_ends_at_a_contact_that_is_open() -> None:
     assert lit("LD a\nOR b\nANDNOT c\nOUT d", "ac") == text("""
-        ┃    a       c        d   │
-        ┣┳━━┫ ┣━┳━━━┤/├──────( )──┤
-        ┃┃   b  ┃                 │
-        ┃┗━━┤ ├─┚                 │
+        ┃    a        c        d   │
+        ┣┳━━┫ ┣━━┳━━━┤/├──────( )──┤
+        ┃┃   b   ┃                 │
+        ┃┗━━┤ ├──┚                 │
     """)
 
 

@@ -1,0 +1,316 @@
+"""A drawing of a rung as cells: the elements that are found in it, and what is wire.
+
+Drawings of box characters and those that people type (`|--| |--( )--|`) are read alike; whether a line is thick or thin
+has no meaning.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+
+from fbvm.syntax.box_lines import DOWN, LEFT, RIGHT, UP
+
+Cell = tuple[int, int]
+WAYS = {LEFT: (-1, 0), RIGHT: (1, 0), UP: (0, -1), DOWN: (0, 1)}
+BACK = {LEFT: RIGHT, RIGHT: LEFT, UP: DOWN, DOWN: UP}
+_WORDS = {"LEFT": {LEFT}, "RIGHT": {RIGHT}, "UP": {UP}, "DOWN": {DOWN}, "HORIZONTAL": {LEFT, RIGHT}, "VERTICAL": {UP, DOWN}}
+_MARK = r"!?/?[↑↓PN]?|[!@%]{0,2}(?:TSTN?|[<>=]{1,2}[A-Z]*\$?)"
+_CONTACT = re.compile(r"[┤┫┥┨|\]]([^─━|┤┫\[\]├┣-]{0,8}?)[├┣┝┠|\[]")
+_COIL = re.compile(r"\(([^()]{0,8})\)")
+_KNOWN = re.compile(rf" ?(?:{_MARK}) ?")
+_COIL_KNOWN = re.compile(r" ?[!@%]{0,2}(?:[/↑↓PN]|S|R|SET|RSET|)(?: ?)")
+_LINK = re.compile(r"[►▶>](\d+)")
+_TITLE = re.compile(r"([A-Za-z_]\w*) ?: ?([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)")
+_STUB = frozenset("─━-╶╴╺╸")
+_BOX_TEXT = re.compile(r" ?[A-Za-z0-9@%!&#+]")
+_TEXT = re.compile(r"= [^\s─-╿|]+(?:, [^\s─-╿|]+)*|[^\s─-╿|]+")
+"""A text of a row: one word, or the values that stand below a comparison."""
+
+
+class Bad(Exception):
+    """The drawing cannot be read; the arguments are column, row, width, message and hint."""
+
+
+@dataclass(eq=False)
+class Drawn:
+    """A contact or a coil: the columns of its strokes or brackets."""
+
+    x: int
+    until: int
+    y: int
+    mark: str
+    is_coil: bool
+    operands: tuple[str, ...] = ()
+    operand_at: list[tuple[int, int]] = field(default_factory=list)
+    """Of each operand the columns, in the row above."""
+
+
+@dataclass(eq=False)
+class DrawnBox:
+    """A box: its sides, and the text of each of its rows."""
+
+    x: int
+    y: int
+    until: int
+    bottom: int
+    title: tuple[str, str] | None
+    rows: dict[int, str] = field(default_factory=dict)
+    stubs: dict[tuple[int, int], str] = field(default_factory=dict)
+    """Operands beside a side, by side (LEFT, RIGHT) and row."""
+
+
+@cache
+def ways(character: str) -> frozenset[int]:
+    """The ways in which lines leave a box character; those of `|`, `-` and `+` depend on what stands around."""
+    words = unicodedata.name(character, "").split()
+    if words[:2] != ["BOX", "DRAWINGS"] or "DIAGONAL" in words:
+        return frozenset()
+    return frozenset(way for word in words for way in _WORDS.get(word, ()))
+
+
+class Grid:
+    """The cells of a drawing.  `taken` are those of elements and texts; the rest is wire."""
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        self.lines = lines
+        self.taken: set[Cell] = set()
+        self.boxes: list[DrawnBox] = []
+        self.elements: list[Drawn] = []
+        self.links: list[tuple[int, int, int, int]] = []
+        """Arrows: column, row, width, number."""
+        self.places: dict[str, str] = {}
+        """What stands below symbols."""
+        self.problems: list[Bad] = []
+        """What is wrong with texts: often they are where they are because a wire is wrong, so wires come first."""
+        for y, line in enumerate(lines):
+            if "\t" in line.rstrip():
+                raise Bad(line.index("\t"), y, 1, "there is a tab in the drawing",
+                          "columns are only known of spaces: write spaces")
+        self.left = min((x for line in lines if (x := _first(line)) is not None and line[x] in RAIL), default=0)
+        self.right = self._right_rail()
+        self._find_boxes()
+        self._find_elements()
+        self._find_stubs()
+        self._find_labels()
+
+    def at(self, x: int, y: int) -> str:
+        """The character of a cell."""
+        return self.lines[y][x] if 0 <= y < len(self.lines) and 0 <= x < len(self.lines[y]) else " "
+
+    def _line(self, x: int, y: int) -> str:
+        """The character of a cell; a sign of a number is none of a line."""
+        character = self.at(x, y)
+        return " " if character in "+-" and self.at(x + 1, y).isdigit() else character
+
+    def ways(self, x: int, y: int) -> frozenset[int]:
+        """The ways in which wires leave a cell; those of elements have none."""
+        character = self._line(x, y)
+        if (x, y) in self.taken:
+            return frozenset()
+        if character == "-":
+            return frozenset((LEFT, RIGHT))
+        if character in "|+":
+            sides = {way for way in (LEFT, RIGHT) if BACK[way] in _plain(self._line(x + WAYS[way][0], y), way)}
+            depths = {way for way in (UP, DOWN) if BACK[way] in _plain(self._line(x, y + WAYS[way][1]), way)}
+            return frozenset(sides | ({UP, DOWN} if character == "|" else depths))
+        return ways(character)
+
+    def _right_rail(self) -> int:
+        """The column of the right rail: where the longest line ends that does not end with a text; 0 if there is none."""
+        longest = max((line for line in self.lines if line[-1:] in (*RAIL, *"-─━)") and line), key=len, default="")
+        return len(longest) - 1 if len(longest) - 1 > self.left and longest[-1] in RAIL else 0
+
+    # --- boxes ------------------------------------------------------------------------------------------------------
+
+    def _find_boxes(self) -> None:
+        for y, line in enumerate(self.lines):
+            for x, character in enumerate(line):
+                if character in "┌┏╔╭┍┎+" and (x, y) not in self.taken and (box := self._box(x, y)):
+                    self.boxes.append(box)
+                    self.taken |= {(column, row) for column in range(x, box.until + 1) for row in range(y, box.bottom + 1)}
+
+    def _box(self, x: int, y: int) -> DrawnBox | None:
+        """The box with this upper left corner, if it is one."""
+        upper = re.compile(r"[─━═-]*( ?[A-Za-z_][\w .:\[\]]*)?[─━═-]*[┐┓╗╮┒┑+]").match(self.lines[y], x + 1)
+        if not upper or (until := upper.end() - 1) - x < 2:
+            return None
+        bottom = y + 1
+        while self._is_side(x, bottom) and self._is_side(until, bottom) and not self._is_bottom(x, until, bottom):
+            bottom += 1
+        rows = {row: self.lines[row][x + 1:until] for row in range(y + 1, bottom)}
+        if not self._is_bottom(x, until, bottom) or not any(text.strip() for text in rows.values()):
+            if rows or self._is_side(x, y + 1) and _BOX_TEXT.match(self.lines[y + 1], x + 1):
+                raise Bad(x, bottom, until - x + 1, f"the box that begins in column {x + 1} is open in this row",
+                          f"its sides stand in the columns {x + 1} and {until + 1} down to its lower corners")
+            return None
+        if any(any(ways(c) or c == "|" for c in text) for text in rows.values()):
+            return None
+        named = upper[1] and _TITLE.search(upper[1])
+        if upper[1] and not named:
+            raise Bad(x + 2, y, len(upper[1].strip()), f"`{upper[1].strip()}` is no title of a block",
+                      "write instance : type")
+        return DrawnBox(x, y, until, bottom, (named[1], named[2]) if named else None, rows)
+
+    def _is_side(self, x: int, y: int) -> bool:
+        character = self.at(x, y)
+        return character in "|+" or {UP, DOWN} <= ways(character)
+
+    def _is_bottom(self, x: int, until: int, y: int) -> bool:
+        if not 0 <= y < len(self.lines) or self.at(x, y) not in "└┗╚╰┕┖+" or self.at(until, y) not in "┘┛╝╯┙┚+":
+            return False
+        return all(c in "─━═-" for c in self.lines[y][x + 1:until])
+
+    def _find_stubs(self) -> None:
+        """What enters and leaves pins of blocks: a text, and a line to the box."""
+        for box in self.boxes:
+            for y in box.rows if box.title else ():
+                for side, start, step in ((LEFT, box.x - 1, -1), (RIGHT, box.until + 1, 1)):
+                    at = start
+                    while self._line(at, y) in _STUB:
+                        at += step
+                    at += step * (self.at(at, y) == " ")
+                    if self.at(start, y) not in _STUB or not self._is_operand(at, y):
+                        continue
+                    begin = at
+                    while self._continues(at, y, step):
+                        at += step
+                    text = self.lines[y][min(at - step, begin):max(at - step, begin) + 1]
+                    box.stubs[side, y] = text.split(" = ")[0].strip()
+                    self.taken |= {(column, y) for column in range(min(at - step, start), max(at - step, start) + 1)}
+
+    def _is_operand(self, x: int, y: int) -> bool:
+        """Whether an operand begins or ends in a cell; one with a sign has a digit behind it."""
+        character = self.at(x, y)
+        if character in "+-":
+            return self.at(x + 1, y).isdigit()
+        arrow = any(link.start() <= x < link.end() for link in _LINK.finditer(self.lines[y]))
+        return character not in " |[()►▶>" and not ways(character) and not arrow
+
+    def _continues(self, x: int, y: int, step: int) -> bool:
+        """Whether the text of a pin goes on: up to a line or to two spaces, where a value stands behind ` = `."""
+        character, line = self.at(x, y), self.lines[y]
+        if character == " ":
+            return line[max(x - 2, 0):x + 3].find(" = ") in (0, 2) if 0 <= x < len(line) else False
+        return not ways(character) and character != "|"
+
+    # --- contacts and coils -----------------------------------------------------------------------------------------
+
+    def _find_elements(self) -> None:
+        for y, line in enumerate(self.lines):
+            for found in _LINK.finditer(line):
+                if not self._is_taken(found.start(), found.end(), y) and self._has_wire_beside(found, y):
+                    self.links.append((found.start(), y, len(found[0]), int(found[1])))
+                    self._take(found.start(), found.end(), y)
+            at = 0
+            while found_next := self._next_element(line, at, y):
+                at = found_next.until + found_next.is_coil
+                self.elements.append(found_next)
+        self.elements.sort(key=lambda element: (element.y, element.x))
+
+    def _next_element(self, line: str, at: int, y: int) -> Drawn | None:
+        for x in range(at, len(line)):
+            for is_coil, shape, known in ((False, _CONTACT, _KNOWN), (True, _COIL, _COIL_KNOWN)):
+                found = shape.match(line, x)
+                if not found or self._is_taken(x, found.end(), y) or not self._is_on_wire(x, found.end() - 1, y, is_coil):
+                    continue
+                if not is_coil and any(self._is_crossed(column, y) for column in (x, found.end() - 1)):
+                    continue
+                if not known.fullmatch(found[1]):
+                    what, hint = _UNKNOWN[is_coil]
+                    raise Bad(x, y, found.end() - x, f"`{found[0]}` is no {what}", hint)
+                self._take(x, found.end(), y)
+                return Drawn(x, found.end() - 1, y, found[1].strip() or " ", is_coil)
+        return None
+
+    def _is_on_wire(self, x: int, until: int, y: int, is_coil: bool) -> bool:
+        """Whether wires lead to an element: at both sides, or to a coil from the left."""
+        before = RIGHT in _plain(self._line(x - 1, y), LEFT) or x - 1 == self.left
+        behind = LEFT in _plain(self._line(until + 1, y), RIGHT)
+        return before and (behind or is_coil or until == self.right - 1)
+
+    def _is_crossed(self, x: int, y: int) -> bool:
+        """Whether a wire comes from above or below, so that what looks like the stroke of a contact is none."""
+        return DOWN in _plain(self._line(x, y - 1), UP) or UP in _plain(self._line(x, y + 1), DOWN)
+
+    def _has_wire_beside(self, found: re.Match[str], y: int) -> bool:
+        return RIGHT in _plain(self._line(found.start() - 1, y), LEFT) or LEFT in _plain(self._line(found.end(), y), RIGHT)
+
+    def _is_taken(self, x: int, until: int, y: int) -> bool:
+        return any((column, y) in self.taken for column in range(x, until))
+
+    def _take(self, x: int, until: int, y: int) -> None:
+        self.taken |= {(column, y) for column in range(x, until)}
+
+    # --- texts ------------------------------------------------------------------------------------------------------
+
+    def _find_labels(self) -> None:
+        """Operands above contacts and coils; then what stands below them."""
+        for element in self.elements:
+            wanted = 2 if element.mark.lstrip("!@%")[:1] in tuple("<=>T") and not element.is_coil else 1
+            texts = self._label(element, wanted)
+            element.operands = tuple(self.lines[element.y - 1][start:end] for start, end in texts)
+            element.operand_at = texts
+        for y in range(len(self.lines)):
+            for start, end in self._texts(y):
+                above = [e for e in self.elements if e.y == y - 1 and e.x <= end + 1 and e.until >= start - 2]
+                if not above:
+                    text = self.lines[y][start:end]
+                    self._take(start, end, y)
+                    self.problems.append(Bad(start, y, end - start, f"`{text}` belongs to no contact, coil or box",
+                                             "operands stand above contacts and coils, in the row next to theirs"))
+                    continue
+                near = min(above, key=lambda e: abs(e.x + e.until - start - end))
+                self.places[" ".join(near.operands)] = self.lines[y][start:end]
+                self._take(start, end, y)
+
+    def _label(self, element: Drawn, wanted: int) -> list[tuple[int, int]]:
+        """Where the operands of a contact or coil stand: so many texts, those nearest to it."""
+        texts = [text for text in self._texts(element.y - 1) if not self.lines[element.y - 1].startswith("= ", text[0])]
+        choices = [texts[at:at + wanted] for at in range(len(texts) - wanted + 1)
+                   if all(b[0] - a[1] == 1 for a, b in zip(texts[at:at + wanted], texts[at + 1:at + wanted], strict=False))]
+        near = [c for c in choices if c[0][0] <= element.until + 2 and c[-1][1] >= element.x - 1]
+        if not near:
+            what = "coil" if element.is_coil else "contact"
+            self.problems.append(Bad(
+                element.x, element.y, element.until + 1 - element.x, f"above this {what} stands no operand",
+                f"write {'two operands with one space between them' if wanted == 2 else 'it'} in the row above, "
+                f"over column {(element.x + element.until) // 2 + 1}"))
+            return []
+        chosen = min(near, key=lambda c: abs(c[0][0] + c[-1][1] - 1 - element.x - element.until))
+        for start, end in chosen:
+            self._take(start, end, element.y - 1)
+        return chosen
+
+    def _texts(self, y: int) -> Iterator[tuple[int, int]]:
+        """The texts of a row that nothing has taken."""
+        if 0 <= y < len(self.lines):
+            for found in _TEXT.finditer(self.lines[y]):
+                if not self._is_taken(found.start(), found.end(), y) and not set(found[0]) <= set("-+"):
+                    yield found.span()
+
+
+RAIL = "│┃├┣┝┠┤┫┥┨|║╟╢┌└┐┘+"
+"""Characters of which rails are made."""
+_UNKNOWN = {False: ("contact", "contacts are ┤ ├, ┤/├, ┤↑├, ┤↓├, and comparisons such as ┤=├ with two operands above"),
+            True: ("coil", "coils are ( ), (/), (S), (R), (↑), (↓); other instructions are boxes")}
+
+
+def _first(line: str) -> int | None:
+    """The column of the first character."""
+    stripped = line.lstrip(" ")
+    return len(line) - len(stripped) if stripped else None
+
+
+def _plain(character: str, way: int) -> frozenset[int]:
+    """The ways of a neighbour as far as its character alone says it."""
+    if character == "-":
+        return frozenset((LEFT, RIGHT))
+    if character == "|":
+        return frozenset((UP, DOWN)) if way in (UP, DOWN) else frozenset()
+    if character == "+":
+        return frozenset((LEFT, RIGHT, UP, DOWN))
+    return ways(character)

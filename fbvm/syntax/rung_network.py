@@ -1,0 +1,223 @@
+"""Nets to a diagram: what hangs together in a drawing, as series, branches and points from which outputs leave."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+
+from fbvm.syntax.box_lines import LEFT, RIGHT
+from fbvm.syntax.rung_diagram import Box, Coil, Contact, Parallel, Part, Pin, Point, Series
+from fbvm.syntax.rung_grid import Bad, Drawn, DrawnBox, Grid
+from fbvm.syntax.rung_wires import BUS, SINK, Net, Order, Wires, border
+
+INLINE = ("NOT", "UP", "DOWN")
+"""Instructions that are boxes on a line."""
+Source = Drawn | DrawnBox
+
+
+@dataclass(eq=False)
+class _Edge:
+    """What lies between two nets."""
+
+    start: Hashable
+    end: Hashable
+    order: Order
+    parts: list[Part]
+
+
+@dataclass
+class _Leaf:
+    """An output on a net, and the nets of its other inputs."""
+
+    order: Order
+    out: Coil | Box
+    others: list[Net] = field(default_factory=list)
+
+
+class Network:
+    """The diagram of a drawing.  `sources` says as what each of its elements was drawn."""
+
+    def __init__(self, grid: Grid) -> None:
+        self.grid = grid
+        self.wires = Wires(grid)
+        for problem in grid.problems:
+            raise problem
+        self.sources: dict[int, Source] = {}
+        self.edges: list[_Edge] = []
+        self.leaves: dict[Hashable, list[_Leaf]] = {}
+        self._rows: dict[int, list[tuple[Order, Series]]] = {}
+        """Branches with their places, by the parallel connection that they are of."""
+        for element in grid.elements:
+            self._element(element)
+        for box in grid.boxes:
+            self._box(box)
+
+    def diagram(self) -> Point:
+        """The bus bar with all that hangs on it.  Raises Bad."""
+        while self._merge_branches() or self._merge_series():
+            pass
+        self._check()
+        bar = Point(Series())
+        self._hang(bar, BUS)
+        return bar
+
+    # --- elements ---------------------------------------------------------------------------------------------------
+
+    def _element(self, drawn: Drawn) -> None:
+        start = self.wires.net(border(drawn.x, drawn.y, LEFT))
+        if drawn.is_coil:
+            coil = Coil(-1, drawn.mark, drawn.operands)
+            self.sources[id(coil)] = drawn
+            self.leaves.setdefault(start.name, []).append(_Leaf(start.order, coil))
+            return
+        contact = Contact(-1, drawn.mark, drawn.operands)
+        self.sources[id(contact)] = drawn
+        self._edge(start, self.wires.net(border(drawn.until, drawn.y, RIGHT)), contact, drawn)
+
+    def _edge(self, start: Net, end: Net, part: Part, drawn: Source) -> None:
+        if start.name == end.name:
+            raise Bad(drawn.x, drawn.y, drawn.until + 1 - drawn.x, "a wire leads around this, so it has no effect",
+                      "take the wire away, or let it begin in front of another contact")
+        self.edges.append(_Edge(start.name, end.name, start.order, [part]))
+
+    def _box(self, drawn: DrawnBox) -> None:
+        rows = range(drawn.y + 1, drawn.bottom)
+        entries = [y for y in rows if (LEFT, y) not in drawn.stubs and self.wires.is_used(border(drawn.x, y, LEFT))]
+        exits = [y for y in rows if (RIGHT, y) not in drawn.stubs and self.wires.is_used(border(drawn.until, y, RIGHT))]
+        if not entries:
+            raise Bad(drawn.x, drawn.y, 1, "no wire leads to this box", "draw ─ to its left side, in the row of its first line")
+        box = _block(drawn) if drawn.title else _instruction(drawn)
+        self.sources[id(box)] = drawn
+        start, *others = (self.wires.net(border(drawn.x, y, LEFT)) for y in entries)
+        if drawn.title or box.name in INLINE:
+            box.through = True
+            end = self.wires.net(border(drawn.until, exits[0], RIGHT)) if exits else Net(SINK, ())
+            self._edge(start, end, box, drawn)
+        else:
+            self.leaves.setdefault(start.name, []).append(_Leaf(start.order, box, others))
+
+    # --- reduction --------------------------------------------------------------------------------------------------
+
+    def _merge_branches(self) -> bool:
+        """Join what lies between the same two nets."""
+        found: dict[tuple[Hashable, Hashable], list[_Edge]] = {}
+        for edge in self.edges:
+            if edge.end != SINK:
+                found.setdefault((edge.start, edge.end), []).append(edge)
+        groups = [sorted(group, key=lambda edge: edge.order) for group in found.values() if len(group) > 1]
+        for group in groups:
+            self.edges = [edge for edge in self.edges if edge not in group]
+            rows = sorted((row for edge in group for row in self._branches(edge)), key=lambda row: row[0])
+            whole = Parallel([branch for _, branch in rows])
+            self._rows[id(whole)] = rows
+            self.edges.append(_Edge(group[0].start, group[0].end, group[0].order, [whole]))
+        return bool(groups)
+
+    def _branches(self, edge: _Edge) -> list[tuple[Order, Series]]:
+        """An edge as branches with their places: one that is nothing else is taken apart."""
+        first = edge.parts[0]
+        if len(edge.parts) == 1 and isinstance(first, Parallel):
+            return self._rows[id(first)]
+        return [(edge.order, Series(edge.parts))]
+
+    def _merge_series(self) -> bool:
+        """Join two edges at a net on which nothing else hangs."""
+        kept = {BUS, SINK, *self.leaves, *(net.name for leaves in self.leaves.values() for leaf in leaves for net in leaf.others)}
+        for before in self.edges:
+            behind = [edge for edge in self.edges if edge.start == before.end]
+            if before.end in kept or len(behind) != 1 or sum(edge.end == before.end for edge in self.edges) != 1:
+                continue
+            self.edges.remove(behind[0])
+            before.end = behind[0].end
+            before.parts = [*before.parts, *behind[0].parts]
+            return True
+        return False
+
+    # --- checks and the tree ----------------------------------------------------------------------------------------
+
+    def _check(self) -> None:
+        reached: set[Hashable] = {BUS}
+        while new := {edge.end for edge in self.edges if edge.start in reached} - reached - {SINK}:
+            reached |= new
+        for edge in self.edges:
+            if edge.start not in reached:
+                self._bad(edge.parts[0], "this hangs on no bus bar", "a wire leads here from the left rail, through contacts")
+            if sum(other.end == edge.end != SINK for other in self.edges) > 1:
+                self._bad(edge.parts[-1], "wires meet behind this that do not begin at one place",
+                          "branches begin and end together; what else leads here has a rung of its own")
+            if edge.end == SINK and isinstance(edge.parts[-1], Contact):
+                self._bad(edge.parts[-1], "there is no coil and no box behind this contact",
+                          "draw ( ) in front of the right rail")
+            used = edge.end in self.leaves or any(other.start == edge.end for other in self.edges) or edge.end in self._others()
+            if edge.end != SINK and not used:
+                self._bad(edge.parts[-1], "the wire behind this leads nowhere", "let it lead to a coil or to a box")
+        for net, leaves in self.leaves.items():
+            for leaf in leaves:
+                if net not in reached:
+                    self._bad(leaf.out, "this hangs on no bus bar", "a wire leads here from the left rail, through contacts")
+
+    def _others(self) -> dict[Hashable, Net]:
+        return {net.name: net for leaves in self.leaves.values() for leaf in leaves for net in leaf.others}
+
+    def _bad(self, part: Part | Coil, message: str, hint: str) -> None:
+        """Say what is wrong at an element; of branches at the first one."""
+        while isinstance(part, Parallel):
+            part = part.branches[0].parts[0]
+        drawn = self.sources[id(part)]
+        raise Bad(drawn.x, drawn.y, drawn.until + 1 - drawn.x, message, hint)
+
+    def _hang(self, point: Point, net: Hashable) -> None:
+        """Hang on a point what its net has, from above."""
+        others = self._others()
+        outs: list[tuple[Order, Coil | Box | Point]] = []
+        for leaf in self.leaves.get(net, ()):
+            if leaf.others:
+                assert isinstance(leaf.out, Box)
+                leaf.out.inputs = tuple(self._input(other, leaf.out) for other in leaf.others)
+            outs.append((leaf.order, leaf.out))
+        for edge in self.edges:
+            if edge.start == net and edge.end not in others:
+                behind = Point(Series(edge.parts))
+                if edge.end != SINK:
+                    self._hang(behind, edge.end)
+                outs.append((edge.order, behind))
+        point.outs = [out for _, out in sorted(outs, key=lambda pair: pair[0])]
+
+    def _input(self, net: Net, box: Box) -> Series:
+        """The condition of a lower input of a box."""
+        into = [edge for edge in self.edges if edge.end == net.name]
+        if net.name == BUS:
+            return Series()
+        if net.name in self.leaves or any(edge.start == net.name for edge in self.edges) or into[0].start != BUS:
+            self._bad(box, "a lower input of this box hangs on a wire that leads elsewhere, too",
+                      "each of its inputs has a line of its own from the left rail")
+        return Series(into[0].parts)
+
+
+def _instruction(drawn: DrawnBox) -> Box:
+    """A box of an instruction: its mnemonic, then its operands."""
+    words = [word for text in drawn.rows.values() for word in text.split(" = ")[0].split()]
+    return Box(-1, words[0], tuple(words[1:]))
+
+
+def _block(drawn: DrawnBox) -> Box:
+    """A box of a function block: pins at its sides, the first with the condition."""
+    assert drawn.title
+    pins: list[Pin] = []
+    for y, text in drawn.rows.items():
+        left, right = _names(text, (LEFT, y) in drawn.stubs, (RIGHT, y) in drawn.stubs)
+        for side, name in ((LEFT, left), (RIGHT, right)):
+            if operand := drawn.stubs.get((side, y)):
+                if not name:
+                    raise Bad(drawn.x if side == LEFT else drawn.until, y, 1, f"`{operand}` stands at no pin",
+                              "write the name of the pin inside of the box, at this side")
+                pins.append(Pin(name, operand, side == RIGHT))
+    return Box(-1, drawn.title[1], (), (), True, drawn.title[0], tuple(pins), ("EN",))
+
+
+def _names(text: str, taking: bool, giving: bool) -> tuple[str, str]:
+    """The names of the pins at the left and at the right of a row."""
+    words = text.split()
+    if len(words) == 1:
+        return ("", words[0]) if giving and not taking else (words[0], "")
+    return (words[0], words[-1]) if words else ("", "")

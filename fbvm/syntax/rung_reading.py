@@ -1,0 +1,103 @@
+"""Drawings of rungs to their instructions: the second notation of a LADDER, beside mnemonics."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fbvm.syntax.box_lines import LEFT
+from fbvm.syntax.rung_diagram import Box, Point
+from fbvm.syntax.rung_grid import Bad, DrawnBox, Grid
+from fbvm.syntax.rung_network import Network
+from fbvm.syntax.rung_steps import Coded, steps
+
+_BEGINS = re.compile(r"[ \t]*(?:[│┃├┣┝┠║╟|]|\+-)")
+_REMARK = re.compile(r"(?<=[│┃┤┫┥┨|\s])\s*(//.*)$")
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a drawing says besides its instructions: how wide it is, whether lines of it go on below, and what stands below
+    symbols."""
+
+    bar: Point
+    width: int
+    is_broken: bool
+    places: dict[str, str]
+
+
+@dataclass(frozen=True)
+class Placed:
+    """An instruction and where it was drawn: offsets of the text, also those of its operands."""
+
+    coded: Coded
+    start: int
+    end: int
+    operands: list[tuple[int, int]]
+
+
+def is_drawn(lines: Sequence[str]) -> bool:
+    """Whether lines are a drawing: one of them begins with a rail."""
+    return any(_BEGINS.match(line) for line in lines)
+
+
+def remark_of(line: str) -> str:
+    """The comment behind a line of a drawing."""
+    found = _REMARK.search(line)
+    return found[1] if found else ""
+
+
+def read_drawing(lines: Sequence[str], offsets: Sequence[int]) -> tuple[list[Placed], Picture]:
+    """The instructions of a drawing; `offsets` are the places of its lines in the text.  Raises Bad."""
+    grid = Grid([_REMARK.sub("", line).rstrip() for line in lines])
+    network = Network(grid)
+    bar = network.diagram()
+    if not bar.outs:
+        raise Bad(grid.left, 0, 1, "nothing hangs on the bus bar", "draw a wire from it, with contacts and a coil")
+    width = max(map(len, grid.lines)) - grid.left
+    return _placed(steps(bar), network, offsets), Picture(bar, width, bool(grid.links), grid.places)
+
+
+def _placed(coded: Sequence[Coded], network: Network, offsets: Sequence[int]) -> list[Placed]:
+    """The instructions with their places; one that nobody has drawn stands behind the one before."""
+    made: list[Placed] = []
+    end = offsets[0]
+    for one in coded:
+        if one.drawn is None:
+            made.append(Placed(one, end, end, [(end, end)] * len(one.operands)))
+            continue
+        drawn = network.sources[id(one.drawn)]
+        if isinstance(drawn, DrawnBox):
+            start = offsets[drawn.y + 1] + drawn.x + 1
+            end = start + drawn.until - drawn.x - 1
+            operands = _operands(one, drawn, network.grid, offsets)
+        else:
+            start, end = offsets[drawn.y] + drawn.x, offsets[drawn.y] + drawn.until + 1
+            operands = [(offsets[drawn.y - 1] + x, offsets[drawn.y - 1] + until) for x, until in drawn.operand_at]
+        made.append(Placed(one, start, end, operands))
+    return made
+
+
+def _operands(one: Coded, drawn: DrawnBox, grid: Grid, offsets: Sequence[int]) -> list[tuple[int, int]]:
+    """Where the operands of a box stand; of a pin so that what is behind its sign is in its place."""
+    assert isinstance(one.drawn, Box)
+    if drawn.title is None:
+        words = [(offsets[y] + drawn.x + 1 + found.start(), offsets[y] + drawn.x + 1 + found.end())
+                 for y, text in drawn.rows.items() for found in re.finditer(r"\S+", text.split(" = ")[0])]  # fmt: skip
+        return words[1:]
+    title = offsets[drawn.y] + grid.lines[drawn.y].index(drawn.title[0], drawn.x)
+    at = offsets[drawn.y] + grid.lines[drawn.y].rindex(drawn.title[1], drawn.x, drawn.until)
+    places = [(at, at + len(drawn.title[1])), (title, title + len(drawn.title[0]))]
+    for pin, ((side, y), operand) in zip(one.drawn.pins, _stubs(drawn), strict=True):
+        line, length = grid.lines[y], len(operand)
+        x = line.rindex(operand, 0, drawn.x) if side == LEFT else line.index(operand, drawn.until)
+        places.append((offsets[y] + x - len(pin.name) - 2, offsets[y] + x + length))
+    return places
+
+
+def _stubs(drawn: DrawnBox) -> list[tuple[tuple[int, int], str]]:
+    """What stands at pins, in the order of the rows, left before right."""
+    return sorted(drawn.stubs.items(), key=lambda stub: (stub[0][1], stub[0][0] != LEFT))
+
+

@@ -1,0 +1,99 @@
+"""How wide the parts of a rung are where they are drawn, and what is known about them that takes room."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+from fbvm.syntax.rung_boxes import Shape, shape
+from fbvm.syntax.rung_diagram import Box, Coil, Contact, Part, Point, Series
+
+LINK = 5
+"""Columns of the arrow with a number at the end of a line that goes on below."""
+SLACK = 4
+"""Columns more than needed between conditions and what ends the rung."""
+LEAD = 2
+"""Columns of line on either side of a box."""
+States = Mapping[int, Sequence[bool]]
+"""What was seen at the steps of a rung in one execution: of a contact its state, of an output the power that reached
+it, of a block the power into it and out of it."""
+
+
+def _nothing(symbol: str) -> str:
+    return ""
+
+
+def _unseen(step: int, operand: str) -> str:
+    return ""
+
+
+class Sight(NamedTuple):
+    """What is known about a rung besides its steps.  No `states` draw it at rest."""
+
+    states: States | None = None
+    places: Callable[[str], str] = _nothing
+    """The address behind a symbol, "" if it has none."""
+    values: Callable[[int, str], str] = _unseen
+    """The value that an operand of a step had, "" if nobody has seen one."""
+
+
+class Widths:
+    """The columns of parts of one rung."""
+
+    def __init__(self, sight: Sight) -> None:
+        self.sight = sight
+        self._parts: dict[int, int] = {}
+
+    def reach(self, point: Point) -> int:
+        """Of a rung on one line."""
+        behind = [self.reach(out) if isinstance(out, Point) else self.output(out) + SLACK for out in point.outs]
+        lower = [self.series(path) + self.output(out) for out in point.outs if isinstance(out, Box) for path in out.inputs]
+        return max(self.series(point.path) + max(behind, default=2 + SLACK), *lower, 0)
+
+    def needed(self, point: Point) -> int:
+        """Behind a path: for what ends the rung, or for an arrow."""
+        return max((LINK if isinstance(out, Point) else self.output(out) for out in point.outs), default=2)
+
+    def part(self, part: Part) -> int:
+        """Of a contact, a box on the line, or branches."""
+        known = self._parts.get(id(part))
+        if known is None:
+            known = self._parts[id(part)] = self._part(part)
+        return known
+
+    def _part(self, part: Part) -> int:
+        if isinstance(part, Contact):
+            return max(len(part.mark) + 6, self._label(part) + 2)
+        if isinstance(part, Box):
+            made = self.shape(part)
+            return max(LEAD, made.left + 1) + made.wide + max(LEAD, made.right + 1)
+        return max(map(self.series, part.branches)) + 3
+
+    def series(self, path: Series) -> int:
+        return sum(map(self.part, path.parts))
+
+    def output(self, out: Coil | Box) -> int:
+        """Of what ends a rung, up to the right rail."""
+        if isinstance(out, Coil):
+            return max(len(out.mark) + 6, self._label(out) + 6)
+        made = self.shape(out)
+        return max(1, made.left + 1) + made.wide + made.right + 3
+
+    def mark_at(self, coil: Coil) -> int:
+        """From the mark of a coil to the right rail."""
+        mark = len(coil.mark) + 2
+        return 2 + max(mark, (self._label(coil) + mark) // 2)
+
+    def shape(self, box: Box) -> Shape:
+        return shape(box, self.sight.values)
+
+    def below(self, contact: Contact) -> str:
+        """What stands below a contact: its address, or the values that it compares."""
+        if len(contact.operands) == 1:
+            return self.sight.places(contact.operands[0])
+        seen = [value for operand in contact.operands if (value := self.sight.values(contact.step, operand))]
+        return f"= {', '.join(seen)}" if seen else ""
+
+    def _label(self, drawn: Contact | Coil) -> int:
+        below = self.below(drawn) if isinstance(drawn, Contact) else self.sight.places(" ".join(drawn.operands))
+        return max(len(" ".join(drawn.operands)), len(below))
