@@ -35,7 +35,7 @@ def test_the_first_program_draws_that_chart(tmp_path: Path, monkeypatch: pytest.
 def test_the_crossing_is_drawn_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
-    Path("crossing.st").write_text(block("iecst", 2), encoding="utf-8")
+    Path("crossing.st").write_text(block("iecst", 3), encoding="utf-8")
     text, _, shown = block("console", 1).removeprefix("$ fbvm ").replace("\\\n", "").partition("\n")
     result = CliRunner().invoke(main, shlex.split(text))
     assert result.output == shown
@@ -79,7 +79,7 @@ def test_a_rung_may_be_drawn() -> None:
 
 
 def test_words_are_read_and_written_by_number() -> None:
-    text = f"PROGRAM Main\n{block('iecst', 3)}END_PROGRAM\n"
+    text = f"PROGRAM Main\n{block('iecst', 4)}END_PROGRAM\n"
     plc = Plc(compile_text(text).image)  # type: ignore[arg-type]
     plc.write("D201", 5)
     plc.run(scans=1)
