@@ -55,7 +55,7 @@ def _native(level: int) -> Callable[[Image], Plc]:
 
 def _guarded(image: Image) -> Plc:
     """A build that could be stopped, by nothing that happens."""
-    plc = _native(0)(image)
+    plc = Plc(image, budget=BUDGET, engine="python")  # whose guard asks for no machine code of its own
     plc.breakpoints.change("D31999")
     guarded = plc.breakpoints.guarding(plc.engine)
     guarded._native = NativeEngine(image, plc.memory, 0, plc.breakpoints._stops)
