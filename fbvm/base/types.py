@@ -106,6 +106,8 @@ class Field:
     reference: bool = False
     constant: bool = False
     hexadecimal: bool = False
+    space: str = ""
+    """Of a global variable the list that declares it, under which it can be named as well."""
 
 
 @dataclass(frozen=True)

@@ -57,6 +57,9 @@ class Variable:
     role: str = ""
     """"step" or "action" for the flags of one, which programs only read."""
     written: bool = False
+    space: str = ""
+    """The name of the list that declares a global variable; with `qualified` it must stand in front of its name."""
+    qualified: bool = False
     object: int | None = None
     """Of a variable that something refers to: the number of its object (see code.operations), or of one that every
     instance has, its position among those.  Known after layout, or when it is referred to."""

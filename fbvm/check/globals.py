@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fbvm.base.diagnostics import Source
@@ -101,6 +102,8 @@ class Globals:
         for name, key in zip(turn.declared.names, keys, strict=True):
             variable = self.checker.interfaces.variable(turn.declared, name, turn.section, turn.source, resolved)
             location = turn.declared.location
+            variable.qualified = turn.section in self.project.qualified_only
+            variable.space = Path(turn.source.name).stem if list_name(turn.source) in self.project.lists else ""
             variable.place = "area" if location is not None and not is_open(location, variable.type) else "abs"
             other = self.project.globals.setdefault(key, variable)
             if other is variable:

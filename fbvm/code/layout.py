@@ -163,13 +163,16 @@ def _fill_in(pou: Pou) -> None:
 
 
 def _path(variable: Variable) -> str:
-    """The name under which a variable is found from outside; a VAR_STAT has that of its POU in front."""
-    return f"{variable.owner.name}.{variable.name}" if variable.owner is not None else variable.name
+    """The name under which a variable is found from outside; a VAR_STAT has that of its POU in front, a global variable that
+    of its list if it must."""
+    if variable.owner is not None:
+        return f"{variable.owner.name}.{variable.name}"
+    return f"{variable.space}.{variable.name}" if variable.qualified and variable.space else variable.name
 
 
 def _symbol(variable: Variable) -> Field:
-    return Field(variable.name, variable.type, variable.offset, variable.kind, variable_bit(variable), absolute=True,
-                 reference=variable.reference, constant=variable.constant, hexadecimal=variable.hexadecimal)
+    return Field(_path(variable), variable.type, variable.offset, variable.kind, variable_bit(variable), absolute=True,
+                 reference=variable.reference, constant=variable.constant, hexadecimal=variable.hexadecimal, space=variable.space)
 
 
 def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:

@@ -52,7 +52,8 @@ class _Writer:
 
     def field(self, field: Field) -> list[Any]:
         flags = field.absolute | field.reference << 1 | field.constant << 2 | field.hexadecimal << 3
-        return [field.name, self.type(field.type), field.offset, field.kind, field.bit, flags]
+        space = (field.space,) if field.space else ()
+        return [field.name, self.type(field.type), field.offset, field.kind, field.bit, flags, *space]
 
     def type(self, kind: Type) -> Any:
         """An elementary type is its name, any other a list that begins with what it is."""
@@ -88,9 +89,9 @@ class _Reader:
         self._made: dict[int, StructType] = {}
 
     def field(self, row: list[Any]) -> Field:
-        name, kind, offset, section, bit, flags = row
+        name, kind, offset, section, bit, flags, *space = row
         return Field(str(name), self.type(kind), int(offset), str(section), bit, bool(flags & 1), bool(flags & 2),
-                     bool(flags & 4), bool(flags & 8))  # fmt: skip
+                     bool(flags & 4), bool(flags & 8), str(space[0]) if space else "")  # fmt: skip
 
     def type(self, data: Any) -> Type:
         if isinstance(data, str):

@@ -48,7 +48,7 @@ class RigMaker(Protocol):
     """What the fixtures `fb` and `plc` are: called, they give a rig."""
 
     def __call__(self, what: str, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
-                 sources: Sequence[str] = (), text: str = "", libraries: Sequence[str] = (),
+                 sources: Sequence[str] = (), text: str = "", libraries: Sequence[str] = (), dialect: str = "",
                  **given: Any) -> Rig: ...  # fmt: skip
 
 
@@ -66,6 +66,7 @@ class PlantMaker(Protocol):
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addini("fbvm_libraries", "folders of libraries of function blocks", type="paths", default=[])
+    parser.addini("fbvm_dialect", "whose answers are taken where compilers disagree (fbvm explain dialects)", default="standard")
     group = parser.getgroup("fbvm", "PLC programs")
     group.addoption("--fbvm-golden", action="store_true", help="write the golden traces of the tests anew")
     group.addoption("--fbvm-pages", type=int, default=MOST_PAGES, metavar="N",
@@ -104,7 +105,8 @@ def fb(request: pytest.FixtureRequest) -> RigMaker:
     """One function block, function or program on a test rig: `fb("src/pump.st::Pump", cycle="10ms")`, `fb("TON")`.
 
     `stubs` put ST or a Python function in place of blocks by name; `text` is ST to compile with it, `sources` are more
-    files, `libraries` folders with blocks in files of their names; `etn21` is the address of an Ethernet unit,
+    files, `libraries` folders with blocks in files of their names; `dialect` is whose
+    answers are taken (else the ini option fbvm_dialect); `etn21` is the address of an Ethernet unit,
     `network` what it is on, `units` are other units."""
     return _maker(request, block=True)
 
@@ -179,14 +181,15 @@ def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
     rigs = _rigs(request.node)
     folders = folders_of(request.path, request.config.rootpath)
 
-    def make(what: str, cycle: str | int = "10ms", *, libraries: Sequence[str] = (), **given: Any) -> Rig:
+    def make(what: str, cycle: str | int = "10ms", *, libraries: Sequence[str] = (), dialect: str = "", **given: Any) -> Rig:
         from fbvm.testing.rig import Rig
 
         __tracebackhide__ = True
         own = [folder / path for path in libraries for folder in folders if (folder / path).is_dir()]
         shelves = [*own, *library_folders(request.config, request.path)]
         warned = warned_of(request.config)
-        rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, wanted=warned.wanted, **given)
+        rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, wanted=warned.wanted,
+                     dialect=dialect or request.config.getini("fbvm_dialect"), **given)
         warned.note(rig.subject)
         rigs.append(rig)
         _attend(request, rig)

@@ -124,11 +124,12 @@ class Rig:
     @classmethod
     def of(cls, what: str, cycle: str | int = "10ms", *, block: bool = True, folders: Sequence[Path] = (),
            libraries: Sequence[Path] = (), sources: Sequence[str] = (), text: str = "",
-           stubs: Mapping[str, Stub] | None = None, wanted: Wanted = ANY, **given: Any) -> Rig:  # fmt: skip
+           stubs: Mapping[str, Stub] | None = None, wanted: Wanted = ANY, dialect: str = "standard",
+           **given: Any) -> Rig:  # fmt: skip
         """A rig by text: `"src/pump.st::Pump"`, `"src/pump.st"`, or `"TON"` from a library.
 
         Files are looked for in `folders`, or where Python runs; without `block` it is the whole program of the file.
-        `wanted` says which warnings are."""
+        `wanted` says which warnings are, `dialect` whose answers are taken where compilers disagree."""
         __tracebackhide__ = True
         file, mark, name = what.partition("::")
         if not mark and block and not file.lower().endswith(".st"):
@@ -137,7 +138,7 @@ class Rig:
         for path in (*([file] if file else []), *sources):
             files.append(_file(path, folders or [Path.cwd()]))
         near = [path.parent for path in files if path.parent not in (*libraries, Path.cwd(), *folders[1:])]
-        made = subject(files, name if name or block else None, [*libraries, *dict.fromkeys(near)], stubs, text, wanted)
+        made = subject(files, name if name or block else None, [*libraries, *dict.fromkeys(near)], stubs, text, wanted, dialect)
         return cls(made, cycle, stubs=stubs, **given)
 
     def _hear(self, reader: Reader, now_ns: int, unit: str, told: Happening) -> None:

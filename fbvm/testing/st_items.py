@@ -72,7 +72,8 @@ class StItem(pytest.Item):
         near = [self.path.parent] if self.path.parent != self.config.rootpath else []
         shelves = [LIBRARY, *library_folders(self.config, self.path), *near]
         warned = warned_of(self.config)
-        made = self.subject = subject([self.path], self.name, shelves, wanted=warned.wanted)
+        dialect = self.config.getini("fbvm_dialect")
+        made = self.subject = subject([self.path], self.name, shelves, wanted=warned.wanted, dialect=dialect)
         warned.note(made)
         plc = Plc(made.image, CYCLE_NS)
         watch = Assertions(plc, made.prefix)

@@ -9,7 +9,7 @@ import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -75,36 +75,39 @@ class Subject:
 
 
 def subject(files: Sequence[Path], name: str | None, libraries: Sequence[Path] = (), stubs: Mapping[str, Stub] | None = None,
-            text: str = "", wanted: Wanted = ANY) -> Subject:  # fmt: skip
+            text: str = "", wanted: Wanted = ANY, dialect: str = "standard") -> Subject:  # fmt: skip
     """The POU `name` of some files (or of a library, without files); the only one if it is "", the program if None.
 
-    `text` is ST that is compiled with them; `wanted` says which warnings are.  Raises SubjectError."""
+    `text` is ST that is compiled with them; `wanted` says which warnings are, `dialect` whose answers are taken.  Raises
+    SubjectError, and ValueError for a dialect that there is not."""
     __tracebackhide__ = True
     sources = [_read(path) for path in files] + ([Source("test.st", text)] if text else [])
     stubs = stubs or {}
     written = {fold(stubbed): stub for stubbed, stub in stubs.items() if isinstance(stub, str)}
-    key = (tuple((source.name, source.text) for source in sources), name, tuple(libraries), tuple(written.items()), wanted)
+    texts = tuple((source.name, source.text) for source in sources)
+    key = texts, name, tuple(libraries), tuple(written.items()), wanted, dialect
     if key not in _images:
-        _images[key] = _build(sources, name, libraries, written, wanted)
+        _images[key] = _build(sources, name, libraries, written, wanted, dialect)
     return _images[key]
 
 
 def _build(sources: list[Source], name: str | None, libraries: Sequence[Path], stubs: Mapping[str, str],
-           wanted: Wanted) -> Subject:  # fmt: skip
+           wanted: Wanted, dialect: str) -> Subject:  # fmt: skip
     __tracebackhide__ = True
+    compiled = partial(_compiled, libraries=libraries, wanted=wanted, dialect=dialect)
     if name == "":
         name = _only(sources)
     for stubbed, stub in stubs.items():
         sources = _stubbed(sources, stubbed, stub, libraries)
     if name is None:
-        return _compiled(sources, None, libraries, wanted, "")
+        return compiled(sources, None, "")
     node, source = _declared(sources, name, libraries)
     if node.kind == "PROGRAM":
-        return _compiled(sources, node.name.text, libraries, wanted, f"{node.name.text}.")
+        return compiled(sources, node.name.text, f"{node.name.text}.")
     wrapper = Source(f"<test of {node.name.text}>", _wrapper(node, source))
     if node.kind == "FUNCTION":
-        return _compiled([*sources, wrapper], WRAPPER, libraries, wanted, f"{WRAPPER}.", node.name.text)
-    made = _compiled([*sources, wrapper], WRAPPER, libraries, wanted, f"{WRAPPER}.{INSTANCE}.", node.name.text)
+        return compiled([*sources, wrapper], WRAPPER, f"{WRAPPER}.", node.name.text)
+    made = compiled([*sources, wrapper], WRAPPER, f"{WRAPPER}.{INSTANCE}.", node.name.text)
     return replace(made, in_outs=frozenset(fold(each) for each, _ in _variables(node, "VAR_IN_OUT", source)))
 
 
@@ -118,10 +121,10 @@ def _only(sources: Sequence[Source]) -> str:
     return chosen[0]
 
 
-def _compiled(sources: list[Source], program: str | None, libraries: Sequence[Path], wanted: Wanted, prefix: str,
-              name: str = "") -> Subject:  # fmt: skip
+def _compiled(sources: list[Source], program: str | None, prefix: str, name: str = "", *, libraries: Sequence[Path],
+              wanted: Wanted, dialect: str) -> Subject:  # fmt: skip
     __tracebackhide__ = True
-    made = compile_sources(sources, program, libraries, runnable=True, no_warn=wanted.no_warn,
+    made = compile_sources(sources, program, libraries, runnable=True, dialect=dialect, no_warn=wanted.no_warn,
                            warnings_as_errors=wanted.as_errors)  # fmt: skip
     if made.image is None:
         raise SubjectError("\n".join(message.render() for message in made.errors))

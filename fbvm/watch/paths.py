@@ -72,6 +72,7 @@ class Span:
 _TOKEN = re.compile(
     r"\s*(?:(?P<name>[^\W\d]\w*)|(?P<bit>\.\s*%?X?\d+(?!\w))|(?P<dot>\.)|\[(?P<index>[^\]]*)\]|(?P<hat>\^))", re.I
 )
+_NAMES = re.compile(r"\s*([^\W\d]\w*)(?:\s*\.\s*([^\W\d]\w*))?")
 _FIRST = re.compile(r"\s*([^\W\d]\w*)")
 _SPACED = re.compile(r"\s*[A-Z]\w*\s+\d+(\.\d+)?\s*", re.I)
 """`D 10`: a name with a space before a number is an address, whatever is called D."""
@@ -83,8 +84,9 @@ def find(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> 
     if ".." in text:
         return _span(symbols, areas, text)
     first = _FIRST.match(text)
-    if first and first[1].upper() in symbols and not _SPACED.fullmatch(text):
-        return _walk(symbols, text)
+    top = _top(symbols, text)
+    if top is not None and not _SPACED.fullmatch(text):
+        return _walk(*top, text)
     try:
         address = parse_address(text, areas)
     except AddressError as error:
@@ -109,6 +111,9 @@ def _unknown(symbols: Mapping[str, Field], text: str, first: str, reason: str) -
     for field in symbols.values():
         if isinstance(field.type, StructType) and field.type.block and field.type.member(first):
             return f"there is no {first}; did you mean {field.name}.{text.strip()}?"
+    listed = sorted(field.name for field in symbols.values() if field.space.upper() == first.upper())
+    if listed:
+        return f"{text.strip()}: the list has no such variable; it has {', '.join(listed[:8])}"
     known = ", ".join(sorted(field.name for field in symbols.values())[:8])
     return f"there is no {first}" + (f"; known here: {known}" if known else " (the program declares nothing)")
 
@@ -169,24 +174,36 @@ def _at(areas: Mapping[str, Area], address: Address) -> Place:
 # --- names ------------------------------------------------------------------------------------------------------------
 
 
-def _walk(symbols: Mapping[str, Field], text: str) -> Place:
-    """Follows a path step by step through the types."""
-    place: Place | None = None
-    at, dot = 0, False
+def _top(symbols: Mapping[str, Field], text: str) -> tuple[Field, int] | None:
+    """The symbol that a path begins with, and where it goes on: `Main`, `GVL.level`, or `level` if one list has it."""
+    names = _NAMES.match(text)
+    if names is None:
+        return None
+    first, second = names[1].upper(), (names[2] or "").upper()
+    if first in symbols:
+        return symbols[first], names.end(1)
+    listed = symbols.get(f"{first}.{second}") or symbols.get(second)
+    if second and listed is not None and (f"{first}.{second}" in symbols or listed.space.upper() == first):
+        return listed, names.end(2)
+    fitting = [field for name, field in symbols.items() if field.space and name == f"{field.space}.{first}".upper()]
+    return (fitting[0], names.end(1)) if len(fitting) == 1 else None
+
+
+def _walk(field: Field, at: int, text: str) -> Place:
+    """Follows a path step by step through the types, from a symbol on."""
+    place = _of(Place(field.name, field.type, 0), field, field.name, field.offset)
+    dot = False
     while at < len(text.rstrip()):
         match = _TOKEN.match(text, at)
-        if not match or (match["name"] and place is not None and not dot):
+        if not match or match["name"] and not dot:
             raise UnknownPlace(f"{text.strip()!r} is not a path of names, subscripts and members")
         at = match.end()
         if match["dot"]:
             dot = True
-        elif match["name"] and place is None:
-            field = symbols[match["name"].upper()]
-            place = _of(Place(field.name, field.type, 0), field, field.name, field.offset)
-        elif place is not None:
+        else:
             place = _step(place, match)
             dot = False
-    if place is None or dot:
+    if dot:
         raise UnknownPlace(f"{text.strip()!r} ends too early")
     return place
 

@@ -558,3 +558,25 @@ def test_a_plc_hears_what_another_one_answers(project: pytest.Pytester) -> None:
         "  scan * 192.168.250.2:49152 -> 192.168.250.1:502  Modbus 1, unit 1: 03 read holding registers, address 1000, *",
         "  scan * 192.168.250.1:502 -> 192.168.250.2:49152  Modbus 1, unit 1: 03 read holding registers, data *",
     ])  # fmt: skip
+
+
+def test_the_dialect_of_a_rig_and_of_a_session(project: pytest.Pytester) -> None:
+    project.makeini("[pytest]\nfbvm_dialect = codesys\n")
+    block = "FUNCTION_BLOCK Last VAR_INPUT w : WORD; END_VAR VAR_OUTPUT n : WORD; END_VAR n := w + 1; END_FUNCTION_BLOCK"
+    (project.path / "src" / "last.st").write_text(block, "utf-8")
+    program = "PROGRAM Test_words VAR w : WORD := 7; END_VAR w := w + 1; ASSERT(w = 8); END_PROGRAM"
+    (project.path / "test_st.st").write_text(program, "utf-8")
+    project.makepyfile("""
+        import pytest
+
+        def test_of_the_session(fb):
+            last = fb("src/last.st")
+            last.w = 5
+            last.scan()
+            assert last.n == 6
+
+        def test_of_its_own(fb):
+            with pytest.raises(Exception, match="WORD has no arithmetic"):
+                fb("src/last.st", dialect="standard")
+    """)
+    run(project).assert_outcomes(passed=3)

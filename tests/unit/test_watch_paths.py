@@ -107,3 +107,23 @@ def test_what_names_nothing_says_why(text: str, message: str) -> None:
 def test_one_place_is_not_a_range() -> None:
     with pytest.raises(UnknownPlace, match="is a range; name one place"):
         place("D1..D3")
+
+
+LISTS = {**SYMBOLS, "GVL.LEVEL": Field("GVL.level", t.INT, 182000, "VAR_GLOBAL", space="GVL"),
+         "GVL.TANK": Field("GVL.tank", POINT, 182008, "VAR_GLOBAL", space="GVL"),
+         "TWO.TANK": Field("Two.tank", POINT, 182016, "VAR_GLOBAL", space="Two"),
+         "FREE": Field("free", t.INT, 182024, "VAR_GLOBAL", space="Two")}
+
+
+@pytest.mark.parametrize(("text", "offset"), [
+    ("GVL.level", 182000), ("gvl . LEVEL", 182000), ("level", 182000), ("GVL.tank.y", 182012), ("two.tank.x", 182016),
+    ("free", 182024), ("Two.free", 182024), ("Main.x2", 180324)])
+def test_lists_of_global_variables_stand_in_front(text: str, offset: int) -> None:
+    assert find_place(LISTS, AREAS, text).offset == offset
+
+
+@pytest.mark.parametrize(("text", "message"), [
+    ("GVL.free", "it has GVL.level, GVL.tank"), ("tank.x", "there is no tank"), ("GVL.levle", "the list has no such variable")])
+def test_what_a_list_does_not_have(text: str, message: str) -> None:
+    with pytest.raises(UnknownPlace, match=message):
+        find_place(LISTS, AREAS, text)
