@@ -73,7 +73,7 @@ class Calls:
         for other in objects[objects.index(item) + 1:]:
             wires = other.inputs[0].wires if other.kind == "outVariable" else []
             if len(wires) == 1 and wires[0].source is item and not (other.negated or other.edge or other.storage):
-                if item.pin(wires[0].pin) or wires[0].pin.upper() == "ENO":
+                if wires[0].pin.upper() == "ENO" or any(pin.name == wires[0].pin for pin in item.in_outs):
                     break
                 found.append((other, wires[0]))
             elif other.kind != "inVariable":

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fbvm.plcopen.diagram import Diagram, Object, read_diagram
 from fbvm.plcopen.document import Body, Pou, Reading
 from fbvm.plcopen.markup import Element
-from fbvm.plcopen.networks import Network, networks
+from fbvm.plcopen.networks import LARGEST, Network, networks
 from fbvm.plcopen.read_types import duration
 from fbvm.plcopen.scope import Scope
 from fbvm.plcopen.statements import Statements
@@ -58,6 +58,8 @@ class Chart:
             raise Incomplete(body, "the chart has no initial step", "")
         self.scope.taken |= {step.get("name").upper() for step in steps}
         diagram = read_diagram(self.reading, body, chart=True)
+        if len(body.children) > LARGEST:
+            raise Incomplete(body, f"the chart has more than {LARGEST} elements", "")
         arrows = [self._arrow(transition) for transition in body.all("transition")]
         blocks = {reference: block for block in body.all("actionBlock") for reference in _references(block)}
         lines = []
@@ -112,46 +114,47 @@ class Chart:
     # --- transitions ---
 
     def _arrow(self, transition: Element) -> Arrow:
-        sources = self._above(transition, set())
-        targets = self._below(transition, set())
+        sources = self._above(transition)
+        targets = self._below(transition)
         for found, where in ((sources, "above"), (targets, "below")):
             if not found:
                 raise Incomplete(transition, f"no step stands {where} transition {transition.get('localId')}", "")
         return Arrow(transition, sources, targets)
 
-    def _above(self, element: Element, seen: set[str]) -> list[str]:
+    def _above(self, element: Element) -> list[str]:
         """Names of the steps from which wires lead to an element."""
-        found: list[str] = []
-        for reference in _references(element):
-            other = self.known.get(reference)
-            if other is None or reference in seen:
-                continue
-            if other.name == "step":
-                found.append(other.get("name"))
-            elif other.name in PASSING:
-                found += self._above(other, seen | {reference})
-        return list(dict.fromkeys(found))
+        return self._steps(element, lambda here: [self.known[r] for r in _references(here) if r in self.known])
 
-    def _below(self, element: Element, seen: set[str]) -> list[str]:
+    def _below(self, element: Element) -> list[str]:
         """Names of the steps to which wires lead from an element; a jump is one to its target."""
-        found: list[str] = []
-        for other in self.followers.get(element.get("localId"), ()):
-            number = other.get("localId")
-            if other.name == "step":
-                found.append(other.get("name"))
-            elif other.name == "jumpStep":
-                found += self._jumped(other)
-            elif other.name in PASSING and number not in seen:
-                found += self._below(other, seen | {number})
-        return list(dict.fromkeys(found))
+        return self._steps(element, lambda here: self.followers.get(here.get("localId"), []))
+
+    def _steps(self, element: Element, beside: Callable[[Element], list[Element]]) -> list[str]:
+        found: dict[str, None] = {}
+        seen: set[str] = set()
+        todo = [element]
+        while todo:
+            for other in beside(todo.pop(0)):
+                if other.name == "step":
+                    found[other.get("name")] = None
+                elif other.name == "jumpStep":
+                    found.update(dict.fromkeys(self._jumped(other)))
+                elif other.name in PASSING and other.get("localId") not in seen:
+                    seen.add(other.get("localId"))
+                    todo.append(other)
+        return list(found)
 
     def _jumped(self, jump: Element) -> list[str]:
         """The step that a jump names, or those behind the simultaneous divergence of that name."""
         name = jump.get("targetName").upper()
         for element in self.known.values():
             if element.get("name").upper() == name:
-                return [element.get("name")] if element.name == "step" else self._below(element, set())
+                return [element.get("name")] if element.name == "step" else self._divided(element)
         raise Incomplete(jump, f"there is no step {jump.get('targetName')} to jump to", "")
+
+    def _divided(self, divergence: Element) -> list[str]:
+        """The steps directly behind a simultaneous divergence."""
+        return [other.get("name") for other in self.followers.get(divergence.get("localId"), ()) if other.name == "step"]
 
     def _transition(self, arrow: Arrow, diagram: Diagram) -> list[str]:
         element = arrow.element

@@ -82,7 +82,7 @@ class Object:
 
 @dataclass
 class Diagram:
-    """The objects of one body in the order of writing, and its comments."""
+    """The objects of one body in the order of writing, and its comments; titles, which are boxes without wires, are such."""
 
     objects: list[Object]
     comments: list[Object]
@@ -114,10 +114,13 @@ def read_diagram(reading: Reading, body: Element, chart: bool = False) -> Diagra
         for pin in item.pins:
             for number, name, at in pin.raw:
                 item.broken |= not _connect(reading, pin, number, name, at, known, connectors)
-    kept = [item for item in objects if item.kind not in ("connector", "continuation")]
+    asked = {wire.source for item in objects for pin in item.pins for wire in pin.wires}
+    titles = [item for item in objects if item.kind == "vendorElement" and item not in asked and not item.inputs[0].raw]
+    comments += titles
+    kept = [item for item in objects if item.kind not in ("connector", "continuation") and item not in titles]
     for item in kept:
         for pin in item.pins:
-            pin.wires = _followed(pin.wires, set())
+            pin.wires = _followed(pin.wires)
     return Diagram(kept, comments)
 
 
@@ -166,16 +169,19 @@ def _connect(reading: Reading, pin: Pin, number: str, name: str, at: Element, kn
     return True
 
 
-def _followed(wires: list[Wire], seen: set[Object]) -> list[Wire]:
-    """Wires with connectors and coils replaced by what feeds them."""
-    found: list[Wire] = []
-    for wire in wires:
-        if wire.source.kind in ("connector", "coil"):
-            if wire.source not in seen:
-                found += _followed([w for pin in wire.source.inputs for w in pin.wires], seen | {wire.source})
-        elif wire not in found:
-            found.append(wire)
-    return [wire for at, wire in enumerate(found) if wire not in found[:at]]
+def _followed(wires: list[Wire]) -> list[Wire]:
+    """Wires with connectors and coils replaced by what feeds them, each once."""
+    found: dict[Wire, None] = {}
+    seen: set[Object] = set()
+    todo = wires[::-1]
+    while todo:
+        wire = todo.pop()
+        if wire.source.kind not in ("connector", "coil"):
+            found[wire] = None
+        elif wire.source not in seen:
+            seen.add(wire.source)
+            todo += [inner for pin in wire.source.inputs for inner in pin.wires[::-1]]
+    return list(found)
 
 
 def _conditions(element: Element, place: int) -> list[Object]:

@@ -15,6 +15,8 @@ from math import inf
 
 from fbvm.plcopen.diagram import Diagram, Object, Wire
 
+LARGEST, MOST_LOOPS = 5_000, 200
+"""Objects and loops of the largest network that is taken over; drawings of people have far fewer."""
 RAILS = ("leftPowerRail", "rightPowerRail")
 SINKS = ("coil", "outVariable", "inOutVariable", "block", "jump", "return", "label")
 """What does something."""
@@ -29,9 +31,12 @@ class Network:
     cut: set[tuple[Object, Wire]] = field(default_factory=set)
     comments: list[str] = field(default_factory=list)
     number: int = 0
+    refused: str = ""
+    """Why nobody tries to execute it."""
 
     @property
     def broken(self) -> bool:
+        """Whether something in it was not understood, and has a diagnostic."""
         return any(item.broken for item in self.objects)
 
 
@@ -111,6 +116,8 @@ def _feeds(item: Object, inside: set[Object], cut: set[tuple[Object, Wire]]) -> 
 
 def _network(group: list[Object], flat: bool) -> Network:
     """Sort a network; where only loops are left, cut one and go on."""
+    if len(group) > LARGEST:
+        return _refused(group)
     inside = set(group)
     cut: set[tuple[Object, Wire]] = set()
     order: list[Object] = []
@@ -125,7 +132,9 @@ def _network(group: list[Object], flat: bool) -> Network:
     place = {item: at for at, item in enumerate(group)}
     while len(order) < len(group):
         while not ready:
-            item, wire = _back([one for one in group if one not in done], inside, cut, done, flat)
+            if len(cut) >= MOST_LOOPS:
+                return _refused(group)
+            item, wire = _back([one for one in group if one not in done], inside, cut, flat)
             cut.add((item, wire))
             waiting[item] -= 1
             if not waiting[item]:
@@ -140,29 +149,47 @@ def _network(group: list[Object], flat: bool) -> Network:
     return Network(order, cut)
 
 
-def _back(left: list[Object], inside: set[Object], cut: set[tuple[Object, Wire]], done: set[Object],
-          flat: bool) -> tuple[Object, Wire]:
+def _refused(group: list[Object]) -> Network:
+    return Network(group, refused=f"the network has more than {LARGEST} elements, or more than {MOST_LOOPS} loops")
+
+
+def _back(left: list[Object], inside: set[Object], cut: set[tuple[Object, Wire]], flat: bool) -> tuple[Object, Wire]:
     """The wire at which a loop is cut, and its consumer."""
-    loops = [(item, wire) for item in left for wire in _feeds(item, inside, cut)
-             if wire.source not in done and _depends(wire.source, item, inside, cut, done)]
+    loop = _loops(left, inside, cut)
+    wires = [(item, wire) for item in left for wire in _feeds(item, inside, cut) if loop.get(wire.source, -1) == loop[item]]
 
     def late(found: tuple[Object, Wire]) -> tuple[bool, bool, tuple[float, float, float, int]]:
         item, wire = found
         return wire.source.kind != "inOutVariable", item.kind != "block", _key(item, flat)
 
-    return min(loops, key=late)
+    return min(wires, key=late)
 
 
-def _depends(item: Object, on: Object, inside: set[Object], cut: set[tuple[Object, Wire]], done: set[Object]) -> bool:
-    """Whether wires lead from one object to another."""
-    seen = {item}
-    todo = [item]
-    while todo:
-        here = todo.pop()
-        if here is on:
-            return True
-        for wire in _feeds(here, inside, cut):
-            if wire.source not in seen and wire.source not in done:
-                seen.add(wire.source)
-                todo.append(wire.source)
-    return False
+def _loops(left: list[Object], inside: set[Object], cut: set[tuple[Object, Wire]]) -> dict[Object, int]:
+    """Objects that wires lead from one to the other and back have the same number (Tarjan 1972, without recursion)."""
+    among = set(left)
+    index: dict[Object, int] = {}
+    low: dict[Object, int] = {}
+    number: dict[Object, int] = {}
+    open_: list[Object] = []
+    for start in left:
+        todo = [] if start in index else [(start, iter(_feeds(start, inside, cut)))]
+        while todo:
+            item, wires = todo[-1]
+            if item not in index:
+                index[item] = low[item] = len(index)
+                open_.append(item)
+            following = next((wire.source for wire in wires if wire.source in among), None)
+            if following is None:
+                todo.pop()
+                if todo:
+                    low[todo[-1][0]] = min(low[todo[-1][0]], low[item])
+                if low[item] == index[item]:
+                    at = open_.index(item)
+                    number.update((one, index[item]) for one in open_[at:])
+                    del open_[at:]
+            elif following not in index:
+                todo.append((following, iter(_feeds(following, inside, cut))))
+            elif following not in number:
+                low[item] = min(low[item], index[following])
+    return number

@@ -37,6 +37,9 @@ OBJECT_ORIENTED = {"method", "property", "interface", "getaccessor", "setaccesso
 """Last words of names of `addData` that hold parts of programs (CODESYS)."""
 READ = {"pou", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location", "action"}
 """Those whose contents are taken."""
+SETTINGS = {"objectid", "tasksettings", "projectinformation", "projectstructure", "fbdcalltype", "fbdelementtype",
+            "interfaceasplaintext", "buildproperties"}
+"""Those that say again what the elements say, or speak of the tool itself."""
 _IDENTIFIER = re.compile(r"[^\W\d]\w*")
 
 
@@ -233,5 +236,7 @@ def _added(reading: Reading, root: Element) -> None:
             called = " ".join(filter(None, (last, inner.get("name"), "of", pou or "the project")))
             reading.report("X0203", inner, f"{called} is not taken over",
                            "object-oriented parts are not executed by this version")
+        elif last in SETTINGS:
+            reading.count("identities and settings of the tool in addData are not taken over", element)
         elif last not in READ and name != LOCATION:
             reading.count(f"addData {name} is not taken over", element)

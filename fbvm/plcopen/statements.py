@@ -14,8 +14,10 @@ from fbvm.plcopen.diagram import Object, Pin, Wire
 from fbvm.plcopen.document import Reading
 from fbvm.plcopen.networks import Network
 from fbvm.plcopen.scope import SHARED, Scope
-from fbvm.plcopen.values import ATOM, FALSE, TRUE, Unexecutable, Value, both, either, negation, written
+from fbvm.plcopen.values import ATOM, FALSE, TRUE, UNARY, Unexecutable, Value, both, either, negation, written
 
+LONGEST = 500
+"""Characters of the longest expression that is written several times."""
 Key = tuple[Object, str]
 """An object and the name of its output."""
 
@@ -42,6 +44,8 @@ class Statements:
 
     def write(self, network: Network) -> list[str]:
         """The statements of a network.  Raises Unexecutable."""
+        if network.refused:
+            raise Unexecutable(network.objects[0], network.refused, "draw it in parts")
         self.lines, self.held, self.network = [], {}, network
         self.memories: dict[Key, str] = {}
         self.uses = Counter((wire.source, wire.pin) for item in network.objects for pin in item.pins for wire in pin.wires)
@@ -87,9 +91,19 @@ class Statements:
             raise Unexecutable(item, f"there is no edge {edge!r}", "")
         if self.scope.is_function:
             raise Unexecutable(item, "an edge needs memory, which a function does not have", "make it a function block")
-        instance = self.scope.new(f"Edge_{item.id}", "R_TRIG" if edge == "rising" else "F_TRIG", True)
+        if edge == "falling":
+            return self._fallen(item, value)
+        instance = self.scope.new(f"Edge_{item.id}", "R_TRIG", True)
         self.effect(f"{instance}(CLK := {value.text});", frozenset((instance.upper(),)))
         return Value(f"{instance}.Q", ATOM, frozenset((instance.upper(),)))
+
+    def _fallen(self, item: Object, value: Value) -> Value:
+        """The falling edge; F_TRIG of the standard has one in its first call too, where nothing has fallen yet."""
+        before = self.scope.new(f"Was_{item.id}", "BOOL", True)
+        fallen = self.scope.new(f"Edge_{item.id}", "BOOL", False)
+        self.effect(f"{fallen} := {before} AND {negation(value).at(UNARY)};", frozenset((fallen.upper(),)))
+        self.effect(f"{before} := {value.text};", frozenset((before.upper(),)))
+        return Value(fallen, ATOM, frozenset((fallen.upper(),)))
 
     def expression(self, text: str) -> Value:
         return TRUE if text.upper() == "TRUE" else FALSE if text.upper() == "FALSE" else written(text, self.scope.roots(text))
@@ -132,6 +146,9 @@ class Statements:
         """The same value in a variable; as it is if nobody knows its type."""
         kind = self.scope.wire_type(wire)
         if not kind:
+            if len(value.text) > LONGEST:
+                raise Unexecutable(wire.source, "it is used in several places, and its type is not known",
+                                   "lead it over a variable")
             self.doubt(wire.source, "its type is not known, and it is worked out where it is used")
             return value
         name = self.scope.new(f"{'Power' if kind == 'BOOL' else 'Value'}_{wire.source.id}", kind, False)
@@ -258,10 +275,6 @@ class Statements:
         self.calls.write(item)
 
     def _strange(self, item: Object) -> None:
-        if item.kind == "vendorElement" and not any(pin.raw for pin in item.pins) and not any(
-                wire.source is item for other in self.network.objects for pin in other.pins for wire in pin.wires):
-            self.reading.count("titles and boxes of the tool's own are not taken over", item.element)
-            return
         raise Unexecutable(item, f"nobody knows what <{item.kind}>{f' {item.text!r}' if item.text else ''} does", "")
 
 

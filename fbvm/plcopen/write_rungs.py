@@ -254,12 +254,13 @@ class RungWriter:
         made = self.drawing.block(kind, instance, [(pin, ends)], [(output, "")], column, row)
         self.now = Power((made[output],), [], column + 1, row)
 
-    def _edge(self, kind: str) -> None:
+    def _up(self) -> None:
+        """UP: an R_TRIG in the way.  F_TRIG is no DOWN: it has an edge in its first call too."""
         name, number = "Edge", 1
         while f"{name}{number}".upper() in self.taken | {known.upper() for known in self.instances}:
             number += 1
-        self.instances[f"{name}{number}"] = kind
-        self._function(kind, "CLK", "Q", f"{name}{number}")
+        self.instances[f"{name}{number}"] = "R_TRIG"
+        self._function("R_TRIG", "CLK", "Q", f"{name}{number}")
 
     def _call(self) -> None:
         kind, instance, *pins = self.step.operands
@@ -302,8 +303,7 @@ def _contacts(series: Series) -> list[Contact]:
 
 _OTHERS: dict[str, Callable[[RungWriter], None]] = {
     "END": RungWriter._nothing, "NOP": RungWriter._nothing, "KEEP": RungWriter._keep, "FBCALL": RungWriter._call,
-    "NOT": lambda writer: writer._function("NOT", "IN", "OUT"), "UP": lambda writer: writer._edge("R_TRIG"),
-    "DOWN": lambda writer: writer._edge("F_TRIG"),
+    "NOT": lambda writer: writer._function("NOT", "IN", "OUT"), "UP": RungWriter._up,
 }
 
 

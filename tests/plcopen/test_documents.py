@@ -6,8 +6,9 @@ from pathlib import Path
 
 from click.testing import CliRunner
 
+from fbvm.base.diagnostics import Source
 from fbvm.cli.main import main
-from fbvm.code.compiler import compile_files
+from fbvm.code.compiler import compile_files, compile_sources
 from fbvm.plc import Plc
 from fbvm.plcopen.importing import import_xml
 
@@ -30,6 +31,22 @@ def test_a_project_of_beremiz_is_checked_without_a_word_and_runs(tmp_path: Path)
     plc.run(scans=4)
     assert plc.read("Instance0.Lamp") is True
     assert plc.read("Instance0.n") == 18
+
+
+def test_a_project_of_codesys_keeps_its_lists_of_globals_and_names_its_method(tmp_path: Path) -> None:
+    made = import_xml(DOCUMENTS / "codesys.xml")
+    assert set(made.files) == {"types.st", "GVL.st", "Plant.st", "PLC_PRG.st", "Device.st"}
+    assert [(d.code, d.message) for d in made.errors] == [("X0203", "method Reset of PLC_PRG is not taken over")]
+    assert "RUNG 1 The press runs" in made.files["PLC_PRG.st"]
+    assert "// Parts are counted" in made.files["PLC_PRG.st"]
+    compiled = compile_sources([Source(name, text) for name, text in made.files.items()], runnable=True)
+    assert compiled.image is not None, [d.render() for d in compiled.diagnostics]
+    plc = Plc(compiled.image, 20_000_000)
+    for scan in range(6):
+        plc.write("PLC_PRG.start", scan % 2 == 0)
+        plc.scan()
+    assert plc.read("PLC_PRG.run") is True
+    assert (plc.read("PLC_PRG.sum"), plc.read("PLC_PRG.full"), plc.read("PLC_PRG.part")["name"]) == (6, True, "new")
 
 
 def test_importing_again_gives_the_same_to_the_letter() -> None:

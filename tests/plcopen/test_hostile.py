@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from drawings import RAIL, block, coil, contact, imported, pou, result, value
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from fbvm.base.diagnostics import Diagnostic
-from fbvm.plcopen.importing import import_xml
+from fbvm.plcopen.importing import Imported, import_xml
 from fbvm.plcopen.markup import MAX_BYTES, MAX_DEPTH, MAX_ELEMENTS, parse_markup
 
 BOMB = b'<?xml version="1.0"?>\n<!DOCTYPE lolz [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;">]>\n<project>&b;</project>'
@@ -115,3 +119,49 @@ def test_depth_within_the_limit_needs_no_deep_stack() -> None:
     assert not isinstance(found, Diagnostic)
     assert found[1].text == "x"
     assert sys.getrecursionlimit() >= 200
+
+
+def chain(count: int, element: Callable[[int], str]) -> Imported:
+    return imported(pou(RAIL + "".join(element(number) for number in range(2, count + 2)), "a x"))
+
+
+@pytest.mark.slow
+def test_long_chains_of_coils_and_contacts_need_no_deep_stack() -> None:
+    backwards = chain(2_000, lambda number: coil(number, str(number + 1) if number < 2_001 else "1", "x"))
+    assert backwards.errors == []
+    forwards = chain(2_000, lambda number: contact(number, str(number - 1), "a") if number < 2_001 else coil(number, "2000", "x"))
+    assert forwards.errors == []
+    assert forwards.files["Main.st"].count(" a") > 1_000
+
+
+def test_values_that_are_doubled_again_and_again_end_with_a_message() -> None:
+    adds = value(1, "who") + "".join(block(n, "ADD", f"IN1={n - 1} IN2={n - 1}", "OUT") for n in range(2, 60))
+    made = imported(pou(adds + result(99, "59", "x"), "x", language="FBD"))
+    assert "X0202" in {d.code for d in made.errors}
+    assert len(made.files["Main.st"]) < 10_000
+
+
+def test_a_network_of_nothing_but_loops_ends_with_a_message() -> None:
+    count = 30
+    everybody = "+".join(str(n) for n in range(1, count))
+    made = imported(pou("".join(block(n, "OR", f"IN1={everybody}", "OUT") for n in range(1, count)), "x", language="FBD"))
+    assert "X0202" in {d.code for d in made.errors}
+    assert "loops" in made.errors[-1].message
+
+
+def test_a_network_that_is_too_large_is_refused() -> None:
+    made = chain(5_100, lambda number: contact(number, str(number - 1), "a"))
+    assert [d.code for d in made.errors] == ["X0202"]
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(data=st.data())
+def test_documents_that_were_spoiled_raise_nothing(data: st.DataObject) -> None:
+    text = (Path(__file__).parent / "documents" / data.draw(st.sampled_from(["beremiz.xml", "codesys.xml"]))).read_bytes()
+    at = data.draw(st.integers(0, len(text)))
+    length = data.draw(st.integers(0, 60))
+    put = data.draw(st.sampled_from([b"", b"0", b"<", b"-1", b'"', b"\xc3", b"<pou>", b"12"]))
+    made = import_xml(text[:at] + put + text[at + length:])
+    for diagnostic in made.diagnostics:
+        assert diagnostic.render()

@@ -1,0 +1,93 @@
+"""Types, values, sections and tasks of documents as Structured Text, and back."""
+
+from __future__ import annotations
+
+import pytest
+from drawings import document, pou
+
+from fbvm.base.diagnostics import Source
+from fbvm.plcopen.exporting import export_xml
+from fbvm.plcopen.importing import import_xml
+from fbvm.plcopen.read_types import duration
+
+
+@pytest.mark.parametrize(("written", "meant"), [
+    ("T#20ms", "T#20ms"), ("TIME#1s", "TIME#1s"), ("t#1.5s", "t#1.5s"), ("PT0.02S", "T#20ms"), ("PT1M30S", "T#1m30s"),
+    ("P1DT2H", "T#1d2h"), ("PT0.000250S", "T#250us"), ("20ms", "T#20ms"), ("1h30m", "T#1h30m"), ("Interval", ""), ("", ""),
+    ("P", ""), ("20", ""),
+])
+def test_intervals_in_all_their_spellings(written: str, meant: str) -> None:
+    assert duration(written) == meant
+
+
+@pytest.mark.parametrize(("element", "text"), [
+    ("<BOOL/>", "BOOL"), ("<bool/>", "BOOL"), ("<string/>", "STRING"), ('<string length="20"/>', "STRING[20]"),
+    ('<wstring length="4"/>', "WSTRING[4]"), ('<derived name="TON"/>', "TON"),
+    ("<pointer><baseType><INT/></baseType></pointer>", "POINTER TO INT"),
+    ('<array><dimension lower="0" upper="N"/><dimension lower="1" upper="2"/><baseType><REAL/></baseType></array>',
+     "ARRAY[0..N, 1..2] OF REAL"),
+    ('<enum><values><value name="A"/><value name="B" value="4"/></values></enum>', "(A, B := 4)"),
+    ('<subrangeUnsigned><range lower="1" upper="9"/><baseType><UINT/></baseType></subrangeUnsigned>', "UINT (1..9)"),
+])
+def test_types(element: str, text: str) -> None:
+    made = import_xml(document(pou("", f'<variable name="v"><type>{element}</type></variable>', language="ST")))
+    assert made.diagnostics == []
+    assert f"v : {text};" in " ".join(made.files["Main.st"].split())
+
+
+@pytest.mark.parametrize("wrong", ["<type/>", "<type><complex/></type>", '<type><derived name="a b"/></type>', ""])
+def test_a_variable_without_a_type_that_can_be_said_is_named(wrong: str) -> None:
+    made = import_xml(document(pou("", f'<variable name="v">{wrong}</variable>', language="ST")))
+    assert [d.code for d in made.errors] == ["X0105"]
+
+
+CONFIGURATION = """
+TYPE Colour : (Red, Green := 4) := Green; Level : INT (0..100); Row : ARRAY [1..2, 0..1] OF REAL := [1.0, 3(2.5)]; END_TYPE
+VAR_GLOBAL CONSTANT N : INT := (2 + 3) * 2; END_VAR
+FUNCTION_BLOCK Block
+VAR_INPUT a : BOOL := TRUE; END_VAR  // the first
+VAR_INPUT CONSTANT b : LTIME := LTIME#1s; END_VAR
+VAR_OUTPUT q : STRING[8] := 'a $'b$' & <c>'; END_VAR
+VAR_IN_OUT io : DWORD; END_VAR
+VAR RETAIN kept : DATE_AND_TIME; END_VAR
+VAR_TEMP t : Colour; END_VAR
+    (* nothing
+         to do *)
+    io := io + 1;
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR b : Block; d : DWORD; n : INT; END_VAR
+VAR_EXTERNAL g : INT; END_VAR
+b(io := d); n := N;
+Again();
+ACTION Again: n := n + g; END_ACTION
+END_PROGRAM
+CONFIGURATION C
+VAR_GLOBAL g : INT := 5; END_VAR
+RESOURCE R ON PLC
+    TASK Fast (INTERVAL := T#10ms, PRIORITY := 1);
+    TASK Slow (INTERVAL := T#1s, PRIORITY := 9);
+    PROGRAM One WITH Fast : Main;
+    PROGRAM Two WITH Slow : Main;
+END_RESOURCE
+END_CONFIGURATION
+"""
+
+
+def test_declarations_tasks_and_texts_survive_the_way_there_and_back() -> None:
+    first = export_xml([Source("Main.st", CONFIGURATION)])
+    assert first.diagnostics == []
+    assert first.text is not None
+    back = import_xml(first.text.encode())
+    assert back.diagnostics == []
+    texts = {name: " ".join(text.split()) for name, text in back.files.items()}
+    assert "Colour : (Red, Green := 4) := Green;" in texts["types.st"]
+    assert "Level : INT (0..100);" in texts["types.st"]
+    assert "[1.0, 3(2.5)]" in texts["types.st"]
+    assert "N : INT := (2 + 3) * 2;" in texts["Main.st"]
+    assert "q : STRING[8] := 'a $'b$' & <c>';" in texts["Block.st"]
+    assert "VAR RETAIN kept : DT; END_VAR" in texts["Block.st"]
+    assert "ACTION Again: n := n + g; END_ACTION" in texts["Main_2.st"]
+    assert "PROGRAM Two WITH Slow : Main;" in texts["C.st"]
+    again = export_xml([Source(name, text) for name, text in back.files.items()])
+    assert import_xml((again.text or "").encode()).files == back.files
