@@ -22,6 +22,7 @@ from fbvm.code.pou_calls import CallLowering
 from fbvm.code.values import DEEPEST, ValueLowering, is_aggregate
 from fbvm.code.weights import counted
 from fbvm.syntax import ladder, sfc, tree
+from fbvm.syntax.pragmas import hides_inside
 
 if TYPE_CHECKING:
     from fbvm.code.compiler import Program
@@ -45,6 +46,7 @@ class BodyLowering:
         self.loops = LoopLowering(self)
         self.value = self.values.value
         self.entry_site = self.site(pou.tree.name)
+        self.unseen = hides_inside(pou.source.text, pou.tree.start)
         self._temporaries = 0
         self._heights: dict[int, tuple[int, Node]] = {}
 
@@ -161,7 +163,8 @@ class BodyLowering:
             if isinstance(statement, tree.Empty):
                 continue
             site = self.site(statement)
-            if not isinstance(statement, ladder.Ladder | ladder.Rung | sfc.Sfc) and statement.end > statement.start:
+            own = isinstance(statement, ladder.Ladder | ladder.Rung | sfc.Sfc)  # these say themselves what there is to see
+            if statement.end > statement.start and not own and not self.unseen:
                 self.out.append(("observe", "statement", site, None))
             mark = len(self.out)
             _LOWER[type(statement)](self, statement, site)

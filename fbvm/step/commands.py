@@ -76,6 +76,7 @@ COMMANDS = (
     Command("why", "y", "why NAME", "why it has its value", takes="place"),
     Command("list", "l", "list [LINES]", "the text around"),
     Command("rung", "u", "rung [NUMBER]", "the rungs executed last and next, with their power, or one of this POU"),
+    Command("sfc", "", "sfc", "the chart of this POU, with its active steps and tested transitions"),
     Command("calls", "", "calls", "who called whom"),
     Command("net", "", "net [SCANS]", "what passed the network in the scan before, or in the last ones"),
     Command("expect", "", "expect CONDITION", "fails if it does not hold; for scripts", takes="place"),
@@ -280,6 +281,9 @@ class Commands:
 
     def _rung(self, rest: str) -> Iterator[str]:
         return self.words.rung(_count(rest, least=0) if rest else None)
+
+    def _sfc(self, rest: str) -> Iterator[str]:
+        return self.words.chart()
 
     def _calls(self, rest: str) -> Iterator[str]:
         return self.words.calls()

@@ -16,6 +16,7 @@ from fbvm.engine.trap import Trap
 from fbvm.plc import Phase, Plc, State
 from fbvm.record.inside import Event, Frame, Inside, Statement
 from fbvm.record.power import Power
+from fbvm.record.sfc_seen import Evolutions
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value
 
@@ -67,6 +68,8 @@ class Twin:
         """Statements of the scan that are done."""
         self.power = Power(plc.image.rungs, lambda scan: True)
         """What was seen in the rungs of this scan."""
+        self.evolutions = Evolutions(plc.image.charts, lambda scan: True)
+        """What was seen of charts in this scan."""
         self._stop: Stop = lambda number, statement: False
         self._acts: Mapping[int, Sequence[Act]] = {}
         self._told: Told | None = None
@@ -78,6 +81,7 @@ class Twin:
         self.plc.restore(state)
         self.statement, self.count = None, 0
         self.power = Power(self.plc.image.rungs, lambda scan: True)
+        self.evolutions = Evolutions(self.plc.image.charts, lambda scan: True)
         self._stop, self._acts, self._told = stop, acts, told
         if self.plc.trap:
             return False
@@ -100,6 +104,7 @@ class Twin:
 
     def _event(self, event: Event) -> None:
         self.power.event(self.plc, event)
+        self.evolutions.event(self.plc, event)
         if isinstance(event, Statement):
             if self.count:
                 for act in self._acts.get(self.count, ()):

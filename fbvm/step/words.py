@@ -8,6 +8,8 @@ from fbvm.base.types import StructType, base
 from fbvm.code.image import Site
 from fbvm.record.inside import Frame
 from fbvm.record.ladder_text import ladder_text
+from fbvm.record.sfc_seen import active_steps
+from fbvm.record.sfc_text import Sighted, sfc_text
 from fbvm.step.session import Session
 from fbvm.syntax.rung_widths import Sight
 from fbvm.watch.paths import Place, Span
@@ -89,6 +91,20 @@ class Words:
             seen = [made.states for made in self._session.rungs
                     if made.picture is rung and made.base == statement.frame.base]  # fmt: skip
             yield from ladder_text(rung, WIDEST_RUNG, Sight(seen[-1] if seen and seen[-1] else None))
+
+    def chart(self) -> Iterator[str]:
+        """The drawing of the chart of this POU, with its steps as they are here.  Raises ValueError."""
+        statement, image = self._session.statement, self._session.plc.image
+        here = image.bodies[statement.frame.body].name if statement else ""
+        for chart in image.charts:
+            name = image.bodies[chart.body].name
+            if statement and here in (name, f"{name}.{here.rpartition('.')[2]}"):
+                base = statement.frame.base
+                tested = [made.tested for made in self._session.charts if made.picture is chart and made.base == base]
+                active = active_steps(chart, base, self._session.plc)
+                yield from sfc_text(chart, WIDEST_RUNG, Sighted(active, tested[-1] if tested else {}))
+                return
+        raise ValueError("there is no chart here")
 
     def changes(self) -> Iterator[str]:
         """What the last move changed."""

@@ -4,7 +4,8 @@ In this order: times of active steps; conditions of the transitions that are ena
 all that fire, at once; the control of every action; BOOL variables that are actions; the ACTIONs that are to run.  A step
 is active for one call at least.  The first call activates the initial steps and tests no transition.
 
-Statements without extent in the text are those that nobody wrote: who looks statement by statement is not shown them.
+Statements without extent in the text are those that nobody wrote: who looks statement by statement is not shown them.  What
+is shown is the chart, where it begins; each transition that is tested; the step behind it, if it fires; what actions do.
 """
 
 from __future__ import annotations
@@ -95,8 +96,9 @@ class Evolution:
         enabled = [self._flag(step.name, "X") for step in steps]
         enabled += [self._not(self._left(step)) for step in steps if fold(step.name.text) in taken]
         seen = Element(self.at, transition.end, self.transitions.index(transition), transition.condition)
-        fires = (*(self._set(self._left(step), True) for step in steps),
-                 *(self._set(self._entered(self.named[fold(name.text)]), True) for name in transition.targets))
+        first, *others = (self._entered(self.named[fold(name.text)]) for name in transition.targets)
+        begin = tree.Assign(transition.targets[0].start, transition.targets[0].end, (first,), ":=", self._truth(True))
+        fires = (begin, *(self._set(step, True) for step in (*others, *map(self._left, steps))))
         tested = tree.If(transition.start, transition.end, ((seen, fires),), tuple(self._waits(transition)) or None)
         if transition.body is not None and transition.name is not None:
             self._temporary(transition.name.text)
@@ -236,7 +238,10 @@ class Evolution:
         return tree.Assign(self.at, self.at, (target,), ":=", value)
 
     def _set(self, target: Expr, value: bool) -> Statement:
-        return self._assign(target, tree.Literal(self.at, self.at, "bool", value, None, "TRUE" if value else "FALSE"))
+        return self._assign(target, self._truth(value))
+
+    def _truth(self, value: bool) -> Expr:
+        return tree.Literal(self.at, self.at, "bool", value, None, "TRUE" if value else "FALSE")
 
     def _not(self, value: Expr) -> Expr:
         return tree.Unary(self.at, self.at, "NOT", value)

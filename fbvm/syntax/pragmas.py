@@ -22,6 +22,7 @@ PACK_MODES = {"0": 1, "1": 1, "2": 2, "4": 4, "8": 8}
 
 _PACK_MODE = re.compile(r"\s*attribute\s*'pack_mode'\s*:=\s*'([^']*)'\s*", re.IGNORECASE)
 _HEXADECIMAL = re.compile(r"""\{\s*attribute\s*'displaymode'\s*:=\s*'hex(?:adecimal)?'\s*\}\s*\Z""", re.IGNORECASE)
+_HIDDEN = re.compile(r"""\{\s*attribute\s*'hide'\s*\}\s*\Z""", re.IGNORECASE)
 _REACH = 100
 """How far before a name its pragma is looked for."""
 
@@ -43,6 +44,13 @@ def shown_in_hexadecimal(text: str, start: int) -> bool:
     """Whether `{attribute 'displaymode' := 'hex'}` stands before the name that begins at `start`, as CODESYS has it."""
     before = text[max(0, start - _REACH):start]
     return before.rstrip().endswith("}") and _HEXADECIMAL.search(before) is not None
+
+
+def hides_inside(text: str, start: int) -> bool:
+    """Whether `{attribute 'hide'}` stands before the POU that begins at `start`: who looks statement by statement passes
+    over what is inside."""
+    before = text[max(0, start - _REACH):start]
+    return before.rstrip().endswith("}") and _HIDDEN.search(before) is not None
 
 
 def attributes(text: SourceText, declaration: Declaration) -> set[str]:

@@ -251,6 +251,35 @@ def test_where_power_flows_in_rungs() -> None:
     assert not [row for row in said(commands, "goto 1", "list 10").splitlines() if row.endswith(("ON", "off"))]
 
 
+CHART = """PROGRAM Main
+VAR go, lamp : BOOL; n : INT; END_VAR
+INITIAL_STEP Dark: END_STEP
+TRANSITION FROM Dark TO Bright := go;
+END_TRANSITION
+STEP Bright: lamp(N); Count(N); END_STEP
+TRANSITION FROM Bright TO Dark := NOT go;
+END_TRANSITION
+ACTION Count:
+    n := n + 1;
+END_ACTION
+END_PROGRAM
+"""
+
+
+def test_a_chart_is_gone_through_by_its_transitions_and_actions() -> None:
+    commands = made(CHART)
+    said(commands, "Main.go = TRUE", "scan")
+    lines = [said(commands, "step").splitlines()[0] for _ in range(5)]
+    assert [line.split(": ")[1] for line in lines] == [
+        "text.st:4 in Main", "text.st:4 in Main", "text.st:10 in Main", "end of the program; the I/O refresh comes next",
+        "text.st:3 in Main"]
+    said(commands, "goto 1", "run 10")
+    drawn = said(commands, "sfc")
+    assert "● Bright" in drawn and "go → TRUE" in drawn and "● Dark" not in drawn
+    with pytest.raises(CommandError, match="no rungs here"):
+        said(commands, "rung")
+
+
 # --- units and network ------------------------------------------------------------------------------------------------
 
 
