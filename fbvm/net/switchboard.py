@@ -15,7 +15,7 @@ from typing import Protocol
 
 from fbvm.net.addresses import AddressMap
 from fbvm.net.channels import ChannelLink
-from fbvm.wire.link import Link, Peer
+from fbvm.wire.link import Peer
 from fbvm.wire.tap import Happening, Tap, What
 
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
@@ -96,6 +96,8 @@ class Switchboard(ABC):
         """What the host was ready for when somebody waited."""
         self._own: dict[tuple[str, Peer], Peer] = {}
         self._orphans: deque[tuple[int, Orphan]] = deque()
+        self._unheard: set[ChannelLink] = set()
+        """Links that may have something to tell, besides what the host is ready for."""
         self.closed = False
         self.driven = False
         """True while somebody else calls `serve` whenever time goes on, for all links at once."""
@@ -106,7 +108,7 @@ class Switchboard(ABC):
 
     def wait(self, timeout_s: float) -> bool:
         """Sleep until a connection wants attention or the time is over; True if there is something to fetch."""
-        if self.closed or any(link.told for link in self.links.values()):
+        if self.closed or (self._unheard and self._is_unheard()):
             return True
         timeout_s = max(timeout_s, 0.0)
         coarse_s = timeout_s if self._number is None else timeout_s // COARSE_S * COARSE_S
@@ -116,17 +118,18 @@ class Switchboard(ABC):
             return bool(self._found)
         return bool(select.select([self._number], [], [], timeout_s - coarse_s)[0])
 
-    def serve(self, now_ns: int) -> list[Link]:
+    def serve(self, now_ns: int) -> list[ChannelLink]:
         """Do everything that the host is ready for; whose connections that was."""
         if self.closed:
             return []
-        woken: list[Link] = []
+        woken: list[ChannelLink] = []
         found, self._found = self._found, []
         if not found and self._watched:
             found = self._selector.select(0)
         for key, ready in found:
             key.data.ready(ready, now_ns)
             woken.append(key.data.link)
+        self._unheard.update(woken)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):
             self._orphans.popleft()[1].give_up(now_ns)
         return woken
@@ -151,6 +154,14 @@ class Switchboard(ABC):
         """Serve, unless somebody else does."""
         if not self.driven:
             self.serve(now_ns)
+
+    def told(self, link: ChannelLink) -> None:
+        """A link was told something in answer to a request."""
+        self._unheard.add(link)
+
+    def _is_unheard(self) -> bool:
+        self._unheard = {link for link in self._unheard if link.told}
+        return bool(self._unheard)
 
     def watch(self, sock: HasFileno, wanted: int, channel: Watcher) -> None:
         """Be told when the host is ready for what is wanted: READ, WRITE, both or nothing."""

@@ -12,13 +12,13 @@ import struct
 import sys
 from abc import abstractmethod
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 
 from fbvm.net.addresses import AddressMap, dotted, fits, impossible
 from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink, undeliverable
 from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, UDP, WRITE, Switchboard, Watcher, errno_name
-from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
+from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Request, Sent
 from fbvm.wire.tap import DATA, What
 
 BUFFER_BYTES = 65_536
@@ -88,6 +88,10 @@ class TcpLink(ChannelLink):
 
     def serve(self, now_ns: int) -> None:
         self.network.attend(now_ns)
+
+    def submit(self, requests: Iterable[Request], now_ns: int) -> None:
+        super().submit(requests, now_ns)
+        self.network.told(self)
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
         channel: _OnHost = _KINDS[type(request)](self, request)
@@ -217,8 +221,6 @@ class _Line(_OnHost):
         self._keep_alive = request.keep_alive
         self._outbox: deque[bytes] = deque()
 
-    # Opening.
-
     def open(self, now_ns: int) -> None:
         error = impossible(self.local, self.remote)
         if error:
@@ -269,8 +271,6 @@ class _Line(_OnHost):
             self._refused(code, now_ns)
         else:
             self._opened(now_ns, True)
-
-    # Working.
 
     def ready(self, ready: int, now_ns: int) -> None:
         if self.sock and not self._connected:

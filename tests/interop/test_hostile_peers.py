@@ -268,7 +268,7 @@ def test_no_scan_waits_for_anybody(name: str, monkeypatch: pytest.MonkeyPatch) -
             network.wait(0.001)
         assert plc.trap is None
     assert guard.most["connect_ex"] == 1
-    assert guard.most["select"] == 1
+    assert guard.most["select"] <= 1, "none where the wait before has looked"
     assert guard.most["send"] <= 1
     assert guard.most["recv"] <= 18, "closing throws away at most sixteen portions"
     assert sum(guard.most.values()) <= 24
