@@ -34,9 +34,9 @@ _SPAN = re.compile(r"(\d+)(?:\.\.(\d+))?")
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], width: int | None,
             svg: Path | None) -> None:
     """Draw the rungs of the files, POU by POU."""
-    image = compiled(files, program, libraries, runnable=False)
+    image = compiled(files, program, libraries, runnable=False, drawn=True)
     if not image.rungs:
-        raise click.UsageError("there is no LADDER .. END_LADDER in these files")
+        raise click.UsageError("there is nothing to draw in these files")
     if svg:
         drawn = [ladder_surface(rung, width or SVG_WIDTH, Sight(None, _places(image, rung.body))) for rung in image.rungs]
         svg.write_text(ladder_svg(drawn), encoding="utf-8")

@@ -98,7 +98,8 @@ def command(
     if project := project_named(files):
         sys.exit(run_project(project, click.get_current_context()))
     _check_usage(**options)
-    image = compiled(files, program, libraries, runnable=True, as_json=as_json)
+    drawn = bool(options["rungs"]) and not options["journal"]  # who replays a journal compiles as it was recorded
+    image = compiled(files, program, libraries, runnable=True, as_json=as_json, drawn=drawn)
     named = [given.name for given in options["settings"]]
     banks = banks_in([*named, *options["shown"], *options["charted"], options["until"] or "", *options["watched"],
                       *options["conditions"]])

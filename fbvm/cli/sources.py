@@ -60,12 +60,14 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def compiled(
-    files: Sequence[Path], program: str | None, libraries: Sequence[Path], *, runnable: bool, as_json: bool = False
+    files: Sequence[Path], program: str | None, libraries: Sequence[Path], *, runnable: bool, as_json: bool = False,
+    drawn: bool = False,
 ) -> Image:
     """The Image of the files.  Reports warnings; reports errors and ends with status 3 if there are any.
 
-    With `runnable` it is an error, too, if nothing says which program to run."""
-    compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable, lint=False, **chosen())
+    With `runnable` it is an error, too, if nothing says which program to run; with `drawn` Structured Text has rungs."""
+    compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable, lint=False, drawn=drawn,
+                                **chosen())
     if compilation.image is None:
         report(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)

@@ -59,7 +59,8 @@ class Compilation:
 class Program:
     """What the lowering of all bodies shares: areas, sites, located members."""
 
-    def __init__(self, placed: Placed) -> None:
+    def __init__(self, placed: Placed, drawn: bool = False) -> None:
+        self.drawn = drawn
         self.areas: dict[str, Area] = placed.layout.areas
         self.sites: list[Site] = []
         self.rungs: list[RungPicture] = []
@@ -102,7 +103,7 @@ class Program:
 def compile_files(paths: Sequence[Path | str], program: str | None = None, libraries: Sequence[Path | str] = (),
                   runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
                   lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False, cache: bool = True,
-                  progress: Progress = _nobody) -> Compilation:
+                  progress: Progress = _nobody, drawn: bool = False) -> Compilation:
     """Compile source files, or with `cache` read what became of the same ones the last time.
 
     `program` names the PROGRAM to run, `resource` the RESOURCE of a CONFIGURATION that has several; `libraries` are folders
@@ -111,7 +112,8 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
     With `runnable` it is an error if there is not exactly one thing to run.  `lint` looks for what is allowed and hardly
     meant; `no_warn` are codes of warnings that are not wanted, or "all".  `dialect` says how to answer what compilers
     disagree about (`base.dialects`).  `progress` is told how far the work is.  Never raises for what files contain; a file
-    that cannot be read gives a diagnostic.  Raises ValueError for a dialect that there is not, or a code that is none of a
+    that cannot be read gives a diagnostic.  With `drawn` statements of Structured Text are rungs of the image, too, where they
+    can be drawn as such.  Raises ValueError for a dialect that there is not, or a code that is none of a
     warning."""
     sources: list[Source] = []
     unreadable: list[Diagnostic] = []
@@ -124,11 +126,11 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
     silenced = sorted(no_warn)
     kept = None if unreadable or not cache else image_cache.name(
         sources, [Path(folder) for folder in libraries],
-        (program, runnable, resource, dialect, lint, silenced, warnings_as_errors))
+        (program, runnable, resource, dialect, lint, silenced, warnings_as_errors, drawn))
     if kept and (known := image_cache.read(kept, sources)):
         return Compilation(*known)
     made = compile_sources(sources, program, libraries, runnable, resource=resource, dialect=dialect, lint=lint,
-                           no_warn=silenced, warnings_as_errors=warnings_as_errors, progress=progress)
+                           no_warn=silenced, warnings_as_errors=warnings_as_errors, progress=progress, drawn=drawn)
     if kept and made.image:
         image_cache.write(kept, sources, made.image, made.diagnostics)
     return Compilation(None, unreadable + made.diagnostics) if unreadable else made
@@ -137,16 +139,16 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
 def compile_text(text: str, name: str = "text.st", program: str | None = None, libraries: Sequence[Path | str] = (), *,
                  resource: str | None = None, dialect: str = "standard",
                   lint: bool = True, no_warn: Iterable[str] = (),
-                 warnings_as_errors: bool = False) -> Compilation:
+                 warnings_as_errors: bool = False, drawn: bool = False) -> Compilation:
     """Compile one text; see `compile_files`."""
     return compile_sources([Source(name, text)], program, libraries, resource=resource, dialect=dialect, lint=lint,
-                           no_warn=no_warn, warnings_as_errors=warnings_as_errors)
+                           no_warn=no_warn, warnings_as_errors=warnings_as_errors, drawn=drawn)
 
 
 def compile_sources(sources: Sequence[Source], program: str | None = None, libraries: Sequence[Path | str] = (),
                     runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
                     lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False,
-                    progress: Progress = _nobody) -> Compilation:
+                    progress: Progress = _nobody, drawn: bool = False) -> Compilation:
     """Compile texts; see `compile_files`."""
     wanted, silence, report = Wanted.of(no_warn, warnings_as_errors), Silence(), Report()
     spoken = named_dialect(dialect)
@@ -172,7 +174,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
             look_for_slips(checker, program)
         found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not damage.explains(d)]
         diagnostics = sorted(silence.heard(found, wanted), key=Diagnostic.order)
-        image = None if errors(diagnostics) else _image(checker, progress)
+        image = None if errors(diagnostics) else _image(checker, progress, drawn)
     return Compilation(image, diagnostics)
 
 
@@ -214,9 +216,9 @@ def _deep() -> Iterator[None]:
             gc.enable()
 
 
-def _image(checker: Checker, progress: Progress) -> Image:
+def _image(checker: Checker, progress: Progress, drawn: bool) -> Image:
     placed = place(checker)
-    program = Program(placed)
+    program = Program(placed, drawn)
     program.held = held = InitialReferences(program, checker, placed.initial)
     held.in_frames()
     bodies = tuple(BodyLowering(program, checker, pou).body()

@@ -19,6 +19,7 @@ from fbvm.code.pictures import sfc_picture
 from fbvm.code.places import Place, Places, detail
 from fbvm.code.pointers import PointerLowering
 from fbvm.code.pou_calls import CallLowering
+from fbvm.code.st_rungs import Mark, NoRung, st_rung
 from fbvm.code.values import DEEPEST, ValueLowering, is_aggregate
 from fbvm.code.weights import counted
 from fbvm.syntax import ladder, sfc, tree
@@ -47,6 +48,10 @@ class BodyLowering:
         self.value = self.values.value
         self.entry_site = self.site(pou.tree.name)
         self.unseen = hides_inside(pou.source.text, pou.tree.start)
+        self.marked: dict[tree.Expr, list[Mark]] = {}
+        """What is seen of expressions that are drawn as steps of a rung."""
+        self._rungs: dict[int, int] = {}
+        """Statements that are drawn as rungs, and the numbers of those."""
         self._temporaries = 0
         self._heights: dict[int, tuple[int, Node]] = {}
 
@@ -55,10 +60,26 @@ class BodyLowering:
         count = counted(self.pou.tree.body)
         self.out.append(("charge", count + 1, self.entry_site))
         self._entry()
+        if self.program.drawn and not self.pou.source.library and not self.unseen:
+            self._draw(self.pou.tree.body)
         self.block_into(self.pou.tree.body)
         self.out += self.pointers.released()
         size = self.pou.type.size if self.pou.type is not None else 0
         return Body(self.pou.name, self.pou.kind, tuple(self.out), size, count)
+
+    def _draw(self, statements: tree.Block) -> None:
+        """Note what is seen of statements of Structured Text where they are drawn as rungs."""
+        own = tree.Empty | ladder.Ladder | sfc.Sfc
+        for number, statement in enumerate((one for one in statements if not isinstance(one, own)), 1):
+            site, steps, said = self.site(statement), (), ""  # type: int, tuple[tuple[int, str, str, tuple[str, ...]], ...], str
+            try:
+                rung = st_rung(statement, self.facts, self.pou.source.text)
+                steps = tuple((self.site(part or statement), *step) for part, step in rung.steps)
+                self.marked |= rung.marks
+            except NoRung as reason:
+                said = f"in line {self.pou.source.place(statement.start)[0]} is not drawn: {reason}"
+            self._rungs[site] = number
+            self.program.rungs.append(RungPicture(self.pou.number, site, number, said, steps))
 
     def _entry(self) -> None:
         """Initial values of the frame, and edges of inputs."""
@@ -165,7 +186,8 @@ class BodyLowering:
             site = self.site(statement)
             own = isinstance(statement, ladder.Ladder | ladder.Rung | sfc.Sfc)  # these say themselves what there is to see
             if statement.end > statement.start and not own and not self.unseen:
-                self.out.append(("observe", "statement", site, None))
+                rung = self._rungs.get(site)
+                self.out.append(("observe", "statement" if rung is None else "rung", site, rung))
             mark = len(self.out)
             _LOWER[type(statement)](self, statement, site)
             if self.reads:

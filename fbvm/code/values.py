@@ -28,6 +28,7 @@ from fbvm.syntax import ladder, tree
 
 if TYPE_CHECKING:
     from fbvm.code.lower import BodyLowering
+    from fbvm.code.st_rungs import Mark
 
 DEEPEST = 40
 """Operations nested deeper than this are cut by a temporary, so that no back end meets deep nesting."""
@@ -60,6 +61,19 @@ class ValueLowering:
 
     def value(self, expr: tree.Expr, want: Type | None = None) -> Node:
         """The value of `expr`, converted to `want` if that is given."""
+        if self.body.marked and (marks := self.body.marked.get(expr)):
+            return self._seen(expr, marks)
+        return self._value(expr, want)
+
+    def _seen(self, expr: tree.Expr, marks: list[Mark]) -> Node:
+        """A value of BOOL that is shown in a rung, for those who look."""
+        here = self.body.keep(self._value(expr, BOOL), always=True)
+        for mark in marks:
+            shown: Node = ("not", "b", here) if mark.negated else here
+            self.body.out.append(("observe", "contact", self.body.site(expr), (mark.step, shown)))
+        return here
+
+    def _value(self, expr: tree.Expr, want: Type | None) -> Node:
         kind = self.facts.types[expr]
         target = base(want) if want is not None else base(kind)
         known = self.facts.constants.get(expr)

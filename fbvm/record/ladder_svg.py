@@ -39,7 +39,7 @@ def ladder_svg(rungs: Sequence[Drawn]) -> str:
         parts.append(_text(0, row, head, "head"))
         parts += [*_lines(surface, row + 1), *_texts(surface, row + 1)]
         columns = max(columns, len(head), *(x + 1 for x, _ in places))
-        row += max(y for _, y in places) + 3
+        row += max((y for _, y in places), default=-1) + 3
     width, height = (columns + 2) * CELL_WIDTH, row * CELL_HEIGHT
     return (f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
             f'viewBox="{-CELL_WIDTH} 0 {width} {height}">\n<style>{_STYLE}</style>\n'

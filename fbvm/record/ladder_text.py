@@ -19,4 +19,6 @@ def ladder_text(picture: RungPicture, width: int = 80, sight: Sight = AT_REST) -
 def ladder_surface(picture: RungPicture, width: int = 80, sight: Sight = AT_REST) -> tuple[str, Surface]:
     """The headline of a rung and its drawing."""
     head = " ".join(filter(None, (f"RUNG {picture.number}", picture.comment)))
+    if not picture.steps:
+        return head, Surface()
     return head, rung_surface([step[1:] for step in picture.steps], width, sight)

@@ -28,8 +28,7 @@ class Power:
         self.executed: list[Executed] = []
         self._wanted = wanted
         self._rungs = {rung.site: rung for rung in rungs}
-        self._steps = {place: (rung.site, step) for rung in rungs
-                       for step, (place, _, _, _) in enumerate(rung.steps)}  # fmt: skip
+        self._owners = {place: rung.site for rung in rungs for place, _, _, _ in rung.steps}
         self._latest: dict[tuple[int, int], Executed] = {}
 
     def phase(self, plc: Scanned, phase: Phase) -> None:
@@ -45,7 +44,7 @@ class Power:
             made = Executed(plc.scans, event.frame.base, self._rungs[event.site])
             self._latest[event.frame.base, event.site] = made
             self.executed.append(made)
-        elif isinstance(event, Contact) and event.site in self._steps:
-            rung, step = self._steps[event.site]
-            if here := self._latest.get((event.frame.base, rung)):
-                here.states.setdefault(step, []).append(event.value)
+        elif isinstance(event, Contact) and isinstance(event.element, int):
+            here = self._latest.get((event.frame.base, self._owners.get(event.site, -1)))
+            if here is not None:
+                here.states.setdefault(event.element, []).append(event.value)

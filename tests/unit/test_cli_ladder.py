@@ -52,10 +52,27 @@ def test_a_run_draws_the_power_of_some_scans(file: Path) -> None:
     assert "┣┳━━┫ ┣━━━┳" in second
 
 
+TEXT = """PROGRAM Main
+VAR Start AT CIO 0.00 : BOOL; Motor AT CIO 100.00 : BOOL; n : INT; END_VAR
+Motor := Start OR Motor;
+n := n + 1;
+END_PROGRAM
+"""
+
+
+def test_structured_text_is_drawn_and_what_is_no_rung_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "text.st"
+    path.write_text(TEXT, encoding="utf-8")
+    drawn = CliRunner().invoke(main, ["ladder", str(path)]).output
+    assert "├┬──┤ ├───┬" in drawn and "RUNG 2 in line 4 is not drawn: an assignment that is not of BOOL" in drawn
+    run = CliRunner().invoke(main, ["run", str(path), "--scans", "5", "--set", "Main.Start=TRUE@20ms", "--ladder", "2"]).output
+    assert "┣┳━━┫ ┣━━━┳" in run
+
+
 @pytest.mark.parametrize(("arguments", "said"), [
-    (["ladder"], "there is no LADDER"), (["run", "--scans", "1", "--ladder", "x"], "'x' names no scans")])
+    (["ladder"], "there is nothing to draw"), (["run", "--scans", "1", "--ladder", "x"], "'x' names no scans")])
 def test_mistakes_of_usage(tmp_path: Path, arguments: list[str], said: str) -> None:
     path = tmp_path / "empty.st"
-    path.write_text("PROGRAM Main VAR a : BOOL; END_VAR a := TRUE; END_PROGRAM", encoding="utf-8")
+    path.write_text("PROGRAM Main END_PROGRAM", encoding="utf-8")
     result = CliRunner().invoke(main, [*arguments, str(path)])
     assert result.exit_code == 2 and said in result.output

@@ -1,0 +1,191 @@
+"""Statements of Structured Text as rungs: boolean assignments and calls of blocks as contacts, coils and boxes.
+
+Nothing is executed differently: a rung says which parts of a statement are drawn as which steps, so that those who lower
+it can observe the values that these parts have.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fbvm.base.types import BOOL
+from fbvm.check.facts import Facts, PouCall
+from fbvm.syntax import tree
+from fbvm.syntax.rung_diagram import Box, Coil, Contact, Parallel, Pin, Point, Series, StepText, Undrawable, diagram
+from fbvm.syntax.rung_steps import steps
+
+COMPARISONS = {"=": "<>", "<>": "=", "<": ">=", ">=": "<", ">": "<=", "<=": ">"}
+"""Comparisons and their opposites."""
+MOST_CONTACTS = 60
+"""Of one rung; XOR doubles them."""
+_CHAINS = {"AND": False, "AND_THEN": False, "OR": True, "OR_ELSE": True}
+"""Operators of chains of contacts: whether they are branches."""
+_LEAVES = (tree.NameRef, tree.Member, tree.Index, tree.Direct, tree.Part, tree.Literal, tree.Deref)
+_NAMES = {"If": "IF", "For": "FOR", "While": "WHILE", "Repeat": "REPEAT", "Case": "CASE", "Return": "RETURN", "Exit": "EXIT",
+          "Assign": "this assignment", "CallStatement": "this call"}
+
+
+class NoRung(Exception):
+    """A statement is no rung; the argument says what is not drawn."""
+
+
+class Mark(NamedTuple):
+    """An expression is seen at a step: its value, or the opposite."""
+
+    step: int
+    negated: bool
+
+
+class StRung(NamedTuple):
+    """The steps of a statement, each with the part of it that it shows, and what is seen of which expression."""
+
+    steps: list[tuple[tree.Node | None, StepText]]
+    marks: dict[tree.Expr, list[Mark]]
+
+
+def st_rung(statement: tree.Statement, facts: Facts, text: str) -> StRung:
+    """The rung of a statement of `text`.  Raises NoRung."""
+    reader = _Reader(facts, text)
+    try:
+        made = reader.rung(statement)
+        diagram([step for _, step in made.steps])
+    except Undrawable:
+        raise NoRung(_NAMES.get(type(statement).__name__, "this statement")) from None
+    return made
+
+
+class _Reader:
+    def __init__(self, facts: Facts, text: str) -> None:
+        self.facts, self.text = facts, text
+        self.shown: dict[int, tuple[tree.Expr, bool]] = {}
+        """What contacts, coils and boxes show, and whether its opposite."""
+
+    def rung(self, statement: tree.Statement) -> StRung:
+        bar = Point(Series(), [self._point(statement)])
+        coded = steps(bar)
+        marks: dict[tree.Expr, list[Mark]] = {}
+        for number, step in enumerate(coded):
+            shown = self.shown.get(id(step.drawn))
+            if shown:
+                marks.setdefault(shown[0], []).append(Mark(number, shown[1]))
+        return StRung([(shown[0] if (shown := self.shown.get(id(step.drawn))) else None, step[:3]) for step in coded], marks)
+
+    def _point(self, statement: tree.Statement) -> Point | Box:
+        if isinstance(statement, tree.Assign):
+            return self._assignment(statement)
+        if isinstance(statement, tree.If):
+            return self._setting(statement)
+        if isinstance(statement, tree.CallStatement) and isinstance(statement.call, tree.Call):
+            return self._call(statement.call)
+        raise NoRung(_NAMES.get(type(statement).__name__, "this statement"))
+
+    # --- statements -------------------------------------------------------------------------------------------------
+
+    def _assignment(self, node: tree.Assign) -> Point:
+        marks = {":=": " ", "S=": "S", "R=": "R"}
+        if node.op not in marks or any(self.facts.types.get(part) != BOOL for part in (*node.targets, node.value)):
+            raise NoRung("an assignment that is not of BOOL")
+        return Point(self.condition(node.value), [self._coil(marks[node.op], target, node.value) for target in node.targets])
+
+    def _coil(self, mark: str, target: tree.Expr, power: tree.Expr) -> Coil:
+        coil = Coil(-1, mark, (self.said(target),))
+        self.shown[id(coil)] = power, False
+        return coil
+
+    def _setting(self, node: tree.If) -> Point:
+        """IF c THEN x := TRUE; y := FALSE; END_IF."""
+        (condition, body), *more = node.branches
+        outs: list[Coil | Box | Point] = []
+        for inner in body:
+            if not isinstance(inner, tree.Assign) or inner.op != ":=" or not isinstance(inner.value, tree.Literal) or \
+                    self.facts.types.get(inner.value) != BOOL:
+                raise NoRung("an IF that does more than setting and resetting")
+            outs += [self._coil("S" if inner.value.value else "R", target, condition) for target in inner.targets]
+        if more or node.otherwise or not outs:
+            raise NoRung("an IF with ELSE" if outs else "an empty IF")
+        return Point(self.condition(condition), outs)
+
+    def _call(self, call: tree.Call) -> Point | Box:
+        called = self.facts.calls.get(call)
+        if not isinstance(called, PouCall) or called.instance is None or called.pou.kind != "FUNCTION_BLOCK":
+            raise NoRung("a call that is none of a function block")
+        given = [(variable.name, value) for variable, value in called.inputs]
+        given += [("EN", called.enable)] if called.enable is not None else []
+        entries: list[tuple[str, tree.Expr, Series]] = []
+        pins: list[Pin] = []
+        for name, value in sorted(given, key=lambda pair: pair[1].start):
+            if self.facts.types.get(value) == BOOL and not isinstance(value, tree.Literal) and (path := self._path(value)):
+                entries.append((name, value, path))
+            else:
+                pins.append(Pin(name, self.said(value)))
+        pins += [Pin(variable.name, self.said(value)) for variable, value in called.in_outs]
+        pins += [Pin(variable.name, self.said(value), True) for variable, value, _ in called.outputs]
+        box = Box(-1, called.pou.name, (), tuple(path for _, _, path in entries[1:]), False, self.said(called.instance),
+                  tuple(pins), tuple(name for name, _, _ in entries))
+        if not entries:
+            return box
+        self.shown[id(box)] = entries[0][1], False
+        return Point(entries[0][2], [box])
+
+    def _path(self, value: tree.Expr) -> Series | None:
+        try:
+            return self.condition(value)
+        except NoRung:
+            return None
+
+    # --- conditions -------------------------------------------------------------------------------------------------
+
+    def condition(self, expr: tree.Expr) -> Series:
+        """An expression of BOOL as contacts."""
+        made = self._contacts(expr, False)
+        if _count(made) > MOST_CONTACTS:
+            raise NoRung(f"an expression of more than {MOST_CONTACTS} contacts")
+        return made
+
+    def _contacts(self, expr: tree.Expr, negated: bool) -> Series:
+        if self.facts.types.get(expr) != BOOL:
+            raise NoRung("an expression that is not of BOOL")
+        if isinstance(expr, tree.Unary) and expr.op == "NOT":
+            return self._contacts(expr.operand, not negated)
+        if isinstance(expr, tree.Binary):
+            return self._binary(expr, negated)
+        if not isinstance(expr, _LEAVES):
+            raise NoRung("a call in an expression" if isinstance(expr, tree.Call) else "this expression")
+        return self._leaf(expr, "/" if negated else " ", (self.said(expr),), negated)
+
+    def _binary(self, expr: tree.Binary, negated: bool) -> Series:
+        if expr.op in _CHAINS:
+            left, right = self._contacts(expr.left, negated), self._contacts(expr.right, negated)
+            return _branches(left, right) if _CHAINS[expr.op] != negated else Series([*left.parts, *right.parts])
+        of_bools = self.facts.types.get(expr.left) == BOOL and self.facts.types.get(expr.right) == BOOL
+        if expr.op in ("XOR", "=", "<>") and of_bools:
+            unequal = (expr.op == "=") == negated
+            both = [Series([*self._contacts(expr.left, first).parts, *self._contacts(expr.right, first != unequal).parts])
+                    for first in (False, True)]
+            return _branches(*both)
+        if expr.op not in COMPARISONS:
+            raise NoRung("this expression")
+        mark = COMPARISONS[expr.op] if negated else expr.op
+        return self._leaf(expr, mark, (self.said(expr.left), self.said(expr.right)), negated)
+
+    def _leaf(self, expr: tree.Expr, mark: str, operands: tuple[str, ...], negated: bool) -> Series:
+        contact = Contact(-1, mark, operands)
+        self.shown[id(contact)] = expr, negated
+        return Series([contact])
+
+    def said(self, expr: tree.Node) -> str:
+        """An expression as it is written, on one line."""
+        return " ".join(self.text[expr.start:expr.end].split())
+
+
+def _branches(left: Series, right: Series) -> Series:
+    """Two paths as branches; one that is nothing but branches is taken apart."""
+    made: list[Series] = []
+    for path in (left, right):
+        first = path.parts[0]
+        made += first.branches if len(path.parts) == 1 and isinstance(first, Parallel) else [path]
+    return Series([Parallel(made)])
+
+
+def _count(path: Series) -> int:
+    return sum(sum(map(_count, part.branches)) if isinstance(part, Parallel) else 1 for part in path.parts)
