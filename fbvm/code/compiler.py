@@ -13,6 +13,7 @@ from pathlib import Path
 from fbvm.base.areas import Area
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.dialects import dialect as named_dialect
+from fbvm.base.repeats import gathered
 from fbvm.base.types import Field, StructType, Type, fold
 from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, Report, Start, TaskFact
@@ -173,7 +174,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         if lint and not errors(report.diagnostics):
             look_for_slips(checker, program)
         found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not damage.explains(d)]
-        diagnostics = sorted(silence.heard(found, wanted), key=Diagnostic.order)
+        diagnostics = gathered(sorted(silence.heard(found, wanted), key=Diagnostic.order))
         image = None if errors(diagnostics) else _image(checker, progress, drawn)
     return Compilation(image, diagnostics)
 

@@ -1,0 +1,42 @@
+"""One message for a name that is unknown in many places: it has one cause."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fbvm.base.diagnostics import Diagnostic
+
+NAMES = frozenset(("S0201", "S0204", "S0401"))
+"""Codes of names that nobody declares."""
+FEW = 2
+"""So often a name of one source is complained about in each place."""
+LISTED = 4
+"""How many lines are named."""
+
+
+def gathered(found: Sequence[Diagnostic]) -> list[Diagnostic]:
+    """The messages, in their order; of those about one unknown name of a source the first, which names the other lines."""
+    places: dict[tuple[str, str, str], list[Diagnostic]] = defaultdict(list)
+    for message in found:
+        if message.code in NAMES:
+            places[message.code, message.source.name, message.message].append(message)
+    kept: list[Diagnostic] = []
+    for message in found:
+        same = places.get((message.code, message.source.name, message.message), [])
+        if len(same) <= FEW:
+            kept.append(message)
+        elif message is same[0]:
+            kept.append(replace(message, hint=_with_lines(message.hint, same)))
+    return kept
+
+
+def _with_lines(hint: str, same: Sequence[Diagnostic]) -> str:
+    lines = sorted({each.source.place(each.start)[0] for each in same} - {same[0].source.place(same[0].start)[0]})
+    if not lines:
+        return hint
+    shown = ", ".join(map(str, lines[:LISTED]))
+    more = f" and {len(lines) - LISTED} more" if len(lines) > LISTED else ""
+    also = f"the same in line{'s' if len(lines) > 1 else ''} {shown}{more}"
+    return f"{hint}; {also}" if hint else also
