@@ -47,6 +47,12 @@ class Graph:
         """Transitions to which a jump leads."""
         self.above: dict[Node, Node | None] = {}
         self._dominate()
+        self.below: dict[Node, list[Node]] = {node: [] for node in self.order}
+        """Nodes where ways meet again that have parted at a node, in order."""
+        for node in self.order:
+            above = self.above[node]
+            if above is not None and len(self.before[node]) > 1:
+                self.below[above].append(node)
 
     def is_jump(self, node: Node, follower: Node) -> bool:
         """Whether a link is drawn as a jump: it leads back, or to what is drawn apart."""
@@ -88,9 +94,10 @@ class Graph:
                 if node not in done:
                     done.add(node)
                     finished.append(node)
+        mine = set(finished)
         for node in finished:
             for follower in self.following[node]:
-                if follower in done and follower not in finished and follower not in open_:
+                if follower in done and follower not in mine:
                     self._back.add((node, follower))
         return finished[::-1]
 
@@ -111,7 +118,3 @@ class Graph:
                         other = self.above[other]
             self.above[node] = above
             depth[node] = depth[above] + 1 if above is not None else 0
-
-    def below(self, node: Node) -> list[Node]:
-        """Nodes where ways meet again that have parted at a node, in order."""
-        return [other for other in self.order if self.above[other] == node and len(self.before[other]) > 1]

@@ -15,6 +15,8 @@ Paint = Callable[[Surface, int, int], None]
 """Draws something on a surface, from a column and a row on."""
 GAP = 3
 """Columns between branches."""
+NAMES = 30
+"""Columns of a line of names behind an arrow."""
 WING = 2
 """Columns that a double line goes on beyond its branches."""
 
@@ -36,13 +38,20 @@ class Piece:
     height: int
     entry: int
     paint: list[Paint] = field(default_factory=list)
+    parts: list[tuple[Piece, int, int]] = field(default_factory=list)
+    """Other pieces in it, and where."""
     ends: list[End] = field(default_factory=list)
     thick: bool = False
     """Whether power goes into it."""
 
     def draw(self, surface: Surface, x: int, y: int) -> None:
-        for paint in self.paint:
-            paint(surface, x, y)
+        """Paint it, and all that is in it, however deep."""
+        left = [(self, x, y)]
+        while left:
+            piece, x, y = left.pop()
+            for paint in piece.paint:
+                paint(surface, x, y)
+            left += [(part, x + dx, y + dy) for part, dx, dy in piece.parts]
 
     def line_down(self, x: int, first: int, last: int, thick: bool = False) -> None:
         self.paint.append(lambda s, dx, dy: s.down(x + dx, first + dy, last + dy, thick))
@@ -56,7 +65,7 @@ class Piece:
 
     def place(self, other: Piece, x: int, y: int) -> None:
         """Put another piece into this one."""
-        self.paint.append(lambda s, dx, dy: other.draw(s, x + dx, y + dy))
+        self.parts.append((other, x, y))
         self.width = max(self.width, x + other.width)
         self.height = max(self.height, y + other.height)
 
@@ -128,11 +137,13 @@ def met(piece: Piece, name: str) -> Piece:
     return made
 
 
-def jump(label: str, thick: bool) -> Piece:
-    """An arrow with the name of a step."""
+def jump(labels: Sequence[str], thick: bool) -> Piece:
+    """An arrow with the names of steps."""
     piece = Piece(1, 1, 0, thick=thick)
     piece.line_across(0, 1, 0, thick)
-    piece.text(1, 0, f"► {label}")
+    for row, line in enumerate(wrap(", ".join(labels), NAMES)):
+        piece.text(1, row, f"{' ' if row else '►'} {line}")
+        piece.height = row + 1
     return piece
 
 

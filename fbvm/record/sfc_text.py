@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import groupby
 
 from fbvm.code.image import SfcPicture
 from fbvm.record import sfc_pieces as pieces
@@ -100,19 +101,24 @@ class _Drawing:
     def _piece(self, node: Node) -> Piece:
         """A node with all that stands below it."""
         graph = self.graph
-        children = []
-        for follower in graph.following[node]:
-            thick = self._went(node, follower)
-            if graph.is_jump(node, follower):
-                children.append(pieces.jump(self._label(follower), thick))
-            elif len(graph.before[follower]) == 1:
-                child = self._pieces[follower]
-                child.thick = thick
-                children.append(child)
-            else:
-                children.append(pieces.passing(follower, thick))
+        children: list[Piece] = []
+        for jumps, followers in groupby(graph.following[node], lambda follower: graph.is_jump(node, follower)):
+            group = list(followers)
+            if jumps and not node.is_step:
+                children.append(pieces.jump([self._label(one) for one in group], self._went(node, group[0])))
+                continue
+            for follower in group:
+                thick = self._went(node, follower)
+                if jumps:
+                    children.append(pieces.jump([self._label(follower)], thick))
+                elif len(graph.before[follower]) == 1:
+                    child = self._pieces[follower]
+                    child.thick = thick
+                    children.append(child)
+                else:
+                    children.append(pieces.passing(follower, thick))
         made = pieces.over(self._own(node), children, double=not node.is_step)
-        for merged in graph.below(node):
+        for merged in graph.below[node]:
             if any(end.to == merged for end in made.ends):
                 made = pieces.join(made, merged, self._pieces[merged], not merged.is_step, self._label(merged))
         return made

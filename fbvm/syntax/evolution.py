@@ -42,7 +42,7 @@ class Evolution:
         self.at = self.start = self.end = 0
         self.shown: dict[str, str] = {}
         """Names of actions as they are written first."""
-        self.kept: list[VarDecl] = []
+        self.kept: dict[str, VarDecl] = {}
         self.temporaries: dict[str, VarDecl] = {}
 
     def sfc(self, start: int, end: int, sound: bool) -> Sfc:
@@ -55,7 +55,7 @@ class Evolution:
             *(statement for name, action in self.actions.items() if name in used for statement in self._run(action)))
         sections = (self._section("VAR", [self._flags(step.name, STEP_FLAGS) for step in self.steps], "step"),
                     self._section("VAR", [self._flags(action.name, ACTION_FLAGS) for action in self.actions.values()], "action"),
-                    self._section("VAR", self.kept), self._section("VAR_TEMP", list(self.temporaries.values())))
+                    self._section("VAR", list(self.kept.values())), self._section("VAR_TEMP", list(self.temporaries.values())))
         return Sfc(start, end, tuple(self.steps), tuple(self.transitions), body, sections)
 
     def _used(self) -> dict[str, Used]:
@@ -199,8 +199,8 @@ class Evolution:
         return VarDecl(name.start, name.end, (name,), None, tree.NamedType(name.start, name.end, kind), None)
 
     def _keep(self, name: str, kind: str) -> NameRef:
-        if all(declared.names[0].text != name for declared in self.kept):
-            self.kept.append(self._declared(Name(self.at, self.at, name), kind))
+        if name not in self.kept:
+            self.kept[name] = self._declared(Name(self.at, self.at, name), kind)
         return self._name(name)
 
     def _temporary(self, name: str) -> NameRef:
