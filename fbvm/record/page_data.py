@@ -10,7 +10,8 @@ A value is written when it changes.  Numbers of signals, statements and instance
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 from fbvm.base.areas import FLAG_AREAS
@@ -21,6 +22,8 @@ from fbvm.record.inside import Contact, Event, Frame, Passing, Statement, Write
 from fbvm.record.ladder_text import ladder_text
 from fbvm.record.power import Power
 from fbvm.record.recorder import Signal, signals_at
+from fbvm.record.sfc_seen import Called, Evolutions
+from fbvm.record.sfc_text import sfc_text
 from fbvm.record.trace import Moment, Trace
 from fbvm.record.trace_format import PHASES
 from fbvm.record.trace_signals import chosen_signals
@@ -57,6 +60,7 @@ class Collector:
         self.pictures: list[str] = []
         self.ladder: dict[int, list[list[int]]] = {}
         self._power = Power(trace.rungs, lambda scan: True)
+        self._evolutions = Evolutions(trace.charts, lambda scan: True)
         self._reader = Reader()
         self._known: list[str] = []
         self._ended: list[str] = []
@@ -84,6 +88,7 @@ class Collector:
         if moved or phase is Phase.INPUTS:
             self._add(moment.scans, [-1 - PHASES.index(phase), -1, *moved])
         self._power.phase(moment, phase)
+        self._evolutions.phase(moment, phase)
         if phase is Phase.PROGRAM:
             self._draw(moment.scans)
         if phase is Phase.REFRESH:
@@ -92,6 +97,7 @@ class Collector:
     def event(self, moment: Moment, event: Event) -> None:
         """Notes a statement, and what it writes."""
         self._power.event(moment, event)
+        self._evolutions.event(moment, event)
         if isinstance(event, Passing):
             self.passed += [(moment.scans, passed) for passed in self._reader.read(event.now_ns, event.happening)]
         elif isinstance(event, Contact):
@@ -107,16 +113,27 @@ class Collector:
             self._row += self._moved(self._written(event), moment)
 
     def _draw(self, scan: int) -> None:
-        """Draws the rungs of a scan with their power; what looked the same before is drawn once."""
+        """Draws the rungs and charts of a scan as they were seen; what looked the same before is drawn once."""
         for made in self._power.executed:
             key = made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items())
-            if key not in self.drawings and len(self.pictures) < MOST_PICTURES:
-                self.drawings[key] = len(self.pictures)
-                self.pictures.append("\n".join(ladder_text(made.picture, RUNG_WIDTH, Sight(made.states))))
-            if key in self.drawings:
-                instance = self.instances.setdefault(self._trace.names.instance(made.base), len(self.instances))
-                self.ladder.setdefault(scan, []).append([instance, self.drawings[key]])
+            self._picture(scan, made.base, key, partial(ladder_text, made.picture, RUNG_WIDTH, Sight(made.states)))
         self._power.executed.clear()
+        for called in self._evolutions.called:
+            key = called.picture.site, tuple(sorted(called.tested.items())), called.active
+            self._picture(scan, called.base, key, partial(self._chart, called))
+        self._evolutions.called.clear()
+
+    def _chart(self, called: Called) -> list[str]:
+        name, kind = self._trace.bodies[called.picture.body]
+        return [f"{kind} {name}", *sfc_text(called.picture, RUNG_WIDTH, called.sighted)]
+
+    def _picture(self, scan: int, base: int, key: tuple[object, ...], lines: Callable[[], list[str]]) -> None:
+        if key not in self.drawings and len(self.pictures) < MOST_PICTURES:
+            self.drawings[key] = len(self.pictures)
+            self.pictures.append("\n".join(lines()))
+        if key in self.drawings:
+            instance = self.instances.setdefault(self._trace.names.instance(base), len(self.instances))
+            self.ladder.setdefault(scan, []).append([instance, self.drawings[key]])
 
     def _open(self, moment: Moment, site: int, frame: Frame) -> None:
         self._row = [site, self._instance(frame)]
@@ -215,7 +232,7 @@ def _in_order(trace: Trace) -> list[Signal]:
         owner, *rest = signal.place.name.split(".")
         return 1 if signal.place.area else len(rest) - 1 if owner in programs else 2
 
-    return sorted(chosen_signals(trace, ()), key=rank)
+    return sorted((signal for signal in chosen_signals(trace, ()) if not signal.place.unwritten), key=rank)
 
 
 def _as_data(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from typing import Any, BinaryIO, Protocol
 
 from fbvm.base.areas import Mailbox
 from fbvm.base.memory import Memory
-from fbvm.code.image import Layout, RungPicture, Site
+from fbvm.code.image import Layout, RungPicture, SfcPicture, Site
 from fbvm.plc import Phase
 from fbvm.record import symbols
 from fbvm.record.inside import Began, Contact, Ended, Event, Frame, Passing, Read, Statement, Write
@@ -113,6 +113,7 @@ class Trace:
             self.outer = [int(number) for number in head["outer"]]
             self.bodies = [(str(name), str(kind)) for name, kind in head["bodies"]]
             self.rungs = tuple(_rung(*row) for row in head["rungs"])
+            self.charts = tuple(_chart(*row) for row in head.get("charts", ()))
             self.rung_sites = frozenset(rung.site for rung in self.rungs)
             self.described = dict(head["described"])
             self.meanings: dict[str, dict[int, str]] = {
@@ -293,6 +294,15 @@ def _rung(body: int, site: int, number: int, comment: str, steps: list[Any]) -> 
     return RungPicture(int(body), int(site), int(number), str(comment),
                        tuple((int(place), str(prefix), str(mnemonic), tuple(map(str, operands)))
                              for place, prefix, mnemonic, operands in steps))  # fmt: skip
+
+
+def _chart(body: int, site: int, steps: list[Any], transitions: list[Any]) -> SfcPicture:
+    return SfcPicture(
+        int(body), int(site),
+        tuple((str(name), bool(initial), int(flag), tuple((str(a), str(b), str(c)) for a, b, c in rows))
+              for name, initial, flag, rows in steps),
+        tuple((int(place), str(name), int(priority), tuple(map(int, sources)), tuple(map(int, targets)), str(condition))
+              for place, name, priority, sources, targets, condition in transitions))  # fmt: skip
 
 
 def _passing(text: bytes) -> Passing:

@@ -89,6 +89,17 @@ def test_where_power_flows_in_rungs() -> None:
     assert flows == {"2": [(3, "0"), (4, "1"), (5, "0")], "3": [(3, "1"), (4, "1"), (5, "1")]}
 
 
+def test_charts_are_drawn_as_they_were_in_each_scan() -> None:
+    text = """PROGRAM Main VAR x : BOOL; END_VAR INITIAL_STEP a: END_STEP
+        TRANSITION FROM a TO b := TRUE; END_TRANSITION STEP b: x(N); END_STEP END_PROGRAM"""
+    data = page_data(Trace(io.BytesIO(record(Plc(image(text)), 4, Depth.STATEMENTS))))
+    drawn = {scan: data["pictures"][number].splitlines() for scan, ((_, number),) in data["ladder"].items()}
+    assert {lines[0] for lines in drawn.values()} == {"PROGRAM Main"}
+    assert not [signal["name"] for signal in data["signals"] if "$" in signal["name"]]
+    assert ["● b" in "\n".join(drawn[scan]) for scan in "0123"] == [False, True, True, True]
+    assert "→ TRUE" in "\n".join(drawn["1"]) and drawn["2"] == drawn["3"] and len(data["pictures"]) == 3
+
+
 def test_names_and_scans_choose() -> None:
     data = page_data(traced(100), ["Main.Pump", "D200"], range(10, 20))
     assert [signal["name"] for signal in data["signals"]] == ["Main.Pump", "D200"]

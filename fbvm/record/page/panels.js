@@ -38,14 +38,14 @@ class ScanPanel {
     }
   }
 
-  /** The rungs of the scan as drawings; what has power is heavy and coloured. */
+  /** The rungs and charts of the scan as drawings; what has power is heavy and coloured. */
   rungs() {
     const shown = this.state.power ? this.run.data.ladder[this.state.scan] ?? [] : [];
     return shown.map(([instance, number]) => {
       const picture = element("pre");
       const path = this.run.data.instances[instance], [head, ...lines] = this.run.data.pictures[number].split("\n");
       picture.append(element("b", "", head), element("span", "dim", path ? `  in ${path}\n` : "\n"));
-      const parts = lines.join("\n").split(/([━┃┏┓┗┛┣┫┳┻╋┡┢┩┪┞┟┦┧┠┨┝┥┯┷┰┸┿╂┚┙┎┒┖╺╸╻╹]+)/);
+      const parts = lines.join("\n").split(/([━┃┏┓┗┛┣┫┳┻╋┡┢┩┪┞┟┦┧┠┨┝┥┯┷┰┸┿╂┚┙┎┒┖╺╸╻╹●]+)/);
       picture.append(...parts.map((part, at) => at % 2 ? element("span", "power", part) : part));
       return picture;
     });
