@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from fbvm.base.types import ANYTHING, AnyType, StringType, Type, base, common, families, fold, string
+from fbvm.base.types import ANYTHING, AnyType, StringType, SubrangeType, Type, base, common, families, fold, string
 from fbvm.check.anything import MEMBERS
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Pou, holds_block
 from fbvm.check.fitting import same
@@ -155,7 +155,14 @@ class Generics:
 
 
 def _joined(met: Type | None, kind: Type, exact: bool) -> Type | None:
-    """The type in which another argument meets those before it; None if there is none."""
+    """The type in which another argument meets those before it; None if there is none.
+
+    Of a subrange an input has the base; an in-out makes it what all have."""
+    if exact and isinstance(kind, SubrangeType):
+        return kind if met in (None, kind, kind.base) or met is UNTYPED_INT else None
+    kind = kind if exact else base(kind)
+    if isinstance(met, SubrangeType) and met.base == kind:
+        return met
     if met is None or met == kind:
         return kind if exact or not isinstance(kind, StringType) else string(max(kind.capacity, RESULT_STRING), kind.wide)
     if kind is UNTYPED_REAL:
