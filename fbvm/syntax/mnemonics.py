@@ -196,13 +196,15 @@ def _tokens(text: str, at: int, end: int, more: bool) -> Iterator[Token]:
         yield token
         yield from filter(None, (take("RUNG_NUMBER"), take("RUNG_COMMENT")))
     else:
-        yield from filter(None, (take("STEP_NUMBER"), take("PREFIX")))
+        begin, head = at, [token for token in (take("STEP_NUMBER"), take("PREFIX")) if token]
         known = instruction_set().pattern.match(text, at, end)
         if known:
-            yield Token("MNEMONIC", known[0], at, known.end())
+            yield from (*head, Token("MNEMONIC", known[0], at, known.end()))
             at = known.end()
-        elif not more and (token := take("MNEMONIC")):
-            yield token
+        elif more:
+            at = begin
+        else:
+            yield from filter(None, (*head, take("MNEMONIC")))
         if token := take("CODE"):
             yield token
         while token := take("PIN") or take("OPERAND"):

@@ -46,6 +46,8 @@ class Rungs:
         self.saved: list[Expr] = []
         self.used: set[str] = set()
         """Conditions of this rung that an output has used, by the names under which they are kept."""
+        self.branches: set[str] = set()
+        """TR bits that this rung has written."""
         self.rung = 0
         """Which rung of the POU it is, whatever number was written."""
         self.step = 0
@@ -79,7 +81,7 @@ class Rungs:
                       tuple(self.temporaries.values()), tuple(self.instances), tuple(self.spans.subroutines))
 
     def _rung(self, text: RungText, number: int) -> Rung:
-        self.out, self.condition, self.saved, self.used = [], None, [], set()
+        self.out, self.condition, self.saved, self.used, self.branches = [], None, [], set(), set()
         for step, line in enumerate(text.lines):
             self.line, self.step, self.reached = line, step, {}
             try:
@@ -314,8 +316,8 @@ class Rungs:
     def _load(self) -> None:
         text = self.line.step.operands[0].upper()
         if text.startswith("TR") and text[2:].isdigit():
-            if f"${text}" not in self.temporaries:
-                raise Refused(f"nothing was written to {text} yet", f"OUT {text} comes first")
+            if text not in self.branches:
+                raise Refused(f"nothing was written to {text} in this rung", f"OUT {text} comes first")
             self.condition = self.temporary(f"${text}")
         else:
             self._join("LD", self._contact())
@@ -355,6 +357,9 @@ class Rungs:
     def _branch(self, text: str) -> None:
         if int(text[2:]) > 15:
             raise Refused(f"there is no {text}", "TR0 to TR15 are there")
+        if text in self.branches:
+            raise Refused(f"{text} is written twice in this rung", "each branch point has one of its own, TR0 to TR15")
+        self.branches.add(text)
         assert self.condition is not None
         self._settle()
         kept = self.temporary(f"${text}")
