@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 
 import pytest
 from mb_tcp_rig import ADDRESS, CYCLE_NS, Rig, image_of
@@ -38,8 +39,13 @@ END_PROGRAM
 """The call of the sheet, its four slips mended: a blank in the name, a comma, a blank in dataarea_holding, input_."""
 
 
-def test_the_call_of_the_sheet() -> None:
-    rig = Rig(text=SHEET)
+RUNG = (Path(__file__).resolve().parents[2] / "examples" / "mb_tcp_server.st").read_text(encoding="utf-8")
+"""The same call as a rung."""
+
+
+@pytest.mark.parametrize("text", [SHEET, RUNG], ids=["text", "rung"])
+def test_the_call_of_the_sheet(text: str) -> None:
+    rig = Rig(text=text)
     rig.set("dataarea_holding[1]", -2)
     rig.set("reg_datarea[0]", 0x12345678)
     rig.set("bb[3]", True)
