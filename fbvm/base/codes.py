@@ -103,6 +103,8 @@ CODES: dict[str, Code] = {
         "S0290": "variable is never used",
         "S0291": "instance is never called",
         "S0292": "function never sets its result",
+        "S0293": "input is never read",
+        "S0294": "output is never written",
         "S0390": "reals compared for equality",
         "S0391": "fraction of an integer division is lost",
         "S0490": "timer, counter or edge is called only sometimes",

@@ -36,6 +36,7 @@ def lint(checker: Checker, program: str | None) -> None:
         lint_declared.overlaps(report, pou.order)
     for pou in own:
         lint_declared.unused(report, pou, uses)
+        lint_declared.pins(report, pou, uses)
     writes.finish()
     for source, expr, code, message in facts.losses:
         if not source.library:

@@ -9,7 +9,7 @@ from fbvm.base.types import BOOL, ArrayType, Type, base
 from fbvm.check.facts import Facts, Pou, PouCall, Report, Variable, is_block
 from fbvm.check.lint_body import Body
 from fbvm.check.values import is_any
-from fbvm.syntax import tree
+from fbvm.syntax import sfc, tree
 
 OWN = ("VAR", "VAR_TEMP", "VAR_STAT")
 """Sections whose variables nobody outside can have asked for."""
@@ -38,6 +38,32 @@ def unused(report: Report, pou: Pou, uses: Uses) -> None:
             never_called(report, variable, uses)
         elif variable not in uses.variables and variable.location is None:
             report.add("S0290", variable.source, variable.node, f"{variable.name} is never used", "remove it")
+
+
+def pins(report: Report, pou: Pou, uses: Uses) -> None:
+    """Warn of inputs that a function or block does not look at, and of outputs that it never sets.
+
+    What has no statements yet is passed over, and programs, whose pins are looked at from outside."""
+    if pou.kind not in ("FUNCTION", "FUNCTION_BLOCK") or not _has_statements(pou):
+        return
+    hidden = {edge.raw: edge.hidden for edge in pou.edges}
+    for variable in pou.order:
+        if variable.name.startswith("_") or variable.name.upper() in ("EN", "ENO") or variable.location or variable.open:
+            continue
+        if variable.kind in ("VAR_INPUT", "VAR_IN_OUT") and hidden.get(variable, variable) not in uses.variables:
+            what = "input" if variable.kind == "VAR_INPUT" else "in-out"
+            report.add("S0293", variable.source, variable.node, f"nothing in {pou.name} reads the {what} {variable.name}",
+                       f"remove it, or call it _{variable.name} if callers need it")
+        elif variable.kind == "VAR_OUTPUT" and not (variable.written or variable.explicit or is_block(variable.type)):
+            report.add("S0294", variable.source, variable.node, f"nothing in {pou.name} sets the output {variable.name}",
+                       f"assign it: {variable.name} := ...")
+
+
+def _has_statements(pou: Pou) -> bool:
+    """True for a body that is more than a stub, and of which all is known."""
+    statements = [pou.tree.body, *(action.tree.body for action in pou.actions.values())]
+    return any(not isinstance(s, tree.Empty | sfc.Sfc) for body in statements for s in body) and \
+        not any(isinstance(s, sfc.Sfc) for body in statements for s in body)
 
 
 def never_called(report: Report, variable: Variable, uses: Uses) -> None:
