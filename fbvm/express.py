@@ -20,30 +20,30 @@ from fbvm.schedule import Schedule
 
 
 class Express:
-    """The quick way through the scans of one PLC.  It has to be `ready` before `once` or `many`."""
+    """The quick way through the scans of one PLC.  It has to be ready for the machine code before `once` or `many`."""
 
     def __init__(self, units: Sequence[Attached], memory: Memory, schedule: Schedule) -> None:
         self._units, self._memory, self._schedule = units, memory, schedule
-        self._machine: NativeEngine
-        self._series: Series | None = None
+        self.machine: NativeEngine | None = None
+        """Machine code for which it is ready."""
+        self._series: Series
         self.idle = False
         """The units have nothing to do as long as what they watch does not change and none of them wakes."""
         self._passed = 0
         """How many refreshes were left out since the last one."""
 
-    def ready(self, machine: NativeEngine) -> bool:
-        """Prepare scans in this machine code; False if a variable says which tasks run, or one has not run yet."""
+    def prepare(self, machine: NativeEngine) -> bool:
+        """Be ready for this machine code; False if a variable says which tasks run, or one has not run yet."""
         turns = self._schedule.turns()
         if not turns:
             return False
-        if self._series is None or machine is not self._machine:
-            self._machine, self.idle = machine, False
-            self._series = machine.series(turns, CLOCKWORK, watched(self._units, self._memory.areas))
+        self.machine, self.idle = machine, False
+        self._series = machine.series(turns, CLOCKWORK, watched(self._units, self._memory.areas))
         return True
 
     def forget(self) -> None:
-        """There are other units."""
-        self._series, self.idle = None, False
+        """There are other units, or tasks begin anew."""
+        self.machine, self.idle = None, False
 
     def refresh(self, now_ns: int, journal: Journal | None = None) -> None:
         """I/O refresh of all units."""
@@ -54,10 +54,9 @@ class Express:
 
     def once(self, step_ns: int, now_ns: int, budget: int) -> Trap | None:
         """One scan at `now_ns`, so much later than the one before."""
-        assert self._series
         point = self._series.once(step_ns, budget, min(step_ns // TENTH_MS_NS, MOST))
         if point:
-            return self._machine.trap_at(point)
+            return self._trap(point)
         if not self.idle or self._series.changed or wake_ns(self._units, NEVER) <= now_ns:
             self._exchange(self._series, now_ns)
         else:
@@ -68,20 +67,23 @@ class Express:
         """Scans that follow the one at `now_ns`, each a step later, while the units are idle; how many there were.
 
         No other begins when all together have executed `spend` statements."""
-        assert self._series
         most = min(most, (wake_ns(self._units, NEVER) - now_ns - 1) // step_ns)
         if most <= 0:
             return 0, None
         done, point = self._series.run(most, step_ns, budget, min(step_ns // TENTH_MS_NS, MOST), spend)
         if point:
             self._passed += done - 1
-            return done, self._machine.trap_at(point)
+            return done, self._trap(point)
         if self._series.changed:
             self._passed += done - 1
             self._exchange(self._series, now_ns + done * step_ns)
         else:
             self._passed += done
         return done, None
+
+    def _trap(self, point: int) -> Trap:
+        assert self.machine
+        return self.machine.trap_at(point)
 
     def _exchange(self, series: Series, now_ns: int) -> None:
         """I/O refresh, and a look whether the next ones may be left out."""

@@ -125,7 +125,7 @@ class Plc:
         machine = self.engine.machine
         if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
             return False
-        return not self.breakpoints.armed and self._express.ready(machine)
+        return not self.breakpoints.armed and (self._express.machine is machine or self._express.prepare(machine))
 
     def _scan_at_once(self, now_ns: int) -> Trap | None:
         """A scan in one piece."""
@@ -373,7 +373,7 @@ class Plc:
         self._schedule.reset()
         self._leave()
         self._first = True
-        self._express.idle = False
+        self._express.forget()
         self.trap = None
 
     def _kept(self, held: Sequence[str]) -> list[tuple[int, bytes]]:
@@ -410,6 +410,7 @@ class Plc:
         self.now_ns, self.scans, self.trap = state.now_ns, state.scans, state.trap
         self._mode, self._first, self._forces = state.mode, state.first, dict(state.forces)
         self._schedule.restore(state.schedule)
+        self._express.forget()
         self._leave()
 
     def _leave(self) -> None:
