@@ -48,8 +48,10 @@ def watched(units: Sequence[Attached], areas: Mapping[str, Area]) -> list[int]:
 
 def is_idle(units: Sequence[Attached], now_ns: int) -> bool:
     """True if the next refresh will change nothing unless what the units watch changes or one of them wakes."""
-    return all(attached.unit.wake_ns > now_ns and attached.unit.watched is not None and attached.link.is_quiet
-               for attached in units)  # fmt: skip
+    for attached in units:
+        if attached.unit.wake_ns <= now_ns or not attached.link.is_quiet or attached.unit.watched is None:
+            return False
+    return True
 
 
 def pass_by(units: Sequence[Attached], refreshes: int) -> None:

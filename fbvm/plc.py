@@ -107,7 +107,11 @@ class Plc:
         if not self.breakpoints.halted:
             now_ns = self._time(now_ns)
             if self._in_one_piece():
-                return self._scan_at_once(now_ns)
+                before_ns, self.now_ns = self.now_ns, now_ns
+                self.trap = self._express.once(now_ns - before_ns, now_ns, self.budget)
+                self.scans += 1
+                self._tell()
+                return self.trap
             self._begin(now_ns)
         if self._mode is RUN:
             self.trap = self._execute()
@@ -126,14 +130,6 @@ class Plc:
         if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
             return False
         return not self.breakpoints.armed and (self._express.machine is machine or self._express.prepare(machine))
-
-    def _scan_at_once(self, now_ns: int) -> Trap | None:
-        """A scan in one piece."""
-        before_ns, self.now_ns = self.now_ns, now_ns
-        self.trap = self._express.once(now_ns - before_ns, now_ns, self.budget)
-        self.scans += 1
-        self._tell()
-        return self.trap
 
     def _begin(self, now_ns: int) -> None:
         """A scan up to its program."""

@@ -2,9 +2,11 @@
 
 Each PLC runs the hundred rungs of `logic`, or a few lines with a timer that waits, at a cycle of 100 ms in real time, with an
 ETN21 that has nothing to do, as `fbvm run` does it: spread over the cycle in steps of 1 ms.  What it costs is the machine
-around the program: times, clock pulses, the unit's switches, the loop.  The limit is the program alone, called from Python
-(the column `alone`, some hundred times less), and a core: when COUNT scans take 100 ms it is full, and scans begin late;
-that is with about 5,000 PLCs, so that 10,000 miss about half of their periods.  A busy host makes scans late before that.
+around the program: the loop, its queue and measurements, and one call of machine code for times, clock pulses, program and the
+unit's switches.  One PLC alone takes 4 us a scan that way, half of it in the loop; among thousands a scan takes several times
+that, since whatever it touches (a dozen Python objects, five pages of the PLC's own) has left the processor's caches since the
+scan before.  The limit is the program alone, called from Python (the column `alone`, some hundred times less), and a core: when
+COUNT scans take 100 ms it is full, and scans begin late.  A busy host makes scans late before that.
 In `event` pace a PLC that has nothing to do is not scanned before its period ends, here after 10 s; its timer wakes it once a
 second.  Memory has the interpreter's and LLVM's share in it, divided by COUNT."""
 
