@@ -36,6 +36,8 @@ class Dialect:
     programs_are_written: bool = False
     locals_are_written: bool = False
     initial_variables: bool = False
+    lenient_texts: str = ""
+    """How a text that is no literal is converted: "leading", "whole", or "" for a trap."""
     narrowing: bool = False
     sums_in_dint: bool = False
     reals_saturate: bool = False
@@ -64,6 +66,8 @@ QUESTIONS = {
     "locals_are_read": ("a VAR of a function block, read through an instance", "an error", "its value"),
     "programs_are_written": ("Prog.count := 0, where count is a VAR of the PROGRAM", "an error", "written"),
     "locals_are_written": ("instance.count := 0, where count is a VAR of the block", "an error", "written"),
+    "lenient_texts": ("STRING_TO_INT('12 pcs'), STRING_TO_REAL('none')", "stops the program (R0111)",
+                      "the number that the text begins with, else 0; under rusty 0 unless the whole text is one"),
     "initial_variables": ("VAR x : INT := y, where y is a variable", "an error",
                           "the value that y begins with; in a FUNCTION, and for VAR_TEMP, what y has when the body starts"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is", "an error that names the conversion",
@@ -84,12 +88,13 @@ _ROWS = (
     Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
             lenient_positions=True, real_bits_by_value=True, arithmetic_of_bits=True, integers_and_bits=True,
             numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, bare_actions=True,
-            locals_are_read=True, programs_are_written=True, initial_variables=True),
-    Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True),
+            locals_are_read=True, programs_are_written=True, lenient_texts="leading", initial_variables=True),
+    Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True,
+            lenient_texts="leading"),
     Dialect("rusty", "programs for RuSTy", loop_ends_each_pass=True, arithmetic_of_bits=True, integers_and_bits=True,
             numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, locals_are_read=True,
             programs_are_written=True, initial_variables=True, locals_are_written=True, narrowing=True, sums_in_dint=True,
-            reals_saturate=True, written_out=True),
+            reals_saturate=True, lenient_texts="whole", written_out=True),
     Dialect("omron", "programs that shall run in Sysmac Studio",
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

@@ -112,5 +112,6 @@ _ROWS: dict[str, Callable[..., Any]] = {
     "recode": lambda form, a: strings.widened(a) if form == "s16" else strings.narrowed(a),
     "to_text": lambda form, kind, a: texts.to_text(kind, a),
     "from_text": lambda form, kind, a, site: texts.from_text(kind, a),
+    "from_leading": lambda form, kind, whole, a: texts.from_leading(kind, whole, a),
 }
 """What each operation yields for values, called with its type and the operands of its row."""

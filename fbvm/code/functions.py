@@ -177,7 +177,7 @@ def _convert(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -
         if is_any(target, "ANY_CHAR"):
             return ("first", machine(target), in_width(node, "s16" if target.name == "WCHAR" else "s8"))
         name = target.base.name if isinstance(target, EnumType) else target.name
-        return ("from_text", machine(target), name, in_width(node, "s8"), site)
+        return _number_of_text(body, in_width(node, "s8"), machine(target), name, site)
     if source.name == "WCHAR" and target.name == "CHAR":
         return _narrow(body, node)
     timed = is_any(source, "ANY_DURATION", "ANY_DATE"), is_any(target, "ANY_DURATION", "ANY_DATE")
@@ -188,6 +188,18 @@ def _convert(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -
     if timed[1]:
         return _to_time(node, source, target, site, _tick(body, target))
     return number(body, node, source, target, site)
+
+
+def _number_of_text(body: BodyLowering, node: Node, form: str, name: str, site: int) -> Node:
+    """The value that a text names; dialects take what they find at its beginning, or 0."""
+    lenient = body.dialect.lenient_texts
+    if not lenient:
+        return ("from_text", form, name, node, site)
+    if lenient == "whole" or form in ("b", "i64", "u64", "f64"):
+        return ("from_leading", form, name, int(lenient == "whole"), node)
+    if form == "f32":
+        return ("convert", form, "f64", ("from_leading", "f64", "LREAL", 0, node))
+    return ("convert", form, "i64", ("from_leading", "i64", "LINT", 0, node))
 
 
 def to_text(source: Type, node: Node, body: BodyLowering) -> Node:

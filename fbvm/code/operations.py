@@ -123,6 +123,7 @@ replace    | a b n p site           | text   | R0108       | n characters from p
 find       | a b                    | i16    |             | first position of b in a, 0 if none or b is empty
 to_text    | data_type a            | s8     |             | the value as a literal would be read back, by data type's name
 from_text  | data_type a site       | any    | R0111 R0105 | reads a literal with or without type prefix, spaces trimmed
+from_leading | data_type whole a     | any    |             | the literal that a text begins with (if `whole`: that it is), else 0
 enum_text  | names a                | s8     |             | the member's name by value from `names`, else the number
 character  | a                      | text   |             | the one character of code a (u8 for s8, u16 for s16); none of code 0
 first      | a                      | u8, u16|             | the code of the first character of a text; 0 if it is empty

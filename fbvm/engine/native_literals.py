@@ -9,6 +9,7 @@ from fbvm.engine.native_reading import (
     GOOD,
     LREAL,
     MALFORMED,
+    OUTSIDE,
     REAL,
     SIGN,
     STRING,
@@ -22,6 +23,7 @@ from fbvm.engine.native_reading import (
 from fbvm.engine.native_routines import INFINITE
 from fbvm.engine.native_subset import data, peek, poke_all
 from fbvm.engine.native_times import read_clock, read_date, read_duration, read_moment
+from fbvm.syntax.texts import LEADING
 
 
 def read_special(out: int, at: int, n: int) -> int:
@@ -64,6 +66,21 @@ def read_typed(out: int, kind: int, at: int, n: int) -> int:
     if kind == 0:
         return read_bool(out, at, n)
     return read_number(out, kind, at, n)
+
+
+def read_leading(out: int, wanted: int, whole: int, at: int, n: int) -> int:
+    """The value of the longest literal that a text begins with, or if `whole` that it is; 0 if there is none."""
+    if whole == 0 and n > LEADING:
+        n = LEADING
+    while n > 0:
+        status = read_value(out, wanted, at, n)
+        if status == GOOD:
+            return GOOD
+        n -= 1
+        if whole != 0 or status == OUTSIDE:
+            n = 0
+    poke_all(out, 0)
+    return GOOD
 
 
 def read_value(out: int, wanted: int, at: int, n: int) -> int:

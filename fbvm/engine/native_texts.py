@@ -310,6 +310,11 @@ def _from_text(w: Writer, machine: str, data_type: str, a: Node, site: int) -> s
     shown: tuple[tuple[Any, ...], ...] = (("text", at, text.length), ("const", data_type))
     w.trap_if(w.new(f"icmp eq i64 {status}, 1"), "R0111", site, *shown)
     w.trap_if(w.new(f"icmp eq i64 {status}, 2"), "R0105", site, *shown)
+    return _read(w, machine, result)
+
+
+def _read(w: Writer, machine: str, result: str) -> str:
+    """The value that a routine has read, as a `machine`."""
     number = w.new(f"load i64, ptr {result}, align 8")
     if machine == "b":
         return w.new(f"icmp ne i64 {number}, 0")
@@ -317,6 +322,14 @@ def _from_text(w: Writer, machine: str, data_type: str, a: Node, site: int) -> s
         return cut(w, number, machine)
     value = w.new(f"bitcast i64 {number} to double")
     return w.new(f"fptrunc double {value} to float") if machine == "f32" else value
+
+
+def _from_leading(w: Writer, machine: str, data_type: str, whole: int, a: Node) -> str:
+    """`from_leading`: what is no literal is 0, so nothing traps."""
+    text, result = w.text(a), w.field("result")
+    kind = KINDS[SHORT_NAMES.get(data_type, data_type)]
+    w.call("read_leading", w.integer(result), str(kind), str(whole), w.integer(text.at), text.length)
+    return _read(w, machine, result)
 
 
 TEXTS: dict[str, Callable[..., Text]] = {
@@ -327,5 +340,6 @@ TEXTS: dict[str, Callable[..., Text]] = {
 }
 """How each operation is written that yields a text: called with the operands of its row."""
 
-VALUES: dict[str, Callable[..., str]] = {"length": _length, "find": _find, "first": _first, "from_text": _from_text}
+VALUES: dict[str, Callable[..., str]] = {"length": _length, "find": _find, "first": _first, "from_text": _from_text,
+          "from_leading": _from_leading}
 """The same for those that read a text and yield a number."""

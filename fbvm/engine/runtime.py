@@ -102,6 +102,7 @@ _PURE: dict[str, Any] = {
     "lesser": arithmetic.lesser, "greater": arithmetic.greater, "choose": choose, "mux": mux, "within": within,
     "single": arithmetic.single, "single_of_integer": arithmetic.single_of_integer, "bits": arithmetic.bits,
     "arctangent": arithmetic.arctangent, "find": strings.find, "to_text": texts.to_text, "enum_text": texts.enum_text,
+    "from_leading": texts.from_leading,
     "bit_behind": bit_behind,
     "character": strings.character, "first": strings.first, "widened": strings.widened, "narrowed": strings.narrowed,
     **{function.__name__: sited(function) for function in (

@@ -13,6 +13,8 @@ from fbvm.base.arithmetic import INF, NAN, Undefined, single
 from fbvm.base.types import DAY_NS, SHORT_NAMES
 from fbvm.syntax.literals import ELEMENTARY, UNITS_NS, Malformed, OutOfRange, typed
 
+LEADING = 64
+"""How many characters may belong to a literal that a text begins with."""
 _SECOND_NS = UNITS_NS["s"]
 _FLOATS = {"NAN": NAN, "INF": INF, "+INF": INF, "-INF": -INF}
 """What no literal can say; written and read all the same."""
@@ -43,6 +45,17 @@ def from_text(data_type: str, text: bytes) -> float:
     if kind != wanted or isinstance(value, str):
         raise Undefined("R0111", text, data_type)
     return single(value) if wanted == "REAL" else value
+
+
+def from_leading(data_type: str, whole: int, text: bytes) -> float:
+    """The value of the longest literal of the type that a text begins with, or if `whole` that it is; 0 if there is none."""
+    for end in [len(text)] if whole else range(min(len(text), LEADING), 0, -1):
+        try:
+            return from_text(data_type, text[:end])
+        except Undefined as undefined:
+            if undefined.code == "R0105":
+                break
+    return 0
 
 
 def enum_text(names: Mapping[int, str], value: int) -> bytes:
