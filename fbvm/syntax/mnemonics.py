@@ -69,6 +69,11 @@ class RungText:
         return not (self.lines or self.declared or self.notes or self.section or self.symbols)
 
     @property
+    def may_end(self) -> bool:
+        """Whether an instruction at the bus bar begins another rung; of one that is damaged nobody knows its conditions."""
+        return closes(self.lines) or self.damaged and not is_input(self.lines[-1].row)
+
+    @property
     def wants_more(self) -> bool:
         """Whether the last instruction has less operands than it takes."""
         if not self.lines:
@@ -296,7 +301,7 @@ class _LineReader:
     def _begin(self, row: Instruction, mnemonic: Token) -> None:
         """Begin another rung if this instruction does."""
         rung = self.rungs[-1]
-        if rung.picture or rung.lines and not rung.declared and row.inputs == 0 and closes(rung.lines):
+        if rung.picture or rung.lines and not rung.declared and row.inputs == 0 and rung.may_end:
             self.rungs.append(RungText(mnemonic.start))
 
 

@@ -43,6 +43,8 @@ _POINTED = re.compile(r"([+-]?\d+|DR\d+)?,(-{0,2})IR(\d+)(\+{0,2})", re.I)
 """An index register that points: with an offset in front, counted down before its use or up after it."""
 REGISTERS = 16
 """Index registers, and data registers."""
+BCD = {"z": "w", "Z": "d"}
+"""Kinds whose constants are BCD, and what they are besides."""
 WORDS = {"d": 2, "r": 2, "q": 4, "l": 4}
 """How many words an instruction reads where it wants more than one."""
 
@@ -73,6 +75,10 @@ class Operands:
     def expression(self, text: str, wanted: str, start: int, end: int, role: str = "a pin") -> Expr:
         """What `text` stands for where an instruction wants `wanted`, as its operand `role`.  Raises Wrong."""
         self.role = role
+        if wanted in BCD:
+            wanted = BCD[wanted]
+            if text[:1] in "#&+-" and "," not in text:
+                _check_decimal(text, wanted, role)
         text = self.numbered.get(text.upper(), text)
         if wanted == "x" and not _REGISTER.fullmatch(text):
             raise Wrong(f"{text} cannot be {role}", "write IR0 to IR15")
@@ -241,6 +247,15 @@ def _number(text: str, bits: int) -> int:
     if not low <= value <= high:
         raise Wrong(f"{text} does not fit in {bits} bits", "")
     return value & (1 << bits) - 1
+
+
+def _check_decimal(text: str, wanted: str, role: str) -> None:
+    """Refuse a constant with digits above 9 where BCD is read: the instruction would never be executed."""
+    bits = _BITS[_TYPES[wanted]]
+    digits = f"{_number(text, bits):0{bits // 4}X}"
+    if not digits.isdigit():
+        raise Wrong(f"{text} is {digits} hex, and {role} is read as BCD",
+                    f"write #{text[1:]}" if text[1:].isdigit() else "BCD has the digits 0 to 9")
 
 
 def _is_address(text: str) -> bool:

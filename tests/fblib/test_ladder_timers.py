@@ -27,7 +27,8 @@ def test_tim_counts_down_and_starts_again() -> None:
 
 def test_tim_of_zero_is_over_at_once_and_a_set_value_that_is_no_bcd_is_refused() -> None:
     assert run_bits("LD 0.00\nTIM 0 #0000", [{"CIO 0.00": True}], "TF0") == [[1]]
-    assert run_bits("LD 0.00\nTIM 0 #000A", [{"CIO 0.00": True}], "TF0 CF3") == [[0, 1]]
+    rows = [{"CIO 0.00": True, "D0": 10}]  # type: ignore[dict-item]
+    assert run_bits("LD 0.00\nTIM 0 D0", rows, "TF0 CF3") == [[0, 1]]
 
 
 def test_timx_is_binary_and_an_interlock_resets_it() -> None:
