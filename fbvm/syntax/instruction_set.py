@@ -16,8 +16,8 @@ JOINS = ("LD", "AND", "OR")
 KINDS = {
     "b": "a bit", "B": "a bit", "w": "a word or constant", "W": "a word", "d": "two words or a constant",
     "q": "four words or a constant", "r": "a REAL in two words or a constant", "l": "an LREAL in four words or a constant",
-    "z": "a word or constant in BCD", "Z": "two words or a constant in BCD", "a": "words", "k": "words or a constant", "A": "words",
-    "n": "a number", "t": "the number of a timer", "c": "the number of a counter",
+    "z": "a word or constant in BCD", "Z": "two words or a constant in BCD", "a": "words", "k": "words or a constant",
+    "A": "words", "n": "a number", "t": "the number of a timer", "c": "the number of a counter",
     "m": "a timer or counter, as in T0005 or C0005", "v": "an address or symbol", "x": "an index register"}
 """What an instruction may want in a place, in words."""
 
