@@ -41,6 +41,7 @@ class Dialect:
     narrowing: bool = False
     sums_in_dint: bool = False
     reals_saturate: bool = False
+    reals_wrap: bool = False
 
 
 QUESTIONS = {
@@ -76,6 +77,8 @@ QUESTIONS = {
                      "as DINT"),
     "reals_saturate": ("REAL_TO_INT(70000.0), TRUNC of what does not fit", "stops the program (R0105)",
                        "the nearest number that there is; 0 for NAN"),
+    "reals_wrap": ("REAL_TO_INT(70000.0), TRUNC: the width of the result", "must suffice (R0105)",
+                   "4464: cut to it, as integers are; what 64 bits do not hold is 16#8000_0000_0000_0000 first"),
     "libraries": ("blocks that begin or end another way; whether actions of charts have a final scan",
                   "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
@@ -88,7 +91,7 @@ _ROWS = (
     Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
             lenient_positions=True, real_bits_by_value=True, arithmetic_of_bits=True, integers_and_bits=True,
             numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, bare_actions=True,
-            locals_are_read=True, programs_are_written=True, lenient_texts="leading", initial_variables=True),
+            locals_are_read=True, programs_are_written=True, lenient_texts="leading", initial_variables=True, reals_wrap=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True,
             lenient_texts="leading"),
     Dialect("rusty", "programs for RuSTy", loop_ends_each_pass=True, arithmetic_of_bits=True, integers_and_bits=True,
@@ -136,5 +139,6 @@ ALIKE = (
     ("TIME_TO_DWORD, DWORD_TO_TIME", "Milliseconds modulo 2**32; in seconds under matiec."),
     ("SIZEOF of ten INT", "20: the bytes that they fill."),
     ("TON, TOF, TP when ET = PT exactly", "The time is over."),
+    ("TON with PT = T#0s, in the scan in which IN rises", "Q is TRUE at once; in the scan after it under matiec."),
 )
 """What users ask about, and every dialect answers alike."""

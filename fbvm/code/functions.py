@@ -257,10 +257,26 @@ def number(body: BodyLowering, node: Node, source: Type, target: Type, site: int
     if a in FLOATS and b not in FLOATS:
         if is_any(target, "ANY_BIT") and not by_value:
             return ("bits", b, a, node)
-        return saturated(body, "nearest", node, b) if body.dialect.reals_saturate else ("nearest", b, a, node, site)
+        return _integer(body, "nearest", node, b, site)
     if b in FLOATS and is_any(source, "ANY_BIT") and a != "b" and not by_value:
         return ("bits", b, a, node)
     return ("convert", b, a, node)
+
+
+def _integer(body: BodyLowering, name: str, node: Node, form: str, site: int) -> Node:
+    """A real as an integer by `nearest` or `truncate`, and what becomes of one that does not fit."""
+    if body.dialect.reals_saturate:
+        return saturated(body, name, node, form)
+    return _cut(body, name, node, form) if body.dialect.reals_wrap else (name, form, node[1], node, site)
+
+
+def _cut(body: BodyLowering, name: str, node: Node, form: str) -> Node:
+    """A real as an integer of 64 bits, the least one where it does not fit, of which the low bits remain (assumed)."""
+    kept = body.keep(node if node[1] == "f64" else ("convert", "f64", "f32", node))
+    low, high = ("const", "f64", -2.0 ** 63), ("const", "f64", 2.0 ** 63)
+    fits = ("and", "b", ("ge", "b", "f64", kept, low), ("lt", "b", "f64", kept, high))
+    number: Node = (name, "i64", "f64", ("select", "f64", fits, low, kept), 0)
+    return number if form == "i64" else ("convert", form, "i64", number)
 
 
 def saturated(body: BodyLowering, name: str, node: Node, form: str) -> Node:
@@ -315,9 +331,7 @@ def _date_part(body: BodyLowering, node: Node, source: Type, target: Type) -> No
 
 def _truncate(body: BodyLowering, a: list[Node], call: StandardCall, site: int) -> Node:
     target = call.detail[1] if len(call.detail) > 1 else DINT
-    if body.dialect.reals_saturate:
-        return saturated(body, "truncate", a[0], machine(target))
-    return ("truncate", machine(target), machine(call.detail[0]), a[0], site)
+    return _integer(body, "truncate", a[0], machine(target), site)
 
 
 def _bcd(name: str) -> Lowering:
