@@ -230,6 +230,27 @@ class CommonUnitTests:
             now_ns += CYCLE_NS
 
     @inherited
+    @given(st.data(), st.booleans())
+    def test_what_it_does_not_watch_does_not_matter(self, data: st.DataObject, is_asked: bool) -> None:
+        """As long as the unit has nothing to do by itself; a unit that says nothing of it is refreshed each time."""
+        unit, memory = self.fresh()
+        if is_asked:
+            self.ask(memory)
+        number = 1
+        while number == 1 or (unit.wake_ns == 0 and number < 20):
+            unit.refresh(memory, [], number * CYCLE_NS)
+            number += 1
+        if unit.watched is None:
+            return
+        watched = {(area, word + more) for area, word in unit.watched for more in range(4)}
+        own = st.sampled_from(sorted((self.may_write() | {("A", 501), ("A", 502), ("CIO", 1500)}) - watched))
+        for area, word in data.draw(st.lists(own, max_size=10)):
+            memory.words(area)[word] = data.draw(st.integers(0, 0xFFFF))
+        before = memory.snapshot()
+        assert unit.refresh(memory, [], number * CYCLE_NS) == []
+        assert not any(memory.differences(before))
+
+    @inherited
     @given(st.lists(st.lists(events(st.integers(0, 3)), max_size=4), max_size=12))
     def test_same_inputs_give_the_same_memory_and_requests(self, scans: list[list[Event]]) -> None:
         runs = []

@@ -68,6 +68,8 @@ class Box:
 
     name, address = "box", "192.168.250.9"
 
+    watched = None
+
     def __init__(self) -> None:
         self.wake_ns = 0
         self.configuration: dict[str, Any] = {}

@@ -322,6 +322,8 @@ class _Echo:
 
     name, address, wake_ns = "Echo 0", "192.168.250.2", 1 << 63
 
+    watched = None
+
     def __init__(self) -> None:
         self.resets = 0
 

@@ -81,6 +81,8 @@ class Idle:
 
     name, address, wake_ns = "Idle 0", "192.168.250.9", 1 << 63
 
+    watched = None
+
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
         return []
 
