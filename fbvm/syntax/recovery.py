@@ -6,7 +6,7 @@ comes what stands open: an END that is missing or has no beginning.  At last the
 from __future__ import annotations
 
 from fbvm.base.diagnostics import Diagnostic
-from fbvm.syntax.automaton import NESTING_LIMIT, Automaton
+from fbvm.syntax.automaton import ELEMENTS, NESTING_LIMIT, Automaton
 from fbvm.syntax.builder import CHAIN_LIMIT, Builder, Stop
 from fbvm.syntax.frames import (
     ENDS,
@@ -71,7 +71,7 @@ class Recovery:
         if token.type in UNITS and self.amid(token):
             self.tell(token)
             return self.give_up(self.following())
-        if token.type in OPENERS or token.type in UNITS or self.shows_end_of_section(token):
+        if token.type in OPENERS or token.type in UNITS or self.shows_end_of_section(token) or self.open_element(token):
             return self.closing(token)
         self.tell(token)
         return self.give_up(token)
@@ -178,6 +178,12 @@ class Recovery:
         place = anchor(self.states)
         return place.symbol in ("var_decls", "type_decls") and (token.type in STATEMENT_WORDS or token.type == "VAR")
 
+    def open_element(self, token: Token) -> list[Frame]:
+        """What is open of the part of a chart in front of a STEP or TRANSITION, which shows that its END is missing."""
+        open_ = frames(self.states, self.values) if token.type in ELEMENTS else []
+        first = next((at for at, frame in enumerate(open_) if frame.word.type in (*ELEMENTS, "ACTION")), len(open_))
+        return open_[first:]
+
     def closing(self, token: Token) -> list[Token]:
         """A word that ends something or begins something new: close what is still open inside, or drop the word."""
         open_ = frames(self.states, self.values)
@@ -187,6 +193,8 @@ class Recovery:
             if target is None:
                 return self.other_end(open_[-1].word, token) if open_ else self.no_opener(token)
             inner = open_[open_.index(target) + 1:]
+        elif token.type in ELEMENTS:
+            inner = self.open_element(token)
         elif token.type not in UNITS:
             inner = open_[-1:]
         if inner:
