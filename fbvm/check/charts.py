@@ -27,7 +27,7 @@ class _Rules:
         self.expressions = statements.expressions
         self.facts = statements.facts
         self.error = statements.error
-        self.pou = statements.pou
+        self.pou = statements.pou.owner
 
     def is_free(self, declared: tree.VarDecl) -> bool:
         """Whether a name of a step or action is not taken by a variable, which was told."""
@@ -67,9 +67,13 @@ class _Rules:
 
     def _action(self, name: tree.Name) -> bool:
         """An ACTION of the POU, or a BOOL variable that can be written."""
-        if fold(name.text) in self.pou.actions:
-            return True
         variable = self.expressions.variable(name.text)
+        if fold(name.text) in self.pou.actions:
+            if variable is not None and variable.role == "action":
+                return True
+            self.error("S0112", name, f"the ACTION {name.text} stands behind its {self.pou.kind}, where no step sees it",
+                       f"write it in front of END_{self.pou.kind}")
+            return False
         if variable is None and self.expressions.pou is not None and fold(name.text) in self.expressions.pou.damaged:
             return False
         if variable is None or variable.role:

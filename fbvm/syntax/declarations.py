@@ -9,7 +9,7 @@ from fbvm.syntax.jumps import Jumps, Tangled
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
 from fbvm.syntax.sfc import Step, Transition
-from fbvm.syntax.sfc_elements import SfcElements
+from fbvm.syntax.sfc_elements import Part, SfcElements
 from fbvm.syntax.statements import Items
 from fbvm.syntax.tree import (
     Access,
@@ -89,28 +89,14 @@ class Declarations(SfcElements):
             declared += self.ladder_sections(declared)
         self.numbered = dict(self.numbered_everywhere)
         body = self.without_jumps(body, declared)
-        if any(isinstance(a, Step | Transition) for a in actions):
-            body = self.chart(word, body, actions, declared)
+        if self.charted or any(isinstance(a, Step | Transition) for a in actions):
+            from fbvm.syntax.charts import Charts
+
+            charts = Charts(self, own)
+            body = charts.body(word, body, [a for a in actions if not isinstance(a, Refused)])
+            own, declared = charts.actions, declared + charts.sections
         return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused), tuple(own),
                    tuple(accesses))
-
-    def chart(self, word: Token, body: Block, elements: list[Element], declared: list[VarSection]) -> Block:
-        """The body of a POU that is a sequential function chart."""
-        from fbvm.syntax.evolution import Evolution
-        from fbvm.syntax.sfc_rules import sound
-
-        steps = [e for e in elements if isinstance(e, Step)]
-        transitions = [e for e in elements if isinstance(e, Transition)]
-        if word.type == "FUNCTION":
-            self.report("S0111", word.start, word.end, "a FUNCTION has no steps: it remembers nothing",
-                        "make it a FUNCTION_BLOCK")
-        if body:
-            self.report("S0111", body[0].start, body[0].end, "statements stand in front of a chart",
-                        "what is to be executed in every scan belongs in an ACTION of a step, or in a POU of its own")
-        evolution = Evolution(self, steps, transitions, (e for e in elements if isinstance(e, Action)))
-        chart = evolution.sfc(elements[0].start, elements[-1].end, sound(steps, transitions, self.report))
-        declared += chart.sections
-        return (chart,)
 
     def without_jumps(self, body: Block, declared: list[VarSection]) -> Block:
         """The body of a POU with conditions and loops for its jumps; as it is where these cannot say the same."""
@@ -146,7 +132,14 @@ class Declarations(SfcElements):
         self.refuse_selves()
         return Action(word.start, end.end, self.name(owner) if owner else None, self.declared(token), body)
 
+    def action_chart(self, word: Token, token: Token, colon: Token, items: Items, parts: list[Part], end: Token) -> Action:
+        made = self.action(word, None, None, token, colon, items, end)
+        self.charted[made] = parts
+        return made
+
     def actions_of(self, word: Token, owner: Token | None, actions: list[Element], end: Token) -> Actions:
+        for part in (each for each in actions if isinstance(each, Step | Transition)):
+            self.report("S0111", part.start, part.end, "a chart stands in its POU, not in ACTIONS", "")
         return Actions(word.start, end.end, self.name(owner) if owner else None,
                        tuple(a for a in actions if isinstance(a, Action)), tuple(a for a in actions if isinstance(a, Refused)))
 

@@ -33,12 +33,15 @@ class Evolution:
     """Writes the statements of one chart.  They are placed `at` the element that they come from."""
 
     def __init__(self, builder: Expressions, steps: Sequence[Step], transitions: Sequence[Transition],
-                 actions: Iterable[tree.Action]) -> None:
+                 actions: Iterable[tree.Action], inside: tree.Action | None) -> None:
+        """`inside` is the action that the chart is the body of."""
         self.builder = builder
         self.steps = steps
         self.transitions = transitions
         self.actions = {fold(action.name.text): action for action in actions}
         self.named = {fold(step.name.text): step for step in steps}
+        self.inside = inside.name.text if inside is not None else "chart"
+        self.is_called_often = inside is not None
         self.at = self.start = self.end = 0
         self.shown: dict[str, str] = {}
         """Names of actions as they are written first."""
@@ -51,10 +54,10 @@ class Evolution:
         self.start, self.end = start, end
         self.at = start
         body: tree.Block = () if not sound else (
-            self._begun_or_evolved(), *map(self._commit, self.steps), *self._controls(used), *self._variables(used),
+            *self._fresh(), self._begun_or_evolved(), *map(self._commit, self.steps),
+            *self._controls(used), *self._variables(used),
             *(statement for name, action in self.actions.items() if name in used for statement in self._run(action)))
-        sections = (self._section("VAR", [self._flags(step.name, STEP_FLAGS) for step in self.steps], "step"),
-                    self._section("VAR", [self._flags(action.name, ACTION_FLAGS) for action in self.actions.values()], "action"),
+        sections = (self._section("VAR", [_flags(step.name, STEP_FLAGS) for step in self.steps], "step"),
                     self._section("VAR", list(self.kept.values())), self._section("VAR_TEMP", list(self.temporaries.values())))
         return Sfc(start, end, tuple(self.steps), tuple(self.transitions), body, sections)
 
@@ -68,8 +71,14 @@ class Evolution:
 
     # --- steps and transitions --------------------------------------------------------------------------------------
 
+    def _fresh(self) -> Iterable[Statement]:
+        """In an action, which may be called several times in one call of its POU: nothing is entered or left yet."""
+        if self.is_called_often:
+            for step in self.steps:
+                yield from (self._set(self._entered(step), False), self._set(self._left(step), False))
+
     def _begun_or_evolved(self) -> Statement:
-        begun = self._keep("$chart begun", "BOOL")
+        begun = self._keep(f"${self.inside} begun", "BOOL")
         evolved = (*map(self._time, self.steps), *self._tested())
         first = (self._set(begun, True), *(self._set(self._entered(s), True) for s in self.steps if s.initial))
         return self._if(begun, evolved, first)
@@ -187,25 +196,17 @@ class Evolution:
 
     # --- variables --------------------------------------------------------------------------------------------------
 
-    def _flags(self, name: Name, members: Iterable[tuple[str, str]]) -> VarDecl:
-        """The variable that has the name of a step or action."""
-        fields = tuple(self._declared(Name(name.start, name.end, field), kind) for field, kind in members)
-        return VarDecl(name.start, name.end, (name,), None, tree.StructSpec(name.start, name.end, fields), None)
-
     def _section(self, kind: str, variables: list[VarDecl], role: str = "") -> VarSection:
         return VarSection(self.start, self.end, kind, (), tuple(variables), True, role)
 
-    def _declared(self, name: Name, kind: str) -> VarDecl:
-        return VarDecl(name.start, name.end, (name,), None, tree.NamedType(name.start, name.end, kind), None)
-
     def _keep(self, name: str, kind: str) -> NameRef:
         if name not in self.kept:
-            self.kept[name] = self._declared(Name(self.at, self.at, name), kind)
+            self.kept[name] = _declared(Name(self.at, self.at, name), kind)
         return self._name(name)
 
     def _temporary(self, name: str) -> NameRef:
         if name not in self.temporaries:
-            self.temporaries[name] = self._declared(Name(self.at, self.at, name), "BOOL")
+            self.temporaries[name] = _declared(Name(self.at, self.at, name), "BOOL")
         return self._name(name)
 
     def _since(self, step: Step) -> NameRef:
@@ -273,3 +274,18 @@ class Evolution:
         moment = self._binary("+", self._since(step), after)
         return tree.CallStatement(self.at, self.at, self._function("__DUE", moment))
 
+
+def action_flags(start: int, end: int, actions: Iterable[tree.Action]) -> VarSection:
+    """The flags of all actions of a POU with charts."""
+    flags = tuple(_flags(action.name, ACTION_FLAGS) for action in actions)
+    return VarSection(start, end, "VAR", (), flags, True, "action")
+
+
+def _flags(name: Name, members: Iterable[tuple[str, str]]) -> VarDecl:
+    """The variable that has the name of a step or action."""
+    fields = tuple(_declared(Name(name.start, name.end, field), kind) for field, kind in members)
+    return VarDecl(name.start, name.end, (name,), None, tree.StructSpec(name.start, name.end, fields), None)
+
+
+def _declared(name: Name, kind: str) -> VarDecl:
+    return VarDecl(name.start, name.end, (name,), None, tree.NamedType(name.start, name.end, kind), None)

@@ -72,6 +72,10 @@ class DeclarationLayout(TypeLayout, SfcLayout):
         phrase.parts += (self.block(items, end), HARD, self.leaf(end))
         return phrase
 
+    def action_chart(self, word: Token, token: Token, colon: Token, items: list[Phrase], parts: list[Phrase],
+                     end: Token) -> Phrase:
+        return self.action(word, None, None, token, colon, items + parts, end)
+
     def actions_of(self, word: Token, owner: Token | None, actions: list[Phrase], end: Token) -> Phrase:
         named = (" ", self.leaf(owner)) if owner else ()
         return Phrase(word.start, self.leaf(word), named, self.block(actions, end), HARD, self.leaf(end))

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+from fbvm.base.diagnostics import Source
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.sfc import QUALIFIERS, Association, Step, Transition
 from fbvm.syntax.statements import Items, Statements
-from fbvm.syntax.tree import Block, Expr, Name, NameRef
+from fbvm.syntax.tree import Action, Block, Expr, Name, NameRef
+
+Part = Step | Transition
 
 
 class SfcElements(Statements):
     """The functions of the rules of steps and transitions."""
+
+    def __init__(self, source: Source) -> None:
+        super().__init__(source)
+        self.charted: dict[Action, list[Part]] = {}
+        """Actions of the POU that is being read whose body is a chart of its own, which needs to know all actions."""
 
     def step(self, word: Token, token: Token, colon: Token, associations: list[Association], end: Token) -> Step:
         self.refuse_selves()
