@@ -69,8 +69,8 @@ OWN = [*(sorted(path.parent.rglob("*.st")) for path in sorted((HOUSE / "fblib").
        *([path] for path in sorted((HOUSE / "examples").glob("*.st"))), sorted((HOUSE / "examples/project/src").glob("*.st"))]
 
 
-FLAGS = re.compile(r"\bP_(ER|GT|N|OF|UF|CY) +:=")
-"""Only a library may write condition flags."""
+FLAGS = re.compile(r"\b(P_(ER|GT|EQ|N|OF|UF|CY)|CX_(Failure|Stopped)) +:=")
+"""Only a library may write condition flags and the words of failures."""
 
 
 @pytest.mark.parametrize("files", OWN, ids=lambda files: files[0].parent.name + "/" + files[0].stem)
