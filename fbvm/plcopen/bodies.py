@@ -13,6 +13,8 @@ from fbvm.plcopen.statements import Statements
 from fbvm.plcopen.values import Unexecutable
 
 NOTE = "//"
+SPANS = {"IL", "ILC", "JMP", "CJP", "CJPN", "JME", "JMP0", "JME0", "FOR", "NEXT", "BREAK", "SBN", "RET", "END"}
+"""Instructions that speak of the rungs between them, which so must all be rungs."""
 
 
 class Bodies:
@@ -53,10 +55,15 @@ class Bodies:
             if item.kind == "jump" and item.text.upper() not in labels:
                 self.reading.report("X0202", item.element, f"there is no label {item.text}")
                 item.broken = True
+        ours = {item.mnemonic.lstrip("!@%") for item in diagram.objects if item.mnemonic}
         in_ladder = False
         statements = Statements(self.reading, self.scope)
         for network in networks(diagram):
-            rung = self._rung(network) if body.language == "LD" and not network.broken else None
+            rung = self._rung(network, bool(ours)) if body.language == "LD" and not network.broken else None
+            if rung is None and ours & SPANS and not network.broken:
+                item = network.objects[0]
+                self.reading.report("X0202", item.element, "the network cannot be written as a rung, and stands among jumps")
+                item.broken = True
             if rung is not None and not in_ladder:
                 lines.append("LADDER")
             elif rung is None and in_ladder:
@@ -65,8 +72,8 @@ class Bodies:
             lines += rung if rung is not None else self._written(statements, network)
         return [*lines, "END_LADDER"] if in_ladder else lines
 
-    def _rung(self, network: Network) -> list[str] | None:
-        steps = rung_steps(network, self.scope)
+    def _rung(self, network: Network, ours: bool) -> list[str] | None:
+        steps = rung_steps(network, self.scope, ours)
         if steps is None:
             return None
         self.rungs += 1

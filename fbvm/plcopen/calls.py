@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.check.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversion, typed_name
 from fbvm.plcopen.diagram import Object, Pin, Wire
+from fbvm.plcopen.rung_parts import instruction
 from fbvm.plcopen.scope import SHARED
 from fbvm.plcopen.values import ATOM, CHAINED, INFIX, TRUE, Unexecutable, Value, joined, negation
 
@@ -26,6 +27,9 @@ class Calls:
     def write(self, item: Object) -> None:
         """The call of a block."""
         self.reads = frozenset()
+        row = instruction(item)
+        if row is not None and row.kind != "?" and row.does != ".not":
+            raise Unexecutable(item, f"the instruction {item.mnemonic} cannot stand outside of a rung", "")
         if item.instance:
             self._instance(item)
         elif _is_standard(item.text) and not item.in_outs:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 from fbvm.plcopen.document import Reading
 from fbvm.plcopen.markup import Element
+from fbvm.plcopen.read_types import MNEMONIC, own_text
 
 OBJECTS = {"leftPowerRail", "rightPowerRail", "contact", "coil", "block", "inVariable", "outVariable", "inOutVariable",
            "label", "jump", "return"}
@@ -67,6 +68,8 @@ class Object:
     inputs: list[Pin] = field(default_factory=list)
     in_outs: list[Pin] = field(default_factory=list)
     outputs: list[Pin] = field(default_factory=list)
+    mnemonic: str = ""
+    """Which instruction a block is that we have drawn."""
     broken: bool = False
     """Whether something about it was not understood, and has a diagnostic."""
 
@@ -222,6 +225,7 @@ def _object(reading: Reading, element: Element, place: int) -> Object:
             for variable in (v for found in element.all(holder) for v in found.all("variable")):
                 pins.append(_pin(variable, variable.one("connectionPointIn"), pin_name(variable.get("formalParameter"))))
         _merge_in_outs(made)
+        made.mnemonic = own_text(element, MNEMONIC)
     elif element.name == "inOutVariable":
         made.inputs = [Pin("", _true(element, "negatedIn"), _word(element, "edgeIn"), _word(element, "storageIn"))]
         _wire_in(made.inputs[0], element.one("connectionPointIn"))

@@ -68,6 +68,7 @@ def _source(parts: _Parts, source: Source) -> None:
     refused = {"S0901", "S0902"}
     parts.diagnostics += [d for d in errors(diagnostics) if d.code not in refused]
     types = Types(source)
+    types.note(declared.section for declared in text.declarations if isinstance(declared, tree.GlobalVars))
     named = Path(source.name).stem
     for declared in text.declarations:
         try:
@@ -81,7 +82,10 @@ def _source(parts: _Parts, source: Source) -> None:
             continue
         parts.diagnostics.append(Diagnostic("X0301" if _matters(pragma.text) else "X0190", source, pragma.start, pragma.end,
                                             f"the pragma {{{pragma.text.strip()}}} is not exported"))
-    parts.diagnostics += [Diagnostic("X0390", source, node.start, node.end, message) for node, message in types.foreign]
+    said: dict[str, tree.Node] = {}
+    for node, message in types.foreign:
+        said.setdefault(message, node)
+    parts.diagnostics += [Diagnostic("X0390", source, node.start, node.end, message) for message, node in said.items()]
 
 
 def _declaration(parts: _Parts, types: Types, declared: tree.Declaration, name: str) -> None:

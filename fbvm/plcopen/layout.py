@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fbvm.plcopen.markup import Element, element
+from fbvm.plcopen.read_types import MNEMONIC
 
 LEFT, COLUMN, ROW, GAP = 20, 110, 60, 40
 """Places in the drawing, in its units: where the rail stands, and how far apart columns, rows and networks are."""
@@ -87,9 +88,9 @@ class Drawing:
             element("expression", text), localId=self.next_id(), height=VARIABLE_HEIGHT, width=VARIABLE_WIDTH, negated="false"))
 
     def block(self, kind: str, instance: str, inputs: list[tuple[str, Ends | str]], outputs: list[tuple[str, str]], column: int,
-              row: int) -> dict[str, End]:
+              row: int, mnemonic: str = "") -> dict[str, End]:
         """A block: each input is a name with the wires or the text that it takes, each output a name with the variable that
-        gets it, or "".  The ends of its outputs by name."""
+        gets it, or "".  The ends of its outputs by name.  `mnemonic` is what it is for us, as data of our own."""
         x, y = self.x(column), self.y(row) - PIN
         pins: list[Element] = []
         values = [(name, (self.in_variable(what, x - 20, y + PIN * (at + 1)),) if isinstance(what, str) else what)
@@ -105,7 +106,8 @@ class Drawing:
         named = {"typeName": kind, **({"instanceName": instance} if instance else {})}
         height = PIN * (max(len(inputs), len(outputs)) + 1)
         made = element("block", _position(x, y), element("inputVariables", *pins), element("inOutVariables"),
-                       element("outputVariables", *outs), localId=number, **named, height=height, width=BLOCK_WIDTH)
+                       element("outputVariables", *outs), own_data(MNEMONIC, mnemonic) if mnemonic else None,
+                       localId=number, **named, height=height, width=BLOCK_WIDTH)
         self.elements.append(made)
         for name, variable in outputs:
             if variable:
@@ -131,6 +133,11 @@ class Drawing:
     def skip(self, rows: int) -> None:
         """Go on below a network that has no rails."""
         self.top += rows * ROW + GAP
+
+
+def own_data(name: str, text: str) -> Element:
+    """Data that only we understand."""
+    return element("addData", element("data", element("text", text), name=name, handleUnknown="discard"))
 
 
 def _position(x: int, y: int) -> Element:

@@ -23,7 +23,7 @@ from fbvm.plcopen.document import (
     VarList,
 )
 from fbvm.plcopen.markup import Element
-from fbvm.plcopen.read_types import LOCATION, duration, location, note, type_text, value_text
+from fbvm.plcopen.read_types import LOCATION, MNEMONIC, duration, location, note, type_text, value_text
 
 TC6 = "http://www.plcopen.org/xml/tc6"
 IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"
@@ -238,5 +238,5 @@ def _added(reading: Reading, root: Element) -> None:
                            "object-oriented parts are not executed by this version")
         elif last in SETTINGS:
             reading.count("identities and settings of the tool in addData are not taken over", element)
-        elif last not in READ and name != LOCATION:
+        elif last not in READ and name not in (LOCATION, MNEMONIC):
             reading.count(f"addData {name} is not taken over", element)

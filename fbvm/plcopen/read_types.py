@@ -14,6 +14,8 @@ ELEMENTARY = frozenset(_WORDS.split())
 """Empty elements that are types (TC6 2.01 elementaryTypes; the long forms and CHAR are extensions)."""
 LOCATION = "urn:fbvm:location"
 """Our `addData`: an address that is no IEC location."""
+MNEMONIC = "urn:fbvm:mnemonic"
+"""The same: which instruction a block is."""
 _NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _DURATION = re.compile(r"P(?:(\d+)D)?(?:T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?)?")
 
@@ -98,9 +100,13 @@ def value_text(holder: Element | None) -> str:
 
 def location(element: Element) -> str:
     """Where a variable lies: its address, or one that is no IEC location, which we keep as data of our own."""
+    return own_text(element, LOCATION) or element.get("address").strip()
+
+
+def own_text(element: Element, name: str) -> str:
+    """What data of our own says about an element."""
     added = element.one("addData")
-    own = next((d.text.strip() for d in added.all("data") if d.get("name") == LOCATION), "") if added else ""
-    return own or element.get("address").strip()
+    return next((data.text.strip() for data in added.all("data") if data.get("name") == name), "") if added else ""
 
 
 def duration(text: str) -> str:

@@ -1,6 +1,6 @@
-"""A network of contacts and coils as mnemonics, where they say exactly what the network does.
+"""A network as mnemonics, where they say exactly what the network does.
 
-They do if each contact has one place among the mnemonics, and what is read and written comes in the same order as in the
+They do if each contact and block has one place among them, and what is read and written comes in the same order as in the
 network.  Other networks become statements.
 """
 
@@ -8,27 +8,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fbvm.plcopen.diagram import Object
+from fbvm.plcopen.diagram import Object, Wire
 from fbvm.plcopen.networks import Network
+from fbvm.plcopen.rung_parts import Inexact, Parts
 from fbvm.plcopen.scope import Scope
-from fbvm.syntax.operands import Operands, Wrong
-from fbvm.syntax.tree import Index, Member, NameRef
 
 BRANCHES = 16
 """TR0 to TR15."""
-CONTACTS = {(False, ""): "", (True, ""): "NOT", (False, "rising"): "@", (False, "falling"): "%"}
-"""Negation and edge of a contact, and how mnemonics say it."""
-COILS = {(False, "", ""): "OUT", (True, "", ""): "OUT NOT", (False, "", "set"): "SET", (False, "", "reset"): "RSET",
-         (False, "rising", ""): "DIFU", (False, "falling", ""): "DIFD", (False, "rising", "set"): "@SET",
-         (False, "rising", "reset"): "@RSET", (False, "falling", "set"): "%SET", (False, "falling", "reset"): "%RSET"}
-"""Negation, edge and storage of a coil."""
-OPERANDS_AT = 8
 LONGEST = 200
 """Objects of the largest network that is written as a rung."""
-
-
-class Inexact(Exception):
-    """Mnemonics do not say it."""
 
 
 @dataclass(eq=False)
@@ -43,70 +31,87 @@ Series = list["Object | Parallel"]
 
 @dataclass(eq=False)
 class Branch:
-    """A place behind a contact or a parallel: the coils there, and where it goes on."""
+    """A place behind an element or a parallel: the outputs there, and where it goes on."""
 
-    coils: list[Object] = field(default_factory=list)
+    outputs: list[Object] = field(default_factory=list)
     ways: list[tuple[Object | Parallel, Branch]] = field(default_factory=list)
 
 
-def rung_steps(network: Network, scope: Scope) -> list[str] | None:
-    """The lines of a rung; None if mnemonics do not say it."""
+def rung_steps(network: Network, scope: Scope, ours: bool = False) -> list[str] | None:
+    """The lines of a rung; None if mnemonics do not say it.  `ours` is a diagram that we have drawn, in which wires from the
+    rail were P_On."""
     try:
-        return _Rung(network, scope).lines()
+        return _Rung(network, scope, ours).lines()
     except Inexact:
         return None
 
 
 class _Rung:
-    def __init__(self, network: Network, scope: Scope) -> None:
-        self.network, self.scope = network, scope
+    def __init__(self, network: Network, scope: Scope, ours: bool) -> None:
+        self.network, self.ours = network, ours
+        self.parts = Parts(network, scope)
         self.place = {item: at for at, item in enumerate(network.objects)}
-        self.known: dict[tuple[Object, ...], Series] = {}
+        self.known: dict[tuple[Wire, ...], Series] = {}
         self.order: list[Object] = []
         self.steps: list[str] = []
 
     def lines(self) -> list[str]:
-        contacts = [item for item in self.network.objects if item.kind == "contact"]
-        coils = [item for item in self.network.objects if item.kind == "coil"]
-        count = len(self.network.objects)
-        if not coils or not contacts or count > LONGEST or len(contacts) + len(coils) < count or self.network.cut:
+        if len(self.network.objects) > LONGEST or self.network.cut or not self.parts.outputs:
             raise Inexact
-        root = Branch()
-        for coil in coils:
-            self._hang(root, self._series(tuple(wire.source for wire in coil.inputs[0].wires)), coil)
-        if root.coils or len(root.ways) != 1:
-            raise Inexact
-        self._branch(root, 0)
-        self._compare()
+        first = self.parts.outputs[0]
+        powers = self.parts.powers(first)
+        if len(powers) != 1:
+            self._alone(first, powers)
+        else:
+            self._tree()
+        self.parts.compare(self.order, self.place)
         return self.steps
 
-    def _compare(self) -> None:
-        """Each object has one place among the steps, and what is written is read before or behind as in the network."""
-        if len(set(self.order)) < len(self.order) or len(self.order) < len(self.network.objects):
+    def _alone(self, output: Object, powers: list[tuple[Wire, ...]]) -> None:
+        """An instruction that takes no condition, or several, and so has a rung for itself."""
+        if len(self.parts.outputs) > 1:
             raise Inexact
-        for at, item in enumerate(self.order):
-            for behind in self.order[at + 1:]:
-                if "coil" in (item.kind, behind.kind) and self.place[behind] < self.place[item] \
-                        and self.scope.roots(item.text) & self.scope.roots(behind.text):
-                    raise Inexact
+        for wires in powers:
+            series = self._series(wires)
+            if not series:
+                self._always()
+            for at, part in enumerate(series):
+                self._part(part, at > 0)
+        self._output(output)
+
+    def _tree(self) -> None:
+        root = Branch()
+        for output in self.parts.outputs:
+            powers = self.parts.powers(output)
+            if len(powers) != 1:
+                raise Inexact
+            self._hang(root, self._series(powers[0]), output)
+        begun = bool(root.outputs) or len(root.ways) != 1
+        if begun:
+            self._always()
+        self._branch(root, 0, begun)
+
+    def _always(self) -> None:
+        if not self.ours:
+            raise Inexact
+        self.steps.append(self.parts.line("LD", "P_On"))
 
     # --- shape ---
 
-    def _series(self, sources: tuple[Object, ...]) -> Series:
-        """What lies between the rail and a place, as contacts and parallels one behind the other."""
-        if not sources:
+    def _series(self, wires: tuple[Wire, ...]) -> Series:
+        """What lies between the rail and a place, as elements and parallels one behind the other."""
+        if not wires:
             raise Inexact
-        if sources not in self.known:
+        if wires not in self.known:
             ways: list[Series] = []
-            for source in sources:
-                if source.kind == "leftPowerRail":
+            for wire in wires:
+                if wire.source.kind == "leftPowerRail":
                     ways.append([])
-                elif source.kind == "contact":
-                    ways.append([*self._series(tuple(wire.source for wire in source.inputs[0].wires)), source])
                 else:
-                    raise Inexact
-            self.known[sources] = self._merged(ways)
-        return self.known[sources]
+                    element, before = self.parts.element(wire)
+                    ways.append([*(self._series(before) if before else []), element])
+            self.known[wires] = self._merged(ways)
+        return self.known[wires]
 
     def _merged(self, ways: list[Series]) -> Series:
         """Several ways as one: what they begin with together, and a parallel of the rest."""
@@ -123,37 +128,37 @@ class _Rung:
             merged.append([group[0][0], *self._merged(rest)] if len(group) > 1 else group[0])
         return merged[0] if len(merged) == 1 else [Parallel(merged)]
 
-    def _hang(self, branch: Branch, series: Series, coil: Object) -> None:
+    def _hang(self, branch: Branch, series: Series, output: Object) -> None:
         for part in series:
             known = next((inner for what, inner in branch.ways if what is part), None)
             if known is None:
                 known = Branch()
                 branch.ways.append((part, known))
             branch = known
-        branch.coils.append(coil)
+        branch.outputs.append(output)
 
     # --- steps ---
 
-    def _branch(self, branch: Branch, depth: int) -> None:
+    def _branch(self, branch: Branch, depth: int, follows: bool) -> None:
         """What hangs on a place, in the order of the network; a TR keeps the power for what comes later."""
-        parts: list[Object | tuple[Object | Parallel, Branch]] = [*branch.coils, *branch.ways]
+        parts: list[Object | tuple[Object | Parallel, Branch]] = [*branch.outputs, *branch.ways]
         parts.sort(key=lambda part: self.place[part if isinstance(part, Object) else self._first(part[0])])
         ways = [at for at, part in enumerate(parts) if not isinstance(part, Object)]
         keeps = bool(ways) and ways[0] < len(parts) - 1
         if keeps and depth >= BRANCHES:
             raise Inexact
         if keeps:
-            self._step("OUT", f"TR{depth}")
+            self.steps.append(self.parts.line("OUT", f"TR{depth}"))
         moved = False
         for part in parts:
             if moved:
-                self._step("LD", f"TR{depth}")
+                self.steps.append(self.parts.line("LD", f"TR{depth}"))
             if isinstance(part, Object):
-                self._coil(part)
+                self._output(part)
                 moved = False
             else:
-                self._part(part[0], bool(self.order))
-                self._branch(part[1], depth + keeps)
+                self._part(part[0], follows)
+                self._branch(part[1], depth + keeps, True)
                 moved = True
 
     def _first(self, part: Object | Parallel) -> Object:
@@ -162,13 +167,13 @@ class _Rung:
         return part
 
     def _part(self, part: Object | Parallel, follows: bool) -> None:
-        """A contact or a parallel, behind what is there already, or at the rail."""
+        """An element or a parallel, behind what is there already, or at the rail."""
         if isinstance(part, Object):
-            self._contact("AND" if follows else "LD", part)
+            self._element("AND" if follows else "LD", part)
             return
         for number, way in enumerate(part.ways):
-            if number and len(way) == 1 and isinstance(way[0], Object):
-                self._contact("OR", way[0])
+            if number and len(way) == 1 and isinstance(way[0], Object) and not self.parts.goes_through(way[0]):
+                self._element("OR", way[0])
                 continue
             for at, inner in enumerate(way):
                 self._part(inner, at > 0)
@@ -177,32 +182,15 @@ class _Rung:
         if follows:
             self.steps.append("AND LD")
 
-    def _contact(self, how: str, item: Object) -> None:
-        form = CONTACTS.get((item.negated, item.edge))
-        if form is None or item.storage:
-            raise Inexact
-        self._step(f"{form}{how}" if form in ("@", "%") else f"{how} {form}".rstrip(), self._operand(item))
+    def _element(self, how: str, item: Object) -> None:
+        if self.parts.goes_through(item):
+            if how == "LD":
+                self._always()
+            self.steps.append(self.parts.through(item))
+        else:
+            self.steps.append(self.parts.contact(how, item))
         self.order.append(item)
 
-    def _coil(self, item: Object) -> None:
-        mnemonic = COILS.get((item.negated, item.edge, item.storage))
-        if mnemonic is None:
-            raise Inexact
-        self._step(mnemonic, self._operand(item))
+    def _output(self, item: Object) -> None:
+        self.steps.append(self.parts.output(item))
         self.order.append(item)
-
-    def _operand(self, item: Object) -> str:
-        """A variable, if rungs read it as one: T1 and D5 are addresses there."""
-        text = item.text
-        if text.upper().startswith("TR") and text[2:].isdigit():
-            raise Inexact
-        try:
-            meant = Operands().expression(text, "b", 0, 0)
-        except Wrong:
-            raise Inexact from None
-        if not isinstance(meant, (NameRef, Member, Index)):
-            raise Inexact
-        return text
-
-    def _step(self, mnemonic: str, operand: str) -> None:
-        self.steps.append(f"{mnemonic:{OPERANDS_AT - 1}} {operand}")

@@ -16,6 +16,7 @@ from fbvm.check.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversi
 from fbvm.plcopen.diagram import Object, Wire
 from fbvm.plcopen.document import Document, Pou, Variable
 from fbvm.syntax import tree
+from fbvm.syntax.operands import Operands, Wrong
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 
@@ -67,6 +68,21 @@ class Scope:
             elif word[0] not in "'\"" and "#" not in word and word.upper() not in _OPERATORS:
                 found.add(self.root(word))
         return frozenset(found)
+
+    def bit(self, text: str) -> str:
+        """A bit as Structured Text says it: an address that rungs know, such as W0.00, has a `%` there."""
+        if self.declares(text):
+            return text
+        try:
+            meant = Operands().expression(text, "b", 0, 0)
+        except Wrong:
+            return text
+        return meant.text if isinstance(meant, tree.Direct) else text
+
+    def declares(self, expression: str) -> bool:
+        """Whether somebody declares the name with which a text begins."""
+        match = _ROOT.match(expression)
+        return match is not None and match[0].upper() in self.taken
 
     def root(self, name: str) -> str:
         """What memory a name stands for."""

@@ -202,7 +202,7 @@ class Statements:
         if not item.inputs[0].wires:
             self.doubt(item, f"contact {item.text} is not connected on its left, and lets no power through")
         power = self.take(item, item.inputs[0])
-        state = self.changed(item, self.expression(item.text), item.negated, item.edge)
+        state = self.changed(item, self.expression(self.scope.bit(item.text)), item.negated, item.edge)
         self.give(wire, both(power, state), keep=True)
 
     def _in_variable(self, item: Object) -> None:
@@ -213,7 +213,7 @@ class Statements:
         if not item.text:
             raise Unexecutable(item, "it has no variable", "name one")
         root = self.scope.root(item.text)
-        return item.text, frozenset((root, SHARED) if root == SHARED else (root,))
+        return self.scope.bit(item.text), frozenset((root, SHARED) if root == SHARED else (root,))
 
     def _sink(self, item: Object) -> None:
         """A coil or an output variable."""

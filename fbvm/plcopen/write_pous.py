@@ -27,15 +27,15 @@ def pou(types: Types, declared: tree.Pou) -> Element:
     if declared.accesses:
         raise Unsayable(declared.accesses[0], "VAR_ACCESS of a POU is not exported", "")
     sections = [section for section in declared.sections if not section.hidden]
+    types.note(sections)
     types.instances = {name.text.upper(): variable.spec.text for section in sections for variable in section.variables
                        for name in variable.names if isinstance(variable.spec, tree.NamedType)}
     lists = [types.section(section) for section in sections if section.variables]
     taken = {name.text.upper() for section in sections for variable in section.variables for name in variable.names}
     inner, instances = _body(types, declared.body, *_span(types, declared), taken)
-    actions = [_action(types, action, taken, instances) for action in declared.actions]
+    actions = [_action(types, action, taken, instances) for action in declared.actions if not action.name.text.startswith("$")]
     if instances:
-        lists.append(element("localVars", *(element("variable", element("type", element("derived", name=kind)), name=name)
-                                            for name, kind in instances.items())))
+        lists.append(element("localVars", *instances.values()))
     result = element("returnType", types.spec(declared.result)) if declared.result is not None else None
     return element("pou", element("interface", result, *lists), element("actions", *actions) if actions else None,
                    element("body", inner), name=declared.name.text, pouType=KINDS[declared.kind])
@@ -52,11 +52,12 @@ def _span(types: Types, declared: tree.Pou) -> tuple[int, int]:
         start += 1
     found = _END.search(text, start, declared.end)
     end = found.start() if found else declared.end
-    written = [action.start for action in declared.actions if start <= action.start < end]
+    written = [action.start for action in declared.actions
+               if start <= action.start < end and not action.name.text.startswith("$")]
     return start, min([end, *written])
 
 
-def _action(types: Types, action: tree.Action, taken: set[str], instances: dict[str, str]) -> Element:
+def _action(types: Types, action: tree.Action, taken: set[str], instances: dict[str, Element]) -> Element:
     text = types.source.text
     start = action.name.end
     if colon := _COLON.match(text, start):
@@ -67,8 +68,8 @@ def _action(types: Types, action: tree.Action, taken: set[str], instances: dict[
     return element("action", element("body", inner), name=action.name.text)
 
 
-def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str]) -> tuple[Element, dict[str, str]]:
-    """The element of a body, and the instances that it needs besides."""
+def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str]) -> tuple[Element, dict[str, Element]]:
+    """The element of a body, and the variables that it needs besides, by name."""
     for statement in body:
         if isinstance(statement, Sfc):
             raise Unsayable(statement, "a sequential function chart is not exported", "")
@@ -81,13 +82,14 @@ def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str])
     if len(body) > 1 and (_JUMP.search(text) or _LABEL.search(_without_ladder(text))):
         raise Unsayable(body[0], "jumps between rungs are not exported", "put the statements into a POU of Structured Text")
     drawing = Drawing()
-    rungs, statements = RungWriter(drawing, taken), StatementWriter(drawing, types)
+    rungs = RungWriter(drawing, types, taken)
+    statements = StatementWriter(drawing, types)
     for statement in body:
         if isinstance(statement, Ladder):
             rungs.ladder(statement)
         else:
             statements.write(statement)
-    return element("LD", *drawing.elements), rungs.instances
+    return element("LD", *drawing.elements), rungs.declared
 
 
 def _without_ladder(text: str) -> str:

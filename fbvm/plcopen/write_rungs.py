@@ -1,26 +1,34 @@
 """Rungs as ladder diagrams: the steps of mnemonics, followed with the stack of those who execute them.
 
 Power is a place, which is a set of outputs that are joined, and what was put behind it and has not been drawn yet.
-An instruction that ladder of the standard does not have cannot be said.
+Comparisons become blocks of the standard; other instructions become boxes of their names, which only we understand.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from fbvm.plcopen.layout import Drawing, End, Ends
-from fbvm.plcopen.markup import Element
-from fbvm.plcopen.write_types import Unsayable
+from fbvm.base.areas import parse_address
+from fbvm.plcopen.layout import Drawing, End, Ends, own_data
+from fbvm.plcopen.markup import Element, element
+from fbvm.plcopen.read_types import LOCATION
+from fbvm.plcopen.write_types import Types, Unsayable
 from fbvm.syntax import tree
+from fbvm.syntax.instruction_set import JOINS, Instruction, instruction_set
 from fbvm.syntax.ladder import Ladder, Rung, Step
+from fbvm.syntax.mnemonics import Symbol, read_rungs
 from fbvm.syntax.operands import SYMBOLS, Operands, Wrong
+from fbvm.syntax.symbols import number
 
 COILS = {"OUT": {}, "OUTNOT": {"negated": "true"}, "SET": {"storage": "set"}, "RSET": {"storage": "reset"},
          "DIFU": {"edge": "rising"}, "DIFD": {"edge": "falling"}}
 EDGES = {"@": {"edge": "rising"}, "%": {"edge": "falling"}}
 ALWAYS = "P_ON"
+COMPARISONS = {"=": "EQ", "<>": "NE", "<": "LT", "<=": "LE", ">": "GT", ">=": "GE"}
+"""Signs of comparisons, and the functions of the standard for them."""
+_NAME = re.compile(r"[^\W\d]\w*(?:\.[^\W\d]\w*|\[\d+\])*")
 
 
 @dataclass(eq=False)
@@ -32,13 +40,21 @@ class Contact:
 
 
 @dataclass(eq=False)
+class Test:
+    """A comparison that is still to be drawn."""
+
+    mnemonic: str
+    operands: tuple[str, ...]
+
+
+@dataclass(eq=False)
 class Ways:
     """Series side by side."""
 
-    series: list[list[Contact | Ways]]
+    series: list[list[Contact | Test | Ways]]
 
 
-Series = list[Contact | Ways]
+Series = list[Contact | Test | Ways]
 
 
 @dataclass
@@ -52,24 +68,53 @@ class Power:
 
 
 class RungWriter:
-    """Draws the rungs of one POU; `instances` are blocks that it adds, by name with their types."""
+    """Draws the rungs of one POU; `declared` are variables that it adds, by name."""
 
-    def __init__(self, drawing: Drawing, taken: set[str]) -> None:
-        self.drawing, self.taken = drawing, taken
-        self.instances: dict[str, str] = {}
+    def __init__(self, drawing: Drawing, types: Types, taken: set[str]) -> None:
+        self.drawing, self.types, self.taken = drawing, types, taken
+        self.declared: dict[str, Element] = {}
+        self.numbered = dict(types.numbered)
+        """Symbols that mean timers and counters, and their numbers."""
 
     def ladder(self, ladder: Ladder) -> None:
         """Draw LADDER .. END_LADDER.  Raises Unsayable."""
+        for symbol in self._symbols(ladder):
+            if timer := number(symbol):
+                self.numbered[symbol.name.upper()] = timer
         for instance in ladder.instances:
-            name, kind = instance.names[0].text, instance.spec
-            if name.upper() not in self.taken and isinstance(kind, tree.NamedType):
-                self.instances.setdefault(name, kind.text)
+            name = instance.names[0].text
+            if name.upper() not in self.taken and name not in self.declared:
+                self.declared[name] = self._declared(instance)
         for rung in ladder.rungs:
             notes = [text.lstrip("'/ ").rstrip() for _, text in rung.notes]
             if comment := "\n".join(filter(None, [rung.comment, *notes])):
                 self.drawing.comment(comment)
-            if rung.steps and rung.steps[0].mnemonic != "END":
+            if rung.steps and not (rung is ladder.rungs[-1] and rung.steps[0].mnemonic == "END"):
                 self._rung(rung)
+
+    def _symbols(self, ladder: Ladder) -> Iterator[Symbol]:
+        """The rows of tables of symbols between the rungs."""
+        text = self.types.source.text[ladder.start:ladder.end]
+        for rung in read_rungs(text, text.find("\n") + 1, text.rfind("\n") + 1, lambda *message: None):
+            yield from rung.symbols
+
+    def _declared(self, variable: tree.VarDecl) -> Element:
+        """An instance of FBCALL, or a variable of a table of symbols."""
+        spec, name = variable.spec, variable.names[0].text
+        if isinstance(spec, tree.ArraySpec) and isinstance(spec.element, tree.NamedType):
+            bounds = {"lower": "0", "upper": str(getattr(spec.dimensions[0][1], "value", 0)) if spec.dimensions[0] else "0"}
+            kind = element("array", element("dimension", **bounds), element("baseType", self.types.spec(spec.element)))
+        else:
+            kind = self.types.spec(spec)
+        made = element("variable", element("type", kind), name=name)
+        if variable.location is not None:
+            place = str(parse_address(variable.location.text))
+            self.foreign(variable, f"the address {place} is kept as data of this program; other tools place the variable")
+            made.content.append(own_data(LOCATION, place))
+        return made
+
+    def foreign(self, node: tree.Node, message: str) -> None:
+        self.types.foreign.append((node, message))
 
     def _rung(self, rung: Rung) -> None:
         self.rail, self.start = self.drawing.rail()
@@ -84,19 +129,21 @@ class RungWriter:
         self.drawing.close(self.rail, self.coils, self.columns, self.rows)
 
     def _step(self, step: Step) -> None:
-        join = re.fullmatch(r"(LD|AND|OR)(NOT)?", step.mnemonic)
-        if step.prefix.replace("!", "") and step.mnemonic not in ("SET", "RSET") and not join:
-            raise self._unsayable(f"{step.prefix}{step.mnemonic}")
-        if join:
+        row = instruction_set().rows[step.mnemonic]
+        prefix = step.prefix.replace("!", "")
+        if join := re.fullmatch(r"(LD|AND|OR)(NOT)?", step.mnemonic):
             self._join(join[1], bool(join[2]), step)
+        elif row.kind == "?":
+            how = next(how for how in JOINS if step.mnemonic.startswith(how))
+            self._joined(how, [Test(step.mnemonic.removeprefix(how), step.operands)])
         elif step.mnemonic in ("ANDLD", "ORLD"):
             self._block(step.mnemonic)
-        elif step.mnemonic in COILS:
+        elif step.mnemonic in COILS and not (prefix and step.mnemonic not in ("SET", "RSET")):
             self._coil(step)
         elif step.mnemonic in _OTHERS:
             _OTHERS[step.mnemonic](self)
         else:
-            raise self._unsayable(step.mnemonic)
+            self._instruction(step, row)
 
     def _unsayable(self, what: str) -> Unsayable:
         return Unsayable(self.step, f"ladder of PLCopen XML has no {what}", "write that rung in Structured Text")
@@ -114,7 +161,9 @@ class RungWriter:
             kept = self.kept[name.upper()]
             self.now = Power(kept.ends, [], kept.column, self.rows)
             return
-        part = self._contact(name, negated, step.prefix.replace("!", ""))
+        self._joined(how, self._contact(name, negated, step.prefix.replace("!", "")))
+
+    def _joined(self, how: str, part: Series) -> None:
         if how == "LD":
             if self.now is not None:
                 self.saved.append(self.now)
@@ -135,14 +184,14 @@ class RungWriter:
         return [Contact(self._symbol(name), marks)]
 
     def _symbol(self, name: str) -> str:
-        """A variable that other tools can name."""
+        """A variable; an address without a name is one that only we can name."""
+        name = self.numbered.get(name.upper(), name)
         try:
             meant = Operands().expression(name, "b", self.step.start, self.step.end)
         except Wrong as wrong:
             raise Unsayable(self.step, wrong.args[0], "") from None
         if not isinstance(meant, tree.NameRef | tree.Member | tree.Index) or name.upper() in SYMBOLS:
-            raise Unsayable(self.step, f"{name} is an address, for which other tools have no name",
-                            "declare a variable AT that address and use its name")
+            self.foreign(self.step, f"{name} is an address, for which other tools have no name; declare a variable AT it")
         return name
 
     def _beside(self, other: Power) -> None:
@@ -196,6 +245,11 @@ class RungWriter:
                 ends = (self.drawing.symbol("contact", part.variable, ends, column, row, **part.marks),)
                 column += 1
                 continue
+            if isinstance(part, Test):
+                ends = self._tested(part, ends, column, row)
+                column += 3
+                rows = max(rows, 3)
+                continue
             joined: list[End] = []
             widest, used = column, 0
             for way in part.series:
@@ -205,6 +259,16 @@ class RungWriter:
                 widest, used = max(widest, end_column), used + taken
             ends, column, rows = tuple(joined), widest, max(rows, used)
         return ends, column, rows
+
+    def _tested(self, part: Test, ends: Ends, column: int, row: int) -> Ends:
+        """A comparison as a block of the standard, and what comes before it ANDed."""
+        kind = COMPARISONS.get(re.sub(r"[A-Z]+$", "", part.mnemonic), part.mnemonic)
+        values = [(f"IN{at}", self._operand(text)) for at, text in enumerate(part.operands, 1)]
+        made = self.drawing.block(kind, "", [*values], [("OUT", "")], column + 1, row + 1, part.mnemonic)
+        if ends[0].id == self.start.id:
+            return (made["OUT"],)
+        both: list[tuple[str, Ends | str]] = [("IN1", ends), ("IN2", (made["OUT"],))]
+        return (self.drawing.block("AND", "", both, [("OUT", "")], column + 2, row)["OUT"],)
 
     def _output(self) -> tuple[Ends, int, int]:
         """The power for an output, and where that goes: a row of its own.  What was saved is drawn first, in its order."""
@@ -235,7 +299,7 @@ class RungWriter:
     # --- others ---
 
     def _nothing(self) -> None:
-        """END and NOP."""
+        """NOP."""
 
     def _keep(self) -> None:
         """KEEP: a coil that sets and, stronger, one that resets."""
@@ -251,16 +315,40 @@ class RungWriter:
     def _function(self, kind: str, pin: str, output: str, instance: str = "") -> None:
         """A block that stands in the way of the power."""
         ends, column, row = self._output()
-        made = self.drawing.block(kind, instance, [(pin, ends)], [(output, "")], column, row)
+        made = self.drawing.block(kind, instance, [(pin, ends)], [(output, "")], column, row, kind if kind == "NOT" else "")
         self.now = Power((made[output],), [], column + 1, row)
+
+    def _refuse(self) -> None:
+        raise self._unsayable(self.step.mnemonic)
 
     def _up(self) -> None:
         """UP: an R_TRIG in the way.  F_TRIG is no DOWN: it has an edge in its first call too."""
-        name, number = "Edge", 1
-        while f"{name}{number}".upper() in self.taken | {known.upper() for known in self.instances}:
-            number += 1
-        self.instances[f"{name}{number}"] = "R_TRIG"
-        self._function("R_TRIG", "CLK", "Q", f"{name}{number}")
+        name, last = "Edge", 1
+        while f"{name}{last}".upper() in self.taken | {known.upper() for known in self.declared}:
+            last += 1
+        kind = element("type", element("derived", name="R_TRIG"))
+        self.declared[f"{name}{last}"] = element("variable", kind, name=f"{name}{last}")
+        self._function("R_TRIG", "CLK", "Q", f"{name}{last}")
+
+    def _instruction(self, step: Step, row: Instruction) -> None:
+        """An instruction of Omron's as a box of its name: conditions, then operands as they are written."""
+        self.foreign(step, f"{step.mnemonic} is an instruction that other tools do not have")
+        inputs: list[tuple[str, Ends | str]] = []
+        column = place = 0
+        if row.inputs:
+            powers = [*[self.saved.pop() for _ in range(row.inputs - 1)][::-1], self.power]
+            for power in powers[:-1]:
+                self._drawn(power)
+                self.rows += 1
+            _, column, place = self._output()
+            inputs = [(f"C{at}" if at > 1 else "EN", power.ends or ()) for at, power in enumerate(powers, 1)]
+        else:
+            place = self.rows
+            self.rows += 1
+        inputs += [(f"OP{at}", self.numbered.get(text.upper(), text)) for at, text in enumerate(step.operands, 1)]
+        self.drawing.block(step.mnemonic, "", inputs, [("ENO", "")], column + 1, place, step.prefix + step.mnemonic)
+        self.rows = max(self.rows, place + len(inputs) // 2 + 1)
+        self.columns = max(self.columns, column + 3)
 
     def _call(self) -> None:
         kind, instance, *pins = self.step.operands
@@ -281,6 +369,7 @@ class RungWriter:
 
     def _operand(self, text: str) -> str:
         """What enters a pin, as Structured Text."""
+        text = self.numbered.get(text.upper(), text)
         if text.upper() in ("P_ON", "P_OFF"):
             return "TRUE" if text.upper() == "P_ON" else "FALSE"
         if re.fullmatch(r"&\d+", text):
@@ -289,28 +378,24 @@ class RungWriter:
             return f"16#{text[1:]}"
         if re.fullmatch(r"[+-][\d.]+", text):
             return text.lstrip("+")
-        if text[0] in "'\"" or "#" in text or text.upper() in ("TRUE", "FALSE"):
+        if text[0] in "'\"" or "#" in text or text.upper() in ("TRUE", "FALSE") or _NAME.fullmatch(text):
             return text
-        return self._symbol(text)
+        self.foreign(self.step, f"{text} is an address, for which other tools have no name; declare a variable AT it")
+        return text
 
 
 def _contacts(series: Series) -> list[Contact]:
     found: list[Contact] = []
     for part in series:
-        found += [part] if isinstance(part, Contact) else [c for way in part.series for c in _contacts(way)]
+        if isinstance(part, Ways):
+            found += [contact for way in part.series for contact in _contacts(way)]
+        elif isinstance(part, Contact):
+            found.append(part)
     return found
 
 
 _OTHERS: dict[str, Callable[[RungWriter], None]] = {
-    "END": RungWriter._nothing, "NOP": RungWriter._nothing, "KEEP": RungWriter._keep, "FBCALL": RungWriter._call,
+    "NOP": RungWriter._nothing, "KEEP": RungWriter._keep, "FBCALL": RungWriter._call,
     "NOT": lambda writer: writer._function("NOT", "IN", "OUT"), "UP": RungWriter._up,
+    "DOWN": lambda writer: writer._refuse(),
 }
-
-
-def draw_rungs(ladders: list[Ladder], taken: set[str]) -> tuple[list[Element], dict[str, str]]:
-    """The elements of an LD body, and the blocks that it needs besides."""
-    drawing = Drawing()
-    writer = RungWriter(drawing, taken)
-    for ladder in ladders:
-        writer.ladder(ladder)
-    return drawing.elements, writer.instances

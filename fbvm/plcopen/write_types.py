@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
+from fbvm.plcopen.layout import own_data
 from fbvm.plcopen.markup import Element, element
 from fbvm.plcopen.read_project import QUALIFIERS, SECTIONS
 from fbvm.plcopen.read_types import LOCATION
@@ -22,6 +23,7 @@ WORDS = {word: name for name, word in QUALIFIERS.items()}
 _TEXTS = r"""'(?:\$.|[^'$])*'|"(?:\$.|[^"$])*\"|\(\*.*?\*\)|//[^\n]*"""
 _SIGNS = re.compile(rf"(?s)({_TEXTS})|[()]")
 _BLANKS = re.compile(rf"(?s)({_TEXTS})|\s+")
+_NUMBERED = re.compile(r"([TtCc])(\d+)")
 _REMARK = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\n]*)")
 
 
@@ -37,6 +39,8 @@ class Types:
         self.foreign: list[tuple[tree.Node, str]] = []
         self.kept: list[tuple[int, int]] = []
         """Parts of the text that are exported as they are."""
+        self.numbered: dict[str, str] = {}
+        """Timers and counters by the names of variables that lie at them, in capitals."""
         self.instances: dict[str, str] = {}
         """Types of the variables of the POU at work that have a type by name, by names in capitals."""
 
@@ -49,6 +53,12 @@ class Types:
             else:
                 end = text.index(")", end) + 1
         return _squeezed(text[start:end])
+
+    def note(self, sections: Iterable[tree.VarSection]) -> None:
+        """Look for variables that lie at timers and counters."""
+        for variable in (variable for section in sections for variable in section.variables):
+            if variable.location is not None and (found := _NUMBERED.fullmatch(variable.location.text.strip())):
+                self.numbered |= {name.text.upper(): f"{found[1].upper()}{int(found[2])}" for name in variable.names}
 
     # --- types ---
 
@@ -124,8 +134,7 @@ class Types:
             made.attributes["address"] = text
             return
         self.foreign.append((location, f"the address {text} is kept as data of this program; other tools place the variable"))
-        made.content.append(element("addData", element("data", element("location", text), name=LOCATION,
-                                                       handleUnknown="discard")))
+        made.content.append(own_data(LOCATION, text))
 
     def section(self, section: tree.VarSection, name: str = "") -> Element:
         """The list that a section is."""

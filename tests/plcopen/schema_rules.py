@@ -12,6 +12,7 @@ _OBJECT = "localId | height width executionOrderId negated edge storage"
 _TYPE = ("BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD string wstring ANY "
          "ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE array derived enum "
          "struct subrangeSigned subrangeUnsigned pointer")
+_PINS = "inputVariables! inOutVariables! outputVariables!"
 _LISTS = "localVars tempVars inputVars outputVars inOutVars externalVars globalVars"
 _MARKS = "| name constant retain nonretain persistent"
 _ROWS = f"""
@@ -46,12 +47,12 @@ contact | {_OBJECT} | position! connectionPointIn connectionPointOut variable!
 coil | {_OBJECT} | position! connectionPointIn connectionPointOut variable!
 inVariable | {_OBJECT} | position! connectionPointOut expression!
 outVariable | {_OBJECT} | position! connectionPointIn expression!
-block | localId typeName | instanceName height width executionOrderId | position! inputVariables! inOutVariables! outputVariables!
+block | localId typeName | instanceName height width executionOrderId | position! {_PINS} addData
 connectionPointIn | | relPosition connection*
 connection | refLocalId | formalParameter | position*
 position | x y |
 relPosition | x y |
-data | name handleUnknown | location
+data | name handleUnknown | text
 """
 COORDINATES = {"x", "y", "height", "width"}
 

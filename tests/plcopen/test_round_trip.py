@@ -109,7 +109,7 @@ def round_trips(folder: str, each: int = 1) -> Counter[str]:
 
 def test_ladder_of_the_corpus_there_and_back() -> None:
     count = round_trips("ladder")
-    assert count["same"] >= 8
+    assert count["same"] >= 35
     assert count["unsaid"] > 0
 
 
@@ -129,7 +129,7 @@ def test_examples_there_and_back() -> None:
         made = export_xml([source])
         lawful(made)
         if made.errors:
-            assert path.stem in ("ladder", "sfc")
+            assert path.stem == "sfc"
             continue
         assert made.text is not None
         back = import_xml(made.text.encode())
@@ -226,6 +226,16 @@ def test_an_address_that_is_no_iec_location_is_kept_for_ourselves_and_named() ->
     assert made.text is not None
     assert "a AT D100 : UINT" in import_xml(made.text.encode()).files["Main.st"].replace("  ", " ")
     assert [element.get("address") for element in document(made).walk() if element.name == "variable"] == ["", "%MW4"]
+
+
+def test_instructions_come_back_as_they_were() -> None:
+    text = "PROGRAM Main\nVAR a : BOOL; n : WORD; END_VAR\nLADDER\n" + "".join(f"RUNG\n{rung}" for rung in (
+        "LD a\nAND<> n #5\n@MOV &200 D500\n", "LD a\nLD W0.00\nCNT 0003 #0002\n", "LD>= D1 D2\nOR= n &7\nNOT\nOUT W1.00\n",
+        "LD P_On\nMOV @D500 D502\n", "LD a\nIL\n", "LD 0.05\nTIM 0 #10\n", "ILC\n")) + "END_LADDER\nEND_PROGRAM\n"
+    back = there_and_back(text).files["Main.st"]
+    steps = [line.split() for line in back.splitlines() if line.startswith("        ")]
+    assert steps == [line.split() for line in text.splitlines() if line.split()[0] not in (
+        "PROGRAM", "VAR", "LADDER", "RUNG", "END_LADDER", "END_PROGRAM")]
 
 
 def test_every_loss_is_named_and_the_rest_is_there() -> None:

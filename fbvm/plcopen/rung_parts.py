@@ -1,0 +1,219 @@
+"""What the elements of a network are for mnemonics: contacts, comparisons, blocks in the way, outputs, and what belongs to
+them."""
+
+from __future__ import annotations
+
+import re
+
+from fbvm.plcopen.diagram import Object, Pin, Wire
+from fbvm.plcopen.networks import Network
+from fbvm.plcopen.scope import Scope
+from fbvm.syntax.instruction_set import Instruction, instruction_set
+from fbvm.syntax.operands import Operands, Wrong
+from fbvm.syntax.tree import Index, Member, NameRef
+
+CONTACTS = {(False, ""): "", (True, ""): "NOT", (False, "rising"): "@", (False, "falling"): "%"}
+"""Negation and edge of a contact, and how mnemonics say it."""
+COILS = {(False, "", ""): "OUT", (True, "", ""): "OUT NOT", (False, "", "set"): "SET", (False, "", "reset"): "RSET",
+         (False, "rising", ""): "DIFU", (False, "falling", ""): "DIFD", (False, "rising", "set"): "@SET",
+         (False, "rising", "reset"): "@RSET", (False, "falling", "set"): "%SET", (False, "falling", "reset"): "%RSET"}
+"""Negation, edge and storage of a coil."""
+OPERANDS_AT = 8
+_CONDITION = re.compile(r"EN|C\d+")
+
+
+class Inexact(Exception):
+    """Mnemonics do not say it."""
+
+
+def instruction(item: Object) -> Instruction | None:
+    """The row of an instruction that is drawn as a block."""
+    name = item.mnemonic.lstrip("!@%")
+    rows = instruction_set().rows
+    return (rows.get(name) or rows.get(f"LD{name}")) if name else None
+
+
+class Parts:
+    """The elements of one network.  `outputs` end a way."""
+
+    def __init__(self, network: Network, scope: Scope) -> None:
+        self.network, self.scope = network, scope
+        self.asked: dict[Object, list[tuple[Object, Wire]]] = {}
+        for item in network.objects:
+            for pin in item.pins:
+                for wire in pin.wires:
+                    self.asked.setdefault(wire.source, []).append((item, wire))
+        self.joined = {item: test for item in network.objects if (test := self._joiner(item))}
+        self.calls = {item for item in network.objects if self._is_call(item)}
+        self.outputs = [item for item in network.objects if self._is_output(item)]
+        self.elements = [item for item in network.objects if item.kind in ("contact", "coil") or instruction(item)
+                         or item in self.calls]
+        for item in network.objects:
+            if item not in self.elements and item not in self.joined and not self._belongs(item):
+                raise Inexact
+
+    # --- what an object is ---
+
+    def _is_test(self, item: Object) -> bool:
+        row = instruction(item)
+        return row is not None and row.kind == "?"
+
+    def _joiner(self, item: Object) -> Object | None:
+        """The comparison that an AND joins to what comes before it."""
+        if item.kind != "block" or item.text.upper() != "AND" or item.instance or item.mnemonic or len(item.inputs) != 2:
+            return None
+        wires = item.inputs[1].wires
+        test = wires[0].source if len(wires) == 1 else None
+        return test if test is not None and self._is_test(test) and len(self.asked.get(test, ())) == 1 else None
+
+    def _is_call(self, item: Object) -> bool:
+        """Whether a block is FBCALL: power goes through EN and ENO, and all else is named at the pins."""
+        if item.kind != "block" or not item.instance or item.mnemonic or item.in_outs or not item.pin("EN"):
+            return False
+        plain = all(self._operand_of(pin) for pin in item.inputs if pin.connected and pin.name.upper() != "EN")
+        outputs = [consumer for consumer, wire in self.asked.get(item, ()) if wire.pin.upper() != "ENO"]
+        return plain and not any(pin.negated or pin.edge for pin in (*item.inputs, *item.outputs)) \
+            and all(self._is_plain_variable(consumer) for consumer in outputs)
+
+    def _is_plain_variable(self, item: Object) -> bool:
+        return item.kind == "outVariable" and len(item.inputs[0].wires) == 1 and not (item.negated or item.edge or item.storage)
+
+    def _operand_of(self, pin: Pin) -> str:
+        """The text that enters a pin; "" if something else does."""
+        if pin.negated or pin.edge:
+            return ""
+        if pin.expression:
+            return pin.expression
+        source = pin.wires[0].source if len(pin.wires) == 1 else None
+        plain = source is not None and source.kind == "inVariable" and not (source.negated or source.edge)
+        return source.text if source is not None and plain else ""
+
+    def _is_output(self, item: Object) -> bool:
+        if item.kind == "coil":
+            return True
+        row = instruction(item)
+        if item in self.calls:
+            return not any(wire.pin.upper() == "ENO" for _, wire in self.asked.get(item, ()))
+        return row is not None and row.kind != "?" and row.does != ".not"
+
+    def _belongs(self, item: Object) -> bool:
+        """Whether an object is a value at the pin of a block that is written with it."""
+        if item.kind == "inVariable":
+            return all(consumer in self.calls or instruction(consumer) for consumer, _ in self.asked.get(item, ()))
+        return self._is_plain_variable(item) and item.inputs[0].wires[0].source in self.calls
+
+    # --- power ---
+
+    def powers(self, output: Object) -> list[tuple[Wire, ...]]:
+        """The wires of each condition that an output takes."""
+        if output.kind == "coil":
+            return [tuple(output.inputs[0].wires)]
+        return [tuple(pin.wires) for pin in output.inputs if _CONDITION.fullmatch(pin.name.upper())]
+
+    def element(self, wire: Wire) -> tuple[Object, tuple[Wire, ...]]:
+        """What a wire comes from, and the wires into that; none at the rail."""
+        item = wire.source
+        if item.kind == "contact":
+            if not item.inputs[0].wires:
+                raise Inexact
+            return item, tuple(item.inputs[0].wires)
+        if item in self.joined:
+            return self.joined[item], tuple(item.inputs[0].wires)
+        if self._is_test(item):
+            return item, ()
+        if item in self.calls and wire.pin.upper() == "ENO":
+            return item, self.powers(item)[0]
+        if (row := instruction(item)) is not None and row.does == ".not":
+            return item, tuple(item.inputs[0].wires)
+        raise Inexact
+
+    def goes_through(self, item: Object) -> bool:
+        """Whether an element takes the power and gives another: FBCALL and NOT."""
+        return item in self.calls or item.mnemonic == "NOT"
+
+    # --- text ---
+
+    def line(self, mnemonic: str, *operands: str) -> str:
+        return f"{mnemonic:{OPERANDS_AT - 1}} {' '.join(operands)}".rstrip()
+
+    def contact(self, how: str, item: Object) -> str:
+        """A contact or a comparison."""
+        if item.kind == "block":
+            operands = [_constant(self._operand_of(pin)) for pin in item.inputs]
+            if not all(operands):
+                raise Inexact
+            return self.line(f"{how}{item.mnemonic}", *operands)
+        form = CONTACTS.get((item.negated, item.edge))
+        if form is None or item.storage:
+            raise Inexact
+        return self.line(f"{form}{how}" if form in ("@", "%") else f"{how} {form}".rstrip(), self._bit(item))
+
+    def through(self, item: Object) -> str:
+        """FBCALL or NOT."""
+        if item not in self.calls:
+            return "NOT"
+        pins = [f"{pin.name}:={_constant(self._operand_of(pin))}" for pin in item.inputs
+                if pin.connected and pin.name.upper() != "EN"]
+        pins += [f"{wire.pin}=>{consumer.text}" for consumer, wire in self.asked.get(item, ()) if wire.pin.upper() != "ENO"]
+        if any(" " in pin for pin in pins):
+            raise Inexact
+        return self.line("FBCALL", item.text, item.instance, *pins)
+
+    def output(self, item: Object) -> str:
+        """A coil, an instruction, or an FBCALL behind which nothing comes."""
+        if item in self.calls:
+            return self.through(item)
+        if item.kind == "block":
+            return self.line(item.mnemonic, *(self._operand_of(pin) for pin in item.inputs
+                                              if not _CONDITION.fullmatch(pin.name.upper())))
+        mnemonic = COILS.get((item.negated, item.edge, item.storage))
+        if mnemonic is None:
+            raise Inexact
+        return self.line(mnemonic, self._bit(item))
+
+    def _bit(self, item: Object) -> str:
+        """A variable, if rungs read it as one, or an address that nobody declares: T1 and D5 are addresses there."""
+        text = item.text
+        if text.upper().startswith("TR") and text[2:].isdigit():
+            raise Inexact
+        try:
+            meant = Operands().expression(text, "b", 0, 0)
+        except Wrong:
+            raise Inexact from None
+        if not isinstance(meant, (NameRef, Member, Index)) and self.scope.declares(text):
+            raise Inexact
+        return text
+
+    # --- order ---
+
+    def compare(self, order: list[Object], place: dict[Object, int]) -> None:
+        """Each element has one step, and what is written is read before or behind as in the network."""
+        if len(set(order)) < len(order) or len(order) < len(self.elements):
+            raise Inexact
+        touched = {item: self._touched(item) for item in order}
+        for at, item in enumerate(order):
+            for behind in order[at + 1:]:
+                if place[behind] < place[item] and (self._writes(item) or self._writes(behind)):
+                    both = touched[item], touched[behind]
+                    if None in both or (both[0] or frozenset()) & (both[1] or frozenset()):
+                        raise Inexact
+
+    def _writes(self, item: Object) -> bool:
+        return item.kind != "contact" and not self._is_test(item)
+
+    def _touched(self, item: Object) -> frozenset[str] | None:
+        """What memory an element reads or writes; None for any."""
+        if item.kind != "block":
+            return self.scope.roots(item.text)
+        if self._is_test(item):
+            return frozenset().union(*(self.scope.roots(self._operand_of(pin)) for pin in item.inputs))
+        return None if item.mnemonic != "NOT" else frozenset()
+
+
+def _constant(text: str) -> str:
+    """An operand of a rung for a value of Structured Text."""
+    if re.fullmatch(r"\d+", text):
+        return f"&{text}"
+    if re.fullmatch(r"16#[0-9A-Fa-f]+", text):
+        return f"#{text[3:]}"
+    return f"+{text}" if re.fullmatch(r"\d+\.\d+", text) else text
