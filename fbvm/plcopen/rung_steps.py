@@ -14,7 +14,7 @@ from fbvm.plcopen.rung_parts import Inexact, Parts
 from fbvm.plcopen.scope import Scope
 
 BRANCHES = 16
-"""TR0 to TR15."""
+"""TR0 to TR15, each for one branch point of a rung."""
 LONGEST = 200
 """Objects of the largest network that is written as a rung."""
 
@@ -54,6 +54,8 @@ class _Rung:
         self.known: dict[tuple[Wire, ...], Series] = {}
         self.order: list[Object] = []
         self.steps: list[str] = []
+        self.points = 0
+        """Branch points so far: each has a TR of its own."""
 
     def lines(self) -> list[str]:
         if len(self.network.objects) > LONGEST or self.network.cut or not self.parts.outputs:
@@ -89,7 +91,7 @@ class _Rung:
         begun = bool(root.outputs) or len(root.ways) != 1
         if begun:
             self._always()
-        self._branch(root, 0, begun)
+        self._branch(root, begun)
 
     def _always(self) -> None:
         if not self.ours:
@@ -139,26 +141,28 @@ class _Rung:
 
     # --- steps ---
 
-    def _branch(self, branch: Branch, depth: int, follows: bool) -> None:
+    def _branch(self, branch: Branch, follows: bool) -> None:
         """What hangs on a place, in the order of the network; a TR keeps the power for what comes later."""
         parts: list[Object | tuple[Object | Parallel, Branch]] = [*branch.outputs, *branch.ways]
         parts.sort(key=lambda part: self.place[part if isinstance(part, Object) else self._first(part[0])])
         ways = [at for at, part in enumerate(parts) if not isinstance(part, Object)]
         keeps = bool(ways) and ways[0] < len(parts) - 1
-        if keeps and depth >= BRANCHES:
-            raise Inexact
+        point = f"TR{self.points}"
         if keeps:
-            self.steps.append(self.parts.line("OUT", f"TR{depth}"))
+            self.points += 1
+            if self.points > BRANCHES:
+                raise Inexact
+            self.steps.append(self.parts.line("OUT", point))
         moved = False
         for part in parts:
             if moved:
-                self.steps.append(self.parts.line("LD", f"TR{depth}"))
+                self.steps.append(self.parts.line("LD", point))
             if isinstance(part, Object):
                 self._output(part)
                 moved = False
             else:
                 self._part(part[0], follows)
-                self._branch(part[1], depth + keeps, True)
+                self._branch(part[1], True)
                 moved = True
 
     def _first(self, part: Object | Parallel) -> Object:

@@ -19,10 +19,11 @@ class _Rung:
     def __init__(self, random: Random, reads: tuple[str, ...], edges: bool) -> None:
         self.random, self.reads, self.edges = random, reads, edges
         self.lines = ["RUNG"]
+        self.branches = 0
 
     def text(self) -> str:
         self._block(2)
-        self._outputs(2, 0)
+        self._outputs(2)
         return "\n".join(self.lines) + "\n"
 
     def _contact(self, how: str) -> None:
@@ -41,15 +42,16 @@ class _Rung:
                 self._block(depth - 1)
                 self.lines.append(f"    {how}")
 
-    def _outputs(self, depth: int, branch: int) -> None:
+    def _outputs(self, depth: int) -> None:
         """What hangs on a place: coils, more contacts with coils behind them, branches."""
         if self.random.random() < 0.2:
             self.lines.append(self.random.choice((
                 "    FBCALL TON t IN:=a PT:=T#20ms Q=>z", "    FBCALL CTU u CU:=b PV:=&3 R:=FALSE Q=>y")))
         if depth and self.random.random() < 0.4:
+            branch, self.branches = self.branches, self.branches + 1
             self.lines.append(f"    OUT TR{branch}")
             self._contact("AND")
-            self._outputs(depth - 1, branch + 1)
+            self._outputs(depth - 1)
             self.lines.append(f"    LD TR{branch}")
             if self.random.random() < 0.7:
                 self._contact("AND")
@@ -57,4 +59,4 @@ class _Rung:
             self.lines.append(f"    {self.random.choice(COILS)} {self.random.choice(BITS[5:])}")
         if depth and self.random.random() < 0.3:
             self._contact("AND")
-            self._outputs(depth - 1, branch)
+            self._outputs(depth - 1)
