@@ -153,7 +153,7 @@ class Etn21:
         if not events and not force and switches == self._seen and now_ns < self._next_ns:
             self.wake_ns = self._next_ns
             return []
-        requests = dispatch.refresh(words, events, switches != self._seen, force, now_ns)
+        requests = dispatch.refresh(words, events, b"" if switches == self._seen else switches, force, now_ns)
         changed = dispatch.show()
         self._seen = words.switches.tobytes() if changed else switches
         self._next_ns = dispatch.wake_ns(now_ns)

@@ -28,7 +28,7 @@ def check_address(memory: AreaMemory, parameters: Parameters) -> int:
     """0000, or the code that the data address deserves: 1101 or 1103.
 
     A block that runs past the end of its area is 1101, assumed, because no table of the switches has 1104."""
-    found = AREA_OF_CODE.get(parameters.area_code)
+    found = AREA_OF_CODE.get(parameters.address_high >> 8)
     if found is None:
         return codes.AREA_CODE
     area, first, last = found
@@ -36,16 +36,16 @@ def check_address(memory: AreaMemory, parameters: Parameters) -> int:
         length = len(memory.words(area))
     except KeyError:
         return codes.AREA_CODE
-    begin = parameters.word
+    begin = _first_word(parameters)
     end = begin + ((parameters.size_bytes + 1) // 2 or 1)
     if begin < first or end > last + 1 or end > length:
         return codes.AREA_CODE
-    return codes.BIT_NUMBER if parameters.bit else codes.NORMAL_END
+    return codes.BIT_NUMBER if parameters.address_low & 0xFF else codes.NORMAL_END
 
 
 def fetch(memory: AreaMemory, parameters: Parameters) -> bytes:
     """The `count` bytes to send, from an address that `check_address` has passed."""
-    words, begin, size_bytes = memory.words(AREA_OF_CODE[parameters.area_code][0]), parameters.word, parameters.size_bytes
+    words, begin, size_bytes = _area(memory, parameters), _first_word(parameters), parameters.size_bytes
     data = array("H", words[begin : begin + (size_bytes + 1) // 2].tobytes())
     if byteorder == "little":
         data.byteswap()
@@ -58,11 +58,21 @@ def store(memory: AreaMemory, parameters: Parameters, data: bytes, odd_filler: i
     The low byte beside an odd last byte becomes `odd_filler`, or stays if that is None."""
     if not data:
         return
-    there, begin = memory.words(AREA_OF_CODE[parameters.area_code][0]), parameters.word
+    there, begin = _area(memory, parameters), _first_word(parameters)
     end = begin + (len(data) + 1) // 2
     if len(data) % 2:
-        data += bytes([there[end - 1] & 0xFF if odd_filler is None else odd_filler])
+        data += bytes((there[end - 1] & 0xFF if odd_filler is None else odd_filler,))
     words = array("H", data)
     if byteorder == "little":
         words.byteswap()
     there[begin:end] = memoryview(words)
+
+
+def _area(memory: AreaMemory, parameters: Parameters) -> memoryview:
+    """The words of the area that the data address names."""
+    return memory.words(AREA_OF_CODE[parameters.address_high >> 8][0])
+
+
+def _first_word(parameters: Parameters) -> int:
+    """The address in that area."""
+    return (parameters.address_high & 0xFF) << 8 | parameters.address_low >> 8

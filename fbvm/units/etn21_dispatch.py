@@ -89,11 +89,13 @@ class Dispatch:
         """Requests that end every connection."""
         return [request for socket in self._sockets.values() for request in socket.reset()]
 
-    def refresh(self, words: Words, events: Sequence[Event], news: bool, force: int, now_ns: int) -> list[Request]:
-        """One I/O refresh, phase by phase; `news` says that switches have changed, `force` that a force-close is asked."""
+    def refresh(self, words: Words, events: Sequence[Event], switches: bytes, force: int, now_ns: int) -> list[Request]:
+        """One I/O refresh, phase by phase.
+
+        `switches` are n+19..n+22 if they have changed, low byte first; `force` says that a force-close is asked for."""
         self._display.begin(words, self.cycle)
         start_force = force and self._forced is None
-        found = self._find(words.switches.tolist()) if news else ()
+        found = self._find(switches) if switches else ()
         requests: list[Request] = []
         for event in events:
             requests += self.take(event)
@@ -112,18 +114,16 @@ class Dispatch:
 
     # --- 1. switches that are new ------------------------------------------------------------------------------------
 
-    def _find(self, switches: Sequence[int]) -> list[Found]:
-        """New switches in n+19..n+22, judged before this refresh ends anything."""
+    def _find(self, switches: bytes) -> list[Found]:
+        """New switches, a byte an area, judged before this refresh ends anything."""
         found = []
-        for pair, word in enumerate(switches):
-            for half in (0, 1) if word else ():
-                new = word >> 8 * half & at.ALL_SWITCHES
-                area = self._areas[2 * pair + half]
-                if new and area.services:
-                    new &= ~area.owned()
-                if new:
-                    busy = bool(area.services) and any(service.code != codes.OTHER_PROCESSING for service in area.services)
-                    found.append(Found(area, at.SWITCHES_IN[new], busy))
+        for area, byte in zip(self._areas, switches, strict=True):
+            new = byte & at.ALL_SWITCHES
+            if new and area.services:
+                new &= ~area.owned()
+            if new:
+                busy = bool(area.services) and any(service.code != codes.OTHER_PROCESSING for service in area.services)
+                found.append(Found(area, at.SWITCHES_IN[new], busy))
         return found
 
     # --- 2. what the network and the clock say -----------------------------------------------------------------------

@@ -148,18 +148,6 @@ class Parameters(NamedTuple):
         return Peer(host_of(self.host_high, self.host_low), self.remote_port)
 
     @property
-    def area_code(self) -> int:
-        return self.address_high >> 8
-
-    @property
-    def word(self) -> int:
-        return (self.address_high & 0xFF) << 8 | self.address_low >> 8
-
-    @property
-    def bit(self) -> int:
-        return self.address_low & 0xFF
-
-    @property
     def timeout_ns(self) -> int:
         return self.timeout * 100_000_000
 
