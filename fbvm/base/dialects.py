@@ -131,6 +131,8 @@ def page() -> str:
 
 
 ALIKE = (
+    ("When a chart tests its transitions", "At the beginning of a call, in front of the actions; CODESYS tests them behind "
+     "the actions: the same steps, with inputs that are one call older."),
     ("REAL_TO_INT(50.5)", "50 in every dialect: to the nearest, ties to even; TRUNC cuts."),
     ("Division by zero, a subscript outside, a null or ended pointer", "The program stops with its line and values."),
     ("Integer overflow, ABS(-32768), -(-32768)", "Wraps, in every dialect."),
