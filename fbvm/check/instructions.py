@@ -83,7 +83,7 @@ def _comment(name: str) -> str:
         if not line.startswith("//"):
             break
         lines.append(line[2:].strip())
-    return " ".join(lines)
+    return " ".join(" ".join(lines).split())
 
 
 def _wrapped(text: str, width: int = 100) -> list[str]:
