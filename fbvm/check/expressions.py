@@ -37,7 +37,7 @@ from fbvm.check import anything, qualified, unknown
 from fbvm.check.aggregates import Aggregates
 from fbvm.check.constants import convert, cut, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
-from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, is_untyped, lent, literal_hint
+from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, hidden_hint, is_untyped, lent, literal_hint
 from fbvm.check.operators import Operators
 from fbvm.check.subscripts import Subscripts
 from fbvm.check.values import is_any
@@ -120,7 +120,8 @@ class Expressions:
             return True
         known = code in _KNOWN and not is_block(kind)
         self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
-                   literal_hint(self.facts.constants.get(expr), base(target)) if known else fitting_hint(expr, kind, target))
+                   hidden_hint(expr, target) or
+                   (literal_hint(self.facts.constants.get(expr), base(target)) if known else fitting_hint(expr, kind, target)))
         return False
 
     def _in_range(self, expr: tree.Expr, value: Value, target: Type, code: str) -> bool:

@@ -11,6 +11,7 @@ from fbvm.base.types import (
     Elementary,
     EnumType,
     OpenArrayType,
+    RefType,
     StringType,
     StructType,
     SubrangeType,
@@ -19,6 +20,7 @@ from fbvm.base.types import (
     converts,
     families,
     families_of,
+    fold,
 )
 from fbvm.check.constants import limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
@@ -52,6 +54,8 @@ def lent(kind: Type, target: Type, dialect: Dialect) -> bool:
         if kind == target or converts(kind, target):
             return True
     kind, target = base(kind), base(target)
+    if dialect.narrowing and isinstance(kind, RefType) and isinstance(target, RefType):
+        return True
     if dialect.narrowing and is_any(kind, "ANY_NUM", "ANY_BIT") and is_any(target, "ANY_NUM", "ANY_BIT") and target != BOOL:
         return True
     if not dialect.integers_and_bits or not isinstance(kind, Elementary) or not isinstance(target, Elementary) or \
@@ -135,6 +139,13 @@ def convertible(form: str, source: Type, target: Type) -> bool:
 
 
 # --- advice ---------------------------------------------------------------------------------------------------------
+
+
+def hidden_hint(expr: tree.Expr, target: Type) -> str:
+    """What to write for a name that means a variable here, and a member of the enumeration that is needed; "" for others."""
+    if isinstance(expr, tree.NameRef) and isinstance(target, EnumType) and fold(expr.text) in target.members:
+        return f"a variable hides the member: write {target}#{expr.text}"
+    return ""
 
 
 def fitting_hint(expr: tree.Expr, kind: Type, target: Type) -> str:

@@ -34,6 +34,7 @@ from fbvm.base.types import (
     machine,
 )
 from fbvm.syntax import literals
+from fbvm.syntax.texts import to_text
 
 Value: TypeAlias = "bool | int | float | str | list[Value] | dict[str, Value] | None"
 """What a place holds, as a Python value; None is a null reference."""
@@ -362,6 +363,8 @@ def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
         return str(shortest_real(value))
     if isinstance(value, int) and plain.name in ("TIME", "LTIME"):
         return show_time(value)
+    if isinstance(value, int) and isinstance(plain, Elementary) and "ANY_DATE" in plain.families:
+        return to_text(plain.name, value).decode("ascii")
     if hexadecimal and isinstance(value, int) and isinstance(plain, Elementary) and "ANY_BIT" in plain.families:
         return in_hexadecimal(plain, value)
     return str(value)

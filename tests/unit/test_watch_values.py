@@ -122,7 +122,8 @@ def test_text_of_another_kind_is_refused(kind: Type, text: str, message: str) ->
     (t.string(), "a", "'a'"), (COLOUR, 5, "Green (5)"), (COLOUR, 3, "? (3)"), (t.REAL, math.inf, "inf"),
     (t.array(((0, 1),), t.BOOL), [True, False], "[TRUE, FALSE]"), (PAIR, {"n": 1, "s": "x"}, "(n := 1, s := 'x')"),
     (t.NULL, None, "NULL"), (t.string(), "it's $5\n\x01", "'it$'s $$5$L$01'"), (CHAR, "a", "'a'"), (CHAR, "\0", "'$00'"),
-    (WCHAR, "\u20ac", '"\u20ac"'), (WIDE, 'a"\x07', '"a$"$0007"'),
+    (t.DATE, 1_749_686_400_000_000_000, "D#2025-06-12"), (t.DT, 1_749_738_615_000_000_000, "DT#2025-06-12-14:30:15"),
+    (t.TOD, 52_215_000_000_000, "TOD#14:30:15"), (WCHAR, "\u20ac", '"\u20ac"'), (WIDE, 'a"\x07', '"a$"$0007"'),
 ])  # fmt: skip
 def test_values_are_shown(kind: Type, value: object, text: str) -> None:
     assert show(kind, value) == text  # type: ignore[arg-type]
