@@ -122,7 +122,7 @@ def takers(switch: str) -> str:
 def page() -> str:
     """All dialects for people: who needs which, and how each answers what others disagree about."""
     lines = ["# Dialects", "", "Where compilers disagree, a dialect says which answer is taken: `--dialect NAME`, `dialect = "
-             '"NAME"` under a', "[plc] of fbvm.toml, or `dialect=` of the compile functions.", ""]
+             '"NAME"` under a', "[plc] of fbvm.toml, or `dialect=` of the compile functions and test rigs.", ""]
     lines += [f"- {row.name}: {row.for_whom}." for row in DIALECTS.values()]
     for switch in SWITCHES:
         what, without, with_it = QUESTIONS[switch]

@@ -330,6 +330,9 @@ class Expressions:
         if not isinstance(whole, StructType):
             if qualified.is_bit(self, expr, whole):
                 return self._part(self.facts.bits[expr], want)
+            if isinstance(whole, EnumType) and isinstance(expr.of, tree.NameRef) and \
+                    self.checker.specs.named_type(expr.of.text, self.source) is whole:
+                return self._enum_value(expr, whole, expr.name)  # a variable that is called like its type
             self.error("S0304", expr.of, f"this is {whole} and has no members",
                        f"what it points to has: write {self.text(expr.of)}^.{expr.name.text}"
                        if isinstance(whole, RefType) and isinstance(whole.target, StructType) else "")

@@ -41,8 +41,8 @@ from fbvm.syntax import tree
 MAX_SIZE = 64 << 20
 """Largest variable in bytes."""
 MAX_STRING = 65534
-WIDE = {"__UXINT": "ULINT", "__XINT": "LINT", "__XWORD": "LWORD"}
-"""CODESYS's names for the types that are as wide as a pointer; here one has 64 bits."""
+WIDE = {"__UXINT": "ULINT", "__XINT": "LINT", "__XWORD": "LWORD", "UXINT": "ULINT", "XINT": "LINT", "XWORD": "LWORD"}
+"""CODESYS's and TwinCAT's names for the types that are as wide as a pointer; here one has 64 bits."""
 Resolved = tuple[Type, bytes]
 
 
