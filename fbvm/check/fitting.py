@@ -163,6 +163,8 @@ def conversion_hint(kind: Type, target: Type) -> str:
     source, wanted = base(kind), base(target)
     if wanted == BOOL and not isinstance(source, StructType):
         return comparison_hint(source)
+    if isinstance(source, ArrayType) and source.element == wanted:
+        return f"one of its elements is meant: write [{', '.join(str(low) for low, _ in source.bounds)}] behind it"
     if isinstance(source, StructType) and source.block:
         outputs = [field.name for field in source.fields.values() if field.kind == "VAR_OUTPUT"]
         return f"name an output of the instance: {' or '.join(outputs[:4])}" if outputs else ""

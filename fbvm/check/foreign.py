@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import re
 
+from fbvm.base.types import ELEMENTARY
+
 _WAIT = "a scan never waits: use a timer, such as TON"
 _PRINT = "a PLC prints nothing: watch a variable"
 VALUES = dict.fromkeys(("DEFAULT", "OTHERS", "OTHERWISE"), "the rest of a CASE stands behind ELSE, without a colon") | {
     "NIL": "write NULL", "NULLPTR": "write NULL", "PI": "write 3.14159265358979, or declare a constant",
     "THEN": "THEN belongs to IF", "NEXT": "a loop ends with END_FOR", "WEND": "a loop ends with END_WHILE",
-    "BREAK": "EXIT leaves a loop"}
+    "BREAK": "EXIT leaves a loop", "END_DO": "FOR ends with END_FOR, WHILE with END_WHILE", "GOTO": "write JMP and a label",
+    "LET": "write x := 5;"} | dict.fromkeys((*ELEMENTARY, "STRING", "WSTRING"), "it is a type: variables are declared between "
+                                            "VAR and END_VAR, in front of all statements")
 """Names of values."""
 FUNCTIONS = {
     "SWITCH": "a choice among values is CASE x OF 1: .. END_CASE", "POW": "write a ** b, or EXPT(a, b)",

@@ -255,11 +255,11 @@ class Operators:
             hint = "a duration is written T#500ms"
         elif expr.op in ("AND", "OR") and want == BOOL and not is_any(left, "ANY_BIT") and not is_any(right, "ANY_BIT"):
             hint = "compare each of them, for example with <> 0"
+        elif expr.op in ("+", "AND") and isinstance(left, StringType):
+            hint = "CONCAT(...) joins texts"
         elif expr.op in ("AND", "OR", "XOR"):
             wrong, other = (right, left) if is_any(left, "ANY_BIT") else (left, right)
             hint = _bit_hint(wrong, other)
-        elif expr.op == "+" and isinstance(left, StringType):
-            hint = "CONCAT(...) joins texts"
         elif isinstance(left, StructType) or isinstance(right, StructType):
             hint = "compare or combine the members"
         elif expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):

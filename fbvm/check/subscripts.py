@@ -42,7 +42,9 @@ class Subscripts:
                 return None
             whole = characters(whole)
         if not isinstance(whole, ArrayType):
-            self.error("S0304", expr.of, f"this is {whole}, not an array")
+            bit = len(expr.subscripts) == 1 and is_any(whole, "ANY_INT", "ANY_BIT")
+            of, number = self.expressions.text(expr.of), self.expressions.text(expr.subscripts[0])
+            self.error("S0304", expr.of, f"this is {whole}, not an array", f"a bit is written {of}.{number}" if bit else "")
             return None
         element: Type = whole
         rest = list(zip(expr.subscripts, kinds, strict=True))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from fbvm.syntax.automaton import Automaton
 from fbvm.syntax.lexer import Token
+from fbvm.syntax.literals import ELEMENTARY
 from fbvm.syntax.mend import Mend
 from fbvm.syntax.phrases import found, sign
 from fbvm.syntax.prospect import advance
-from fbvm.syntax.tree import Node
+from fbvm.syntax.tree import NameRef, Node
 
 OPERANDS = {"NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "LPAR", "DIRECT", "NOT"}
 FUNCTIONS = {"SHL", "SHR", "ROL", "ROR", "MIN", "MAX", "EXPT", "ADD", "SUB", "MUL", "ATAN2", "CONCAT", "FIND"}
@@ -16,6 +17,10 @@ SIGNS = {"DIV": ("SLASH", ", which drops the fraction between integers"), "POW":
          "GE": ("GREATER_EQUAL", ""), "LT": ("LESS", ""), "LE": ("LESS_EQUAL", ""), "EQ": ("EQUAL", ""), "NE": ("UNEQUAL", ""),
          "IS": ("EQUAL", ""), "NAND": ("AND", ""), "NOR": ("OR", "")}
 """Words between two values: our terminal, and more advice."""
+UNARY = {"ABS", "SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "TRUNC", "LEN"}
+"""Functions of one input that are written without brackets."""
+NUMBERS = {"FLOAT": "REAL", "DOUBLE": "LREAL", "INTEGER": "INT", "LONG": "DINT", "SHORT": "INT", "UNSIGNED": "UDINT"}
+"""Types of other languages in front of what is to be converted."""
 WEAKER = ("PLUS", "LESS", "EQUAL", "AND", "OR")
 """What can still stand behind an expression in brackets that the word behind it has closed."""
 
@@ -51,5 +56,43 @@ def decimal_comma(automaton: Automaton, token: Token, following: list[Token]) ->
     if before.end != token.start or number.start != token.end or not before.text.isdigit():
         return None
     automaton.next()
-    return Mend([], before.start, number.end, f"`{before.text},{number.text}` has a comma",
-                f"the decimal sign is a point: {before.text}.{number.text}", lossless=True)
+    advice = f"thousands have no sign, or `_`: {before.text}_{number.text}" if "." in number.text else \
+        f"the decimal sign is a point: {before.text}.{number.text}"
+    return Mend([], before.start, number.end, f"`{before.text},{number.text}` has a comma", advice, lossless=True)
+
+
+def bare_point(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`x := 1.;`"""
+    before = automaton.before
+    if token.type != "DOT" or before.type != "NUMBER" or before.end != token.start:
+        return None
+    return Mend([], before.start, token.end, f"`{before.text}.` ends with its point",
+                f"a number has digits behind it: {before.text}.0", lossless=True)
+
+
+def doubled_quote(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`'it''s'`"""
+    before = automaton.before
+    if token.type != "STRING_LITERAL" or before.type != "STRING_LITERAL" or before.end != token.start:
+        return None
+    quote = token.text[0]
+    return Mend([], before.start, token.end, f"a text with two {quote} inside", f"inside a text {quote} is written ${quote}",
+                lossless=True)
+
+
+def bare_function(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`abs i`, `(INT) x`"""
+    before, behind = automaton.before, token.text if token.type in ("NAME", "NUMBER") else "x"
+    if token.type not in ("NAME", "NUMBER", "TYPED_LITERAL", "LPAR") or not automaton.values:
+        return None
+    if before.type == "NAME" and before.text.upper() in UNARY:
+        return Mend([], before.start, before.end, f"{found(before)} is a function", f"write {before.text.upper()}({behind})",
+                    lossless=False)
+    value = automaton.values[-1]
+    if before.type != "RPAR" or not isinstance(value, NameRef) or automaton.text[value.start - 1:value.start] != "(":
+        return None
+    kind = value.text.upper() if value.text.upper() in ELEMENTARY else NUMBERS.get(value.text.upper())
+    if kind is None:
+        return None
+    return Mend([], value.start - 1, before.end, f"`({value.text})` converts nothing", f"write TO_{kind}({behind})",
+                lossless=False)

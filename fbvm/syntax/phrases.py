@@ -105,6 +105,12 @@ def hint(token: Token, kinds: set[str]) -> str:
         return advice
     if token.type == "TO" and "ASSIGN" in kinds:
         return "the variable of a loop takes its first value with `:=`"
+    if token.type == "RANGE" and "TO" in kinds:
+        return "the last value of a loop stands behind TO"
+    if token.text.upper() == "IN" and "ASSIGN" in kinds:
+        return "write FOR i := 0 TO 9 DO"
+    if token.type == "OUTPUT" and "ASSIGN" in kinds:
+        return "`:` stands behind a label of CASE, `:=` assigns"
     if token.type == "EQUAL" and "ASSIGN" in kinds:
         return "`:=` assigns and gives initial values, `=` compares"
     if token.type == "ASSIGN" and "EQUAL" in kinds:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 
 from fbvm.syntax.automaton import Automaton
-from fbvm.syntax.foreign_forms import decimal_comma, infix
+from fbvm.syntax.foreign_forms import bare_function, bare_point, decimal_comma, doubled_quote, infix
 from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, cut, frames
 from fbvm.syntax.lexer import Token, lexis, meant
 from fbvm.syntax.literals import ELEMENTARY
@@ -200,7 +200,8 @@ def _caret(automaton: Automaton, token: Token, following: list[Token]) -> Mend |
         return None
     automaton.values[-1] = value.of
     return Mend([Token("XOR", "XOR", caret.start, caret.end), token], caret.start, caret.end,
-                "`^` stands behind a reference and leads to what it refers to", "write XOR for exclusive or, a ** b for powers")
+                "`^` stands behind a reference and leads to what it refers to", "write XOR for exclusive or, a ** b for powers",
+                lossless=False)
 
 
 def _begin(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -292,5 +293,6 @@ def _instruction_list(automaton: Automaton, token: Token, following: list[Token]
 SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
     _ladder, _misspelt, _statement_word, _nameless, _reserved_name, _end_of_section,
     _colon_behind_else, _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end,
-    _location_behind_type, _caret, _begin, infix, decimal_comma, _c_loop, _declared_in_body, _instruction_list)
+    _location_behind_type, _caret, _begin, infix, decimal_comma, bare_point, doubled_quote, bare_function, _c_loop,
+    _declared_in_body, _instruction_list)
 """Asked one after the other; the first that knows the mistake mends it."""
