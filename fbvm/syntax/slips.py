@@ -200,8 +200,7 @@ def _caret(automaton: Automaton, token: Token, following: list[Token]) -> Mend |
         return None
     automaton.values[-1] = value.of
     return Mend([Token("XOR", "XOR", caret.start, caret.end), token], caret.start, caret.end,
-                "`^` stands behind a reference and leads to what it refers to", "write XOR for exclusive or, a ** b for powers",
-                lossless=False)
+                "`^` stands behind a reference and leads to what it refers to", "write XOR for exclusive or, a ** b for powers")
 
 
 def _begin(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
