@@ -17,9 +17,11 @@ from typing import Any
 from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.memory import WHOLE_BYTES, Snapshot, compare
 from fbvm.base.types import StructType
+from fbvm.code.image import RungPicture
 from fbvm.plc import Phase
 from fbvm.record.inside import Contact, Event, Frame, Passing, Statement, Write
-from fbvm.record.ladder_text import ladder_text
+from fbvm.record.ladder_svg import rung_svg
+from fbvm.record.ladder_text import ladder_surface
 from fbvm.record.power import Power
 from fbvm.record.recorder import Signal, signals_at
 from fbvm.record.sfc_seen import Called, Evolutions
@@ -116,7 +118,7 @@ class Collector:
         """Draws the rungs and charts of a scan as they were seen; what looked the same before is drawn once."""
         for made in self._power.executed:
             key = made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items())
-            self._picture(scan, made.base, key, partial(ladder_text, made.picture, RUNG_WIDTH, Sight(made.states)))
+            self._picture(scan, made.base, key, partial(_rung, made.picture, Sight(made.states)))
         self._power.executed.clear()
         for called in self._evolutions.called:
             key = called.picture.site, tuple(sorted(called.tested.items())), called.active
@@ -191,6 +193,12 @@ class Collector:
             changes = self.words.setdefault(area, {}).setdefault(address, [] if self._whole is None else [self.first, 0])
             changes += [scan, moment.memory.words(area)[address]]
         self._whole = now
+
+
+def _rung(picture: RungPicture, sight: Sight) -> list[str]:
+    """The headline of a rung, and its drawing as SVG."""
+    head, surface = ladder_surface(picture, RUNG_WIDTH, sight)
+    return [head, rung_svg(surface)] if picture.steps else [head]
 
 
 def _words(trace: Trace, runs: list[tuple[int, int]]) -> Iterator[tuple[str, int]]:

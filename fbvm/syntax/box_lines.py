@@ -49,6 +49,10 @@ class Surface:
     def __init__(self) -> None:
         self.lines: dict[tuple[int, int], list[int]] = {}
         self.texts: dict[tuple[int, int], str] = {}
+        self.strokes: set[tuple[int, int]] = set()
+        """Characters that are the strokes of a contact or the brackets of a coil."""
+        self.faint: set[tuple[int, int]] = set()
+        """Characters that say less than others, as addresses below symbols."""
 
     def _leave(self, x: int, y: int, way: int, weight: int) -> None:
         cell = self.lines.setdefault((x, y), [0, 0, 0, 0])
@@ -72,6 +76,11 @@ class Surface:
         """Text over whatever is there."""
         for at, character in enumerate(text):
             self.texts[x + at, y] = character
+
+    def symbol(self, x: int, y: int, text: str) -> None:
+        """A contact or a coil: its first and its last character are strokes."""
+        self.write(x, y, text)
+        self.strokes |= {(x, y), (x + len(text) - 1, y)}
 
     def cut(self, depth: int) -> None:
         """Leave out what lies above the first row, or in row `depth` and below."""

@@ -10,6 +10,7 @@ from fbvm.syntax.mnemonics import RungText
 from fbvm.syntax.operands import Wrong
 from fbvm.syntax.tree import (
     Argument,
+    Assign,
     Call,
     CallStatement,
     Direct,
@@ -186,7 +187,8 @@ class LadderBlocks:
         arguments += [self._pin(position) for position in range(2, len(line.step.operands))]
         arguments.append(_named(start, end, "ENO", "=>", eno))
         call = Call(start, rungs.end, NameRef(at, until, instance), tuple(arguments))
-        rungs.emit(rungs.assign(eno, rungs.truth(False)), CallStatement(rungs.start, rungs.end, call))
+        seen = Assign(start, start, (eno,), ":=", rungs.contact(eno))  # of no length: for those who look at power, no statement
+        rungs.emit(rungs.assign(eno, rungs.truth(False)), CallStatement(rungs.start, rungs.end, call), seen)
         rungs.instances.append(VarDecl(at, until, (Name(at, until, instance),), None, NamedType(start, end, block), None))
         rungs.condition = rungs.temporary(rungs.name("ENO"))
 

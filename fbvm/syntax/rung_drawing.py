@@ -150,7 +150,7 @@ class _Drawing:
             self.need = max(self.need, columns)
 
     def _output(self, out: Coil | Box, x: int, y: int, power: bool | None, below: int) -> int:
-        seen = self._state(out.step, 0)
+        seen = None if isinstance(out, Box) and out.inputs else self._state(out.step, 0)  # of several inputs it is the last
         on = bool(power if seen is None else seen)
         end = self.width - 1
         self._take(x + self.widths.output(out))
@@ -159,7 +159,7 @@ class _Drawing:
             at = end - self.widths.mark_at(out)
             self.surface.across(x, at, y + 1, on)
             self.surface.across(at + len(mark) - 1, end, y + 1, on)
-            self.surface.write(at, y + 1, mark)
+            self.surface.symbol(at, y + 1, mark)
             return y + 2 + self._labels(label, self.sight.places(label), at, len(mark), y)
         made = self.widths.shape(out)
         at = end - made.right - made.wide - 2
@@ -205,7 +205,9 @@ class _Drawing:
         """A name above a mark and an address or a value below; how many rows that are more than two."""
         self.surface.write(x + (wide - len(label)) // 2, y, label)
         if below:
-            self.surface.write(x + (wide - len(below)) // 2, y + 2, below)
+            start = x + (wide - len(below)) // 2
+            self.surface.write(start, y + 2, below)
+            self.surface.faint |= {(column, y + 2) for column in range(start, start + len(below))}
         return bool(below)
 
     # --- conditions: each gives the rows that it takes and the power behind it --------------------------------------
@@ -252,7 +254,7 @@ class _Drawing:
         at = x + (wide - len(mark) + 1) // 2 + 1
         self.surface.across(x, at, y + 1, bool(power))
         self.surface.across(at + len(mark) - 1, x + wide, y + 1, bool(out))
-        self.surface.write(at, y + 1, mark if not state else f"┫{contact.mark}┣")
+        self.surface.symbol(at, y + 1, mark if not state else f"┫{contact.mark}┣")
         below = self.widths.below(contact)
         return 2 + self._labels(" ".join(contact.operands), below, at, len(mark), y), out
 

@@ -151,6 +151,29 @@ def test_power_is_what_was_seen_and_not_what_is_there_at_the_end_of_the_scan() -
     assert second.picture.steps[1][2] == "RSET"
 
 
+def test_each_input_of_a_box_has_its_own_power() -> None:
+    assert lit("LD a\nLD b\nKEEP c", "a") == text("""
+        ┃   a         ┌──────┐ │
+        ┣━━┫ ┣━━━━━━━━┥ KEEP │ │
+        ┃   b         │ c    │ │
+        ┣━━┤ ├────────┤      │ │
+        ┃             └──────┘ │
+    """)
+
+
+def test_power_behind_a_block_is_its_ENO() -> None:
+    rungs = "LD a\nFBCALL Never x\nOUT b"
+    block = "FUNCTION_BLOCK Never VAR_OUTPUT ENO : BOOL; END_VAR ENO := FALSE; END_FUNCTION_BLOCK\n"
+    made = compile_text(f"{block}PROGRAM Main VAR a, b : BOOL; END_VAR\nLADDER\n{rungs}\nEND_LADDER\nEND_PROGRAM")
+    plc = Plc(made.image)  # type: ignore[arg-type]
+    plc.write("Main.a", True)
+    power = Power(plc.image.rungs, lambda scan: True)
+    with looking(plc, power):
+        plc.scan()
+    made = power.executed[0]
+    assert ladder_text(made.picture, sight=Sight(made.states))[2] == "┣━━┫ ┣━━━┥EN        ENO├──────( )──┤"
+
+
 def test_a_rung_that_was_passed_over_is_not_there() -> None:
     made = executed("LD a\nJMP 1\nLD b\nOUT c\nJME 1", "b")
     assert [len(one.states) for one in made] == [2, 0, 0]
