@@ -80,7 +80,7 @@ class Oracle:
         self._cycle_ns, self._now_ns = cycle_ns, -cycle_ns
         self._levels: dict[str, bool] = {}
 
-    def _instance(self, pou: Pou, section: str = "") -> dict[str, Any]:
+    def _instance(self, pou: Pou) -> dict[str, Any]:
         rows = [row for row in pou.variables if row.section not in ("VAR_TEMP", "VAR_IN_OUT")]
         return {row.name: self._first(row) for row in rows}
 

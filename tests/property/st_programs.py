@@ -23,7 +23,7 @@ from st_oracle_values import Trapped
 from st_shrinking import smallest
 from st_text import text_of
 
-from fbvm.base.types import ArrayType, RefType, StructType, base
+from fbvm.base.types import ArrayType, RefType, StructType, Type, base
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.engine import native
@@ -153,13 +153,17 @@ def _values(variables: dict[Any, Any], plc: Plc, path: str) -> Iterator[tuple[st
             yield from _values(wanted, plc, where)
             continue
         kind = base(place.type)
-        if isinstance(kind, StructType) and kind.block:
+        if _is_block(kind):
             yield from _values(wanted, plc, where)
-        elif isinstance(kind, ArrayType) and isinstance(base(kind.element), StructType) and base(kind.element).block:
+        elif isinstance(kind, ArrayType) and _is_block(base(kind.element)):
             for number, one in enumerate(wanted):
                 yield from _values(one, plc, f"{where}[{number}]")
         elif not isinstance(kind, RefType) and not isinstance(wanted, Pointer) and wanted is not None:
             yield where, wanted, plc.read(place)
+
+
+def _is_block(kind: Type) -> bool:
+    return isinstance(kind, StructType) and kind.block
 
 
 def _same(wanted: Any, found: Any) -> bool:
