@@ -229,7 +229,8 @@ class Maker(Features):
         if what == 7 and self.one_in(4):
             return self.said("if", ((self.value("BOOL", 2), (self.said("return"),)),), ())
         if what in (8, 9, 10, 13, 14):
-            made: Node | None = self.pick((self.block_call, self.block_call, self.bind, self.point, self.open_call, self.through))()
+            makers = (self.block_call, self.block_call, self.bind, self.point, self.open_call, self.through)
+            made: Node | None = self.pick(makers)()
             if made:
                 return made
         if what == 16 and self.traps:
