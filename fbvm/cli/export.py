@@ -21,7 +21,7 @@ from fbvm.plcopen.exporting import export_xml
 def command(files: tuple[Path, ...], document: Path, as_json: bool) -> None:
     """Write the files as a project in PLCopen XML (TC6 2.01), and say what it does not hold.
 
-    Structured Text stays as it is, LADDER .. END_LADDER becomes ladder diagrams. Status 3 if something is left out."""
+    Structured Text stays as it is, LADDER .. END_LADDER and charts are drawn. Status 3 if something is left out."""
     latest = max(file.stat().st_mtime for file in files)
     created = datetime.fromtimestamp(int(latest), UTC).strftime("%Y-%m-%dT%H:%M:%S")
     made = export_xml(files, document.stem, created)

@@ -1,4 +1,4 @@
-"""POUs of the tree as elements of PLCopen XML 2.01: Structured Text as it is, ladder as ladder diagrams."""
+"""POUs of the tree as elements of PLCopen XML 2.01: Structured Text as it is, ladder and charts as drawings."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 
 from fbvm.plcopen.layout import Drawing
 from fbvm.plcopen.markup import Element, element
+from fbvm.plcopen.write_charts import ChartWriter
 from fbvm.plcopen.write_rungs import RungWriter
 from fbvm.plcopen.write_statements import StatementWriter
 from fbvm.plcopen.write_types import Types, Unsayable
@@ -32,13 +33,32 @@ def pou(types: Types, declared: tree.Pou) -> Element:
                        for name in variable.names if isinstance(variable.spec, tree.NamedType)}
     lists = [types.section(section) for section in sections if section.variables]
     taken = {name.text.upper() for section in sections for variable in section.variables for name in variable.names}
-    inner, instances = _body(types, declared.body, *_span(types, declared), taken)
+    transitions: list[Element] = []
+    if declared.body and isinstance(declared.body[0], Sfc):
+        inner, transitions, instances = _chart(types, declared.body[0], taken)
+    else:
+        inner, instances = _body(types, declared.body, *_span(types, declared), taken)
     actions = [_action(types, action, taken, instances) for action in declared.actions if not action.name.text.startswith("$")]
     if instances:
         lists.append(element("localVars", *instances.values()))
     result = element("returnType", types.spec(declared.result)) if declared.result is not None else None
     return element("pou", element("interface", result, *lists), element("actions", *actions) if actions else None,
-                   element("body", inner), name=declared.name.text, pouType=KINDS[declared.kind])
+                   element("transitions", *transitions) if transitions else None, element("body", inner),
+                   name=declared.name.text, pouType=KINDS[declared.kind])
+
+
+def _chart(types: Types, chart: Sfc, taken: set[str]) -> tuple[Element, list[Element], dict[str, Element]]:
+    """The element of a chart, its transitions that have bodies, and variables that these need."""
+    instances: dict[str, Element] = {}
+
+    def body(statements: tree.Block, start: int, end: int) -> Element:
+        made, more = _body(types, statements, start, end, taken)
+        instances.update(more)
+        return made
+
+    writer = ChartWriter(types, chart, body)
+    drawn = element("SFC", *writer.write())
+    return drawn, writer.named, instances
 
 
 def _span(types: Types, declared: tree.Pou) -> tuple[int, int]:
@@ -71,8 +91,6 @@ def _action(types: Types, action: tree.Action, taken: set[str], instances: dict[
 def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str]) -> tuple[Element, dict[str, Element]]:
     """The element of a body, and the variables that it needs besides, by name."""
     for statement in body:
-        if isinstance(statement, Sfc):
-            raise Unsayable(statement, "a sequential function chart is not exported", "")
         if isinstance(statement, tree.RefusedStatement):
             raise Unsayable(statement, f"{statement.what} is not exported", "")
     text = types.source.text[start:end]

@@ -23,9 +23,8 @@ coordinateInfo | | fbd! ld! sfc!
 scaling | x y |
 types | | dataTypes! pous!
 dataType | name | baseType! initialValue
-pou | name pouType | interface actions body
+pou | name pouType | interface actions transitions body
 interface | | returnType {_LISTS.replace(" ", "* ")}*
-action | name | body!
 variable | | type initialValue addData documentation connectionPointIn connectionPointOut
 instances | | configurations!
 configuration | name | resource* globalVars*
@@ -48,6 +47,13 @@ coil | {_OBJECT} | position! connectionPointIn connectionPointOut variable!
 inVariable | {_OBJECT} | position! connectionPointOut expression!
 outVariable | {_OBJECT} | position! connectionPointIn expression!
 block | localId typeName | instanceName height width executionOrderId | position! {_PINS} addData
+step | localId name | initialStep height width | position! connectionPointIn connectionPointOut connectionPointOutAction
+transition | localId | priority | position! connectionPointIn connectionPointOut condition
+selectionDivergence | localId | | position! connectionPointIn connectionPointOut*
+simultaneousDivergence | localId | | position! connectionPointIn connectionPointOut*
+simultaneousConvergence | localId | | position! connectionPointIn connectionPointOut
+jumpStep | localId targetName | | position! connectionPointIn
+actionBlock | localId | height width | position! connectionPointIn action*
 connectionPointIn | | relPosition connection*
 connection | refLocalId | formalParameter | position*
 position | x y |
@@ -77,7 +83,7 @@ def _element(element: Element) -> list[str]:
              if key in COORDINATES and not value.isdigit()]
     if name in ("type", "baseType", "returnType"):
         return wrong + [f"holds {child.name}" for child in element.children if child.name not in _TYPE.split()]
-    if name not in RULES:
+    if name not in RULES or (name == "transition" and element.one("body")):
         return wrong
     must, may, children = RULES[name]
     wrong += [f"has no {key}" for key in must if key not in element.attributes]

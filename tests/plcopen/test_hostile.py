@@ -141,6 +141,7 @@ def test_values_that_are_doubled_again_and_again_end_with_a_message() -> None:
     assert len(made.files["Main.st"]) < 10_000
 
 
+@pytest.mark.slow
 def test_a_network_of_nothing_but_loops_ends_with_a_message() -> None:
     count = 30
     everybody = "+".join(str(n) for n in range(1, count))
@@ -149,6 +150,7 @@ def test_a_network_of_nothing_but_loops_ends_with_a_message() -> None:
     assert "loops" in made.errors[-1].message
 
 
+@pytest.mark.slow
 def test_a_network_that_is_too_large_is_refused() -> None:
     made = chain(5_100, lambda number: contact(number, str(number - 1), "a"))
     assert [d.code for d in made.errors] == ["X0202"]

@@ -107,10 +107,11 @@ def round_trips(folder: str, each: int = 1) -> Counter[str]:
     return count
 
 
+@pytest.mark.slow
 def test_ladder_of_the_corpus_there_and_back() -> None:
-    count = round_trips("ladder")
-    assert count["same"] >= 35
-    assert count["unsaid"] > 0
+    count = round_trips("ladder", each=3)
+    assert count["same"] >= 12
+    assert count["unsaid"] <= 3
 
 
 @pytest.mark.slow
@@ -128,9 +129,7 @@ def test_examples_there_and_back() -> None:
         assert isinstance(source, Source)
         made = export_xml([source])
         lawful(made)
-        if made.errors:
-            assert path.stem == "sfc"
-            continue
+        assert made.errors == []
         assert made.text is not None
         back = import_xml(made.text.encode())
         assert not back.errors
@@ -226,6 +225,13 @@ def test_an_address_that_is_no_iec_location_is_kept_for_ourselves_and_named() ->
     assert made.text is not None
     assert "a AT D100 : UINT" in import_xml(made.text.encode()).files["Main.st"].replace("  ", " ")
     assert [element.get("address") for element in document(made).walk() if element.name == "variable"] == ["", "%MW4"]
+
+
+@pytest.mark.slow
+def test_charts_of_the_corpus_there_and_back() -> None:
+    count = round_trips("sfc")
+    assert count["same"] >= 20
+    assert count["unsaid"] == 0
 
 
 def test_instructions_come_back_as_they_were() -> None:
