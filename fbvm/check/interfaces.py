@@ -11,7 +11,20 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
-from fbvm.base.types import BOOL, AnyType, ArrayType, Field, OpenArrayType, StringType, StructType, Type, base, fold, on_bits
+from fbvm.base.types import (
+    BOOL,
+    AnyType,
+    ArrayType,
+    Field,
+    OpenArrayType,
+    StringType,
+    StructType,
+    Type,
+    base,
+    fold,
+    followed,
+    on_bits,
+)
 from fbvm.check import beginnings
 from fbvm.check.facts import Edge, Pou, Variable, holds_block, is_block, is_open
 from fbvm.check.names import refuse_reserved
@@ -135,6 +148,8 @@ class Interfaces:
             inner = section.kind in ("VAR", "VAR_OUTPUT") and pou.is_function
             late = (inner or section.kind == "VAR_TEMP") and all(fold(word.text) != "CONSTANT" for word in section.qualifiers)
             resolved = self._early.get(declared) or self.typed(declared, pou.source, pou, late)
+            if resolved is not None and section.kind == "VAR_IN_OUT":
+                resolved = followed(resolved[0]), resolved[1]  # an in-out of REFERENCE TO is one of what it is bound to
             borrowed = resolved is not None and section.kind == "VAR_INPUT" and \
                 (isinstance(resolved[0], AnyType) or is_block(resolved[0]))
             for name in declared.names:
@@ -184,8 +199,12 @@ class Interfaces:
                     beginnings.varies(self.checker.expressions(source, pou), declared.initial):
                 self._begun.append(declared)
             elif declared.initial is not None:
+                before = len(self.project.facts.starts)
                 with self.checker.scope(pou, late):
                     initial = self.checker.values.initial(kind, declared.initial, source, initial)
+                if len(self.project.facts.starts) > before and declared.location is not None:
+                    self.report.add("S0701", source, declared.initial,
+                                    "a reference that lies AT an address is made by the program", "assign it in the body instead")
         return kind, initial
 
     def variable(self, declared: tree.VarDecl, name: tree.Name, section: tree.VarSection, source: Source,

@@ -220,7 +220,7 @@ def _deep() -> Iterator[None]:
 def _image(checker: Checker, progress: Progress, drawn: bool) -> Image:
     placed = place(checker)
     program = Program(placed, drawn)
-    program.held = held = InitialReferences(program, checker, placed.initial)
+    program.held = held = InitialReferences(program, checker, placed)
     held.in_frames()
     bodies = tuple(BodyLowering(program, checker, pou).body()
                    for pou in _told(checker.bodies, partial(progress, "compiled")))

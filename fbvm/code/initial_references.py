@@ -6,7 +6,7 @@ arrays, in values of a type, in initial values of an instance."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from fbvm.base.memory import STRUCTS
@@ -15,6 +15,7 @@ from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, Start
 from fbvm.check.references import MARK
 from fbvm.code.evaluation import value_of
+from fbvm.code.layout import Placed
 from fbvm.code.lower import BodyLowering
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_SHIFT, Address, Node
 from fbvm.code.shapes import is_expression
@@ -28,13 +29,13 @@ Marked = tuple[int, Start, Instances]
 
 
 class InitialReferences:
-    """The references of one program; `initial` is what the buffer holds at power-on without them."""
+    """The references of one program; `placed` has what the buffer holds at power-on without them."""
 
-    def __init__(self, program: Program, checker: Checker, initial: Sequence[tuple[int, bytes]]) -> None:
+    def __init__(self, program: Program, checker: Checker, placed: Placed) -> None:
         self.program, self.checker = program, checker
         self.starts = checker.project.facts.starts
         frames = [(pou.frame_offset, pou.frame_initial) for pou in checker.bodies] if self.starts else []
-        self.initial = [*initial, *frames]
+        self.initial, self.completed = [*placed.initial, *frames], placed.completed
 
     def in_slots(self) -> Iterator[tuple[int, bytes]]:
         """Where each of those lies that live as long as the program, and its bytes."""
@@ -42,6 +43,10 @@ class InitialReferences:
             if variable.place == "abs" and not variable.reference:
                 for at, start, around in self._marked(variable.type, variable.initial, 0, variable.offset, {}):
                     yield variable.offset + at, self._made(start, around)
+
+        for offset, kind, content in self.completed if self.starts else ():
+            for at, start, around in self._marked(kind, content, 0, offset, {}):
+                yield offset + at, self._made(start, around)
 
     def within(self, kind: Type, content: bytes) -> Iterator[tuple[int, Start]]:
         """Those in a value that a body makes, which are to global variables."""

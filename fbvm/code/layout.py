@@ -27,6 +27,8 @@ class Placed:
     initial: list[tuple[int, bytes]] = field(default_factory=list)
     retained: list[Retained] = field(default_factory=list)
     objects: Objects = field(default_factory=Objects)
+    completed: list[tuple[int, Type, bytes]] = field(default_factory=list)
+    """First values that VAR_CONFIG gives: where each lies, its type and its bytes."""
 
 
 def place(checker: Checker) -> Placed:
@@ -99,6 +101,7 @@ def _complete(row: Completed, slots: bytearray, placed: Placed) -> None:
         offset = there
     if row.initial is None:
         return
+    placed.completed.append((offset, row.spot.type, row.initial))
     if bit is not None:
         value = 1 << bit if any(row.initial) else 0
         others = sum(data[0] for at, data in placed.initial if at == offset and len(data) == 1)
