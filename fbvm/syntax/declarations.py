@@ -85,7 +85,11 @@ class Declarations(SfcElements):
         declared = [s for s in sections if isinstance(s, VarSection)]
         own = [a for a in actions if isinstance(a, Action)]
         if self.ladders:
+            from fbvm.syntax.rung_blocks import begin
+
             own += [subroutine for ladder in self.ladders for subroutine in ladder.subroutines]
+            if word.type == "PROGRAM":
+                begin(self.ladders)
             declared += self.ladder_sections(declared)
         self.numbered = dict(self.numbered_everywhere)
         body = self.without_jumps(body, declared)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from fbvm.syntax.instruction_set import Instruction
+from fbvm.syntax.instruction_set import Instruction, instruction_set
+from fbvm.syntax.ladder import Ladder
 from fbvm.syntax.mnemonics import RungText
-from fbvm.syntax.operands import Wrong
+from fbvm.syntax.operands import SYMBOLS, Wrong
 from fbvm.syntax.tree import (
     Argument,
     Assign,
@@ -200,6 +201,18 @@ class LadderBlocks:
             raise Wrong(f"{text} is no pin", "write PIN:=operand for an input or PIN=>operand for an output")
         at = start + len(name) + 2
         return _named(start, end, name, sign, self.rungs.value(value, at, end))
+
+
+def begin(ladders: Sequence[Ladder]) -> None:
+    """Let the first LADDER of a PROGRAM turn the condition flags OFF if its rungs use them."""
+    rows = instruction_set().rows
+    for ladder in ladders:
+        for step in (step for rung in ladder.rungs for step in rung.steps):
+            reads = any(SYMBOLS.get(operand.upper(), "").startswith("CF0") for operand in step.operands)
+            if reads or rows[step.mnemonic].does.startswith("CX_"):
+                first, at = ladders[0], ladders[0].start
+                first.body = (CallStatement(at, at, Call(at, at, NameRef(at, at, "CX_Begin"), ())), *first.body)
+                return
 
 
 def undeclared(instances: Iterable[VarDecl], sections: Iterable[VarSection],

@@ -105,8 +105,7 @@ def steps(text: str) -> list[list[tuple[str, str, tuple[str, ...]]]]:
     assert [d for d in diagnostics if d.severity == "error"] == []
     pou = tree.declarations[0]
     assert isinstance(pou, Pou)
-    ladder = pou.body[0]
-    assert isinstance(ladder, Ladder)
+    ladder = next(statement for statement in pou.body if isinstance(statement, Ladder))
     return [[_key(step) for step in each.steps] for each in ladder.rungs]
 
 
