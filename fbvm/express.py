@@ -26,23 +26,28 @@ class Express:
         self._units, self._memory, self._schedule = units, memory, schedule
         self.machine: NativeEngine | None = None
         """Machine code for which it is ready."""
+        self._known: list[Attached] = []
+        """Units for which it is ready."""
         self._series: Series
         self.idle = False
         """The units have nothing to do as long as what they watch does not change and none of them wakes."""
         self._passed = 0
         """How many refreshes were left out since the last one."""
 
-    def prepare(self, machine: NativeEngine) -> bool:
+    def ready(self, machine: NativeEngine) -> bool:
         """Be ready for this machine code; False if a variable says which tasks run, or one has not run yet."""
+        return (machine is self.machine and self._units == self._known) or self._prepare(machine)
+
+    def _prepare(self, machine: NativeEngine) -> bool:
         turns = self._schedule.turns()
         if not turns:
             return False
-        self.machine, self.idle = machine, False
+        self.machine, self._known, self.idle = machine, list(self._units), False
         self._series = machine.series(turns, CLOCKWORK, watched(self._units, self._memory.areas))
         return True
 
     def forget(self) -> None:
-        """There are other units, or tasks begin anew."""
+        """Tasks begin anew."""
         self.machine, self.idle = None, False
 
     def refresh(self, now_ns: int, journal: Journal | None = None) -> None:

@@ -129,7 +129,7 @@ class Plc:
         machine = self.engine.machine
         if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
             return False
-        return not self.breakpoints.armed and (self._express.machine is machine or self._express.prepare(machine))
+        return not self.breakpoints.armed and self._express.ready(machine)
 
     def _begin(self, now_ns: int) -> None:
         """A scan up to its program."""
@@ -323,7 +323,6 @@ class Plc:
         attached = Attached(unit, network.attach(unit.address), network)
         with self._acting("unit", self._journal.unit(unit) if self._journal else None):
             self.units.append(attached)
-            self._express.forget()
             attached.link.submit(unit.reset(self.memory), self.now_ns)
 
     # --- start, stop and travel ---------------------------------------------------------------------------------------

@@ -266,6 +266,18 @@ def test_a_unit_that_something_is_done_to_takes_part_again() -> None:
     assert plc.read("A302") == 0
 
 
+def test_a_unit_that_is_taken_away_and_comes_back_takes_part() -> None:
+    plc = with_unit("native", 1_000_000)
+    plc.run(scans=100)
+    taken = plc.units.pop()
+    plc.write("CIO1517", 0)
+    plc.run(scans=100)
+    assert plc.read("CIO1517") == 0
+    plc.units.append(taken)
+    plc.run(scans=1)
+    assert plc.read("CIO1517") != 0
+
+
 def test_faults_by_the_number_of_a_scan_count_all_scans() -> None:
     plc = with_unit("native", 1_000_000)
     plc.run(scans=5000)
