@@ -2,7 +2,8 @@
 prints, and gates nothing.
 
 The limit is the scan without a recorder: as machine code, where only ends of scans are written down, and as the observed
-build in Python, where every write or statement is; what is above is looking at values and packing what changed."""
+build in Python, where every write or statement is; what is above is looking at values and packing what changed.  `auto` has
+the way to machine code in it, which few scans do not pay for."""
 
 from __future__ import annotations
 
