@@ -19,6 +19,7 @@ from fbvm.record.ladder_svg import ladder_svg
 from fbvm.record.ladder_text import ladder_surface, ladder_text
 from fbvm.record.names import Names
 from fbvm.record.power import Power
+from fbvm.record.rung_values import Values
 from fbvm.syntax.rung_widths import Sight
 from fbvm.watch.paths import Place
 
@@ -88,7 +89,8 @@ def drawing(plc: Plc, scans: str | None) -> Iterator[None]:
     if not scans:
         yield
         return
-    power = Power(plc.image.rungs, scans_named(scans))
+    values = Values(plc.image.symbols, plc.memory.areas)
+    power = Power(plc.image.rungs, scans_named(scans), values.keep)
     with looking(plc, power):
         yield
     names = Names(plc.image.symbols, plc.memory.areas)
@@ -97,4 +99,4 @@ def drawing(plc: Plc, scans: str | None) -> Iterator[None]:
         if before != (made.scan, made.base):
             before = made.scan, made.base
             click.echo(f"scan {made.scan}, {names.instance(made.base)}")
-        _draw(made.picture, chart_width(), Sight(made.states, _places(plc.image, made.picture.body)))
+        _draw(made.picture, chart_width(), Sight(made.states, _places(plc.image, made.picture.body), values.of(made)))

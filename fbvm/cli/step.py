@@ -52,7 +52,7 @@ def command(
         bench = ProjectBench(project, name)
         texts = source_texts(bench.image, bench.files, bench.libraries)
     else:
-        image = compiled(files, program, libraries, runnable=True)
+        image = compiled(files, program, libraries, runnable=True, drawn=True)
         bench = Bench(image, cycle_ns, mappings, timing, seed)
         texts = source_texts(image, {str(path): path for path in files}, libraries)
     session = Session(bench.make)

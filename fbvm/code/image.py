@@ -127,6 +127,8 @@ class RungPicture:
     number: int
     comment: str
     steps: tuple[tuple[int, str, str, tuple[str, ...]], ...]
+    is_text: bool = False
+    """Whether it is a statement of Structured Text that is drawn as a rung."""
 
 
 @dataclass(frozen=True)

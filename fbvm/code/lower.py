@@ -79,7 +79,7 @@ class BodyLowering:
             except NoRung as reason:
                 said = f"in line {self.pou.source.place(statement.start)[0]} is not drawn: {reason}"
             self._rungs[site] = number
-            self.program.rungs.append(RungPicture(self.pou.number, site, number, said, steps))
+            self.program.rungs.append(RungPicture(self.pou.number, site, number, said, steps, is_text=True))
 
     def _entry(self) -> None:
         """Initial values of the frame, and edges of inputs."""

@@ -20,6 +20,7 @@ from fbvm.record.inside import Statement
 from fbvm.record.names import Names
 from fbvm.record.power import Executed
 from fbvm.record.recorder import HEXADECIMAL_AREAS, Signal
+from fbvm.record.rung_values import Values
 from fbvm.record.sfc_seen import Called
 from fbvm.step.twin import END, Act, Injector, Seen, Stop, Told, Twin, depth
 from fbvm.watch import places
@@ -89,6 +90,11 @@ class Session:
     def rungs(self) -> list[Executed]:
         """The rungs that were executed in this scan, in order, and what was seen in them."""
         return self._twin.power.executed
+
+    @property
+    def values(self) -> Values:
+        """The values in those rungs."""
+        return self._twin.values
 
     @property
     def charts(self) -> list[Called]:

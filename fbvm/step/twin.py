@@ -16,6 +16,7 @@ from fbvm.engine.trap import Trap
 from fbvm.plc import Phase, Plc, State
 from fbvm.record.inside import Event, Frame, Inside, Statement
 from fbvm.record.power import Power
+from fbvm.record.rung_values import Values
 from fbvm.record.sfc_seen import Evolutions
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value
@@ -66,7 +67,8 @@ class Twin:
         self.statement: Statement | None = None
         self.count = 0
         """Statements of the scan that are done."""
-        self.power = Power(plc.image.rungs, lambda scan: True)
+        self.values = Values(plc.image.symbols, self.plc.memory.areas)
+        self.power = Power(plc.image.rungs, lambda scan: True, self.values.keep)
         """What was seen in the rungs of this scan."""
         self.evolutions = Evolutions(plc.image.charts, lambda scan: True)
         """What was seen of charts in this scan."""
@@ -80,7 +82,7 @@ class Twin:
         `acts` happen before the statements of their numbers, 0 before the scan."""
         self.plc.restore(state)
         self.statement, self.count = None, 0
-        self.power = Power(self.plc.image.rungs, lambda scan: True)
+        self.power = Power(self.plc.image.rungs, lambda scan: True, self.values.keep)
         self.evolutions = Evolutions(self.plc.image.charts, lambda scan: True)
         self._stop, self._acts, self._told = stop, acts, told
         if self.plc.trap:

@@ -72,7 +72,8 @@ class Words:
     def _power(self, file: str) -> dict[int, bool]:
         """Of rungs of this instance in this scan, line by line, whether the element conducts."""
         statement = self._session.statement
-        return {site.line: seen[-1] for rung in self._session.rungs if statement and rung.base == statement.frame.base
+        return {site.line: seen[-1] for rung in self._session.rungs
+                if statement and rung.base == statement.frame.base and not rung.picture.is_text
                 for step, seen in rung.states.items()
                 if (site := self.sites[rung.picture.steps[step][0]]).file == file}  # fmt: skip
 
@@ -88,9 +89,9 @@ class Words:
         if not chosen:
             raise ValueError(f"there is no rung {number}; rungs are {mine[0].number} to {mine[-1].number}")
         for rung in chosen:
-            seen = [made.states for made in self._session.rungs
-                    if made.picture is rung and made.base == statement.frame.base]  # fmt: skip
-            yield from ladder_text(rung, WIDEST_RUNG, Sight(seen[-1] if seen and seen[-1] else None))
+            seen = [made for made in self._session.rungs if made.picture is rung and made.base == statement.frame.base]
+            sight = Sight(seen[-1].states, values=self._session.values.of(seen[-1])) if seen and seen[-1].states else Sight()
+            yield from ladder_text(rung, WIDEST_RUNG, sight)
 
     def chart(self) -> Iterator[str]:
         """The drawing of the chart of this POU, with its steps as they are here.  Raises ValueError."""

@@ -14,6 +14,7 @@ from fbvm.record.history import looking
 from fbvm.record.ladder_svg import ladder_svg
 from fbvm.record.ladder_text import ladder_surface, ladder_text
 from fbvm.record.power import Executed, Power
+from fbvm.record.rung_values import Values
 from fbvm.syntax.rung_widths import Sight
 
 
@@ -172,6 +173,24 @@ def test_power_behind_a_block_is_its_ENO() -> None:
         plc.scan()
     made = power.executed[0]
     assert ladder_text(made.picture, sight=Sight(made.states))[2] == "┣━━┫ ┣━━━┥EN        ENO├──────( )──┤"
+
+
+def test_values_are_those_that_the_rung_read() -> None:
+    """The second rung changes what the first one compared and gave to the block."""
+    declared = "n : INT; d : WORD := 7; b : BOOL; t : CTU;"
+    plc = Plc(image("LD> d &5\nFBCALL CTU t PV:=n\nOUT b\nLD P_On\n++ d", declared))
+    values = Values(plc.image.symbols, plc.memory.areas)
+    power = Power(plc.image.rungs, lambda scan: scan == 0, values.keep)
+    plc.write("Main.n", 3)
+    with looking(plc, power):
+        plc.scan()
+    first = power.executed[0]
+    assert ladder_text(first.picture, sight=Sight(first.states, values=values.of(first)))[1:] == text("""
+        ┃ d &5        ┌─ t : CTU ─┐       b   │
+        ┣━━┫>┣━━━━━━━━┥EN      ENO┝━━━━━━( )━━┥
+        ┃  = 7  n = 3─┤PV         │           │
+        ┃             └───────────┘           │
+    """)
 
 
 def test_a_rung_that_was_passed_over_is_not_there() -> None:
