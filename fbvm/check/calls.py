@@ -27,7 +27,7 @@ from fbvm.check.foreign import comma_hint
 from fbvm.check.generics import Generics, is_generic
 from fbvm.check.standard import StandardCalls
 from fbvm.check.writes import note_count, writable
-from fbvm.syntax import tree
+from fbvm.syntax import ladder, tree
 
 if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
@@ -285,6 +285,8 @@ class Calls:
                     "pass a variable that has as many, or give both the same length"
             self.error("S0405", value, f"the in-out {variable.name} needs {variable.type}, this is {kind}", hint)
             return False
+        if isinstance(value, ladder.Words):
+            value = value.of
         return variable.constant or writable(self.expressions, value, f"be passed to the in-out {variable.name}")
 
     def output(self, argument: tree.Argument, kind: Type, name: str) -> bool:

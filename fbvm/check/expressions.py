@@ -375,7 +375,7 @@ class Expressions:
 
     def _is_variable(self, expr: tree.Expr) -> bool:
         expr = self.facts.root(expr)
-        places = tree.Deref | tree.Index | ladder.Memory
+        places = tree.Deref | tree.Index | ladder.Memory | ladder.Words
         return isinstance(expr, places) or expr in self.facts.variables or expr in self.facts.directs or \
             expr in self.facts.followed
 
@@ -385,7 +385,8 @@ class Expressions:
             return anything.is_array(expr)
         return expr not in self.facts.rewritten and self._is_variable(expr) and \
             (expr in self.facts.followed or isinstance(
-                expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part | tree.Deref | ladder.Memory))
+                expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part | tree.Deref | ladder.Memory |
+                ladder.Words))
 
     def _deref(self, expr: tree.Deref, want: Type | None) -> Type | None:
         kind = self.infer(expr.of)
@@ -418,6 +419,13 @@ class Expressions:
         self.fit(expr.address, UDINT)
         return ELEMENTARY[expr.kind] if expr.kind else anything.VIEWS["WORDS"]
 
+    def _words(self, expr: ladder.Words, want: Type | None) -> Type | None:
+        kind = self.infer(expr.of)
+        if kind is not None and (base(kind) == BOOL or not self.is_variable(expr.of)):
+            self.error("S0405", expr, f"words are needed here, this is {kind}")
+            return None
+        return kind and anything.VIEWS["WORDS"]
+
     def _unary(self, expr: tree.Unary, want: Type | None) -> Type | None:
         return self.operators.unary(expr, want)
 
@@ -436,4 +444,5 @@ _INFER: dict[type, Callable[..., Type | None]] = {
     tree.ArrayInit: Expressions._aggregate, tree.StructInit: Expressions._aggregate,
     tree.Call: Expressions._call, tree.Unary: Expressions._unary, tree.Binary: Expressions._binary,
     ladder.Edge: Expressions._edge, ladder.Element: Expressions._element, ladder.Memory: Expressions._memory,
+    ladder.Words: Expressions._words,
 }

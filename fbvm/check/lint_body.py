@@ -98,6 +98,6 @@ _BELOW: dict[type, Callable[[Any], Iterable[tree.Node | None]]] = {
     tree.Direct: _nothing,
     ladder.Ladder: lambda n: n.body, ladder.Rung: lambda n: n.body, sfc.Sfc: lambda n: n.body,
     ladder.Edge: lambda n: (n.of, n.memory), ladder.Element: lambda n: (n.value,),
-    ladder.Memory: lambda n: (n.address,),
+    ladder.Memory: lambda n: (n.address,), ladder.Words: lambda n: (n.of,),
 }
 """For each kind of node of a body the nodes directly below it, in the order of the text."""

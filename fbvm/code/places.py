@@ -110,6 +110,8 @@ class Places:
             return Place((("ref", self.body.value(expr.of), self.body.site(expr)), 0, ()), kind)
         if isinstance(expr, ladder.Memory):
             return plc_addresses.place_at(self.body, expr, kind)
+        if isinstance(expr, ladder.Words):
+            return Place(self.of(expr.of).address, kind)
         assert isinstance(expr, tree.Index)
         whole = self.facts.types[expr.of]
         if whole is VIEWS["BITS"]:
@@ -204,7 +206,7 @@ class Places:
         return Place((start, offset, (*terms, (kind.element.size, distance))), kind.element)
 
     def _bound_at(self, expr: tree.Expr, kind: OpenArrayType, dimension: int, upper: bool) -> Node:
-        if isinstance(expr, ladder.Memory):
+        if isinstance(expr, ladder.Memory | ladder.Words):
             return plc_addresses.bound(self.body, expr, upper)
         if isinstance(expr, tree.Member):
             return self._last_of_any(expr, kind) if upper else ("const", "i64", 0)

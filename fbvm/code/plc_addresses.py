@@ -85,9 +85,24 @@ def place_at(body: BodyLowering, expr: ladder.Memory, kind: Type) -> Place:
     return Place((("ref", bit, site), 0, ()), BOOL)
 
 
-def bound(body: BodyLowering, expr: ladder.Memory, upper: bool) -> Node:
-    """The first and the last subscript of the words from an address on, as i64."""
+def bound(body: BodyLowering, expr: ladder.Memory | ladder.Words, upper: bool) -> Node:
+    """The first and the last subscript of the words from an address or a variable on, as i64."""
     if not upper:
         return _number(0)
+    if isinstance(expr, ladder.Words):
+        return _number(_words_behind(body, expr.of) - 1)
     left = ("convert", "i64", "u32", words_from(body, body.value(expr.address)))
     return ("sub", "i64", left, _number(1))
+
+
+def _words_behind(body: BodyLowering, expr: tree.Expr) -> int:
+    """How many words there are from a variable on, or from a part of one whose subscripts are constants."""
+    root = body.facts.root(expr)
+    place, whole = body.places.of(expr), body.places.of(root)
+    start, offset, terms = place.address
+    end = whole.address[1] + whole.type.size
+    if start == "abs":
+        ends = (area.offset + area.size_bytes for area in body.program.areas.values()
+                if area.unit_bits == 16 and area.offset <= whole.address[1] < area.offset + area.size_bytes)
+        end = next(ends, end)
+    return (place.type.size if terms else end - offset) // 2

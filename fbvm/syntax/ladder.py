@@ -40,6 +40,13 @@ class Memory(Expr):
 
 
 @_node
+class Words(Expr):
+    """The words that begin with a variable: up to the end of its area if it lies in one, else up to its own end."""
+
+    of: Expr
+
+
+@_node
 class Step(Node):
     """One instruction as a programming tool writes it: `prefix` is made of `!`, `@` and `%`, `operands` are as written."""
 

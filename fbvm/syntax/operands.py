@@ -21,7 +21,7 @@ from fbvm.base.areas import (
     parse_address,
 )
 from fbvm.syntax import tree
-from fbvm.syntax.ladder import Memory
+from fbvm.syntax.ladder import Memory, Words
 from fbvm.syntax.tree import Argument, Binary, Call, Direct, Expr, Index, Literal, Member, Name, NameRef
 
 SYMBOLS = {
@@ -227,6 +227,8 @@ class Operands:
                 place = Index(start, end, place, (Literal(start, end, "int", int(part[1:-1]), None, part[1:-1]),))
             else:
                 place = Member(start, end, place, Name(start, end, part))
+        if wanted in "aA":
+            return Words(start, end, place)
         if wanted not in "wdqn":
             return place
         return Call(start, end, NameRef(start, end, f"TO_{_TYPES[wanted]}"), (Argument(start, end, "", None, place),))
