@@ -5,19 +5,19 @@ about time.  It has no calls but those of the tasks."""
 
 from __future__ import annotations
 
+import ctypes
 from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from string import Template
-from weakref import finalize
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
 from fbvm.base.memory import Memory
 from fbvm.engine import native_cache
 from fbvm.engine.native_cache import Stored, name_of
 from fbvm.engine.native_compiler import Linked, compile_text
-from fbvm.engine.native_entries import Entry, entry
+from fbvm.engine.native_entries import Entry
 
 
 @dataclass
@@ -54,7 +54,7 @@ WATCHED_ROW, WATCHED_BYTES = 2, 8
 """Numbers of what is watched: its offset in the memory, and the eight bytes that are expected there."""
 NO_LIMIT = 1 << 62
 _SCANS = Template(f"""
-define i32 @scans(ptr %p, ptr %unused) {{
+define i32 @scans(ptr %p) {{
 entry:
 %m = load ptr, ptr %p
 %c_at = getelementptr inbounds i8, ptr %p, i64 {8 * CONTEXT}
@@ -210,12 +210,9 @@ class Series:
         self._watched = [(memory.u8[offset : offset + WATCHED_BYTES].cast("q"), first + WATCHED_ROW * number + 1)
                          for number, offset in enumerate(watched)]  # fmt: skip
         """What is watched, and where what is expected of it is."""
-        entered = entry()
-        entered.bind(self._numbers.buffer_info()[0], 0)
         shape = tuple(turn.interval_ns > 0 for turn in turns), clockwork, len(watched)
-        entered.point_to(_scans(*shape).address("scans"))
-        finalize(self, entered.give_back)
-        self._call: Callable[[], int] = entered.call
+        self._numbers_at = self._numbers.buffer_info()[0]
+        self._call = _scans(*shape)
 
     @property
     def changed(self) -> bool:
@@ -233,7 +230,7 @@ class Series:
         numbers[STEP], numbers[BUDGETED], numbers[CYCLE] = step_ns, budget, cycle_time
         for row, at in timed:
             numbers[at] = self.turns[row].next_ns
-        point = self._call()
+        point = self._call(self._numbers_at)
         for row, at in timed:
             self.turns[row].next_ns = numbers[at]
         return point
@@ -250,8 +247,8 @@ class Series:
 
 
 @cache
-def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int) -> Linked:
-    """The code for a shape: its function takes the parameters and returns the point of a trap or 0."""
+def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int) -> Callable[[int], int]:
+    """The function for a shape: it takes the address of the parameters and returns the point of a trap or 0."""
     points = ", ".join(f"[ %r{n}, %run{n} ]" for n in range(len(intervals)))
     text = _SCANS.substitute(rows="\n".join(_rows(len(intervals))), clockwork="\n".join(_clockwork(clockwork)),
                              turns="\n".join(_turns(intervals)), points=points,
@@ -261,4 +258,10 @@ def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int) -> L
     if stored is None:
         stored = Stored({}, compile_text(text, 2))
         native_cache.write(name, stored)
-    return Linked(stored.compiled, ["scans"])
+    linked = Linked(stored.compiled, ["scans"])
+    _LOADED.append(linked)
+    return ctypes.PYFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)(linked.address("scans"))
+
+
+_LOADED: list[Linked] = []
+"""What functions that were given out lie in."""
