@@ -151,7 +151,8 @@ def compare(everybody: dict[str, Exchange]) -> None:
         rate, client = statistics.median(found), everybody[name]
         scans = f"{client.scans / client.done:.1f}" if isinstance(client, Blocks) and client.done else ""
         own = "" if name in (BEST, LIBMODBUS) else f"{statistics.median(used[name]):,.0f}"
-        print(f"{name:<34}{rate:>12,.0f}{rate / best if best else 0:>8.2f}{rate / plain:>13.2f}{own:>13}{scans:>12}")
+        of_c = f"{rate / best:.2f}" if best else ""
+        print(f"{name:<34}{rate:>12,.0f}{of_c:>8}{rate / plain:>13.2f}{own:>13}{scans:>12}")
 
 
 def main() -> None:
