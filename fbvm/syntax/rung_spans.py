@@ -157,6 +157,8 @@ class Spans:
     def _visit(self) -> Statement:
         rungs = self.rungs
         number = self._number(rungs.line.step.operands[0], "subroutine")
+        if any(frame.what == f"SBN{number}" for frame in self.frames):
+            raise self.refused(f"subroutine {number} calls itself", "FOR and NEXT repeat rungs")
         self._visited.setdefault(number, (rungs.start, rungs.end))
         return rungs.called(f"$SBN{number}")
 
