@@ -42,6 +42,7 @@ class Dialect:
     sums_in_dint: bool = False
     reals_saturate: bool = False
     reals_wrap: bool = False
+    ties_away: bool = False
 
 
 QUESTIONS = {
@@ -80,6 +81,9 @@ QUESTIONS = {
                        "the nearest number that there is; 0 for NAN"),
     "reals_wrap": ("REAL_TO_INT(70000.0), TRUNC: the width of the result", "must suffice (R0105)",
                    "4464: cut to it, as integers are; what 64 bits do not hold is 16#8000_0000_0000_0000 first"),
+    "ties_away": ("REAL_TO_INT(2.5), REAL_TO_INT(50.5); REAL_TO_BYTE(-1.0)",
+                  "2, 50: to the nearest, ties to even; bit strings have no negative ones",
+                  "3, 51: to the nearest, ties away from 0; bit strings take the low bits, 16#FF"),
     "libraries": ("blocks that begin or end another way; whether actions of charts have a final scan",
                   "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
@@ -92,14 +96,15 @@ _ROWS = (
     Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
             lenient_positions=True, real_bits_by_value=True, arithmetic_of_bits=True, integers_and_bits=True,
             numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, bare_actions=True,
-            locals_are_read=True, programs_are_written=True, lenient_texts="leading", initial_variables=True, reals_wrap=True),
+            locals_are_read=True, programs_are_written=True, lenient_texts="leading", initial_variables=True, reals_wrap=True,
+            ties_away=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True,
             lenient_texts="leading"),
     Dialect("rusty", "programs for RuSTy", real_bits_by_value=True, loop_ends_each_pass=True, arithmetic_of_bits=True,
             integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
             locals_are_read=True,
             programs_are_written=True, initial_variables=True, locals_are_written=True, narrowing=True, sums_in_dint=True,
-            reals_saturate=True, lenient_texts="whole", written_out=True),
+            reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True),
     Dialect("omron", "programs that shall run in Sysmac Studio",
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )
@@ -135,7 +140,7 @@ def page() -> str:
 ALIKE = (
     ("When a chart tests its transitions", "At the beginning of a call, in front of the actions; CODESYS tests them behind "
      "the actions: the same steps, with inputs that are one call older."),
-    ("REAL_TO_INT(50.5)", "50 in every dialect: to the nearest, ties to even; TRUNC cuts."),
+    ("REAL_TO_INT(50.7)", "51 in every dialect: to the nearest; TRUNC cuts."),
     ("Division by zero, a subscript outside, a null or ended pointer", "The program stops with its line and values."),
     ("Integer overflow, ABS(-32768), -(-32768)", "Wraps, in every dialect."),
     ("AND and OR whose right side has effects", "Both sides are worked out; AND_THEN and OR_ELSE leave out what cannot matter."),

@@ -257,7 +257,8 @@ def number(body: BodyLowering, node: Node, source: Type, target: Type, site: int
     if a in FLOATS and b not in FLOATS:
         if is_any(target, "ANY_BIT") and not by_value:
             return ("bits", b, a, node)
-        return _integer(body, "nearest", node, b, site)
+        wraps = body.dialect.ties_away and is_any(target, "ANY_BIT")
+        return _cut(body, "nearest", node, b) if wraps else _integer(body, "nearest", node, b, site)
     if b in FLOATS and is_any(source, "ANY_BIT") and a != "b" and not by_value:
         return ("bits", b, a, node)
     return ("convert", b, a, node)
@@ -275,8 +276,25 @@ def _cut(body: BodyLowering, name: str, node: Node, form: str) -> Node:
     kept = body.keep(node if node[1] == "f64" else ("convert", "f64", "f32", node))
     low, high = ("const", "f64", -2.0 ** 63), ("const", "f64", 2.0 ** 63)
     fits = ("and", "b", ("ge", "b", "f64", kept, low), ("lt", "b", "f64", kept, high))
-    number: Node = (name, "i64", "f64", ("select", "f64", fits, low, kept), 0)
-    return number if form == "i64" else ("convert", form, "i64", number)
+    number = _whole(body, name, ("select", "f64", fits, low, kept), "i64")
+    if form != "u64":
+        return number if form == "i64" else ("convert", form, "i64", number)
+    above = ("and", "b", ("ge", "b", "f64", kept, high), ("lt", "b", "f64", kept, ("const", "f64", 2.0 ** 64)))
+    large = ("truncate", "u64", "f64", ("select", "f64", above, ("const", "f64", 0.0), kept), 0)
+    return ("select", "u64", above, ("convert", "u64", "i64", number), large)
+
+
+def _whole(body: BodyLowering, name: str, node: Node, form: str) -> Node:
+    """A real that fits as an integer by `nearest` or `truncate`; ties away from 0 where the dialect has them so."""
+    if name != "nearest" or not body.dialect.ties_away:
+        return (name, form, "f64", node, 0)
+    real = body.keep(node)
+    number = body.keep(("nearest", form, "f64", real, 0))
+    rest = body.keep(("sub", "f64", real, ("convert", "f64", form, number)))
+    zero = ("const", "f64", 0.0)
+    up = ("and", "b", ("eq", "b", "f64", rest, ("const", "f64", 0.5)), ("gt", "b", "f64", real, zero))
+    down = ("and", "b", ("eq", "b", "f64", rest, ("const", "f64", -0.5)), ("lt", "b", "f64", real, zero))
+    return ("sub", form, ("add", form, number, ("convert", form, "b", up)), ("convert", form, "b", down))
 
 
 def saturated(body: BodyLowering, name: str, node: Node, form: str) -> Node:
@@ -287,7 +305,7 @@ def saturated(body: BodyLowering, name: str, node: Node, form: str) -> Node:
     last = high - 1 if bits < 64 else math.nextafter(high, 0)
     inside = ("min", "f64", ("max", "f64", kept, ("const", "f64", low)), ("const", "f64", last))
     there = ("select", "f64", ("eq", "b", "f64", kept, kept), ("const", "f64", 0.0), inside)
-    number: Node = (name, form, "f64", there, 0)
+    number = _whole(body, name, there, form)
     if bits < 64:
         return number
     most = ("const", form, int(high) - 1)
