@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from fbvm.syntax.instruction_set import instruction_set
+
 StepText = tuple[str, str, tuple[str, ...]]
 """Prefix, mnemonic and operands of an instruction."""
 
@@ -79,8 +81,6 @@ CALL = "CALL"
 """The call of a block in Structured Text, as a step: type, instance, pins; a pin takes a condition where nothing enters it."""
 COILS = {"OUT": " ", "OUTNOT": "/", "SET": "S", "RSET": "R", "DIFU": "↑", "DIFD": "↓"}
 EDGES = {"": "", "@": "↑", "%": "↓"}
-INPUTS = {"KEEP": 2, "CNT": 2, "CNTX": 2, "TTIM": 2, "TTIMX": 2, "CNTR": 3, "CNTRX": 3, "SFT": 3}
-"""Instructions that take several conditions."""
 
 
 @dataclass
@@ -183,7 +183,8 @@ class _Reader:
             given = tuple(pin for pin in map(_pin, pins) if pin.operand)
             self._box(Box(number, block, (), (), False, instance, given, entries), len(entries))
         else:
-            self._box(Box(number, prefix + mnemonic, operands), INPUTS.get(mnemonic, 1))
+            row = instruction_set().rows.get(mnemonic)
+            self._box(Box(number, prefix + mnemonic, operands), row.inputs if row else 1)
 
     def _box(self, box: Box, count: int) -> None:
         """A box at the end of a rung.  If it has several inputs, they are the last blocks; all but the first begin at the

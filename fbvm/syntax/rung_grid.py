@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from fbvm.syntax.box_lines import DOWN, LEFT, RIGHT, UP
+from fbvm.syntax.instruction_set import instruction_set
 
 Cell = tuple[int, int]
 WAYS = {LEFT: (-1, 0), RIGHT: (1, 0), UP: (0, -1), DOWN: (0, 1)}
@@ -250,7 +251,8 @@ class Grid:
     def _find_labels(self) -> None:
         """Operands above contacts and coils; then what stands below them."""
         for element in self.elements:
-            wanted = 2 if element.mark.lstrip("!@%")[:1] in tuple("<=>T") and not element.is_coil else 1
+            row = None if element.is_coil else instruction_set().rows.get("LD" + element.mark.lstrip("!@%").strip())
+            wanted = len(row.operands) if row else 1
             texts = self._label(element, wanted)
             element.operands = tuple(self.lines[element.y - 1][start:end] for start, end in texts)
             element.operand_at = texts
@@ -277,7 +279,7 @@ class Grid:
             what = "coil" if element.is_coil else "contact"
             self.problems.append(Bad(
                 element.x, element.y, element.until + 1 - element.x, f"above this {what} stands no operand",
-                f"write {'two operands with one space between them' if wanted == 2 else 'it'} in the row above, "
+                f"write {f'{wanted} operands with one space between them' if wanted > 1 else 'it'} in the row above, "
                 f"over column {(element.x + element.until) // 2 + 1}"))
             return []
         chosen = min(near, key=lambda c: abs(c[0][0] + c[-1][1] - 1 - element.x - element.until))
