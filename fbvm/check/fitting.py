@@ -161,6 +161,8 @@ def fitting_hint(expr: tree.Expr, kind: Type, target: Type) -> str:
 def conversion_hint(kind: Type, target: Type) -> str:
     """How to turn a value of one type into another, "" if there is no conversion."""
     source, wanted = base(kind), base(target)
+    if isinstance(source, RefType) or isinstance(wanted, RefType):
+        return _reference_hint(source, wanted)
     if wanted == BOOL and not isinstance(source, StructType):
         return comparison_hint(source)
     if isinstance(source, ArrayType) and source.element == wanted:
@@ -175,6 +177,22 @@ def conversion_hint(kind: Type, target: Type) -> str:
     if isinstance(source, EnumType):
         return f"write TO_{names[1]}(...)"
     return f"write {names[0]}_TO_{names[1]}(...)"
+
+
+def _reference_hint(source: Type, wanted: Type) -> str:
+    """What to write where a reference meets a value."""
+    if isinstance(source, RefType) and isinstance(wanted, RefType):
+        return "REF_TO and REFERENCE TO have one type; POINTER TO, which ADR(...) gives, may change it" \
+            if not source.moves and not wanted.moves else ""
+    if isinstance(source, RefType):
+        if wanted == source.target:
+            return "^ behind a reference is what it refers to"
+        if wanted == BOOL:
+            return "compare it with NULL"
+        return "a reference is no number here: keep it in a POINTER TO, such as PVOID"
+    assert isinstance(wanted, RefType)
+    made = "ADR" if wanted.moves else "REF"
+    return f"write {made}(...)" if source == wanted.target else f"a reference is made of a variable: {made}(x)"
 
 
 def comparison_hint(kind: Type) -> str:
@@ -194,6 +212,8 @@ def literal_hint(value: Value | None, kind: Type) -> str:
         return 'a WSTRING is written "text"' if kind.wide else "a text is written 'text'"
     if is_any(kind, "ANY_CHAR"):
         return 'a WCHAR is one character, written "A"' if kind.name == "WCHAR" else "a CHAR is one character, written 'A'"
+    if isinstance(kind, RefType):
+        return "a reference is made of a variable, or NULL"
     if isinstance(kind, EnumType):
         return f"name a member, such as {kind}#{next(iter(kind.shown.values()))}"
     for name, written in (("DURATION", "a duration is written T#500ms"), ("DATE", f"a literal is written {_dated(kind)}")):

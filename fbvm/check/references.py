@@ -181,6 +181,10 @@ def lend(expressions: Expressions, value: tree.Expr, kind: Type, code: str, name
     """True if a REFERENCE TO `kind` that is called `name` can be bound to a value; else a diagnostic."""
     if is_null(value):
         return True
+    if named(value) is not value and value not in expressions.facts.followed:
+        expressions.error("S0407", value, f"{name} is bound to a variable, and this makes a reference already",
+                          f"name the variable alone: {expressions.text(named(value))}")
+        return False
     found = refer(expressions, value, lasting=False)
     if found is None or found == kind:
         return found is not None
