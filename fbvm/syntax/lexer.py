@@ -67,6 +67,8 @@ _SIGNS = tuple((re.compile(shape), advice) for shape, advice in (
     (r"#", "a type stands in front of `#`, and no space"),
     (r"\\", "the escape in a string is `$`")))
 """What no word begins with, and advice."""
+_DRAWN = re.compile(r"(?:[ \t]*[│├┃┣][^\n]*\n)+")
+"""Lines that begin with the left rail of a rung."""
 END_OF_FILE = "\x1a\0"
 """Characters with which older machines fill a file behind its end."""
 NO_VALUE = ("<<", ">>", "++", "--")
@@ -217,6 +219,10 @@ class Lexer:
             return None, len(text)
         if character in "'\"":
             return self._open_string(at)
+        if drawn := _DRAWN.match(text, text.rfind("\n", 0, at) + 1):
+            self.report("S0101", at, min(drawn.end(), text.find("\n", at)), "these lines are a rung that is drawn",
+                        "rungs stand between LADDER and END_LADDER", False)
+            return None, drawn.end()
         if word := lex.foreign_word.match(text, at):
             self.report("S0102", at, word.end(),
                         f"`{_short(word[0])}` is no name: of letters only A to Z can be part of one",
