@@ -42,7 +42,7 @@ def _names(transitions: Iterable[Transition], known: dict[str, Step], tell: Call
             for name in names:
                 if fold(name.text) not in known:
                     close = get_close_matches(fold(name.text), known, 1)
-                    hint = f"the nearest is {known[close[0]].name.text}" if close else f"declare it: STEP {name.text}: END_STEP"
+                    hint = f"did you mean {known[close[0]].name.text}?" if close else f"declare it: STEP {name.text}: END_STEP"
                     tell("S0201", name, f"there is no step {name.text}", hint)
                 elif fold(name.text) in seen:
                     tell("S0111", name, f"{name.text} stands twice behind {side}", "")

@@ -341,14 +341,16 @@ def _member(field: Field, value: Value, hexadecimal: bool) -> str:
 
 
 def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
-    """A value for people: TRUE, 12, 16#00FF, T#1s500ms, 'text', [1, 2], (a := 1); of an instance the pins first."""
+    """A value for people: TRUE, 12, 16#00FF, T#1s500ms, 'text', [1, 2], (a := 1); of an instance the pins first, and not what
+    nobody has written."""
     plain = base(as_read(kind))
     if value is None:
         return "NULL"
     if isinstance(plain, ArrayType) and isinstance(value, list):
         return "[" + ", ".join(show(plain.element, item, hexadecimal) for item in value) + "]"
     if isinstance(plain, StructType) and isinstance(value, dict):
-        members = [f for f in plain.fields.values() if f.name in value and not (plain.block and f.constant)]
+        members = [f for f in plain.fields.values()
+                   if f.name in value and "$" not in f.name and not (plain.block and f.constant)]
         members.sort(key=lambda f: _PINS.get(f.kind, len(_PINS)))
         return "(" + ", ".join(f"{f.name} := {_member(f, value[f.name], hexadecimal)}" for f in members) + ")"
     if isinstance(value, bool):

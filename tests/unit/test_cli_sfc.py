@@ -59,3 +59,9 @@ def test_without_a_chart_there_is_nothing_to_draw(tmp_path: Path) -> None:
     path.write_text("PROGRAM Main\nEND_PROGRAM\n", encoding="utf-8")
     result = CliRunner().invoke(main, ["sfc", str(path)])
     assert result.exit_code == 2 and "no POU has an INITIAL_STEP" in result.output
+
+
+def test_a_value_for_people_has_no_names_that_nobody_wrote(file: Path) -> None:
+    result = CliRunner().invoke(main, ["run", str(file), "--scans", "1", "--show", "Main.left"])
+    shown = "(on := FALSE, lit := FALSE, Dark := (X := TRUE, T := T#0s), Bright := (X := FALSE, T := T#0s))"
+    assert result.output == f"Main.left = {shown}\n"
