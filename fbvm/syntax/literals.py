@@ -234,6 +234,8 @@ def duration(text: str) -> int:
     negative = text.startswith("-")
     rest = text[1:] if text[:1] in ("-", "+") else text
     units, total, last = list(UNITS_NS), 0, -1
+    if "," in rest:
+        raise Malformed(f"`{_short(rest)}` has a comma", f"the decimal sign is a point: T#{_short(rest.replace(',', '.'))}")
     if not rest:
         raise Malformed("a duration needs a number and a unit, as in `T#1s500ms`", "")
     while rest:
