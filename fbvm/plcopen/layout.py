@@ -36,6 +36,8 @@ class Drawing:
         self.elements: list[Element] = []
         self.top = GAP
         self.number = 0
+        self.first = 0
+        """Where the elements of the network at work begin."""
 
     def next_id(self) -> int:
         self.number += 1
@@ -58,6 +60,7 @@ class Drawing:
 
     def rail(self) -> tuple[Element, End]:
         """The left rail of a network; its outputs are counted when the network is finished."""
+        self.first = len(self.elements)
         made = element("leftPowerRail", _position(LEFT, self.top), localId=self.next_id(), height=ROW, width=RAIL_WIDTH)
         self.elements.append(made)
         return made, End(self.number, "", LEFT + RAIL_WIDTH, self.y(0))
@@ -118,7 +121,7 @@ class Drawing:
         """Finish a network: the right rail, and as many outputs of the left one as it needs."""
         height = max(rows, 1) * ROW
         rail.attributes["height"] = str(height)
-        wired_rows = sorted({int(position.get("y")) for made in self.elements for point in made.walk()
+        wired_rows = sorted({int(position.get("y")) for made in self.elements[self.first:] for point in made.walk()
                              for wire in point.all("connection") if wire.get("refLocalId") == rail.get("localId")
                              for position in wire.all("position")[-1:]})
         rail.content += [element("connectionPointOut", _relative(RAIL_WIDTH, y - self.top), formalParameter="")

@@ -78,12 +78,12 @@ def _by_number(made: list[Network]) -> list[Network] | None:
 
 def _comment(made: list[Network], comments: list[Object], flat: bool) -> None:
     """Give each comment to the network that comes next below it, else to the last one."""
+    ends = [max(_place(item, flat) for item in network.objects) for network in made]
     for comment in sorted(comments, key=lambda item: _place(item, flat)):
         here = _place(comment, flat)
-        below = [network for network in made if max(_place(item, flat) for item in network.objects) >= here]
-        for network in (below or made[-1:])[:1]:
-            if comment.text:
-                network.comments.append(comment.text)
+        at = next((at for at, end in enumerate(ends) if end >= here), len(made) - 1)
+        if comment.text and made:
+            made[at].comments.append(comment.text)
 
 
 # --- one network ------------------------------------------------------------------------------------------------------

