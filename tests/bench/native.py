@@ -67,18 +67,16 @@ def power_on(image: Image) -> Memory:
 def shortest_ns(work: Callable[[int], object], rounds: int = ROUNDS) -> float:
     """Nanoseconds of one of n pieces of work, in the shortest round."""
     work(100)  # what is done once only
-    n, taken = 1, 0.0
-    while taken < ROUND_S:
+
+    def took(n: int) -> float:
+        began = time.perf_counter()
+        work(n)
+        return time.perf_counter() - began
+
+    n = 1
+    while min(took(n) for _ in range(3)) < ROUND_S:  # short rounds would see one phase of a program only
         n *= 2
-        began = time.perf_counter()
-        work(n)
-        taken = time.perf_counter() - began
-    best = taken / n
-    for _ in range(rounds):
-        began = time.perf_counter()
-        work(n)
-        best = min(best, (time.perf_counter() - began) / n)
-    return best * 1e9
+    return min(took(n) for _ in range(rounds)) / n * 1e9
 
 
 def by_hand(name: str, folder: Path, step_ns: int) -> Callable[[int], object]:
