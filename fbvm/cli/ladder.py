@@ -25,7 +25,7 @@ from fbvm.watch.paths import Place
 
 SVG_WIDTH = 120
 """Columns of a picture."""
-_SPAN = re.compile(r"(\d+)(?:\.\.(\d+))?")
+_SPAN = re.compile(r"([0-9]{1,18})(?:\.\.([0-9]{1,18}))?")
 
 
 @click.command("ladder")
@@ -74,13 +74,20 @@ def _places(image: Image, body: int) -> Callable[[str], str]:
 
 def scans_named(text: str) -> Callable[[int], bool]:
     """Which scans `3,5..7` names.  Another text is a mistake of usage."""
-    wanted: set[int] = set()
+    wanted: list[range] = []
     for part in text.split(","):
         match = _SPAN.fullmatch(part.strip())
-        if not match:
+        if not match or not (span := range(int(match[1]), int(match[2] or match[1]) + 1)):
             raise click.UsageError(f"{text!r} names no scans; write 3 or 3,5..7")
-        wanted.update(range(int(match[1]), int(match[2] or match[1]) + 1))
-    return wanted.__contains__
+        wanted.append(span)
+    return lambda scan: any(scan in span for span in wanted)
+
+
+def tell_nothing_drawn(plc: Plc, option: str, part: str, there: bool) -> None:
+    """Says why an option drew nothing: no such `part` is in the program, or none was executed in the scans it names."""
+    why = f"no {part} was executed in these scans; the run had scans 0 to {plc.scans - 1}" if there and plc.scans else \
+        f"no {part} was executed" if there else f"there is no {part} in this program"  # fmt: skip
+    click.secho(f"{option}: {why}", fg="yellow", err=True)
 
 
 @contextmanager
@@ -93,6 +100,8 @@ def drawing(plc: Plc, scans: str | None) -> Iterator[None]:
     power = Power(plc.image.rungs, scans_named(scans), values.keep)
     with looking(plc, power):
         yield
+    if not power.executed:
+        tell_nothing_drawn(plc, f"--ladder {scans}", "rung", bool(plc.image.rungs))
     names = Names(plc.image.symbols, plc.memory.areas)
     before: tuple[int, int] | None = None
     for made in power.executed:

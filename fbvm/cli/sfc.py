@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli.ladder import SVG_WIDTH, scans_named
+from fbvm.cli.ladder import SVG_WIDTH, scans_named, tell_nothing_drawn
 from fbvm.cli.outcome import chart_width
 from fbvm.cli.sources import compiled, source_arguments
 from fbvm.code.image import Image, SfcPicture
@@ -58,6 +58,8 @@ def drawing(plc: Plc, scans: str | None) -> Iterator[None]:
     seen = Evolutions(plc.image.charts, scans_named(scans))
     with looking(plc, seen):
         yield
+    if not seen.called:
+        tell_nothing_drawn(plc, f"--sfc {scans}", "chart", bool(plc.image.charts))
     names = Names(plc.image.symbols, plc.memory.areas)
     for called in seen.called:
         click.echo(f"scan {called.scan}, {names.instance(called.base)}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 
 from fbvm.base.diagnostics import Diagnostic, Source
@@ -17,6 +18,10 @@ def parse(source: Source, reached: Callable[[int], None] | None = None) -> tuple
 
     Never raises for any text: what cannot be understood is left out of the tree and has a diagnostic.  Tells now and then
     which character it has `reached`."""
+    if xml := _XML.match(source.text):
+        return SourceText(0, len(source.text), ()), [Diagnostic(
+            "S0101", source, xml.start(1), xml.end(1), "this is XML, no source",
+            "`fbvm import FILE.xml -o DIR` makes sources of a project in PLCopen XML")]  # fmt: skip
     builder = Types(source)
     lexer = Lexer(source.text, builder.report)
     tokens = lexer.tokens()
@@ -28,6 +33,10 @@ def parse(source: Source, reached: Callable[[int], None] | None = None) -> tuple
         tree = SourceText(0, len(source.text), tuple(read))
     tree.pragmas = tuple(lexer.pragmas)
     return tree, sorted(builder.diagnostics, key=Diagnostic.order)
+
+
+_XML = re.compile(r"\s*(<\?xml\b|<project\b)")
+"""What exports of PLC tools begin with."""
 
 
 def _counted(tokens: Iterator[Token], reached: Callable[[int], None]) -> Iterator[Token]:

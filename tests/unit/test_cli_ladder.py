@@ -70,9 +70,21 @@ def test_structured_text_is_drawn_and_what_is_no_rung_is_named(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(("arguments", "said"), [
-    (["ladder"], "there is nothing to draw"), (["run", "--scans", "1", "--ladder", "x"], "'x' names no scans")])
+    (["ladder"], "there is nothing to draw"), (["run", "--scans", "1", "--ladder", "x"], "'x' names no scans"),
+    (["run", "--scans", "1", "--ladder", "7..3"], "'7..3' names no scans")])
 def test_mistakes_of_usage(tmp_path: Path, arguments: list[str], said: str) -> None:
     path = tmp_path / "empty.st"
     path.write_text("PROGRAM Main END_PROGRAM", encoding="utf-8")
     result = CliRunner().invoke(main, [*arguments, str(path)])
     assert result.exit_code == 2 and said in result.output
+
+
+@pytest.mark.parametrize(("options", "said"), [
+    (["--ladder", "7"], "--ladder 7: no rung was executed in these scans; the run had scans 0 to 4"),
+    (["--ladder", "7..999999999999999999"], "no rung was executed in these scans"),
+    (["--sfc", "2"], "--sfc 2: there is no chart in this program")])
+def test_what_draws_nothing_says_why(tmp_path: Path, options: list[str], said: str) -> None:
+    path = tmp_path / "text.st"
+    path.write_text(TEXT, encoding="utf-8")
+    result = CliRunner().invoke(main, ["run", str(path), "--scans", "5", *options])
+    assert result.exit_code == 0 and said in result.stderr

@@ -67,3 +67,10 @@ def test_lines_may_end_with_cr_alone() -> None:
 def test_what_old_machines_write_behind_a_text_is_passed_over(rest: str) -> None:
     assert compile_text("PROGRAM Main\r\nEND_PROGRAM\r\n" + rest).diagnostics == []
     assert [d.code for d in compile_text(f"PROGRAM Main {rest} END_PROGRAM").diagnostics] == ["S0102"]
+
+
+@pytest.mark.parametrize("text", ['<?xml version="1.0"?>\n<project/>', '\n<project xmlns="x"><type>?</type></project>'])
+def test_xml_is_one_mistake_with_its_mend(text: str) -> None:
+    (diagnostic,) = compile_text(text).diagnostics
+    assert diagnostic.code == "S0101" and "this is XML" in diagnostic.render()
+    assert "fbvm import FILE.xml -o DIR" in diagnostic.render()
