@@ -16,6 +16,7 @@ PEER = ("--map", "192.168.250.1:502=peer")
 END = ("--until", "Main.Step = Ready OR Main.Step = Failed", "--max", "20s")
 
 
+@pytest.mark.slow
 def test_the_example_reads_writes_and_counts(tmp_path: Path) -> None:
     journal = tmp_path / "journal"
     shown = [f"--show=Main.{name}" for name in ("Step", "Sum", "Sent", "Result")]

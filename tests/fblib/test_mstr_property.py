@@ -25,6 +25,7 @@ WORDS = st.one_of(st.integers(0, 130), st.sampled_from([0x0700, 0x07FF, 0xFE00, 
 OPERATIONS = st.sampled_from([1, 2, 3, 4, 7, 8, 10, 23, 0xFFF0])
 
 
+@pytest.mark.slow
 @settings(COMMON, max_examples=25)
 @given(st.lists(st.tuples(OPERATIONS, st.lists(WORDS, min_size=10, max_size=10), st.booleans()), min_size=1, max_size=4))
 def test_any_control_ends_with_a_documented_code(operations: list[tuple[int, list[int], bool]]) -> None:
@@ -58,6 +59,7 @@ def test_registers_arrive_right_however_frames_are_cut(seed: int, cut: int, oper
         assert rig.databuf(other) == held[:other]
 
 
+@pytest.mark.slow
 @settings(COMMON, max_examples=30)
 @given(st.binary(max_size=300), st.sampled_from([(2, 0, 3, 1), (1, 0, 3, 1), (7, 0, 38, 0), (8, 0, 0, 0)]), st.booleans())
 def test_any_bytes_for_an_answer(data: bytes, control: tuple[int, ...], has_header: bool) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
 from lang_corpus import programs
 
 from fbvm.code.compiler import compile_text
@@ -13,6 +14,7 @@ EACH = 6
 """Every sixth program is taken: all would take long."""
 
 
+@pytest.mark.slow
 def test_programs_come_back_as_they_were() -> None:
     compared = 0
     for program in list(programs())[::EACH]:

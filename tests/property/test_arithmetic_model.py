@@ -160,6 +160,7 @@ def test_reals(kind: str) -> None:
     check()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["TIME", "LTIME"])
 def test_durations(kind: str) -> None:
     declared = f"a, b, sum, dif, pro, quo, neg, mx, mn : {kind}; n : INT; lt, le, gt, ge, eq, ne : BOOL;"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from random import Random
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -102,6 +103,7 @@ def read(lines: list[str]) -> tuple[list[StepText], list[str]]:
     return found, rung_lines([rung])
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 2**32), st.integers(24, 160), st.booleans())
 def test_what_is_drawn_is_read_back(seed: int, width: int, with_places: bool) -> None:
@@ -113,6 +115,7 @@ def test_what_is_drawn_is_read_back(seed: int, width: int, with_places: bool) ->
     assert [line.removeprefix("    ") for line in again] == lines
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 2**32), st.integers(24, 160))
 def test_power_in_a_drawing_is_not_read(seed: int, width: int) -> None:
@@ -123,6 +126,7 @@ def test_power_in_a_drawing_is_not_read(seed: int, width: int) -> None:
     assert read(lines)[0] == said, "\n".join(lines)
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(st.integers(0, 2**32), st.integers(24, 160))
 def test_lines_meet_and_rails_are_straight(seed: int, width: int) -> None:

@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -43,11 +44,13 @@ def test_any_text(text: str) -> None:
     check_places(text)
 
 
+@pytest.mark.slow
 @given(st.lists(st.sampled_from(WORDS), max_size=60), st.sampled_from([" ", "\n", ""]))
 def test_any_words(words: list[str], between: str) -> None:
     check_places("PROGRAM p " + between.join(words))
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(st.data())
 def test_any_change_of_a_program(data: st.DataObject) -> None:
@@ -78,6 +81,7 @@ def test_case_does_not_matter_to_the_structure(path: Path, change: Any) -> None:
     assert [line.split("=")[0] for line in dump(changed).lower().splitlines()] == [line.split("=")[0] for line in same]
 
 
+@pytest.mark.slow
 @given(st.sampled_from(TEXTS), st.integers(0, 3000))
 @settings(deadline=None)
 def test_a_text_cut_anywhere_is_read_to_its_end(text: str, at: int) -> None:

@@ -66,12 +66,14 @@ def test_a_way_back_is_a_way_back(before: list[tuple[bool, ...]], after: list[tu
     assert feed(twin, after) == first
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(rows=inputs)
 def test_plain_and_observed_agree(rows: list[tuple[bool, ...]]) -> None:
     assert feed(Plc(image()), rows) == feed(Plc(image(), observed=True), rows)
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(rows=inputs)
 def test_a_warm_start_keeps_what_is_retained_and_nothing_else(rows: list[tuple[bool, ...]]) -> None:

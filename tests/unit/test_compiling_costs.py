@@ -5,6 +5,8 @@ from __future__ import annotations
 import gc
 import sys
 
+import pytest
+
 from fbvm.code.compiler import compile_text
 
 TEXT = "PROGRAM Main\nVAR a : INT; END_VAR\na := a + 1;\nEND_PROGRAM\n"
@@ -16,6 +18,7 @@ def test_the_collector_and_the_limits_are_as_before() -> None:
     assert gc.isenabled() and sys.getrecursionlimit() == frames
 
 
+@pytest.mark.slow
 def test_what_compilations_leave_is_collected_in_passing() -> None:
     counts = []
     for _ in range(4):

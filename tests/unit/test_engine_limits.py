@@ -106,6 +106,7 @@ def test_deep_conditions_and_addresses_read_temporaries_and_instance() -> None:
     assert rig.slot("u8", 7) == 5
 
 
+@pytest.mark.slow
 def test_a_chain_of_a_thousand_calls() -> None:
     count = 1200
     codes = [(add(0, ONE), ("call", number + 1, None)) for number in range(count - 1)]

@@ -120,6 +120,7 @@ def test_trees_of_integer_operations(data: st.DataObject, machine: str) -> None:
     assert evaluated(machine, expression, slots) == wanted
 
 
+@pytest.mark.slow
 @given(machine=integer_types, data=st.data())
 @settings(max_examples=150, deadline=None)
 def test_rotation(machine: str, data: st.DataObject) -> None:
@@ -197,6 +198,7 @@ def test_a_float_becomes_an_integer_or_traps(value: float, machine: str) -> None
         assert seen == (whole if low <= whole <= high else "R0105")
 
 
+@pytest.mark.slow
 @given(raw=st.integers(0, 2**32 - 1), long=st.integers(0, 2**64 - 1))
 @settings(max_examples=200, deadline=None)
 def test_bits_go_there_and_back_but_for_nan(raw: int, long: int) -> None:

@@ -105,6 +105,7 @@ def test_switched_off_nothing_is_read_or_written(folder: Path) -> None:
     assert not (folder / ("b" * 64)).exists()
 
 
+@pytest.mark.slow
 def test_code_that_comes_a_second_time_moves_nothing() -> None:
     """From the compiler's helper, while it is running already: who runs it, and what it calls, would be gone."""
     compilation = compile_text("PROGRAM Main VAR s : STRING := 'a'; n : INT; END_VAR n := LEN(CONCAT(s, 'b')); END_PROGRAM")
@@ -120,6 +121,7 @@ def test_code_that_comes_a_second_time_moves_nothing() -> None:
     assert code.address(0, 2) == before
 
 
+@pytest.mark.slow
 def test_the_library_is_loaded_once_for_all_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     compilation = compile_text("PROGRAM Main VAR s : STRING := 'a'; n : INT; END_VAR n := LEN(CONCAT(s, 'b')); END_PROGRAM")
     assert compilation.image

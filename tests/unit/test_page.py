@@ -164,6 +164,7 @@ def test_frames_are_arrows() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_a_long_run_stays_a_picture() -> None:
     svg = drawn(traced(3000), "CIO 0.00")
     assert float(svg.get("width", 0)) < 2000

@@ -61,6 +61,7 @@ def test_only_so_deep(trace: Trace) -> None:
     assert len(told(trace, ask(trace, "Main.Pump", 41, 1)).splitlines()) == 2
 
 
+@pytest.mark.slow
 def test_what_is_long_ago_is_found() -> None:
     trace = traced(400, Depth.STATEMENTS)
     assert "FALSE since scan 150" in told(trace, ask(trace, "Main.Pump", 399))

@@ -300,6 +300,7 @@ def demo() -> Callable[[], Plc]:
     return make
 
 
+@pytest.mark.slow
 def test_back_goes_back_with_unit_and_network(demo: Callable[[], Plc]) -> None:
     session = Session(demo)
     assert session.run(lambda statement: session.read("Main.Done") is True, 100)

@@ -73,6 +73,7 @@ def test_a_folder_that_cannot_be_made_does_no_harm(tmp_path: Path, monkeypatch: 
     assert fresh() == tables("st")
 
 
+@pytest.mark.slow
 def test_the_grammar_has_only_the_conflicts_that_are_meant(caplog: pytest.LogCaptureFixture) -> None:
     """A result type in front of a statement that begins with `(`, `[` or a name: that belongs to the type.  A `;`
     behind VAR sections belongs to them, and one behind END_STRUCT to the structure."""

@@ -143,6 +143,7 @@ def test_what_a_function_of_the_test_asked_for_counts(project: pytest.Pytester) 
     run(project).stdout.fnmatch_lines(["Running is FALSE since power-on, written last in scan 0, by src/pump.st:14*"])
 
 
+@pytest.mark.slow
 def test_a_condition_that_never_holds(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def test_wrong(fb):
