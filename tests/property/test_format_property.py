@@ -52,6 +52,10 @@ def corpus() -> list[str]:
     return [text for path in FILES for text in programs(path) if len(text) < 6000]
 
 
+PROGRAM_NUMBERS = st.deferred(lambda: st.sampled_from(range(len(corpus()))))
+"""Which program of the corpus; it is read by the first test that wants one."""
+
+
 def write(text: str) -> str:
     written, wrong = formatted(Source("x.st", text))
     assert not wrong
@@ -161,7 +165,7 @@ REMARKS = (" (* c{} *) ", " // c{}\n", "\n// c{}\n", "\n\n  // c{}\n\n", " /* c{
 
 @pytest.mark.slow
 @settings(deadline=None)
-@given(st.sampled_from(range(len(corpus()))), st.randoms(use_true_random=False))
+@given(PROGRAM_NUMBERS, st.randoms(use_true_random=False))
 def test_spaces_line_ends_and_case_of_words_do_not_matter(number: int, chance: random.Random) -> None:
     text = corpus()[number]
     assume(not any("\n" in comment for comment in comments(text)) and not any(t.type in WHOLE for t in tokens(text)))
@@ -170,7 +174,7 @@ def test_spaces_line_ends_and_case_of_words_do_not_matter(number: int, chance: r
 
 @pytest.mark.slow
 @settings(deadline=None)
-@given(st.sampled_from(range(len(corpus()))), st.randoms(use_true_random=False))
+@given(PROGRAM_NUMBERS, st.randoms(use_true_random=False))
 def test_names_are_written_as_they_are_declared(number: int, chance: random.Random) -> None:
     text = corpus()[number]
     assert write(renamed(text, chance)) == write(text)
@@ -178,7 +182,7 @@ def test_names_are_written_as_they_are_declared(number: int, chance: random.Rand
 
 @pytest.mark.slow
 @settings(deadline=None, max_examples=100)
-@given(st.sampled_from(range(len(corpus()))), st.randoms(use_true_random=False))
+@given(PROGRAM_NUMBERS, st.randoms(use_true_random=False))
 def test_comments_may_stand_anywhere(number: int, chance: random.Random) -> None:
     text = commented(corpus()[number], chance)
     assume(not syntax_errors(text))
