@@ -144,8 +144,9 @@ class Expressions:
         if is_untyped(kind):
             kind = self.adopt(expr, BOOL, "S0303")
         if kind is not None and base(kind) != BOOL:
-            self.error("S0303", expr, f"the condition of {what} is {kind}, not BOOL",
-                       conversion_hint(kind, BOOL))
+            step = isinstance(kind, StructType) and not kind.block and set(kind.fields) == {fold("X"), fold("T")}
+            self.error("S0303", expr, f"the condition of {what} is {'a step' if step else kind}, not BOOL",
+                       f"write {self.text(expr)}.X" if step else conversion_hint(kind, BOOL))
 
     def adopt(self, expr: tree.Expr, target: Type, code: str = "S0301") -> Type | None:
         """Give an expression of nothing but untyped literals the type `target`."""

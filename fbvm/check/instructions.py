@@ -15,10 +15,16 @@ _PREFIXES = {"@": "@ on the rise of its condition", "%": "% on its fall", "!": "
 
 
 def find(name: str) -> Instruction | None:
-    """The instruction of that name; of comparisons also without LD, AND or OR in front."""
+    """The instruction of that name, as it is written or listed (`@MOV`, `MOV(021)`) or of that function code; of comparisons
+    also without LD, AND or OR in front."""
     rows = instruction_set().rows
-    spelt = name.strip().upper().replace(" ", "")
-    return rows.get(spelt) or rows.get(f"LD{spelt}")
+    spelt, _, _ = name.strip().upper().replace(" ", "").partition("(")
+    found = rows.get(spelt) or rows.get(f"LD{spelt}")
+    if found is None and spelt[:1] in _PREFIXES:
+        found = rows.get(spelt[1:]) or rows.get(f"LD{spelt[1:]}")
+    if found is None and spelt.isdecimal():
+        found = next((row for row in rows.values() if row.code and int(row.code) == int(spelt)), None)
+    return found
 
 
 def page(row: Instruction) -> str:

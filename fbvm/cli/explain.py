@@ -8,6 +8,7 @@ from fbvm.base import dialects
 from fbvm.base.codes import CODES
 from fbvm.base.pages import UnknownCode, page
 from fbvm.check import instructions
+from fbvm.syntax.instruction_set import meant, spelling
 
 
 @click.command("explain")
@@ -31,7 +32,9 @@ def command(code: str | None) -> None:
     try:
         click.echo(page(code))
     except UnknownCode as error:
-        raise click.UsageError(f"{error}\n`fbvm explain` alone lists all.") from None
+        named = [found.mnemonic for name in meant(spelling(code)) if (found := instructions.find(name))]
+        said = f"\nOr the instruction {' or '.join(named)}?" if named else ""
+        raise click.UsageError(f"{error}{said}\n`fbvm explain` alone lists all.") from None
     code = code.strip().upper()
     if CODES[code].severity == "warning":
         click.echo(f"\nSwitch it off in a text with {{warning disable {code}}} .. {{warning restore {code}}}, or for a whole "

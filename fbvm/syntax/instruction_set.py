@@ -99,8 +99,19 @@ def _pattern(rows: dict[str, Instruction]) -> re.Pattern[str]:
     return re.compile(rf"(?:{'|'.join(sorted(words, key=len, reverse=True))})(?![A-Za-z0-9+*/<>=$-])", re.I)
 
 
+ELSEWHERE = {
+    "LDN": "LDNOT", "ANDN": "ANDNOT", "ORN": "ORNOT", "ST": "OUT", "STN": "OUTNOT", "S": "SET", "R": "RSET",
+    "LDI": "LDNOT", "ANI": "ANDNOT", "ORI": "ORNOT", "ANB": "ANDLD", "ORB": "ORLD", "RST": "RSET", "PLS": "DIFU", "PLF": "DIFD",
+    "XIC": "LD", "XIO": "LDNOT", "OTE": "OUT",
+    "MOVE": "MOV", "ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/",
+    **{block: f"FBCALL {block}" for block in ("TON", "TOF", "TP", "CTU", "CTD", "CTUD", "R_TRIG", "F_TRIG", "SR", "RS")}}
+"""What other tools call an instruction: instruction lists of the standard, Mitsubishi, Rockwell; and blocks."""
+
+
 def meant(name: str) -> list[str]:
-    """The instructions that are written most like this."""
+    """The instructions that other tools call so, or that are written most like this."""
+    if name in ELSEWHERE:
+        return [ELSEWHERE[name]]
     return get_close_matches(name, instruction_set().rows, 2, 0.6)
 
 

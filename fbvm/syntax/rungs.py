@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from fbvm.syntax import tree
 from fbvm.syntax.expressions import Expressions
-from fbvm.syntax.instruction_set import Instruction
+from fbvm.syntax.instruction_set import Instruction, instruction_set, spelling
 from fbvm.syntax.ladder import Edge, Element, Ladder, Rung
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.mnemonics import Line, RungText, is_input, read_rungs
@@ -126,9 +126,14 @@ class Rungs:
         if row.does != ".call" and not row.least <= given <= wanted:
             names = f" ({', '.join(row.names)})" if wanted else ""
             raise Refused(f"{row.mnemonic} takes {wanted or 'no'} operand{'s' * (wanted != 1)}{names}, not {given}",
-                          row.described)
+                          self._too_many(wanted) or row.described)
         if row.inputs and self.condition is None:
             raise Refused(f"{row.mnemonic} needs an execution condition", "write LD in front of it; LD P_On is always ON")
+
+    def _too_many(self, wanted: int) -> str:
+        """What to do if one of the operands in excess is an instruction; "" otherwise."""
+        excess = (text for text in self.line.step.operands[wanted:] if spelling(text) in instruction_set().rows)
+        return f"{inner} begins a line of its own" if (inner := next(excess, "")) else ""
 
     # --- what the parts share ---------------------------------------------------------------------------------------
 

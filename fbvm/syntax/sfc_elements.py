@@ -32,7 +32,8 @@ class SfcElements(Statements):
             qualifier = first.text.upper()
             del values[0]
         elif first is not None:
-            self.report("S0112", first.start, first.end, "the first thing in the parentheses is a qualifier",
+            none = f", and {first.text} is none" if isinstance(first, NameRef) else ""
+            self.report("S0112", first.start, first.end, f"the first thing in the parentheses is a qualifier{none}",
                         f"one of {', '.join(QUALIFIERS)}; indicators stand behind it")
             values.clear()
         time = values.pop(0) if values and QUALIFIERS[qualifier] else None

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from fbvm.base.data import data_folder
 from fbvm.check.instructions import find, flags, meaning, page
 from fbvm.cli.main import main
-from fbvm.syntax.instruction_set import instruction_set
+from fbvm.syntax.instruction_set import ELSEWHERE, instruction_set
 
 LIST = Path(__file__).parents[2] / "fblib/omron/ladder/INSTRUCTIONS.md"
 HEAD = """# The instructions of Omron CS/CJ ladder
@@ -52,8 +52,21 @@ def test_everything_says_what_it_does_or_why_it_is_refused() -> None:
 
 
 @pytest.mark.parametrize(("name", "part"), [
-    ("mov", "flags: P_ER P_EQ P_N"), ("=", "a contact"), ("SEND", "no FINS network"), ("SFT", "takes 3 conditions")])
+    ("mov", "flags: P_ER P_EQ P_N"), ("=", "a contact"), ("SEND", "no FINS network"), ("SFT", "takes 3 conditions"),
+    ("@mov", "MOV(021)"), ("MOV(021)", "MOV(021)"), ("21", "MOV(021)"), ("@<>", "a contact")])
 def test_explain(name: str, part: str) -> None:
     result = CliRunner().invoke(main, ["explain", name])
     assert result.exit_code == 0
     assert part.lower() in result.output.lower()
+
+
+def test_explain_offers_what_may_be_meant() -> None:
+    said = CliRunner().invoke(main, ["explain", "move"]).output
+    assert "there is no diagnostic move" in said and "Or the instruction MOV?" in said
+    assert "instruction" not in CliRunner().invoke(main, ["explain", "zzzz"]).output
+
+
+def test_what_other_tools_call_an_instruction_leads_to_one_that_there_is() -> None:
+    rows = instruction_set().rows
+    for name, ours in ELSEWHERE.items():
+        assert name not in rows and (ours in rows or ours.partition(" ")[0] in rows), name

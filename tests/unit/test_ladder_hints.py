@@ -1,0 +1,30 @@
+"""What to do about rungs and charts as people write them who come from other tools."""
+
+from __future__ import annotations
+
+import pytest
+
+from fbvm.code.compiler import compile_text
+
+
+def said(body: str) -> list[str]:
+    """The diagnostics of a program, each with its hint."""
+    text = f"PROGRAM Main\nVAR A AT CIO 0.00 : BOOL; M AT CIO 100.00 : BOOL; END_VAR\n{body}\nEND_PROGRAM"
+    return [diagnostic.render() for diagnostic in compile_text(text).diagnostics]
+
+
+@pytest.mark.parametrize(("rung", "hint"), [
+    ("LDN A\nOUT M", "did you mean LDNOT?"), ("LD A\nST M", "did you mean OUT?"), ("XIC A\nOTE M", "did you mean LD?"),
+    ("LD A\nADD D0 D1 D2", "did you mean +?"), ("LD A\nTON D0", "did you mean FBCALL TON?"),
+    ("LD A OUT M", "OUT begins a line of its own"), ("LD A\nMOV #1 D0 D1", "S is a word or constant, D is a word")])
+def test_ladder(rung: str, hint: str) -> None:
+    assert f"help: {hint}" in said(f"LADDER\n{rung}\nEND_LADDER")[0]
+
+
+@pytest.mark.parametrize(("action", "condition", "message"), [
+    ("M(X)", "A", "is a qualifier, and X is none"), ("M(5)", "A", "the first thing in the parentheses is a qualifier"),
+    ("M(N)", "s", "the condition of a transition is a step, not BOOL"), ("M(N)", "s", "help: write s.X")])
+def test_charts(action: str, condition: str, message: str) -> None:
+    chart = (f"INITIAL_STEP s: {action}; END_STEP STEP t: END_STEP TRANSITION FROM s TO t := {condition}; END_TRANSITION "
+             "TRANSITION FROM t TO s := A; END_TRANSITION")
+    assert message in said(chart)[0]
