@@ -160,8 +160,8 @@ class Automaton:
         """Reduce what is complete whatever follows; done at an error, so that the stacks show what has been read."""
         while True:
             acts = set(self.rows[self.states[-1]].values())
-            act = next(iter(acts))
-            if len(acts) != 1 or act >= 0:
+            act = acts.pop() if len(acts) == 1 else 0
+            if act >= 0:
                 return
             self.reduce(act)
 

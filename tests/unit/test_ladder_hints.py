@@ -28,3 +28,8 @@ def test_charts(action: str, condition: str, message: str) -> None:
     chart = (f"INITIAL_STEP s: {action}; END_STEP STEP t: END_STEP TRANSITION FROM s TO t := {condition}; END_TRANSITION "
              "TRANSITION FROM t TO s := A; END_TRANSITION")
     assert message in said(chart)[0]
+
+
+def test_a_comment_behind_a_comment_is_a_mistake_with_its_place() -> None:
+    (diagnostic,) = said("LADDER\n' a note // and another\nLD A\nOUT M\nEND_LADDER")
+    assert ":4:1: error S0109: this is no instruction" in diagnostic
