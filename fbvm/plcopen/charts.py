@@ -10,7 +10,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fbvm.plcopen.diagram import Diagram, Object, read_diagram
+from fbvm.plcopen.diagram import Diagram, Object, placed, read_diagram
 from fbvm.plcopen.document import Body, Pou, Reading
 from fbvm.plcopen.markup import Element
 from fbvm.plcopen.networks import LARGEST, Network, networks
@@ -235,8 +235,8 @@ def _references(element: Element) -> list[str]:
 
 
 def _place(element: Element) -> tuple[float, float]:
-    position = element.one("position")
-    return (float(position.get("y") or 0), float(position.get("x") or 0)) if position else (0.0, 0.0)
+    x, y = placed(element)
+    return y, x
 
 
 def _order(arrows: list[Arrow]) -> Callable[[Arrow], tuple[float, tuple[str, ...], float, int]]:

@@ -7,7 +7,7 @@ on the power that reaches it, so a wire from a coil is one from what feeds the c
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, isfinite
 from typing import NamedTuple
 
 from fbvm.plcopen.document import Reading
@@ -202,16 +202,21 @@ def _conditions(element: Element, place: int) -> list[Object]:
 # --- one element ------------------------------------------------------------------------------------------------------
 
 
+def placed(element: Element) -> tuple[float, float]:
+    """Where an element is drawn, x and y; what is no number of a place counts as 0."""
+    position = element.one("position")
+    return (_number(position.get("x")), _number(position.get("y"))) if position else (0.0, 0.0)
+
+
 def _number(text: str) -> float:
     try:
-        return float(text)
+        return number if isfinite(number := float(text)) else 0.0
     except ValueError:
         return 0.0
 
 
 def _object(reading: Reading, element: Element, place: int) -> Object:
-    position = element.one("position")
-    x, y = (_number(position.get("x")), _number(position.get("y"))) if position else (0.0, 0.0)
+    x, y = placed(element)
     order = element.get("executionOrderId")
     made = Object(element.name, element.get("localId"), place, x, y, int(order) if order.isdigit() else 0, _text(element),
                   element, element.get("instanceName").strip(), _true(element, "negated"), _word(element, "edge"),

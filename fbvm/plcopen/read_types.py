@@ -17,7 +17,7 @@ LOCATION = "urn:fbvm:location"
 MNEMONIC = "urn:fbvm:mnemonic"
 """The same: which instruction a block is."""
 _NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
-_DURATION = re.compile(r"P(?:(\d+)D)?(?:T(?:(\d+)H)?(?:(\d+)M)?(?:(\d+(?:\.\d+)?)S)?)?")
+_DURATION = re.compile(r"P(?:(\d{1,12})D)?(?:T(?:(\d{1,12})H)?(?:(\d{1,12})M)?(?:(\d{1,12}(?:\.\d+)?)S)?)?")
 
 
 def type_text(reading: Reading, holder: Element | None, owner: Element) -> str:

@@ -66,6 +66,14 @@ def test_a_selection_goes_by_priority_and_else_from_left_to_right() -> None:
     assert states(first, "x y", ["", "go=1"]) == ["0 0", "1 0"]
 
 
+@pytest.mark.parametrize("at", ["x y,0", "nan,inf", ",1e999"])
+def test_a_transition_at_no_place_counts_as_the_first(at: str) -> None:
+    made = chart(step(1, "s", first=True), node("selectionDivergence", 2, "1"), transition(3, "2", inline("go"), at="90,0"),
+                 step(4, "right", "3"), transition(5, "2", inline("go"), at=at), step(6, "left", "5"), actions(7, "4", does("x")),
+                 actions(8, "6", does("y")), declared="go x y")
+    assert states(made, "x y", ["", "go=1"]) == ["0 0", "0 1"]
+
+
 def test_ways_side_by_side_begin_and_end_together() -> None:
     made = chart(step(1, "s", first=True), transition(2, "1", inline("go")), node("simultaneousDivergence", 3, "2"),
                  step(4, "a", "3"), step(5, "b", "3"), actions(6, "4", does("x")), actions(7, "5", does("y")),
