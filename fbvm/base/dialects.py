@@ -25,10 +25,12 @@ class Dialect:
     hexadecimal_bits: bool = False
     real_bits_by_value: bool = False
     loop_ends_each_pass: bool = False
+    loop_counters_wrap: bool = False
     arithmetic_of_bits: bool = False
     integers_and_bits: bool = False
     numbers_of_enumerations: bool = False
     number_times_duration: bool = False
+    integers_are_nanoseconds: bool = False
     mixed_arguments: bool = False
     bare_actions: bool = False
     locals_are_read: bool = False
@@ -54,12 +56,15 @@ QUESTIONS = {
     "real_bits_by_value": ("REAL_TO_DWORD(1.5), DWORD_TO_REAL", "the bits, of one width", "the value, rounded"),
     "loop_ends_each_pass": ("end and step of FOR", "worked out once, in front of the loop",
                             "worked out on every pass, the end in front of it, the step behind it"),
+    "loop_counters_wrap": ("FOR i := 120 TO 127, where i is a SINT: what i is behind it", "127: the next one does not fit",
+                           "-128: the next one, wrapped"),
     "arithmetic_of_bits": ("+ - * / MOD of BYTE, WORD, DWORD, LWORD", "an error", "as unsigned numbers"),
     "integers_and_bits": ("WORD where INT is needed, INT where UINT is, LREAL where REAL is, DINT where REAL is; AND, OR, XOR, "
                           "NOT of integers",
                           "an error that names the conversion", "converted as it stands if the width suffices; on their bits"),
     "numbers_of_enumerations": ("an enumeration as a number, < and > between its members", "an error", "its value"),
     "number_times_duration": ("2 * T#5s", "an error: the TIME stands in front", "T#10s"),
+    "integers_are_nanoseconds": ("T#1s + 5, T#1s - n: an integer beside a duration", "an error", "nanoseconds"),
     "mixed_arguments": ("F(1, b := 2): some arguments named, some not", "an error",
                         "those without a name are for the parameters that none names, in order"),
     "bare_actions": ("Reset; where Reset is an ACTION", "an error", "a call of it"),
@@ -100,11 +105,10 @@ _ROWS = (
             ties_away=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True,
             lenient_texts="leading"),
-    Dialect("rusty", "programs for RuSTy", real_bits_by_value=True, loop_ends_each_pass=True, arithmetic_of_bits=True,
-            integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
-            locals_are_read=True,
-            programs_are_written=True, initial_variables=True, locals_are_written=True, narrowing=True, sums_in_dint=True,
-            reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True),
+    Dialect("rusty", "programs for RuSTy", real_bits_by_value=True, loop_ends_each_pass=True, loop_counters_wrap=True,
+            arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
+            integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
+            initial_variables=True, locals_are_written=True, narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True),
     Dialect("omron", "programs that shall run in Sysmac Studio",
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

@@ -155,6 +155,9 @@ class Operators:
             turned = tree.Binary(expr.start, expr.end, "*", expr.right, expr.left, expr.op_start)
             self.facts.rewritten[expr] = turned
             return self.expressions.infer(turned)
+        timed = self._nanoseconds(expr, left, right)
+        if timed is not None:
+            return self.expressions.infer(timed)
         a, b = as_number(left, dialect), as_number(right, dialect)
         if (a, b) == (left, right):
             return None
@@ -168,6 +171,22 @@ class Operators:
         keeps = left != a and right in (left, UNTYPED_INT) and machine(kind) == machine(left)
         result = left if keeps else kind
         return self._folded(expr, kind, BOOL if expr.op in COMPARISONS else result)
+
+    def _nanoseconds(self, expr: tree.Binary, left: Type, right: Type) -> tree.Binary | None:
+        """A sum of a duration and an integer in a dialect that takes integers as nanoseconds: what it means."""
+        integer = [kind is UNTYPED_INT or is_any(kind, "ANY_INT") for kind in (left, right)]
+        duration = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
+        turned = integer[0] and duration[1] and expr.op == "+"
+        if not self.expressions.project.dialect.integers_are_nanoseconds or expr.op not in ("+", "-") or \
+                not (turned or duration[0] and integer[1]):
+            return None
+        kind, number = (right, expr.left) if turned else (left, expr.right)
+        unit = tree.Literal(number.start, number.end, "time", 1, kind.name, f"{kind.name}#1ns")
+        span = tree.Binary(number.start, number.end, "*", unit, number, number.start)
+        left_side, right_side = (span, expr.right) if turned else (expr.left, span)
+        meant = tree.Binary(expr.start, expr.end, expr.op, left_side, right_side, expr.op_start)
+        self.facts.rewritten[expr] = meant
+        return meant
 
     def _beside_reference(self, expr: tree.Binary, side: tree.Expr) -> Type:
         """The type of an operand of an operator on references; a literal 0 that is compared is NULL."""

@@ -47,8 +47,8 @@ class LoopLowering:
     # --- FOR --------------------------------------------------------------------------------------------------------
 
     def for_(self, node: tree.For, site: int) -> None:
-        """Bounds and step are worked out once, in order of writing.  The variable ends beyond the last value, or at
-        the last one used where the next does not fit its type."""
+        """Bounds and step are worked out once, in order of writing.  The variable ends beyond the last value; where the
+        next one does not fit its type, at the last one used, or in a dialect at the next one as it wraps."""
         body = self.body
         place = body.places.fixed(body.places.of(node.variable))
         kind = base(place.type)
@@ -119,11 +119,18 @@ class LoopLowering:
         following = ("add" if up else "sub", form, now, size)
         tail: list[Node] = []
         if not low <= edge <= high:
-            return head, LEAVE  # one step leaves the type
+            return head, self._leave(place, following, site)  # one step leaves the type
         if not (last[0] == "const" and (last[2] <= edge if up else last[2] >= edge)):
-            tail.append(_leave_if("gt" if up else "lt", form, now, ("const", form, edge)))
+            tail.append(_leave_if("gt" if up else "lt", form, now, ("const", form, edge),
+                                  self._leave(place, following, site)))
         tail.append(self.body.places.store(place, following, site))
         return head, tuple(tail)
+
+    def _leave(self, place: Place, following: Node, site: int) -> Block:
+        """What leaves the loop where the following value does not fit the type of the variable."""
+        if self.body.dialect.loop_counters_wrap and not isinstance(place.type, SubrangeType):
+            return (self.body.places.store(place, following, site), *self._observed(place, site), *LEAVE)
+        return LEAVE
 
     def _computed_step(self, place: Place, last: Node, begun: Node, step: Node, site: int) -> tuple[Block, Block]:
         """The same for a step that is known only when the program runs; the first one, `begun`, says which way it counts."""
@@ -135,12 +142,15 @@ class LoopLowering:
         room_up = ("sub", form, ("const", form, high), step)
         room_down = ("sub", form, ("const", form, low), step)
         upward = ("gt", "b", form, step, ("const", form, 0))
-        ends = ("if", ((upward, (_leave_if("gt", form, now, room_up),)),), (_leave_if("lt", form, now, room_down),))
-        return head, (ends, self.body.places.store(place, ("add", form, now, step), site))
+        following = ("add", form, now, step)
+        leave = self._leave(place, following, site)
+        ends = ("if", ((upward, (_leave_if("gt", form, now, room_up, leave),)),),
+                (_leave_if("lt", form, now, room_down, leave),))
+        return head, (ends, self.body.places.store(place, following, site))
 
 
-def _leave_if(name: str, form: str, left: Node, right: Node) -> Node:
-    return ("if", (((name, "b", form, left, right), LEAVE),), ())
+def _leave_if(name: str, form: str, left: Node, right: Node, leave: Block = LEAVE) -> Node:
+    return ("if", (((name, "b", form, left, right), leave),), ())
 
 
 def _span(kind: Type) -> tuple[int, int]:
