@@ -32,6 +32,7 @@ class Dialect:
     number_times_duration: bool = False
     integers_are_nanoseconds: bool = False
     mixed_arguments: bool = False
+    inputs_by_reference: bool = False
     bare_actions: bool = False
     locals_are_read: bool = False
     written_out: bool = False
@@ -67,6 +68,8 @@ QUESTIONS = {
     "integers_are_nanoseconds": ("T#1s + 5, T#1s - n: an integer beside a duration", "an error", "nanoseconds"),
     "mixed_arguments": ("F(1, b := 2): some arguments named, some not", "an error",
                         "those without a name are for the parameters that none names, in order"),
+    "inputs_by_reference": ("VAR_INPUT {ref}", "inputs like others; the pragma has no effect (S0190)",
+                            "passed by reference, as VAR_IN_OUT"),
     "bare_actions": ("Reset; where Reset is an ACTION", "an error", "a call of it"),
     "written_out": ("a := [1, 2, 3], F((x := 1, y := 2)): arrays and structures written out in statements", "an error (S0903)",
                     "taken; what is left out has the first value of its type"),
@@ -108,7 +111,8 @@ _ROWS = (
     Dialect("rusty", "programs for RuSTy", real_bits_by_value=True, loop_ends_each_pass=True, loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
-            initial_variables=True, locals_are_written=True, narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True),
+            inputs_by_reference=True, initial_variables=True, locals_are_written=True, narrowing=True, sums_in_dint=True,
+            reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True),
     Dialect("omron", "programs that shall run in Sysmac Studio",
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

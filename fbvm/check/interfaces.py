@@ -31,6 +31,7 @@ from fbvm.check.names import refuse_reserved
 from fbvm.check.specs import MAX_SIZE
 from fbvm.check.statements import assigns_to
 from fbvm.syntax import tree
+from fbvm.syntax.pragmas import passes_places
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
@@ -152,6 +153,8 @@ class Interfaces:
                 resolved = followed(resolved[0]), resolved[1]  # an in-out of REFERENCE TO is one of what it is bound to
             borrowed = resolved is not None and section.kind == "VAR_INPUT" and \
                 (isinstance(resolved[0], AnyType) or is_block(resolved[0]))
+            by_place = section.kind == "VAR_INPUT" and self.project.dialect.inputs_by_reference and \
+                passes_places(pou.source, section)
             for name in declared.names:
                 pou.later.pop(fold(name.text), None)
                 if resolved is None:
@@ -159,7 +162,9 @@ class Interfaces:
                     continue
                 variable = self.variable(declared, name, section, pou.source, resolved)
                 variable.owner = pou
-                if borrowed:
+                if by_place:
+                    variable.kind = "VAR_IN_OUT"
+                elif borrowed:
                     variable.kind = "VAR_IN_OUT"  # ANY, as CODESYS has it, and an instance, whose outputs are read, go by place
                     variable.constant = is_block(variable.type)
                 if is_block(variable.type) and variable.kind == "VAR_OUTPUT":

@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.dialects import Dialect
+from fbvm.syntax.pragmas import NO_EFFECT, dialectal, in_place
 
 if TYPE_CHECKING:
     from fbvm.syntax.tree import SourceText
@@ -55,10 +57,13 @@ class Silence:
         self._switches: dict[tuple[str, str], list[tuple[int, bool]]] = {}
         """Source and code -> places from which on it is off (True) or on."""
 
-    def note(self, source: Source, text: SourceText) -> list[Diagnostic]:
-        """Take the pragmas of one text; warnings for codes that there are not."""
+    def note(self, source: Source, text: SourceText, dialect: Dialect) -> list[Diagnostic]:
+        """Take the pragmas of one text; warnings for codes that there are not, and for pragmas of other dialects."""
         unknown = []
         for pragma in text.pragmas:
+            if dialectal(pragma.text) and not (dialect.inputs_by_reference and in_place(source, pragma)):
+                unknown.append(Diagnostic("S0190", source, pragma.start, pragma.end, f"the pragma `{{{pragma.text.strip()}}}` "
+                                          "is not known and has no effect", NO_EFFECT))
             found = _PRAGMA.fullmatch(pragma.text)
             if not found:
                 continue

@@ -162,7 +162,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         damage = Damage()
         for source in sources:
             text, diagnostics = parse(source, partial(_read_so_far, progress, source))
-            report.diagnostics += diagnostics + silence.note(source, text)
+            report.diagnostics += diagnostics + silence.note(source, text, spoken)
             damage.note(source, text, errors(diagnostics))
             project.collect(text, source)
         unread = len(report.diagnostics)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from typing import NamedTuple
 
-from fbvm.syntax.pragmas import harmless
+from fbvm.syntax.pragmas import NO_EFFECT, dialectal, harmless
 from fbvm.syntax.tables import Terminal, tables
 from fbvm.syntax.tree import Pragma
 
@@ -259,9 +259,9 @@ class Lexer:
         if ";" in contents and not harmless(contents):
             self.report("S0190", start, end + 1, "what stands in braces is a pragma, and no statement is executed in one",
                         "blocks are written IF .. END_IF, FOR .. END_FOR, without braces")
-        elif not harmless(contents):
+        elif not harmless(contents) and not dialectal(contents):
             self.report("S0190", start, end + 1, f"the pragma `{{{_short(contents.strip())}}}` is not known and has no effect",
-                        "what it switches for another compiler is not switched here")
+                        NO_EFFECT)
         return end + 1
 
     def _ladder(self, start: int, end: int) -> int:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from fbvm.syntax.tree import Declaration, SourceText
+from fbvm.base.diagnostics import Source
+from fbvm.syntax.tree import Declaration, Pragma, SourceText, VarSection
 
 WORDS = {"region", "endregion", "warning", "info", "text", "elsif", "else", "end_if"}
 """First words of pragmas for the reader or for messages of a compiler that we are not, and of those that go on with an
@@ -20,12 +21,19 @@ ATTRIBUTES = {
 PACK_MODES = {"0": 1, "1": 1, "2": 2, "4": 4, "8": 8}
 """Values of the attribute pack_mode, and the multiples of bytes at which members of a structure lie at most."""
 
+DIALECTAL = {"ref"}
+"""Pragmas that mean something in some dialects only: what becomes of them is said where the dialect is known."""
+
+NO_EFFECT = "what it switches for another compiler is not switched here"
+"""The hint for pragmas that are not known."""
+
 _PACK_MODE = re.compile(r"\s*attribute\s*'pack_mode'\s*:=\s*'([^']*)'\s*", re.IGNORECASE)
 _HEXADECIMAL = re.compile(r"""\{\s*attribute\s*'displaymode'\s*:=\s*'hex(?:adecimal)?'\s*\}\s*\Z""", re.IGNORECASE)
 _HIDDEN = re.compile(r"""\{\s*attribute\s*'hide'\s*\}\s*\Z""", re.IGNORECASE)
 _REACH = 100
 """How far before a name its pragma is looked for."""
 
+_REF = re.compile(r"VAR_INPUT\s*\{\s*ref\s*\}", re.IGNORECASE)
 _SHAPE = re.compile(r"""\s*(?:attribute\s*'([^']*)'|(\w+))""", re.IGNORECASE)
 
 
@@ -38,6 +46,22 @@ def harmless(text: str) -> bool:
         return not text.strip()
     name, word = found[1], found[2]
     return name.lower() in ATTRIBUTES if name is not None else word.lower() in WORDS
+
+
+def dialectal(text: str) -> bool:
+    """Whether it is for the dialect to say what the pragma whose contents are `text` means."""
+    return text.strip().lower() in DIALECTAL
+
+
+def passes_places(source: Source, section: VarSection) -> bool:
+    """Whether a section begins `VAR_INPUT {ref}`, by which RuSTy passes inputs by reference."""
+    return _REF.match(source.text, section.start) is not None
+
+
+def in_place(source: Source, pragma: Pragma) -> bool:
+    """Whether a pragma of some dialects stands where it means something there: {ref} directly behind VAR_INPUT."""
+    before = source.text[max(0, pragma.start - _REACH):pragma.start].rstrip()
+    return re.search(r"\bVAR_INPUT\Z", before, re.IGNORECASE) is not None
 
 
 def shown_in_hexadecimal(text: str, start: int) -> bool:
