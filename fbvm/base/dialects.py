@@ -32,6 +32,7 @@ class Dialect:
     number_times_duration: bool = False
     integers_are_nanoseconds: bool = False
     mixed_arguments: bool = False
+    pointers_count_elements: bool = False
     inputs_by_reference: bool = False
     bare_actions: bool = False
     locals_are_read: bool = False
@@ -68,6 +69,8 @@ QUESTIONS = {
     "integers_are_nanoseconds": ("T#1s + 5, T#1s - n: an integer beside a duration", "an error", "nanoseconds"),
     "mixed_arguments": ("F(1, b := 2): some arguments named, some not", "an error",
                         "those without a name are for the parameters that none names, in order"),
+    "pointers_count_elements": ("p + 1, where p is POINTER TO INT, or REF_TO INT", "the next byte; REF_TO is not moved",
+                                "the next INT; ADR(x) + 1 is the next byte"),
     "inputs_by_reference": ("VAR_INPUT {ref}", "inputs like others; the pragma has no effect (S0190)",
                             "passed by reference, as VAR_IN_OUT"),
     "bare_actions": ("Reset; where Reset is an ACTION", "an error", "a call of it"),
@@ -111,8 +114,8 @@ _ROWS = (
     Dialect("rusty", "programs for RuSTy", real_bits_by_value=True, loop_ends_each_pass=True, loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
-            inputs_by_reference=True, initial_variables=True, locals_are_written=True, narrowing=True, sums_in_dint=True,
-            reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True),
+            pointers_count_elements=True, inputs_by_reference=True, initial_variables=True, locals_are_written=True,
+            narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True),
     Dialect("omron", "programs that shall run in Sysmac Studio",
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )

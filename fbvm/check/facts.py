@@ -255,6 +255,8 @@ class Facts:
     directs: dict[tree.Expr, Address] = field(default_factory=dict)
     operands: dict[tree.Expr, Type] = field(default_factory=dict)
     """The type in which a binary operator works on its operands."""
+    by_elements: set[tree.Expr] = field(default_factory=set)
+    """Sums of a reference and a number of elements, not of bytes."""
     calls: dict[tree.Call, PouCall | StandardCall] = field(default_factory=dict)
     rewritten: dict[tree.Expr, tree.Expr] = field(default_factory=dict)
     """Expressions that mean the same as another one (ADD(a, b) is a + b)."""

@@ -27,6 +27,7 @@ from fbvm.base.types import (
     base,
     common,
     converts,
+    fold,
     machine,
 )
 from fbvm.check import constants
@@ -127,9 +128,12 @@ class Operators:
         return self._folded(expr, kind, BOOL if expr.op in COMPARISONS else kind)
 
     def _reference(self, expr: tree.Binary) -> Type | None:
-        """References are compared; pointers are ordered too, and moved by numbers of bytes."""
+        """References are compared; pointers are ordered too, and moved by numbers of bytes; in a dialect that counts
+        elements all references are moved."""
         left, right = (self._beside_reference(expr, side) for side in (expr.left, expr.right))
         moves = [isinstance(kind, RefType) and kind.moves for kind in (left, right)]
+        counts = self.expressions.project.dialect.pointers_count_elements
+        moved = [isinstance(kind, RefType) and kind.target is not None for kind in (left, right)] if counts else moves
         refers = isinstance(left, RefType) and isinstance(right, RefType)
         result: Type | None = None
         if expr.op in COMPARISONS:
@@ -137,15 +141,23 @@ class Operators:
             result = BOOL if all(moves) or same else None
         elif expr.op == "-" and all(moves):
             result = DINT
-        elif expr.op in ("+", "-") and moves[0] and is_any(right, "ANY_INT", "ANY_BIT"):
+        elif expr.op in ("+", "-") and moved[0] and is_any(right, "ANY_INT", "ANY_BIT"):
             result = left
-        elif expr.op == "+" and moves[1] and is_any(left, "ANY_INT", "ANY_BIT"):
+        elif expr.op == "+" and moved[1] and is_any(left, "ANY_INT", "ANY_BIT"):
             result = right
         if result is None:
             self._undefined(expr, left, right, None)
             return None
         self.facts.operands[expr] = NULL
+        if counts and isinstance(result, RefType) and not self._made_by_adr(expr):
+            self.facts.by_elements.add(expr)
         return result
+
+    def _made_by_adr(self, expr: tree.Expr) -> bool:
+        """Whether a sum begins with ADR(x), which is a plain number of bytes for who counts elements."""
+        while isinstance(expr, tree.Binary):
+            expr = expr.left if isinstance(self.facts.types[expr.left], RefType) else expr.right
+        return isinstance(expr, tree.Call) and isinstance(expr.callee, tree.NameRef) and fold(expr.callee.text) == "ADR"
 
     def _lent(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
         """What an operator yields in a dialect that takes bit strings and enumerations as numbers; None if it does not."""

@@ -154,9 +154,13 @@ class PointerLowering:
             difference = ("sub", "u64", self._offset(_number(a)), self._offset(_number(b)))
             return ("convert", "i32", "u64", difference)
         if isinstance(right, RefType):
-            a, b, right = b, a, left
+            a, b, left, right = b, a, right, left
         form = machine(right)
-        steps = ("mul", "u64", b if form == "u64" else ("convert", "u64", form, b), _word(1 << OFFSET_SHIFT))
+        stride = 1
+        if expr in self.facts.by_elements:
+            assert isinstance(left, RefType) and left.target is not None
+            stride = left.target.size
+        steps = ("mul", "u64", b if form == "u64" else ("convert", "u64", form, b), _word(stride << OFFSET_SHIFT))
         number = body.keep(_number(a))
         mask = OFFSET_MASK << OFFSET_SHIFT
         there = ("and", "u64", ("add" if expr.op == "+" else "sub", "u64", number, steps), _word(mask))
