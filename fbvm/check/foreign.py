@@ -12,6 +12,8 @@ VALUES = dict.fromkeys(("DEFAULT", "OTHERS", "OTHERWISE"), "the rest of a CASE s
     "NIL": "write NULL", "NULLPTR": "write NULL", "PI": "write 3.14159265358979, or declare a constant",
     "THEN": "THEN belongs to IF", "NEXT": "a loop ends with END_FOR", "WEND": "a loop ends with END_WHILE",
     "BREAK": "EXIT leaves a loop", "END_DO": "FOR ends with END_FOR, WHILE with END_WHILE", "GOTO": "write JMP and a label",
+    "INF_REAL": "write STRING_TO_REAL('INF')", "INF_LREAL": "write STRING_TO_LREAL('INF')",
+    "NAN_REAL": "write STRING_TO_REAL('NAN')", "NAN_LREAL": "write STRING_TO_LREAL('NAN')",
     "LET": "write x := 5;"} | dict.fromkeys((*ELEMENTARY, "STRING", "WSTRING"), "it is a type: variables are declared between "
                                             "VAR and END_VAR, in front of all statements")
 """Names of values."""

@@ -18,7 +18,7 @@ from fbvm.check.facts import Facts, Pou, Report, Variable, list_name
 from fbvm.check.library import Libraries
 from fbvm.check.names import refuse_reserved
 from fbvm.syntax import tree
-from fbvm.syntax.pragmas import attributes, pack_mode
+from fbvm.syntax.pragmas import attributes, external, pack_mode
 
 
 @dataclass(eq=False)
@@ -89,6 +89,10 @@ class Project:
                 self._refused.add((source.library, _refused_name(declaration, source)))
             elif isinstance(declaration, tree.Pou):
                 last = self._add_pou(declaration, source)
+                if self.dialect.pragmas_of_rusty and external(text, declaration):
+                    name = declaration.name
+                    self.report.add("S0901", source, name, f"the body of {name.text} is in another language ({{external}}), "
+                                    "which fbvm does not call", "leave {external} out and write its body in Structured Text")
             elif isinstance(declaration, tree.Action):
                 self._add_action(declaration, source, declaration.owner, last)
             elif isinstance(declaration, tree.Actions):

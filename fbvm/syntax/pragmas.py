@@ -21,7 +21,7 @@ ATTRIBUTES = {
 PACK_MODES = {"0": 1, "1": 1, "2": 2, "4": 4, "8": 8}
 """Values of the attribute pack_mode, and the multiples of bytes at which members of a structure lie at most."""
 
-DIALECTAL = {"ref"}
+DIALECTAL = {"ref", "external"}
 """Pragmas that mean something in some dialects only: what becomes of them is said where the dialect is known."""
 
 NO_EFFECT = "what it switches for another compiler is not switched here"
@@ -34,6 +34,7 @@ _REACH = 100
 """How far before a name its pragma is looked for."""
 
 _REF = re.compile(r"VAR_INPUT\s*\{\s*ref\s*\}", re.IGNORECASE)
+_POU = re.compile(r"\s*(?:FUNCTION|FUNCTION_BLOCK|PROGRAM)\b", re.IGNORECASE)
 _SHAPE = re.compile(r"""\s*(?:attribute\s*'([^']*)'|(\w+))""", re.IGNORECASE)
 
 
@@ -58,8 +59,16 @@ def passes_places(source: Source, section: VarSection) -> bool:
     return _REF.match(source.text, section.start) is not None
 
 
+def external(text: SourceText, declaration: Declaration) -> bool:
+    """Whether {external} stands in front of a declaration, by which RuSTy leaves its body to another language."""
+    return any(pragma.strip().lower() == "external" for pragma in _in_front(text, declaration))
+
+
 def in_place(source: Source, pragma: Pragma) -> bool:
-    """Whether a pragma of some dialects stands where it means something there: {ref} directly behind VAR_INPUT."""
+    """Whether a pragma of some dialects stands where it means something there: {ref} directly behind VAR_INPUT,
+    {external} directly in front of a POU."""
+    if pragma.text.strip().lower() == "external":
+        return _POU.match(source.text, pragma.end) is not None
     before = source.text[max(0, pragma.start - _REACH):pragma.start].rstrip()
     return re.search(r"\bVAR_INPUT\Z", before, re.IGNORECASE) is not None
 
