@@ -206,6 +206,8 @@ class Maker:
     def read(self, form: str, d: int) -> Node:
         name = self.pick([name for name, kind in DATA_TYPES.items() if kind == form])
         text = self.value("s8", d) if self.rarely() else ("to_text", "s8", name, self.value(form, min(d, 1)))
+        if self.rarely():
+            return "from_leading", form, name, int(form not in ("b", "i64", "u64", "f64") or self.rarely()), text
         return "from_text", form, name, text, self.site()
 
     def real(self, form: str, d: int) -> Node:
