@@ -5,18 +5,19 @@ connection of 127.0.0.1; rounds take turns, and the median counts.  The limit is
 what the host's network and two changes of processes cost.  Modbus clients add their own code around the same two calls;
 pymodbus's plain client adds about as much again.
 
-The blocks do it as on the device: send switch, sending flag, receive switch, words in memory.  That is four scans an
-exchange at the least, since a unit finishes what it accepted one refresh later, and a program sees it in the next scan; on a
-quiet host the reply is not there yet when the fourth begins, and one or two scans more are begun by its arrival.  Beside the
-others' processor time stands our own: two to four times that of pymodbus, whose whole client does one send and one receive.  Up to its refresh a scan is one call of machine code, a
-microsecond with the program in it.  What is left is Python, some 470 calls for four scans: two fifths of the time in the unit
-(it accepts a request in 8 us and ends one in 5: parameters, checks, words shown), one in the connection (a send takes as long
-as in any other client, and the host is looked at once a scan), one in the loop, the queue and the measuring of times, the rest
-in the machine between them.  So the blocks reach seven tenths of pymodbus's rate and two fifths of C's on a quiet host.  More
-than that takes fewer scans, or the unit itself into machine code, with its words, checks and services: then Python would be called twice an exchange, to
-send and to receive.  On a busy host the fraction is smaller, down to a quarter, because whoever computes between sending and
-receiving is the one who is interrupted.  A server in Python, as most simulators are, takes part of the difference
-away: the second table.  In `cyclic` pace an exchange takes four periods, whatever everybody's speed."""
+The blocks do it as on the device: send switch, sending flag, receive switch, words in memory.  That is four scans an exchange
+at the least, since a unit finishes what it accepted one refresh later, and a program sees it in the next scan; on a quiet host
+the reply is not there yet when the fourth begins, and one or two scans more are begun by its arrival.  Beside the others'
+processor time stands our own: two to four times that of pymodbus, whose whole client does one send and one receive.  Up to its
+refresh a scan is one call of machine code, a microsecond with the program in it.  What is left is Python, some 470 calls for
+four scans: two fifths of the time in the unit (it accepts a request in 8 us and ends one in 5: parameters, checks, words
+shown), one in the connection (a send takes as long as in any other client, and the host is looked at once a scan), one in the
+loop, the queue and the measuring of times, the rest in the machine between them.  So the blocks reach seven tenths of
+pymodbus's rate and two fifths of C's on a quiet host.  More than that takes fewer scans, or the unit itself into machine code,
+with its words, checks and services: then Python would be called twice an exchange, to send and to receive.  On a busy host the
+fraction is smaller, down to a quarter, because whoever computes between sending and receiving is the one who is interrupted.  A
+server in Python, as most simulators are, takes part of the difference away: the second table.  In `cyclic` pace an exchange
+takes four periods, whatever everybody's speed."""
 
 from __future__ import annotations
 
