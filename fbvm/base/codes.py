@@ -122,6 +122,7 @@ CODES: dict[str, Code] = {
         "S0690": "output written in two POUs",
         "S0691": "located variables share memory",
         "S0692": "location left open",
+        "S0693": "number of a timer or counter used twice",
         "S0790": "text is cut",
         "S0791": "constant loses digits",
         "S0890": "program that no task runs",

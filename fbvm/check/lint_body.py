@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Source
 from fbvm.check.facts import Facts, Pou, Report
 from fbvm.syntax import ladder, sfc, tree
@@ -42,6 +43,20 @@ class Body:
             if node is not None:
                 yield node
                 todo.extend(reversed([*self.below(node)]))
+
+    def numbered(self) -> Iterator[tuple[tree.Call, Address]]:
+        """Timers and counters of rungs that have a number, each with its completion flag.
+
+        What an interlock does with an instruction are more calls in the same place; they are one."""
+        seen: set[int] = set()
+        for node in self.nodes():
+            if (isinstance(node, tree.Call) and isinstance(node.callee, tree.NameRef) and node.callee.text.startswith("$")
+                    and node.start not in seen):
+                seen.add(node.start)
+                for argument in node.arguments:
+                    flag = self.facts.directs.get(argument.value) if argument.value is not None else None
+                    if argument.name is None and flag is not None and flag.area in ("TF", "CNF"):
+                        yield node, flag
 
     def constant(self, expr: tree.Expr) -> Any:
         """The value of an expression in which no name stands, so that nobody meant to change it; else None."""

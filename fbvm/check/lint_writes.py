@@ -48,15 +48,28 @@ class Writes:
 
     def __init__(self) -> None:
         self._writers: dict[Key, list[tuple[Body, tree.Node]]] = {}
+        self._numbers: dict[Address, tuple[Body, tree.Call]] = {}
+        """Who executes the timer or counter of a number, by its completion flag."""
 
     def body(self, body: Body) -> None:
         """Look at one body."""
         order = _Order(body)
         definite = order.block(body.pou.tree.body)
         order.complain_of_calls(definite)
+        self._count(body)
         for key, node in definite.items():
             if _is_coil(key):
                 self._writers.setdefault(key, []).append((body, node))
+
+    def _count(self, body: Body) -> None:
+        """Warn of numbers of timers and counters that two instructions use (W474 3-6: each in one of them only)."""
+        for node, flag in body.numbered():
+            first, call = self._numbers.setdefault(flag, (body, node))
+            if call is node:
+                continue
+            kind = "timer" if flag.area == "TF" else "counter"
+            body.warn("S0693", node, f"{kind} number {flag.number} is used twice: both instructions write its completion flag "
+                      "and its present value", f"each {kind} needs a number of its own", first.there(call, "used here, too"))
 
     def finish(self) -> None:
         """Warn of outputs that several POUs write whatever happens: the last one decides."""
@@ -83,6 +96,9 @@ class _Order:
         self.body, self.facts = body, body.facts
         self.stores: dict[Key, dict[tuple[Key, int], _Store]] = {}
         """By what a read would name: the variable, or the word of an area."""
+        self.coils: dict[tuple[Key, int], tree.Node] = {}
+        """Outputs of rungs by their blocks, also those that were read since."""
+        self.in_rung = False
         self.blocks = [0]
         self._count = 0
         self.calls: dict[Key, list[tree.Call]] = {}
@@ -160,8 +176,10 @@ class _Order:
 
     def inside(self, node: ladder.Ladder | ladder.Rung | sfc.Sfc, definite: Definite) -> None:
         """Rungs are executed one after the other, as if they were not there; so is what a chart does."""
+        self.in_rung = isinstance(node, ladder.Rung)
         for statement in node.body:
             _STEPS[type(statement)](self, statement, definite)
+        self.in_rung = False
 
     def leave(self, node: tree.Return | tree.Exit | tree.Continue, definite: Definite) -> None:
         """Whatever was written may be the last word."""
@@ -238,15 +256,23 @@ class _Order:
         root = key[0] if isinstance(key, tuple) else key
         if isinstance(root, Address):
             root = (root.area, root.byte_offset() // 2)
-        known = self.stores.setdefault(root, {})
-        before = known.get((key, self.blocks[-1]))
+        known, here = self.stores.setdefault(root, {}), (key, self.blocks[-1])
+        before, coil = known.get(here), self.coils.get(here)
         if before is not None and (literal or not before.literal):
-            shown = node.targets[0] if isinstance(node, tree.Assign) else node
-            self.body.warn("S0596", shown, f"{self.body.text(shown)} is written twice: what it was given before is never used",
-                           "let one statement decide, and give it the conditions of both",
-                           self.body.there(before.node, "written here before"))
-        known[key, self.blocks[-1]] = _Store(node, literal)
+            self.written_twice(node, before.node, "is written twice: what it was given before is never used")
+        elif self.in_rung and coil is not None:
+            self.written_twice(node, coil, "is the output of two rungs: it leaves as the last one says, and only rungs between "
+                               "see the first")
+        known[here] = _Store(node, literal)
+        if self.in_rung:
+            self.coils[here] = node
         definite[key] = node
+
+    def written_twice(self, node: tree.Node, before: tree.Node, what: str) -> None:
+        shown = node.targets[0] if isinstance(node, tree.Assign) else node
+        self.body.warn("S0596", shown, f"{self.body.text(shown)} {what}",
+                       "let one statement decide, and give it the conditions of both",
+                       self.body.there(before, "written here before"))
 
     # --- timers -----------------------------------------------------------------------------------------------------
 
