@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from fbvm.base.areas import AddressError, parse_address
+from fbvm.base.areas import FLAG_AREAS, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import (
     BOOL,
@@ -302,7 +302,7 @@ class Expressions:
             return None
         self.facts.directs[expr] = address
         self.checker.use_area(address.area)
-        if address.bit is not None or address.area in ("TF", "CF", "CNF"):
+        if address.bit is not None or address.area in FLAG_AREAS:
             return BOOL
         return {8: BYTE, 32: DWORD, 64: LWORD}.get(address.size_bits, WORD)
 

@@ -104,8 +104,7 @@ def _complete(row: Completed, slots: bytearray, placed: Placed) -> None:
     placed.completed.append((offset, row.spot.type, row.initial))
     if bit is not None:
         value = 1 << bit if any(row.initial) else 0
-        others = sum(data[0] for at, data in placed.initial if at == offset and len(data) == 1)
-        placed.initial.append((offset, bytes(((others & ~(1 << bit)) | value,))))
+        placed.initial.append((offset, bytes((_begins(placed, offset) & ~(1 << bit) | value,))))
     elif SLOTS_OFFSET <= offset < SLOTS_OFFSET + len(slots):
         slots[offset - SLOTS_OFFSET:offset - SLOTS_OFFSET + len(row.initial)] = row.initial
     else:
@@ -145,7 +144,12 @@ def _place_located(variables: list[Variable], placed: Placed) -> None:
                 bits[at] = bits.get(at, 0) | 1 << number % 8
         elif variable.initial != b"\0":
             bits[variable.offset] = bits.get(variable.offset, 0) | 1 << variable.location.bit_in_byte()
-    placed.initial += [(offset, bytes((value,))) for offset, value in bits.items()]
+    placed.initial += [(offset, bytes((_begins(placed, offset) | value,))) for offset, value in bits.items()]
+
+
+def _begins(placed: Placed, offset: int) -> int:
+    """What a byte holds at power-on by what has been placed so far: the others of its bits stay as they are."""
+    return next((data[offset - at] for at, data in reversed(placed.initial) if at <= offset < at + len(data)), 0)
 
 
 def variable_bit(variable: Variable) -> int | None:
@@ -153,7 +157,7 @@ def variable_bit(variable: Variable) -> int | None:
     location = variable.location
     if variable.place != "area" or location is None:
         return None
-    return location.bit_in_byte() if location.bit is not None or location.area in ("TF", "CNF", "CF") else None
+    return location.bit_in_byte() if location.bit is not None or location.area in FLAG_AREAS else None
 
 
 def _fill_in(pou: Pou) -> None:
