@@ -349,8 +349,7 @@ class Expressions:
         if whole.block and member.kind not in READABLE and \
                 not (member.kind == "VAR" and (self.project.dialect.locals_are_read or
                                                self.checker.block_of(whole).kind == "PROGRAM")):
-            what = "an in-out of" if member.kind == "VAR_IN_OUT" else "internal to"
-            self.error("S0210", expr.name, f"{member.name} is {what} {whole} and cannot be reached from outside")
+            unknown.complain_internal(self, expr.name, member, whole)
             return None
         self.facts.fields[expr] = member
         return member.type

@@ -215,7 +215,8 @@ def literal_hint(value: Value | None, kind: Type) -> str:
     if isinstance(kind, RefType):
         return "a reference is made of a variable, or NULL"
     if isinstance(kind, EnumType):
-        return f"name a member, such as {kind}#{next(iter(kind.shown.values()))}"
+        same = kind.shown.get(value) if isinstance(value, int) else None
+        return f"name a member, such as {kind}#{same or next(iter(kind.shown.values()))}"
     for name, written in (("DURATION", "a duration is written T#500ms"), ("DATE", f"a literal is written {_dated(kind)}")):
         if f"ANY_{name}" in families(kind):
             return written

@@ -362,7 +362,7 @@ class Interfaces:
             variable = self.project.global_variable(name.text, pou.source)
             if variable is None:
                 self.report.add("S0208", pou.source, name, f"there is no VAR_GLOBAL {name.text}",
-                                self.project.nearest(name.text, (v.name for v in self.project.globals.values())))
+                                self.project.nearest_global(name.text))
             elif resolved is not None and resolved[0] != variable.type:
                 self.report.add("S0208", pou.source, name,
                                 f"{name.text} is {resolved[0]} here and {variable.type} as global",

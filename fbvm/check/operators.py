@@ -296,6 +296,9 @@ class Operators:
         elif expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
             number = {"BYTE": "USINT", "WORD": "UINT", "DWORD": "UDINT", "LWORD": "ULINT"}.get(left.name, "INT")
             hint = f"{left} has no arithmetic: convert with {left}_TO_{number}(...), or take {takers('arithmetic_of_bits')}"
+        elif left == right and isinstance(left, EnumType):
+            numbers = (f"TO_{left.base}({self.expressions.text(side)})" for side in (expr.left, expr.right))
+            hint = f"write {f' {expr.op} '.join(numbers)}, or take {takers('numbers_of_enumerations')}"
         elif common(left, right) is None:
             hint = _meeting_hint(left, right)
         self.expressions.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)

@@ -208,6 +208,13 @@ class Project:
             return None
         return variable
 
+    def nearest_global(self, name: str, more: Iterable[str] = ()) -> str:
+        """A hint for a name that means no global variable and, beside them, nothing else of `more`."""
+        for variable in self.globals.values():
+            if variable.qualified and fold(variable.name) == fold(name):
+                return f"its list is qualified_only: write {variable.space}.{variable.name}"
+        return self.nearest(name, [*more, *(v.name for v in self.globals.values())])
+
     def names_in(self, space: str) -> list[str]:
         """The global variables of a list."""
         return [v.name for v in self.globals.values() if list_name(v.source) == fold(space)]

@@ -293,11 +293,13 @@ class StandardCalls:
     # --- conversions ------------------------------------------------------------------------------------------------
 
     def _enum_conversion(self, name: str) -> Conversion | None:
-        """`INT_TO_Color` and the like, where Color is a declared enumeration."""
-        source, _, target = name.partition("_TO_")
-        named = self.expressions.checker.specs.named_type(target, self.expressions.source) if target else None
-        return Conversion(functions.long_name(source), "TO", target) \
-            if isinstance(named, EnumType) and source in ELEMENTARY else None
+        """`INT_TO_Color`, `Color_TO_INT` and the like, where Color is a declared enumeration."""
+        sides = tuple(name.split("_TO_"))
+        if len(sides) != 2 or sum(functions.long_name(side) in ELEMENTARY for side in sides) != 1:
+            return None
+        source, target = (side if isinstance(self._named(side), EnumType) else functions.long_name(side) for side in sides)
+        known = self._named(source) is not None and self._named(target) is not None
+        return Conversion(source, "TO", target) if known else None
 
     def _conversion(self, call: tree.Call, row: Conversion) -> Type | None:
         values = Arguments(self.expressions, call, ["IN"]).in_order()

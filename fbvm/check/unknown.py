@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import AddressError, parse_address
-from fbvm.base.types import fold
+from fbvm.base.dialects import takers
+from fbvm.base.types import Field, StructType, fold
 from fbvm.check import foreign
 from fbvm.syntax import tree
 
@@ -41,6 +42,14 @@ def complain(expressions: Expressions, expr: tree.NameRef) -> None:
         expressions.error("S0201", expr, f"{name} is a {pou.kind} and has no value", _USES[pou.kind].format(pou.name))
 
 
+def complain_internal(expressions: Expressions, name: tree.Name, member: Field, block: StructType) -> None:
+    """Say that a member of an instance is not for others."""
+    what, hint = "internal to", f"make it a VAR_OUTPUT, or take {takers('locals_are_read')}"
+    if member.kind != "VAR":
+        what, hint = "an in-out of", ""
+    expressions.error("S0210", name, f"{member.name} is {what} {block} and cannot be reached from outside", hint)
+
+
 def _hint(expressions: Expressions, expr: tree.NameRef) -> str:
     name, project = expr.text, expressions.project
     try:
@@ -48,8 +57,8 @@ def _hint(expressions: Expressions, expr: tree.NameRef) -> str:
         return f"for the address write %{name}, or declare a variable AT {address}"
     except AddressError:
         known = [v.name for v in expressions.pou.order] if expressions.pou else []
-    hint = foreign.VALUES.get(fold(name)) or foreign.library_of(name) or project.nearest(
-        name, [*known, *(v.name for v in project.globals.values()), *_members(expressions)])
+    hint = foreign.VALUES.get(fold(name)) or foreign.library_of(name) or project.nearest_global(
+        name, [*known, *_members(expressions)])
     if not hint and expr in expressions.spaces:
         return "if it is a library, an enumeration or a file of global variables, give its source with the files"
     return hint

@@ -7,6 +7,7 @@ from dataclasses import fields
 
 from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import takers
 from fbvm.base.types import ArrayType, Field, RefType, StructType, Type, families, fold
 from fbvm.check.constants import encode
 from fbvm.check.facts import UNTYPED_INT, Facts, Pou, Value, Variable
@@ -65,8 +66,9 @@ class Values:
             self.facts.wrong.add(expr)
             if self._is_undefined(expr, source):
                 return None
+            taken = isinstance(expr, tree.NameRef | tree.Member) and not self.project.dialect.initial_variables
             self.report.add("S0701", source, expr, "an initial value must be known before the program runs",
-                            "assign it in the body instead")
+                            "assign it in the body instead" + (f", or take {takers('initial_variables')}" if taken else ""))
         return value
 
     def _is_undefined(self, expr: tree.Expr, source: Source) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import AREAS, Address
+from fbvm.base.dialects import takers
 from fbvm.base.types import Field, StructType, fold
 from fbvm.check.facts import Facts, Variable
 from fbvm.syntax import tree
@@ -32,7 +33,8 @@ def writable(expressions: Expressions, expr: tree.Expr, purpose: str, bound: boo
         if member is not None and (member.constant or member.kind in ("VAR", "VAR_OUTPUT")) and \
                 not _written_from_outside(expressions, inner, member):
             what = "a constant" if member.constant else _OWN[member.kind]
-            expressions.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here")
+            expressions.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here",
+                              _writers(expressions, inner) if member.kind == "VAR" and not member.constant else "")
             return False
         if not (facts.is_part(inner) or inner is expr and bound and isinstance(inner, tree.Member | tree.Index)):
             break
@@ -54,6 +56,13 @@ def writable(expressions: Expressions, expr: tree.Expr, purpose: str, bound: boo
         expressions.error("S0501", expr, f"{address} is read-only for programs and cannot {purpose}")
         return False
     return True
+
+
+def _writers(expressions: Expressions, expr: tree.Expr) -> str:
+    """Which dialects write a variable of another body."""
+    whole = expressions.facts.types.get(expr.of) if isinstance(expr, tree.Member) else None
+    program = isinstance(whole, StructType) and whole.block and expressions.checker.block_of(whole).kind == "PROGRAM"
+    return f"make it a VAR_INPUT, or take {takers('programs_are_written' if program else 'locals_are_written')}"
 
 
 def _written_from_outside(expressions: Expressions, expr: tree.Expr, member: Field) -> bool:
