@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from fbvm.cli.files import writing
 from fbvm.cli.options import split_names
 from fbvm.cli.traces import SUFFIX, opened, recorded, scans_option
 from fbvm.record.page import page
@@ -78,7 +79,7 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
     .pcapng  what passed the network, for Wireshark
 
     Without names, all variables that changed are written."""
-    try:
+    with writing(target):
         if source.suffix.lower() == CSV:
             _to_trace(source, target)
             return
@@ -87,8 +88,6 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
             raise click.UsageError(f"{target}: what it shall be is not clear; end it with {', '.join(FORMATS)}")
         with opened(source) as trace:
             write(trace, [name for text in names for name in split_names(text)], scans, target)
-    except OSError as error:
-        raise click.UsageError(f"{target} cannot be written: {error.strerror}") from None
 
 
 def _to_trace(source: Path, target: Path) -> None:

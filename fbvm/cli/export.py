@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from fbvm.cli import status
+from fbvm.cli.files import writing
 from fbvm.cli.sources import report
 from fbvm.plcopen.exporting import export_xml
 
@@ -28,9 +29,7 @@ def command(files: tuple[Path, ...], document: Path, as_json: bool) -> None:
     if made.diagnostics or as_json:
         report(made.diagnostics, as_json)
     if made.text is not None:
-        try:
+        with writing(document):
             document.write_text(made.text, encoding="utf-8")
-        except OSError as error:
-            raise click.UsageError(f"{document} cannot be written: {(error.strerror or str(error)).lower()}") from None
     if made.errors:
         sys.exit(status.PROGRAM_ERRORS)

@@ -18,6 +18,7 @@ from fbvm.base.diagnostics import Source, whole_lines
 from fbvm.base.types import fold
 from fbvm.check.functions import OPERATORS, SIGNATURES, conversion, typed_name
 from fbvm.cli import status
+from fbvm.cli.files import writing
 from fbvm.cli.sources import show
 from fbvm.syntax.format import formatted
 from fbvm.syntax.format_names import Outside
@@ -119,13 +120,13 @@ def _replace(path: Path, data: bytes) -> None:
     """Write a file through one beside it, so that nobody ever finds half of it."""
     target = path.resolve()
     part = target.with_name(f"{target.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(data)
-        shutil.copymode(target, part)
-        os.replace(part, target)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise click.ClickException(f"{path} cannot be written: {(error.strerror or str(error)).lower()}") from None
+    with writing(path):
+        try:
+            part.write_bytes(data)
+            shutil.copymode(target, part)
+            os.replace(part, target)
+        finally:
+            part.unlink(missing_ok=True)
 
 
 def _difference(source: Source, text: str) -> Iterator[str]:

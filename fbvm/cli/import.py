@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from fbvm.cli import status
+from fbvm.cli.files import writing
 from fbvm.cli.sources import report
 from fbvm.plcopen.importing import import_xml
 
@@ -29,13 +30,11 @@ def command(file: Path, folder: Path, force: bool, as_json: bool) -> None:
         raise click.UsageError(f"{folder / there[0]} is there already; --force writes over it")
     if made.diagnostics or as_json:
         report(made.diagnostics, as_json)
-    try:
+    with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in made.files.items():
             (folder / name).write_text(text, encoding="utf-8")
             if not as_json:
                 click.echo(str(folder / name))
-    except OSError as error:
-        raise click.UsageError(f"{folder} cannot be written: {(error.strerror or str(error)).lower()}") from None
     if made.errors:
         sys.exit(status.PROGRAM_ERRORS)

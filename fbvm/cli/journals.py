@@ -14,6 +14,7 @@ import fbvm
 from fbvm.base.diagnostics import Source
 from fbvm.cli import status
 from fbvm.cli.banks import with_banks
+from fbvm.cli.files import writing
 from fbvm.cli.sources import chosen, report
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
@@ -28,10 +29,8 @@ def start_journal(
 ) -> Journal:  # fmt: skip
     """A journal to be written to a file; it holds the texts of the program and the `options` of the run, and ends with
     the stack."""
-    try:
+    with writing(path):
         file = stack.enter_context(path.open("w", encoding="utf-8", newline="\n"))
-    except OSError as error:
-        raise click.UsageError(f"{path} cannot be written: {error.strerror}") from None
     texts = [read(name, str(name)) for name in files]
     journal = Journal(file, {
         "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program, "chosen": chosen(),

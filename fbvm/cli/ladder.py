@@ -10,6 +10,7 @@ from pathlib import Path
 import click
 
 from fbvm.base.types import StructType, fold
+from fbvm.cli.files import writing
 from fbvm.cli.outcome import chart_width
 from fbvm.cli.sources import compiled, source_arguments
 from fbvm.code.image import Image, RungPicture
@@ -40,7 +41,8 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         raise click.UsageError("there is nothing to draw in these files")
     if svg:
         drawn = [ladder_surface(rung, width or SVG_WIDTH, Sight(None, _places(image, rung.body))) for rung in image.rungs]
-        svg.write_text(ladder_svg(drawn), encoding="utf-8")
+        with writing(svg):
+            svg.write_text(ladder_svg(drawn), encoding="utf-8")
         return
     body = -1
     for rung in image.rungs:

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from fbvm.cli import status
+from fbvm.cli.files import writing
 
 FOLDER = "lessons"
 
@@ -46,10 +47,8 @@ def command(number: int | None, checked: bool, solved: bool, folder: Path, learn
     if solved:
         click.echo(found.solution())
         return
-    try:
+    with writing(folder):
         target = found.begin(folder)
-    except OSError as error:
-        raise click.UsageError(f"{folder} cannot be written: {error.strerror}") from None
     if not checked:
         click.echo(found.text)
         click.echo(f"Your files are in {target}.  When you are ready: fbvm learn {number} --check")
@@ -75,12 +74,10 @@ def _class(learners: Path, out: Path) -> None:
 
     if out.resolve().is_relative_to(learners.resolve()):
         raise click.UsageError(f"{out} lies among the learners of {learners}; choose another --report")
-    try:
+    with writing(out):
         results = check_class(learners, out)
         page = out / "report.html"
         page.write_text(report(results, lessons(), out), encoding="utf-8")
-    except OSError as error:
-        raise click.UsageError(f"{out} cannot be written: {error.strerror}") from None
     if not results:
         raise click.UsageError(f"{learners} holds no folders of learners")
     for line in summary(results, lessons()):

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from fbvm.base.data import data_folder
+from fbvm.cli.files import writing
 
 EXAMPLE = "project"
 """The folder in `examples/` that is copied."""
@@ -37,13 +38,11 @@ def command(name: str) -> None:
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise click.UsageError(f"{name} is there already")
     source = data_folder("examples") / EXAMPLE
-    try:
+    with writing(name):
         for path in sorted(each for each in source.rglob("*") if each.is_file() and "__pycache__" not in each.parts):
             copy = target / path.relative_to(source)
             copy.parent.mkdir(parents=True, exist_ok=True)
             copy.write_text(path.read_text(encoding="utf-8").replace(TITLE, title), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise click.UsageError(f"{name} cannot be made: {error.strerror}") from None
     click.echo(f"{name}/")
     for file, said in WORDS.items():
         click.echo(f"  {file:<28}{said}")

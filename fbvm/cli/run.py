@@ -12,6 +12,7 @@ import click
 from fbvm.cli import sfc, status
 from fbvm.cli.banks import banks_in, with_banks
 from fbvm.cli.breakpoints import breakpoint_options, halt_lines, set_breakpoints
+from fbvm.cli.files import writing
 from fbvm.cli.journals import start_journal
 from fbvm.cli.ladder import drawing
 from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, time_ns
@@ -222,10 +223,8 @@ def _tell_unused(plc: Plc, network: LoopNetwork | TcpNetwork) -> None:
 
 
 def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork, plc: Plc) -> Capture:
-    try:
+    with writing(path):
         file = stack.enter_context(path.open("wb"))
-    except OSError as error:
-        raise click.UsageError(f"{path} cannot be written: {error.strerror}") from None
     return Capture(file, 0 if network.virtual_time else loop.epoch_ns(), lambda address: f"scan {plc.scans}")
 
 

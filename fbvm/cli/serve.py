@@ -15,6 +15,7 @@ import click
 
 from fbvm.base.data import data_folder
 from fbvm.cli import status
+from fbvm.cli.files import writing
 from fbvm.cli.options import time_ns
 from fbvm.cli.peer import LISTENING
 from fbvm.code.compiler import compile_files
@@ -95,10 +96,8 @@ def _plc(settings: dict[str, int], image: Path | None) -> Plc:
 
 
 def _opened(stack: ExitStack, log: Path) -> IO[str]:
-    try:
+    with writing(log):
         return stack.enter_context(click.open_file(str(log), "a", encoding="utf-8"))
-    except OSError as error:
-        raise click.UsageError(f"{log} cannot be written: {error.strerror}") from None
 
 
 def _network(bind: str, port: int) -> TcpNetwork:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from fbvm.cli.files import writing
 from fbvm.cli.ladder import SVG_WIDTH, scans_named, tell_nothing_drawn
 from fbvm.cli.outcome import chart_width
 from fbvm.cli.sources import compiled, source_arguments
@@ -32,7 +33,8 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         raise click.UsageError("there is no chart in these files: no POU has an INITIAL_STEP")
     if svg:
         drawn = [(_head(image, chart), sfc_surface(chart, width or SVG_WIDTH)) for chart in image.charts]
-        svg.write_text(ladder_svg(drawn), encoding="utf-8")
+        with writing(svg):
+            svg.write_text(ladder_svg(drawn), encoding="utf-8")
         return
     for chart in image.charts:
         click.echo(_head(image, chart))

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from fbvm.cli.files import writing
 from fbvm.code.image import Image
 from fbvm.plc import Plc
 from fbvm.record.page import page
@@ -95,10 +96,8 @@ def tracing(
             raise click.UsageError("--select chooses what --trace keeps, which is not given")
         yield
         return
-    try:
+    with writing(path):
         file = path.open("wb")
-    except OSError as error:
-        raise click.UsageError(f"{path} cannot be written: {error.strerror}") from None
     with file:
         try:
             writer = TraceWriter(plc, file, Depth(depth), selected, _lines(plc.image, files, libraries))
@@ -123,10 +122,8 @@ def paging(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Sequen
         finally:
             writer.close()
         file.seek(0)
-        try:
+        with writing(path):
             path.write_text(page(page_data(Trace(file), title=path.stem)), encoding="utf-8")
-        except OSError as error:
-            raise click.UsageError(f"{path} cannot be written: {error.strerror}") from None
 
 
 def _lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:

@@ -181,6 +181,19 @@ def test_wrong_usage_is_said_in_a_sentence(counter: str, arguments: list[str], m
     assert message in " ".join(result.stderr.split())
 
 
+def test_what_cannot_be_written_is_said_alike_by_every_verb(counter: str) -> None:
+    chart = "PROGRAM Main\nINITIAL_STEP A: END_STEP\nTRANSITION FROM A TO A := TRUE; END_TRANSITION\nEND_PROGRAM\n"
+    Path("chart.st").write_text(chart, encoding="utf-8")
+    for arguments in (
+        ["ladder", counter, "--svg", "none/x"], ["sfc", "chart.st", "--svg", "none/x"], ["export", counter, "-o", "none/x"],
+        ["run", counter, "--scans", "1", "--journal", "none/x"], ["run", counter, "--scans", "1", "--html", "none/x"],
+        ["run", counter, "--scans", "1", "--trace", "none/x"], ["new", f"{counter}/x"],
+    ):
+        result = fbvm(*arguments)
+        assert result.exit_code == 2, arguments
+        assert f"{arguments[-1]} cannot be written: no" in result.stderr, arguments
+
+
 def test_a_network_that_cannot_be_is_status_5(counter: str) -> None:
     result = run("--scans", "1", "--net", "tcp", "--map", "1.2.3.4:502=no.such.host.invalid:502")
     assert result.exit_code == 5
