@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from pathlib import Path
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import click
@@ -46,10 +45,11 @@ def _parted(text: str) -> tuple[str, str]:
     return " ".join(words[:at]), " ".join(words[at + 1:])
 
 
-def halt_lines(plc: Plc, halt: Halt, files: Sequence[Path]) -> Iterator[str]:
-    """Where a scan stands and why, the line of the source, and who called whom."""
+def halt_lines(plc: Plc, halt: Halt, lines: Mapping[str, Mapping[int, str]]) -> Iterator[str]:
+    """Where a scan stands and why, the line of the source, and who called whom; `lines` are texts by file and number."""
     yield str(halt)
-    yield from _line(halt, files)
+    if halt.site is not None and (text := lines.get(halt.site.file, {}).get(halt.site.line)):
+        yield f"  {halt.site.line} | {text}"
     names = Names(plc.image.symbols, plc.memory.areas)
     rows = [_row(number, frame, names) for number, frame in enumerate(halt.frames)]
     widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
@@ -60,15 +60,3 @@ def halt_lines(plc: Plc, halt: Halt, files: Sequence[Path]) -> Iterator[str]:
 def _row(number: int, frame: Frame, names: Names) -> tuple[str, str, str]:
     place = f"{frame.site.file}:{frame.site.line}" if frame.site else "at its end"
     return f"#{number} {frame.pou}", names.instance(frame.base), place
-
-
-def _line(halt: Halt, files: Sequence[Path]) -> Iterator[str]:
-    """The line that is next, where its file is one of these."""
-    if halt.site is None:
-        return
-    for path in files:
-        if path.as_posix().endswith(halt.site.file):
-            lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
-            if halt.site.line <= len(lines):
-                yield f"  {halt.site.line} | {lines[halt.site.line - 1].strip()}"
-            return

@@ -19,7 +19,7 @@ from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, 
 from fbvm.cli.outcome import Outcome, Progress
 from fbvm.cli.project import project_named, run_project
 from fbvm.cli.sources import compiled, source_options
-from fbvm.cli.traces import paging, tracing
+from fbvm.cli.traces import paging, statement_lines, tracing
 from fbvm.code.image import Image
 from fbvm.engine.tiers import CHOICES
 from fbvm.net.journal import Journal
@@ -33,8 +33,7 @@ from fbvm.record.trace_writer import Depth
 from fbvm.run import loop
 from fbvm.run.running import EVENT, PACES, TimedWrite
 from fbvm.units.backplane import usual_units
-from fbvm.watch.paths import Place
-from fbvm.watch.values import parse_value, split_list
+from fbvm.watch.places import parsed
 from fbvm.wire import registers
 
 CYCLE_NS = 10_000_000
@@ -103,7 +102,7 @@ def command(
     image = compiled(files, program, libraries, runnable=True, as_json=as_json, drawn=drawn)
     named = [given.name for given in options["settings"]]
     banks = banks_in([*named, *options["shown"], *options["charted"], options["until"] or "", *options["watched"],
-                      *options["conditions"]])
+                      *options["conditions"], *options["lines"]])
     image = with_banks(image, banks)
     with ExitStack() as stack:
         network = build_network(options["net"], options["mappings"], options["seed"])
@@ -124,7 +123,7 @@ def command(
         outcome.print()
         _tell_unused(plc, network)
         if plc.halted and not as_json:
-            for line in halt_lines(plc, plc.halted, files):
+            for line in halt_lines(plc, plc.halted, statement_lines(image, files, libraries)):
                 click.secho(line, fg="yellow", err=True)
     sys.exit(outcome.status)
 
@@ -167,14 +166,7 @@ def _run(
 def _write(plc: Plc, given: Setting) -> TimedWrite:
     """A setting with its value read for the type of its place; a range takes values parted by commas."""
     found = plc.find(given.name)
-    if isinstance(found, Place):
-        return TimedWrite(found, parse_value(found.type, given.value, given.name), given.at_ns)
-    texts = split_list(given.value)
-    if len(texts) != len(found.places):
-        raise ValueError(f"{given.name} takes {len(found.places)} values parted by commas, {len(texts)} given")
-    values = [parse_value(place.type, text.strip(), place.name)
-              for place, text in zip(found.places, texts, strict=True)]  # fmt: skip
-    return TimedWrite(found, values, given.at_ns)
+    return TimedWrite(found, parsed(found, given.value), given.at_ns)
 
 
 def build_network(net: str, mappings: tuple[Mapping, ...], seed: int = 0) -> LoopNetwork | TcpNetwork:

@@ -18,8 +18,7 @@ from fbvm.record.source_texts import source_texts
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.session import Session
 from fbvm.step.words import Words
-from fbvm.watch.paths import Place
-from fbvm.watch.values import parse_value
+from fbvm.watch.places import parsed
 
 
 @click.command("step", epilog="At the prompt, `help` lists the commands.  A script: printf 'run Main.Done\\nprint D200\\n' | "
@@ -74,10 +73,10 @@ def command(
 
 
 def _write(session: Session, given: Setting) -> None:
+    if given.time:
+        raise ValueError(f"--set {given}: here values are written before the first scan only; leave out @{given.time}")
     place = session.find(given.name)
-    if not isinstance(place, Place):
-        raise ValueError(f"{given.name} is a range; name one place")
-    value = parse_value(place.type, given.value, given.name)
+    value = parsed(place, given.value)
     session.act(lambda plc: plc.write(place, value))
 
 

@@ -100,7 +100,7 @@ def tracing(
         file = path.open("wb")
     with file:
         try:
-            writer = TraceWriter(plc, file, Depth(depth), selected, _lines(plc.image, files, libraries))
+            writer = TraceWriter(plc, file, Depth(depth), selected, statement_lines(plc.image, files, libraries))
         except UnknownPlace as error:
             raise click.UsageError(str(error)) from None
         try:
@@ -116,7 +116,7 @@ def paging(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Sequen
         yield
         return
     with tempfile.TemporaryFile() as file:
-        writer = TraceWriter(plc, file, Depth.STATEMENTS, (), _lines(plc.image, files, libraries))
+        writer = TraceWriter(plc, file, Depth.STATEMENTS, (), statement_lines(plc.image, files, libraries))
         try:
             yield
         finally:
@@ -126,5 +126,6 @@ def paging(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Sequen
             path.write_text(page(page_data(Trace(file), title=path.stem)), encoding="utf-8")
 
 
-def _lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:
+def statement_lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:
+    """By file and number the lines on which statements of a program stand."""
     return source_lines(image, source_texts(image, {str(path): path for path in files}, libraries))

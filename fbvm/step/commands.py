@@ -24,7 +24,8 @@ from fbvm.step.twin import Act
 from fbvm.step.words import Words
 from fbvm.watch.conditions import ConditionError, parse_condition
 from fbvm.watch.paths import Place, Span, UnknownPlace
-from fbvm.watch.values import parse_time_ns, parse_value, split_list
+from fbvm.watch.places import parsed
+from fbvm.watch.values import parse_time_ns
 
 LOOK_AHEAD_NS = 60_000_000_000
 """How far `run` looks for a line or a condition."""
@@ -231,13 +232,7 @@ class Commands:
         if not match:
             raise CommandError("write NAME = VALUE")
         found = self.session.find(match[1])
-        if isinstance(found, Place):
-            return found, parse_value(found.type, match[2], found.name)
-        texts = split_list(match[2])
-        if len(texts) != len(found.places):
-            raise CommandError(f"{found.name} takes {len(found.places)} values parted by commas")
-        return found, [parse_value(place.type, text.strip(), place.name)
-                       for place, text in zip(found.places, texts, strict=True)]  # fmt: skip
+        return found, parsed(found, match[2])
 
     def _act(self, act: Act, name: str) -> Iterator[str]:
         self.session.act(act)

@@ -18,12 +18,9 @@ from fbvm.base.types import (
     families,
     machine,
 )
-from fbvm.watch.paths import Place, member
-from fbvm.watch.values import Value, as_read, conform
-
-POINTED_AT = 8
-"""Bits of a reference below its byte offset; above the offset is the object's number (see code.operations)."""
-OFFSET_BITS = 32
+from fbvm.code.operations import BIT_MASK, OFFSET_MASK, OFFSET_SHIFT
+from fbvm.watch.paths import Place, Span, member
+from fbvm.watch.values import Value, as_read, conform, parse_value, split_list
 
 
 def read(memory: Memory, place: Place) -> Value:
@@ -52,8 +49,8 @@ def _follow(memory: Memory, place: Place) -> tuple[int, int | None] | None:
         reference = int(memory.read(offset, "ref"))
         if reference == 0:
             return None
-        pointed = reference & 0xFF
-        offset = (reference >> POINTED_AT & (1 << OFFSET_BITS) - 1) + distance
+        pointed = reference & BIT_MASK
+        offset = (reference >> OFFSET_SHIFT & OFFSET_MASK) + distance
         bit = place.bit if pointed == WHOLE_BYTES else pointed
     return offset, bit
 
@@ -122,6 +119,18 @@ def _pieces(memory: Memory, place: Place, value: object) -> Iterator[tuple[int, 
             yield from _pieces(memory, member(replace(place, offset=offset, hops=()), name), item)
     else:
         yield offset, _encoded(plain, conform(place.type, value, place.name)), bit
+
+
+def parsed(where: Place | Span, text: str) -> Value:
+    """The value that a text writes for a place; for a span those of its places, parted by commas, as a list.
+
+    Raises ValueError or TypeError with the name of the place."""
+    if isinstance(where, Place):
+        return parse_value(where.type, text, where.name)
+    texts = split_list(text)
+    if len(texts) != len(where.places):
+        raise ValueError(f"{where.name} takes {len(where.places)} values parted by commas, {len(texts)} given")
+    return [parse_value(place.type, part, place.name) for place, part in zip(where.places, texts, strict=True)]
 
 
 def _encoded(kind: Type, value: Value) -> bytes:

@@ -66,6 +66,18 @@ def test_a_run_that_meets_none_ends_as_ever() -> None:
     assert (result.exit_code, result.stdout, result.stderr) == (0, "D100 = 60 (16#003C)\n", "")
 
 
+def test_the_line_is_that_of_its_own_file() -> None:
+    Path("ant.st").write_text(PLANT.replace("Main", "Other").replace("Adder", "Less").replace("n + a", "n - a"), encoding="utf-8")
+    result = CliRunner().invoke(main, ["run", "plant.st", "ant.st", "--program", "Other", "--scans", "1", "--break", "ant.st:4"])
+    assert "  4 | n := n - a;\n" in result.stderr
+
+
+def test_a_bank_that_only_a_condition_names_is_there() -> None:
+    result = run("--break", "plant.st:12 IF E3_5 = 7", "--set", "E3_5=7@20ms")
+    assert "scan 2: breakpoint plant.st:12" in result.stderr
+    assert "scan 0: breakpoint" in run("--break", "plant.st:12 IF E4_0 = 0").stderr
+
+
 def test_json_tells_where() -> None:
     told = json.loads(run("--watch", "D100", "--json").stdout)
     assert told["stopped"] == "break" and told["scans"] == 0

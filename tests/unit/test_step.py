@@ -342,6 +342,8 @@ def test_a_script_ends_with_what_is_wrong() -> None:
     assert called("nonsense\n")[0] == 2
     assert called("", "--map", "192.168.250.1:502=127.0.0.1:502")[0] == 2
     assert called("", "--set", "Nobody=1")[0] == 2
+    assert called("expect D8 = 2\nquit\n", "--set", "D7..D8=1,2")[0] == 0
+    assert "leave out @1s" in called("", "--set", "D7=1@1s")[1] and called("", "--set", "D7=1@1s")[0] == 2
     assert called("", "--watch", "Nobody")[0] == 2
 
 
