@@ -15,6 +15,7 @@ from rich.table import Table
 
 from fbvm.breakpoints import Halt
 from fbvm.cli import status
+from fbvm.engine.trap import Trap
 from fbvm.plc import Plc
 from fbvm.record.chart import draw
 from fbvm.record.recorder import Recorder
@@ -48,7 +49,7 @@ class Outcome:
     def print(self) -> None:
         """Values and charts on stdout, what stopped the run on stderr."""
         if self.as_json:
-            click.echo(json.dumps(self._as_dict(), allow_nan=True))
+            click.echo(json.dumps(self._as_dict(), allow_nan=False))
             return
         if self.recorder:
             click.echo(draw(self.recorder, width=chart_width(), ruler=True, compress=True), nl=False)
@@ -65,20 +66,24 @@ class Outcome:
             click.secho(f"{self.until} did not hold in {show_time(passed_ns)[2:]}", fg="yellow", err=True)
 
     def _as_dict(self) -> dict[str, object]:
-        plc, trap = self.plc, self.plc.trap
-        site = trap.site if trap else None
+        plc = self.plc
         return {
             "scans": plc.scans,
             "time_ms": plc.elapsed_ns // 1_000_000 if plc.elapsed_ns % 1_000_000 == 0 else plc.elapsed_ns / 1e6,
             "stopped": self.reason,
             "values": {text: for_scripts(place, plc.read(place)) for text, place in self.places.items()},
             **({"break": _halt(plc.halted)} if plc.halted else {}),
-            "trap": trap and site and {
-                "code": trap.code, "file": site.file, "pou": site.pou, "line": site.line, "column": site.column,
-                "message": trap.message,
-            },
+            "trap": trap_for_scripts(plc.trap),
             **({"scan_time": plc.scan_times.as_dict(), "lateness": plc.lateness.as_dict()} if self.scan_time else {}),
         }  # fmt: skip
+
+
+def trap_for_scripts(trap: Trap | None) -> dict[str, object] | None:
+    """What stopped a program, as JSON has it."""
+    return None if trap is None else {
+        "code": trap.code, "file": trap.site.file, "pou": trap.site.pou, "line": trap.site.line, "column": trap.site.column,
+        "message": trap.message,
+    }  # fmt: skip
 
 
 def _halt(halt: Halt) -> dict[str, object]:

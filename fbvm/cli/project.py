@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli import status
-from fbvm.cli.outcome import EXIT_STATUS, Progress, for_scripts, shown
+from fbvm.cli.outcome import EXIT_STATUS, Progress, for_scripts, shown, trap_for_scripts
 from fbvm.cli.sources import report, show
 from fbvm.run import run_all
 from fbvm.run.plant import Kind, Plant
@@ -89,7 +89,7 @@ def _check_end(project: Project, net: str | None, for_ns: int | None, scans: int
 
 def _print(plant: Plant, as_json: bool, scan_time: bool) -> None:
     if as_json:
-        click.echo(json.dumps({"plcs": dict(_for_scripts(plant)), **(_measures(plant) if scan_time else {})}, allow_nan=True))
+        click.echo(json.dumps({"plcs": dict(_for_scripts(plant)), **(_measures(plant) if scan_time else {})}, allow_nan=False))
         return
     for kind in plant.kinds:
         for line in _lines(kind):
@@ -134,11 +134,10 @@ def _scans(least: int, most: int) -> str:
 def _for_scripts(plant: Plant) -> Iterator[tuple[str, object]]:
     for kind in plant.kinds:
         for name, run in zip(kind.names, kind.runs, strict=True):
-            trap = run.plc.trap
             yield name, {
                 "scans": run.plc.scans, "time_ns": run.plc.elapsed_ns, "stopped": run.reason,
                 "values": {text: for_scripts(kind.watched[text], value) for text, value in kind.values(run).items()},
-                "trap": trap and {"code": trap.code, "message": trap.message},
+                "trap": trap_for_scripts(run.plc.trap),
             }  # fmt: skip
 
 

@@ -311,12 +311,14 @@ _PINS = {"VAR_INPUT": 0, "VAR_IN_OUT": 1, "VAR_OUTPUT": 2}
 
 
 def plain_value(kind: Type, value: Value) -> Value:
-    """The same value for JSON: each REAL as the number that people see."""
+    """The same value for JSON: each REAL as the number that people see; what JSON has no number for as text, "nan"."""
     plain = base(kind)
     if isinstance(plain, ArrayType) and isinstance(value, list):
         return [plain_value(plain.element, item) for item in value]
     if isinstance(plain, StructType) and isinstance(value, dict):
         return {f.name: plain_value(f.type, value[f.name]) for f in plain.fields.values() if f.name in value}
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
     return shortest_real(value) if isinstance(value, float) and plain is REAL else value
 
 

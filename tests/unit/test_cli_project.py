@@ -116,6 +116,8 @@ def test_a_trap_stops_one_plc_and_is_told(folder: Path) -> None:
     assert result.exit_code == 4
     assert result.stdout.startswith(SAID + "bad: 1 scan in 10ms, ended by trap")
     assert result.stderr == "bad: R0101 counter.st:4:14 in Main: 1 divided by 0\n"
+    told = json.loads(run("--json").stdout)["plcs"]["bad"]["trap"]
+    assert (told["code"], told["file"], told["line"], told["column"]) == ("R0101", "counter.st", 4, 14)
 
 
 def test_a_bad_file_is_refused_as_a_bad_program_is(folder: Path) -> None:
