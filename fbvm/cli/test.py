@@ -9,8 +9,9 @@ import click
 
 from fbvm.cli import status
 
-STATUS = {0: status.GOOD, 1: status.FAILED, 2: status.INTERRUPTED, 4: status.USAGE, 5: status.USAGE}
-"""Statuses by pytest's own; 5 is that there was no test."""
+STATUS = {0: status.GOOD, 4: status.USAGE, 5: status.USAGE}
+"""Statuses by pytest's own, the others are failures: 1 of a test, 2 of what could not even be collected (Ctrl-C ends both
+processes); 5 is that there was no test."""
 
 
 @click.command("test", context_settings={"ignore_unknown_options": True, "help_option_names": ["-h", "--help"]},

@@ -181,6 +181,20 @@ def test_wrong_usage_is_said_in_a_sentence(counter: str, arguments: list[str], m
     assert message in " ".join(result.stderr.split())
 
 
+def test_what_json_has_no_number_for_is_text(counter: str) -> None:
+    Path("wild.st").write_text("PROGRAM Main\nVAR a, z : REAL; l : LREAL; END_VAR\na := -1.0 / z;\nl := z / z;\nEND_PROGRAM\n",
+                               encoding="utf-8")
+    told = fbvm("run", "wild.st", "--scans", "1", "--json", "--show", "Main.a", "--show", "Main.l").stdout
+    assert "NaN" not in told and json.loads(told)["values"] == {"Main.a": "-inf", "Main.l": "nan"}
+
+
+@pytest.mark.slow
+def test_tests_that_cannot_be_collected_have_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("test_a.py").write_text("def test_a(:\n", encoding="utf-8")
+    assert fbvm("test", "-q", "-p", "no:cacheprovider").exit_code == 1
+
+
 def test_what_cannot_be_written_is_said_alike_by_every_verb(counter: str) -> None:
     chart = "PROGRAM Main\nINITIAL_STEP A: END_STEP\nTRANSITION FROM A TO A := TRUE; END_TRANSITION\nEND_PROGRAM\n"
     Path("chart.st").write_text(chart, encoding="utf-8")
