@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from typing import Any, Protocol
 
@@ -27,6 +28,8 @@ wrong one; those who mend want to know before."""
 
 ELEMENTS = frozenset(("STEP", "TRANSITION"))
 """Words of charts: what must follow them says that they are no names."""
+NAMED = re.compile(r"\s+\w+\s*:(?!=)")
+"""What behind ACTION says that it is no name either."""
 FUNCTION_OPERATORS = frozenset(("AND", "OR", "XOR", "MOD", "NOT"))
 """Reserved words that are names in front of `(`, as in `AND(a, b)`."""
 
@@ -188,5 +191,6 @@ class Automaton:
     def may_be_name(self, token: Token) -> bool:
         """Whether a word that the grammar cannot take here may be the user's name."""
         if token.type in self.soft:
-            return token.text[-1] != "=" and token.type not in ELEMENTS
+            return token.text[-1] != "=" and token.type not in ELEMENTS and not (
+                token.type == "ACTION" and NAMED.match(self.text, token.end))
         return token.type in FUNCTION_OPERATORS and self.text[token.end:token.end + 20].lstrip().startswith("(")

@@ -32,11 +32,13 @@ MISSPELT = {
     "ELSEIF": "ELSIF", "ELIF": "ELSIF", "ENDIF": "END_IF", "ENDFOR": "END_FOR", "ENDWHILE": "END_WHILE",
     "ENDCASE": "END_CASE", "ENDREPEAT": "END_REPEAT", "ENDVAR": "END_VAR", "ENDSTRUCT": "END_STRUCT",
     "ENDTYPE": "END_TYPE", "ENDFUNCTION": "END_FUNCTION", "ENDFUNCTION_BLOCK": "END_FUNCTION_BLOCK",
-    "ENDPROGRAM": "END_PROGRAM", "SWITCH": "CASE", "BREAK": "EXIT", "END": "END_"}
+    "ENDPROGRAM": "END_PROGRAM", "ENDSTEP": "END_STEP", "ENDTRANSITION": "END_TRANSITION", "ENDACTION": "END_ACTION",
+    "END_TRANS": "END_TRANSITION", "SWITCH": "CASE", "BREAK": "EXIT", "END": "END_"}
 """Words of other languages, and ours without their `_`: of the type MISSPELT, and names where they fit as such.  So are
 END with a space behind it, and words that begin with VAR_."""
 
-_END_OF = re.compile(r"(?i)[ \t]+(?:IF|CASE|FOR|WHILE|REPEAT|VAR|STRUCT|TYPE|FUNCTION|FUNCTION_BLOCK|PROGRAM)\b")
+_END_OF = re.compile(r"(?i)[ \t]+(?:IF|CASE|FOR|WHILE|REPEAT|VAR|STRUCT|TYPE|FUNCTION|FUNCTION_BLOCK|PROGRAM|STEP|TRANSITION|"
+                     r"ACTION)\b")
 
 
 _END_LADDER = re.compile(r"(?im)^[ \t]*END_LADDER\b")

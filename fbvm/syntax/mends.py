@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fbvm.syntax.automaton import Automaton
+from fbvm.syntax.automaton import ELEMENTS, Automaton
+from fbvm.syntax.chart_slips import chart_slip
 from fbvm.syntax.frames import OPENERS, UNITS, anchor, frames
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.mend import Mend
@@ -27,7 +28,7 @@ GOOD = 3
 
 def best_mend(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
     """The mend after which the most of `following` (which begins with `token`) can be read; None if none is good."""
-    known = slip(automaton, token, following)
+    known = chart_slip(automaton, token, following) or slip(automaton, token, following)
     if known:
         return known
     trials = [*_insertions(automaton, following), *_replacements(automaton, following), *_removal(automaton, following)]
@@ -66,9 +67,17 @@ def _insertions(automaton: Automaton, following: list[Token]) -> Iterator[Trial]
             rank = -1
         where = f"before {found(token)}"
         if kind == "SEMICOLON":
-            where = f"after the {'statement' if anchor(automaton.states).symbol == 'ended_list' else 'declaration'}"
+            where = f"after the {_unended(automaton)}"
         yield score, -rank, Mend([Token(kind, sign(kind), at, at), token], at, at, f"{quoted(kind)} expected {where}",
                                  "", open_bracket(automaton, BRACKETS.get(kind)))
+
+
+def _unended(automaton: Automaton) -> str:
+    """What it is that a `;` is to end."""
+    place, open_ = anchor(automaton.states), frames(automaton.states, automaton.values)
+    if open_ and open_[-1].word.type == "TRANSITION" and place.size <= open_[-1].at:
+        return "condition"
+    return {"ended_list": "statement", "associations": "action"}.get(place.symbol, "declaration")
 
 
 def _after_label(automaton: Automaton) -> bool:
@@ -92,7 +101,7 @@ def _replacements(automaton: Automaton, following: list[Token]) -> Iterator[Tria
 
 def _removal(automaton: Automaton, following: list[Token]) -> Iterator[Trial]:
     token = following[0]
-    if token.type in OPENERS or token.type in UNITS or token.type == "VAR":
+    if token.type in OPENERS or token.type in UNITS or token.type in ("VAR", "ACTION", *ELEMENTS):
         return
     rest = following[1:]
     score = _score(automaton, automaton.states, rest)

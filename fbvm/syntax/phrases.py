@@ -94,6 +94,8 @@ def found(token: Token) -> str:
 
 def unlike(token: Token, kinds: set[str]) -> str:
     """The message for a token where `kinds` are expected."""
+    if token.type == "VAR" and kinds & {"END_PROGRAM", "END_FUNCTION_BLOCK", "END_FUNCTION"} and "VAR" not in kinds:
+        return f"{found(token)} behind the first statement"
     want = wanted(kinds)
     return f"{want} expected, but {found(token)} found" if want else f"unexpected {found(token)}"
 
@@ -121,6 +123,8 @@ def hint(token: Token, kinds: set[str]) -> str:
         return "a declaration has a type, and then its value: `x : INT := 5;`"
     if token.type == "VAR" and "SEMICOLON" in kinds:
         return "VAR sections stand in front of the first statement"
+    if token.type in ("IF", "CASE") and "NUMBER" in kinds and "IF" not in kinds:
+        return f"{token.type} is a statement and has no value: SEL(condition, if_false, if_true) has one"
     if token.type in lexis().reserved and "NAME" in kinds and "IF" not in kinds and token.type[:4] != "END_":
         return f"{token.text} is a reserved word and cannot be a name"
     if (token.type == "RSQB" and "RANGE" in kinds and "COMMA" not in kinds) or (token.type == "LPAR" and kinds == {"LSQB"}):

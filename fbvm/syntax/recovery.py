@@ -8,6 +8,7 @@ from __future__ import annotations
 from fbvm.base.diagnostics import Diagnostic
 from fbvm.syntax.automaton import ELEMENTS, NESTING_LIMIT, Automaton
 from fbvm.syntax.builder import CHAIN_LIMIT, Builder, Stop
+from fbvm.syntax.chart_slips import pass_over
 from fbvm.syntax.frames import (
     ENDS,
     HEADS,
@@ -36,6 +37,9 @@ LOOK = 4
 HOLES = {"IF": ("TRUE",), "ELSIF": ("TRUE",), "WHILE": ("TRUE",), "UNTIL": ("TRUE",), "CASE": ("NUMBER",),
          "FOR": ("NAME", "ASSIGN", "NUMBER", "TO", "NUMBER")}
 """What is read in the place of a head that cannot be understood, so that its block can."""
+
+PARTS = {*ELEMENTS, "ACTION"}
+"""Words that begin a part of a chart."""
 
 HOLE_TEXTS = {"NUMBER": "0", "NAME": "i"}
 
@@ -179,9 +183,9 @@ class Recovery:
         return place.symbol in ("var_decls", "type_decls") and (token.type in STATEMENT_WORDS or token.type == "VAR")
 
     def open_element(self, token: Token) -> list[Frame]:
-        """What is open of the part of a chart in front of a STEP or TRANSITION, which shows that its END is missing."""
-        open_ = frames(self.states, self.values) if token.type in ELEMENTS else []
-        first = next((at for at, frame in enumerate(open_) if frame.word.type in (*ELEMENTS, "ACTION")), len(open_))
+        """What is open of the part of a chart in front of a STEP, TRANSITION or ACTION, which shows that its END is missing."""
+        open_ = frames(self.states, self.values) if token.type in PARTS else []
+        first = next((at for at, frame in enumerate(open_) if frame.word.type in PARTS), len(open_))
         return open_[first:]
 
     def closing(self, token: Token) -> list[Token]:
@@ -193,7 +197,7 @@ class Recovery:
             if target is None:
                 return self.other_end(open_[-1].word, token) if open_ else self.no_opener(token)
             inner = open_[open_.index(target) + 1:]
-        elif token.type in ELEMENTS:
+        elif token.type in PARTS:
             inner = self.open_element(token)
         elif token.type not in UNITS:
             inner = open_[-1:]
@@ -274,8 +278,11 @@ class Recovery:
         if head:
             return self.skip_head(head, token)
         place = anchor(self.states)
+        lost = next((f.word for f in frames(self.states, self.values) if f.at >= place.size and f.word.type in PARTS), None)
         cut(self.states, self.values, place)
-        if token.type in ("VAR", "VAR_GLOBAL") and place.symbol == "ended_list":
+        if lost:
+            return pass_over(self.automaton, token, ENDS[lost.type])
+        if token.type in ("VAR", "VAR_GLOBAL") and place.symbol in ("ended_list", "some_actions"):
             while token.type not in ("END_VAR", "$END") and token.type not in POUS:
                 token = self.following()
             return [] if token.type == "END_VAR" else [token]

@@ -6,7 +6,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.sfc import QUALIFIERS, Association, Step, Transition
 from fbvm.syntax.statements import Items, Statements
-from fbvm.syntax.tree import Action, Block, Expr, Name, NameRef
+from fbvm.syntax.tree import Action, Block, Call, CallStatement, Expr, Name, NameRef
 
 Part = Step | Transition
 
@@ -47,6 +47,11 @@ class SfcElements(Statements):
     def transition_body(self, word: Token, token: Token | None, priority: int | None, from_: Token, sources: list[Name],
                         to: Token, targets: list[Name], colon: Token, items: Items, end: Token) -> Transition:
         body = self.block(items)
+        only = body[0] if len(body) == 1 else None
+        if isinstance(only, CallStatement) and not isinstance(only.call, Call):
+            self.report("S0101", colon.start, colon.end, "`:=` expected in front of the condition, but `:` found",
+                        "behind `:` stand statements that assign the condition to the transition's name")
+            return self._transition(word, token, priority, sources, targets, only.call, None, end)
         if token is None:
             self.report("S0111", word.start, word.end, "a transition with statements needs a name",
                         "the statements assign the condition to it; or write `:= condition;`")

@@ -53,7 +53,7 @@ ONE_ERROR = [
     ("REPEAT x := 1; UNTIL END_REPEAT y := 1;", "an expression expected, but `END_REPEAT` found", 2),
     ("x := .5; y := 1;", "an expression expected, but `.5` found", 1),
     ("VAR q : INT; END_VAR y := 1;", "", 1),
-    ("y := 1; VAR q : INT; END_VAR", "a statement or `END_FUNCTION_BLOCK` expected, but `VAR` found", 1),
+    ("y := 1; VAR q : INT; END_VAR", "`VAR` behind the first statement", 1),
     ("CASE a OF x := 1; 1: x := 2; END_CASE y := 1;",
      "a statement in CASE stands behind a label, none is in front of this one", 2),
     ("x : = 1; y := 1;", "`: =` is no operator of Structured Text", 2),
