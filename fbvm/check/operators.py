@@ -330,7 +330,8 @@ class Operators:
             self._undefined(expr, left, right, want)
             return None
         kind: Type = left if is_any(left, "ANY_REAL") else LREAL
-        if left in numeric and want is not None and base(want) == REAL and right == REAL:
+        single = left in numeric and right == REAL or left is UNTYPED_REAL and is_any(right, "ANY_INT")
+        if single and want is not None and base(want) == REAL:
             kind = REAL
         for side, side_kind in ((expr.left, left), (expr.right, right)):
             if side_kind in numeric and self.expressions.adopt(side, kind) is None:

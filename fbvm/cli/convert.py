@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import click
@@ -30,11 +31,12 @@ def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
 
 
 def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
-    with path.open("w", encoding="ascii", errors="replace") as file:
-        try:
-            write_vcd(recorded(trace, names, scans), file)
-        except ModuleNotFoundError:
-            raise click.UsageError("VCD needs the package pyvcd: pip install 'fbvm[vcd]'") from None
+    text = StringIO()
+    try:
+        write_vcd(recorded(trace, names, scans), text)
+    except ModuleNotFoundError:
+        raise click.UsageError("VCD needs the package pyvcd: pip install 'fbvm[vcd]'") from None
+    path.write_text(text.getvalue(), encoding="ascii", errors="replace")
 
 
 def _svg(trace: Trace, names: Names, scans: range | None, path: Path) -> None:

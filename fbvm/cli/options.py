@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from click import BadParameter
+from click import BadParameter, Context, Parameter, option
 
 from fbvm.watch.values import parse_time_ns
 from fbvm.wire.link import Peer
@@ -83,6 +83,14 @@ def _endpoint(text: str) -> tuple[str, int]:
     if not colon or not host or not port.isdecimal() or int(port) > 65535:
         raise BadParameter(f"{text!r} is not an address and a port such as 192.168.250.1:502")
     return host, int(port)
+
+
+def _shown(context: Context, parameter: Parameter, given: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(name for text in given for name in split_names(text))
+
+
+show_option = option("--show", "shown", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST,...", callback=_shown,
+                           help="Print these at the end.")
 
 
 def charted_names(options: Iterable[str]) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from fbvm.cli import journals
-from fbvm.cli.options import charted_names
+from fbvm.cli.options import charted_names, show_option
 from fbvm.cli.outcome import Outcome
 from fbvm.net.journal import JournalError
 from fbvm.record.recorder import Recorder
@@ -22,7 +22,7 @@ from fbvm.run.replay import Replay
               help="Where folders of libraries are now, if the journal's are gone; may be repeated.")
 @click.option("--scans", type=click.IntRange(min=0), metavar="N", help="End after N scans.")
 @click.option("--until", metavar="EXPRESSION", help="End when this holds after a scan: 'Main.done AND D200 > 5'.")
-@click.option("--show", "shown", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST", help="Print this at the end.")
+@show_option
 @click.option("--chart", "charted", multiple=True, metavar="NAME|ADDRESS,...", help="Draw these, a column a scan.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(

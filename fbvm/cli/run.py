@@ -15,7 +15,7 @@ from fbvm.cli.breakpoints import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.files import writing
 from fbvm.cli.journals import start_journal
 from fbvm.cli.ladder import drawing
-from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, time_ns
+from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, show_option, time_ns
 from fbvm.cli.outcome import Outcome, Progress
 from fbvm.cli.project import project_named, run_project
 from fbvm.cli.sources import compiled, source_options
@@ -53,7 +53,7 @@ CYCLE_NS = 10_000_000
 @breakpoint_options
 @click.option("--set", "settings", type=setting, multiple=True, metavar="NAME=VALUE[@TIME]",
               help="Write once, before the scan at that time.")
-@click.option("--show", "shown", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST", help="Print this at the end.")
+@show_option
 @click.option("--chart", "charted", multiple=True, metavar="NAME|ADDRESS,...", help="Draw these, a column a scan.")
 @click.option("--ladder", "rungs", metavar="SCANS", help="Draw the rungs with their power in these scans: 3 or 3,5..7.")
 @click.option("--sfc", "charts", metavar="SCANS",

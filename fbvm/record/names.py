@@ -153,14 +153,16 @@ def _subscripts(kind: ArrayType, number: int) -> list[int]:
 def _address(areas: Mapping[str, Area], area: Area, offset: int, bit: int | None) -> Place | None:
     """The word, byte, bit or flag of an area."""
     distance = offset - area.offset
+    text = ""
     if area.name in FLAG_AREAS:
         address = Address(area.name, distance * 8 + (bit or 0))
+        text = f"{area.name}{address.number}"  # T0005 alone means the present value
     elif area.unit_bits == 8:
         address = Address(area.name, distance, bit, 1 if bit is not None else 8)
     else:
         address = Address(area.name, distance // 2, None if bit is None else distance % 2 * 8 + bit)
     try:
-        return find_place({}, areas, str(address))
+        return find_place({}, areas, text or str(address))
     except UnknownPlace:
         return None
 

@@ -5,7 +5,7 @@ Needs a trace of statements.  What the conditions around a statement read counts
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -22,6 +22,8 @@ DEEPEST = 6
 """Causes of causes that are looked for if nobody says how deep."""
 WINDOWS = (100, 2000)
 """Scans that are read at first, and if they do not suffice; then all."""
+MOST_FACTS = 32
+"""Places of which a value without a name is remembered to have been made."""
 LARGEST_BYTES = 4096
 """What copies at once is not followed byte by byte if it is larger."""
 
@@ -110,6 +112,8 @@ class _Changes:
         self._trace = trace
         self._changes: dict[int, list[tuple[int, Change]]] = {}
         self._reads: dict[tuple[Frame, int], list[Fact]] = {}
+        self._nameless: dict[int, tuple[Fact, ...]] = {}
+        """What was read for the bytes that no name has: conditions of rungs, variables of functions."""
         self._known: Snapshot | None = None
         self.order = 0
         trace.follow(self, scans)
@@ -133,9 +137,13 @@ class _Changes:
             self._reads[event.frame, event.site] = []
         elif isinstance(event, Read):
             place = self._trace.names.at(event.offset, event.bit if event.bit < 8 else None)
-            if place is not None:
-                text = Signal(place, place.name).text(moment.read(place))
-                self._reads.setdefault((event.frame, event.site), []).append(Fact(place, text, self.order))
+            facts = self._reads.setdefault((event.frame, event.site), [])
+            if place is None:
+                facts += self._nameless.get(event.offset, ())
+            else:
+                facts.append(Fact(place, Signal(place, place.name).text(moment.read(place)), self.order))
+        elif isinstance(event, Write) and self._trace.names.at(event.offset, event.bit if event.bit < 8 else None) is None:
+            self._nameless[event.offset] = tuple(_once(self._facts(event.frame, event.site)))[:MOST_FACTS]
         elif isinstance(event, Write) and event.old != event.value and len(event.value) <= LARGEST_BYTES:
             site = self._trace.sites[event.site] if event.site >= 0 else None
             change = Change(moment.scans, moment.now_ns, self.order, site, self._trace.names.instance(event.frame.base),
@@ -193,7 +201,7 @@ def _explain(past: _Changes, place: Place, value: str, before: int, deepest: int
     return cause
 
 
-def _once(facts: tuple[Fact, ...]) -> Iterator[Fact]:
+def _once(facts: Iterable[Fact]) -> Iterator[Fact]:
     seen: set[Place] = set()
     for fact in facts:
         if fact.place not in seen:

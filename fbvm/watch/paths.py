@@ -114,7 +114,8 @@ def _unknown(symbols: Mapping[str, Field], text: str, first: str, reason: str) -
     listed = sorted(field.name for field in symbols.values() if field.space.upper() == first.upper())
     if listed:
         return f"{text.strip()}: the list has no such variable; it has {', '.join(listed[:8])}"
-    known = ", ".join(sorted(field.name for field in symbols.values())[:8])
+    programs_first = sorted(symbols.values(), key=lambda field: (not isinstance(field.type, StructType), field.name))
+    known = ", ".join(field.name for field in programs_first[:8])
     return f"there is no {first}" + (f"; known here: {known}" if known else " (the program declares nothing)")
 
 

@@ -110,6 +110,11 @@ def test_values_are_shown(counter: str) -> None:
     )
 
 
+def test_values_are_shown_by_lists_too(counter: str) -> None:
+    result = run("--scans", "3", "--show", "Main.n, Main.list[2,0],D5..D6", "--show", "Main.done")
+    assert result.stdout == "Main.n = 3\nMain.list[2,0] = 0\nD5..D6 = 0 0\nMain.done = FALSE\n"
+
+
 def test_what_is_declared_to_be_read_in_hexadecimal_is_shown_in_both_ways(counter: str) -> None:
     Path(counter).write_text(
         "PROGRAM Main VAR {attribute 'displaymode' := 'hex'} Code : UINT; END_VAR END_PROGRAM", encoding="utf-8"

@@ -103,6 +103,40 @@ def test_a_bit_of_a_word_that_was_written_whole() -> None:
     assert [change and change.scan for change in changes] == [9, 7, 7]
 
 
+def _causes(text: str, name: str, *ons: str) -> list[tuple[str, str]]:
+    """What gave a place its value after 30 scans, each with the value that it had."""
+    plc, file = Plc(image(text)), io.BytesIO()
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    plc.scan()
+    for on in ons:
+        plc.write(on, True)
+    plc.run(scans=29)
+    writer.close()
+    cause = ask(Trace(io.BytesIO(file.getvalue())), name, 29, 1)
+    return [(inner.place.name, inner.value) for inner in cause.causes]
+
+
+def test_contacts_of_a_rung_are_what_its_coil_read() -> None:
+    rungs = "LD Start\nOR Motor\nANDNOT Stop\nOUT Motor\nLD Motor\nTIM 0001 #0002\nLD T0001\nANDNOT C0001\nOUT Lamp"
+    text = f"PROGRAM Main VAR Start, Stop, Motor, Lamp : BOOL; END_VAR LADDER\n{rungs}\nEND_LADDER END_PROGRAM"
+    assert _causes(text, "Main.Motor", "Main.Start") == [("Main.Start", "TRUE"), ("Main.Motor", "FALSE"), ("Main.Stop", "FALSE")]
+    assert _causes(text, "Main.Lamp", "Main.Start") == [("T0001", "TRUE"), ("C0001", "FALSE")]
+
+
+def test_what_a_function_was_given_is_what_its_result_is_made_of() -> None:
+    text = """FUNCTION Scaled : INT
+        VAR_INPUT raw, low : INT; END_VAR
+        VAR i : INT; END_VAR
+        FOR i := 1 TO 3 DO Scaled := Scaled + raw; END_FOR
+        Scaled := Scaled + low;
+        END_FUNCTION
+        PROGRAM Main
+        VAR on : BOOL; raw : INT := 5; low : INT := 100; shown, other : INT; END_VAR
+        IF on THEN shown := Scaled(raw, low); END_IF
+        END_PROGRAM"""
+    assert sorted(_causes(text, "Main.shown", "Main.on")) == [("Main.low", "100"), ("Main.on", "TRUE"), ("Main.raw", "5")]
+
+
 def test_a_scan_that_is_not_there(trace: Trace) -> None:
     with pytest.raises(ValueError, match="scan 300 is not in the trace"):
         ask(trace, "D200", 300)

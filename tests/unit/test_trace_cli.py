@@ -133,6 +133,7 @@ def test_vcd_without_its_package(fbvm: Fbvm, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setitem(__import__("sys").modules, "vcd", None)
     record(fbvm)
     assert "pip install 'fbvm[vcd]'" in fbvm("convert", "run.fbtrace", "run.vcd").output
+    assert not Path("run.vcd").exists()
 
 
 def test_only_what_is_selected(fbvm: Fbvm) -> None:
