@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import click
 
-from fbvm.base.areas import Address, AddressError, parse_address
+from fbvm.base.areas import AREAS, Address, AddressError, parse_address
+from fbvm.watch.paths import UnknownPlace, address_range
 
 
 class Table(NamedTuple):
@@ -72,17 +73,7 @@ def _ends() -> Iterator[Address]:
 
 def _range(text: str) -> list[Address]:
     """The addresses of `D100` or `D100..D109`."""
-    first_text, dots, last_text = text.partition("..")
     try:
-        first = parse_address(first_text)
-        last = parse_address(last_text) if dots else first
-    except AddressError as error:
+        return address_range(AREAS, text) if ".." in text else [parse_address(text)]
+    except (AddressError, UnknownPlace) as error:
         raise click.UsageError(str(error)) from None
-    if last.area != first.area or (last.bit is None) != (first.bit is None):
-        raise click.UsageError(f"{text} has no two ends of one kind")
-    if (last.number, last.bit or 0) < (first.number, first.bit or 0):
-        raise click.UsageError(f"{text} runs backwards")
-    if first.bit is None or last.bit is None:
-        return [Address(first.area, number, None, first.size_bits) for number in range(first.number, last.number + 1)]
-    bits = range(16 * first.number + first.bit, 16 * last.number + last.bit + 1)
-    return [Address(first.area, bit // 16, bit % 16, first.size_bits) for bit in bits]

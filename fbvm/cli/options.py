@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from click import BadParameter, Context, Parameter, option
 
-from fbvm.watch.values import parse_time_ns
+from fbvm.watch.values import parse_time_ns, split_list
 from fbvm.wire.link import Peer
 
 
@@ -103,11 +103,4 @@ def charted_names(options: Iterable[str]) -> list[str]:
 
 def split_names(text: str) -> list[str]:
     """The names of a list such as `Main.done,a[1,2],D5`: commas within brackets do not part."""
-    names, depth = [""], 0
-    for character in text:
-        depth += {"[": 1, "]": -1}.get(character, 0)
-        if character == "," and depth == 0:
-            names.append("")
-        else:
-            names[-1] += character
-    return [name.strip() for name in names if name.strip()]
+    return [name for name in split_list(text) if name]

@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from fbvm.code.image import Image
-from fbvm.code.operations import Block, Node
+from fbvm.code.operations import Block
+from fbvm.code.shapes import blocks
 
 
 @dataclass(frozen=True)
@@ -40,18 +41,8 @@ def _sites(block: Block) -> Iterator[int]:
     for node in block:
         if node[0] == "observe" and node[1] in ("statement", "rung"):
             yield node[2]
-        for inner in _blocks(node):
+        for inner in blocks(node):
             yield from _sites(inner)
-
-
-def _blocks(node: Node) -> list[Block]:
-    """The blocks in a statement of code."""
-    name, *operands = node
-    if name == "if":
-        return [*(inner for _, inner in operands[0]), operands[1]]
-    if name == "case":
-        return [*(inner for _, inner in operands[2]), operands[3]]
-    return list(operands) if name == "loop" else []
 
 
 def _walk(block: Block, around: int, found: dict[int, tuple[list[int], bool]]) -> None:
@@ -60,7 +51,7 @@ def _walk(block: Block, around: int, found: dict[int, tuple[list[int], bool]]) -
         if node[0] == "observe" and node[1] in ("statement", "rung"):
             here = node[2]
             continue
-        inner = _blocks(node)
+        inner = blocks(node)
         if node[0] in ("if", "case") and here >= 0:
             ways = [first for each in inner if (first := next(_sites(each), None)) is not None]
             past = next(_sites(inner[-1]), None) is None

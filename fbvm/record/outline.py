@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from fbvm.code.image import Image
 from fbvm.code.operations import Block
+from fbvm.code.shapes import blocks
 
 NONE = -1
 
@@ -22,18 +23,8 @@ def _walk(block: Block, around: int, outer: dict[int, int]) -> None:
     Of statements that begin at one place, as those of a rung and of its first step, the outermost counts."""
     here = around
     for node in block:
-        name, *operands = node
-        if name == "observe" and operands[0] in ("statement", "rung"):
-            here = operands[1]
+        if node[0] == "observe" and node[1] in ("statement", "rung"):
+            here = node[2]
             outer.setdefault(here, around)
-        elif name == "if":
-            for _, inner in operands[0]:
-                _walk(inner, here, outer)
-            _walk(operands[1], here, outer)
-        elif name == "case":
-            for _, inner in operands[2]:
-                _walk(inner, here, outer)
-            _walk(operands[3], here, outer)
-        elif name == "loop":
-            for inner in operands:
-                _walk(inner, here, outer)
+        for inner in blocks(node):
+            _walk(inner, here, outer)

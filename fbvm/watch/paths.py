@@ -82,7 +82,7 @@ _ADDRESS_TYPES = {8: BYTE, 16: WORD, 32: DWORD, 64: LWORD}
 def find(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> Place | Span:
     """The place or the span that `text` names.  Raises UnknownPlace for text that names nothing."""
     if ".." in text:
-        return _span(symbols, areas, text)
+        return _span(areas, text)
     first = _FIRST.match(text)
     top = _top(symbols, text)
     if top is not None and not _SPACED.fullmatch(text):
@@ -139,19 +139,23 @@ def _meant(text: str) -> str:
         return ""
 
 
-def _span(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> Span:
+def _span(areas: Mapping[str, Area], text: str) -> Span:
+    addresses = address_range(areas, text)
+    return Span(f"{addresses[0]}..{addresses[-1]}", tuple(_at(areas, address) for address in addresses))
+
+
+def address_range(areas: Mapping[str, Area], text: str) -> list[Address]:
+    """The addresses of `D200..D202`, both ends with them.  Raises UnknownPlace for what is no such range."""
     low_text, _, high_text = text.partition("..")
     low, high = (_span_end(areas, part, text) for part in (low_text, high_text))
     same = (low.area, low.size_bits, low.bit is None) == (high.area, high.size_bits, high.bit is None)
     if not same or (low.number, low.bit or 0) > (high.number, high.bit or 0):
         raise UnknownPlace(f"{text} is no range: both ends must lie in one area, the lower end first")
     if low.bit is None:
-        addresses = [replace(low, number=number) for number in range(low.number, high.number + 1)]
-    else:
-        width = 8 if low.area in PORTABLE_AREAS else 16
-        bits = range(low.number * width + low.bit, high.number * width + (high.bit or 0) + 1)
-        addresses = [replace(low, number=bit // width, bit=bit % width) for bit in bits]
-    return Span(f"{low}..{high}", tuple(_at(areas, address) for address in addresses))
+        return [replace(low, number=number) for number in range(low.number, high.number + 1)]
+    width = 8 if low.area in PORTABLE_AREAS else 16
+    bits = range(low.number * width + low.bit, high.number * width + (high.bit or 0) + 1)
+    return [replace(low, number=bit // width, bit=bit % width) for bit in bits]
 
 
 def _span_end(areas: Mapping[str, Area], part: str, text: str) -> Address:
