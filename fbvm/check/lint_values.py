@@ -123,21 +123,24 @@ def _statement(body: Body, node: tree.CallStatement) -> None:
     if not isinstance(call, tree.Call) or call not in facts.types or call in facts.guards:
         return
     called = facts.calls.get(call)
-    if isinstance(called, PouCall) and (called.outputs or called.in_outs or called.enabled or not _silent(body, called.pou, [])):
+    if isinstance(called, PouCall) and (called.outputs or called.in_outs or called.enabled or not _silent(body, called.pou, {})):
         return
     name = body.text(call.callee)
     body.warn("S0491", call, f"the result of {name} is not used, and the call does nothing else",
               f"assign it: x := {name}(...)")
 
 
-def _silent(body: Body, pou: Pou, path: list[Pou]) -> bool:
-    """True for a function that changes nothing but variables of its own."""
-    if not pou.is_function or pou in path:
-        return False
-    function = Body(pou, body.facts, body.report)
-    for node in function.nodes():
+def _silent(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
+    """True for a function that changes nothing but variables of its own; `known` is what was found of those it calls."""
+    if pou not in known:
+        known[pou] = pou.is_function and _changes_nothing(body, pou, known)
+    return known[pou]
+
+
+def _changes_nothing(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
+    for node in Body(pou, body.facts, body.report).nodes():
         called = body.facts.calls.get(node) if isinstance(node, tree.Call) else None
-        if isinstance(called, PouCall) and not _silent(body, called.pou, [*path, pou]):
+        if isinstance(called, PouCall) and not _silent(body, called.pou, known):
             return False
         targets = node.targets if isinstance(node, tree.Assign) else (node.variable,) if isinstance(node, tree.For) else ()
         if isinstance(called, PouCall):

@@ -1,4 +1,4 @@
-"""What compiling leaves behind in the process: limits and the collector as they were, and no garbage that piles up."""
+"""What compiling costs, and what it leaves behind in the process: limits as they were, no garbage that piles up."""
 
 from __future__ import annotations
 
@@ -26,3 +26,10 @@ def test_what_compilations_leave_is_collected_in_passing() -> None:
             compile_text(TEXT)
         counts.append(len(gc.get_objects()))
     assert counts[-1] < counts[0] + 20_000
+
+
+def test_functions_that_call_the_next_twice_are_looked_at_once() -> None:
+    text = "".join(f"FUNCTION F{n} : INT\nVAR_INPUT a : INT; END_VAR\nF{n} := F{n + 1}(a) + F{n + 1}(a);\nEND_FUNCTION\n"
+                   for n in range(60))
+    text += "FUNCTION F60 : INT\nVAR_INPUT a : INT; END_VAR\nF60 := a;\nEND_FUNCTION\nPROGRAM Main\nF0(1);\nEND_PROGRAM\n"
+    assert [d.code for d in compile_text(text).diagnostics] == ["S0491"], "2 ** 60 ways through them"
