@@ -6,6 +6,7 @@ references 64 bits.  Source: IEC 61131-3 ed. 3 tables 10 and 11, figures 5 and 1
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
@@ -57,10 +58,8 @@ class ArrayType(Type):
 
     @property
     def count(self) -> int:
-        total = 1
-        for low, high in self.bounds:
-            total *= high - low + 1
-        return total
+        """How many elements it has in all."""
+        return _elements(self.bounds)
 
 
 @dataclass(frozen=True)
@@ -249,10 +248,11 @@ def _string(capacity: int, wide: bool) -> StringType:
 def array(bounds: tuple[tuple[int, int], ...], element: Type) -> ArrayType:
     """ARRAY [bounds] OF element."""
     shown = ", ".join(f"{low}..{high}" for low, high in bounds)
-    count = 1
-    for low, high in bounds:
-        count *= high - low + 1
-    return ArrayType(f"ARRAY [{shown}] OF {element.name}", count * element.size, element.align, bounds, element)
+    return ArrayType(f"ARRAY [{shown}] OF {element.name}", _elements(bounds) * element.size, element.align, bounds, element)
+
+
+def _elements(bounds: tuple[tuple[int, int], ...]) -> int:
+    return math.prod(high - low + 1 for low, high in bounds)
 
 
 def characters(text: StringType) -> ArrayType:
@@ -272,7 +272,7 @@ def open_array(dimensions: int, element: Type) -> OpenArrayType:
 
 
 def base(kind: Type) -> Type:
-    """The type that operations see: that of a subrange or of an enumeration's base stays, others are themselves."""
+    """The type that operations see: of a subrange the one that it is a part of; others, enumerations too, are themselves."""
     return kind.base if isinstance(kind, SubrangeType) else kind
 
 

@@ -96,13 +96,13 @@ class Configurations:
 
     def _configuration(self, configuration: tree.Configuration, source: Source) -> None:
         for refused in configuration.refused:
-            self._refuse(refused, source)
+            self.report.refuse(source, refused)
         if self.checker.resource is not None:
             self._resource(self.checker.resource, source)
 
     def _resource(self, resource: tree.Resource, source: Source) -> None:
         for refused in resource.refused:
-            self._refuse(refused, source)
+            self.report.refuse(source, refused)
         tasks: dict[str, TaskFact] = {}
         for declared in resource.tasks:
             if fold(declared.name.text) in tasks:
@@ -201,6 +201,3 @@ class Configurations:
             self.report.add("S0801", source, expr, "SINGLE needs a global BOOL variable")
             return ""
         return expr.text if isinstance(expr, tree.NameRef) and kind is not None else ""
-
-    def _refuse(self, refused: tree.Refused, source: Source) -> None:
-        self.report.add(refused.code, source, refused, f"{refused.what} is understood but not executed by this version")

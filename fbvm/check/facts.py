@@ -9,7 +9,7 @@ from typing import TypeGuard
 
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, Field, RefType, StructType, Type, base, fold
+from fbvm.base.types import BOOL, ArrayType, Elementary, Field, RefType, StructType, Type, base, fold
 from fbvm.syntax import tree
 from fbvm.syntax.pragmas import shown_in_hexadecimal
 from fbvm.syntax.tree import Action, Node, VarDecl, VarSection
@@ -283,6 +283,8 @@ class Facts:
     leases: dict[Variable, int] = field(default_factory=dict)
     referred: list[Variable] = field(default_factory=list)
     """Variables with one place that something refers to."""
+    losses: list[tuple[Source, tree.Expr, str, str]] = field(default_factory=list)
+    """Constants that their places do not keep as they are written: where, code and message of the warning."""
 
     def is_part(self, expr: tree.Expr) -> TypeGuard[tree.Member | tree.Index | tree.Part]:
         """True for a member, element or bit, which lies in what it is of; not for an element behind a pointer, nor for
@@ -295,9 +297,6 @@ class Facts:
         while self.is_part(expr):
             expr = expr.of
         return expr
-    losses: list[tuple[Source, tree.Expr, str, str]] = field(default_factory=list)
-    """Constants that their places do not keep as they are written: where, code and message of the warning."""
-
 
 @dataclass(frozen=True, eq=False)
 class Spot:
@@ -372,6 +371,12 @@ class Report:
             self._seen.add(key)
             self.diagnostics.append(Diagnostic(code, source, node.start, node.end, message, hint, related))
 
+    def refuse(self, source: Source, node: tree.Refused | tree.RefusedStatement) -> None:
+        """Say of something that was read why it is not executed."""
+        why = "is object-oriented text, which fbvm does not execute" if node.code == "S0902" else \
+            "is understood but not executed by this version"
+        self.add(node.code, source, node, f"{node.what} {why}")
+
 
 def is_block(kind: Type) -> bool:
     """True for the type of a function block's or program's instances."""
@@ -400,7 +405,3 @@ def holds_block(kind: Type) -> bool:
     if isinstance(kind, ArrayType):
         return holds_block(kind.element)
     return is_block(kind) or isinstance(kind, StructType) and any(holds_block(f.type) for f in kind.fields.values())
-
-
-def enum_member(kind: EnumType, name: str) -> int | None:
-    return kind.members.get(fold(name))

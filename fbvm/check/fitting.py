@@ -29,6 +29,7 @@ from fbvm.syntax import tree
 
 
 def is_untyped(kind: Type | None) -> bool:
+    """True for a literal, or an expression of nothing but literals, that has not met a context yet."""
     return kind is UNTYPED_INT or kind is UNTYPED_REAL
 
 
@@ -72,11 +73,12 @@ def as_number(kind: Type, dialect: Dialect) -> Type:
     if isinstance(kind, EnumType) and dialect.numbers_of_enumerations:
         return kind.base
     if dialect.arithmetic_of_bits and is_any(kind, "ANY_BIT") and kind != BOOL:
-        return ELEMENTARY[_UNSIGNED[kind.name]]
+        return ELEMENTARY[UNSIGNED[kind.name]]
     return kind
 
 
-_UNSIGNED = {"BYTE": "USINT", "WORD": "UINT", "DWORD": "UDINT", "LWORD": "ULINT"}
+UNSIGNED = {"BYTE": "USINT", "WORD": "UINT", "DWORD": "UDINT", "LWORD": "ULINT"}
+"""The unsigned number of each bit string."""
 
 
 def holds(target: Type, kind: Type) -> bool:

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import ANYTHING, AnyType, StringType, SubrangeType, Type, base, common, families, fold, string
 from fbvm.check.anything import MEMBERS
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Pou, holds_block
-from fbvm.check.fitting import same
+from fbvm.check.fitting import is_untyped, same
+from fbvm.check.functions import RESULT_STRING
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 from fbvm.syntax.node import copied, walk
@@ -21,9 +22,6 @@ from fbvm.syntax.node import copied, walk
 if TYPE_CHECKING:
     from fbvm.check.calls import Calls
     from fbvm.check.project import Project
-
-RESULT_STRING = 255
-"""Characters of a generic STRING, which takes texts of any length."""
 
 
 def variables(declared: tree.Pou) -> dict[str, str]:
@@ -139,9 +137,9 @@ class Generics:
 
     def _settled(self, call: tree.Call, pou: Pou, name: str, kind: Type | None, want: Type | None) -> Type | None:
         """The type that a generic type stands for, if it belongs to it."""
-        if kind in (UNTYPED_INT, UNTYPED_REAL) or kind is None:
+        if kind is None or is_untyped(kind):
             wanted = base(want) if want is not None and name in families(want) else None
-            literal = {UNTYPED_INT: "DINT", UNTYPED_REAL: "LREAL"}.get(kind) if kind is not None else None
+            literal = "DINT" if kind is UNTYPED_INT else "LREAL" if kind is UNTYPED_REAL else None
             if wanted is None and literal is None:
                 self.error("S0405", call, f"nothing tells which type {name} stands for in this call of {pou.name}",
                            f"pass an argument to a parameter of type {name}")

@@ -38,11 +38,8 @@ if TYPE_CHECKING:
 
 OBJECTS_AT = 4
 """Where an instance has the number of the first of its objects: behind its type identifier, 32 bits each."""
-_SECTIONS = {
-    "FUNCTION": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT"),
-    "FUNCTION_BLOCK": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT"),
-    "PROGRAM": ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT"),
-}
+_SECTIONS = ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT")
+"""What every POU may have."""
 _QUALIFIERS = {
     "VAR": ("CONSTANT", "RETAIN", "NON_RETAIN", "PERSISTENT"), "VAR_INPUT": ("CONSTANT", "RETAIN", "NON_RETAIN"),
     "VAR_OUTPUT": ("RETAIN", "NON_RETAIN"), "VAR_IN_OUT": ("CONSTANT",), "VAR_TEMP": (), "VAR_EXTERNAL": ("CONSTANT",),
@@ -123,7 +120,7 @@ class Interfaces:
     def _section_allowed(self, section: tree.VarSection, pou: Pou) -> bool:
         if section.kind in _LATER:
             self.report.add("S0901", pou.source, section, f"{section.kind} is understood but not executed by this version")
-        elif section.kind not in _SECTIONS[pou.kind]:
+        elif section.kind not in _SECTIONS:
             self.report.add("S0205", pou.source, section, f"{section.kind} has no place in a {pou.kind}")
         else:
             return self.qualified(section, pou.source, pou.kind)

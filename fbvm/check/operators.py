@@ -32,7 +32,7 @@ from fbvm.base.types import (
 )
 from fbvm.check import constants
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
-from fbvm.check.fitting import as_number, conversion_hint, convertible
+from fbvm.check.fitting import UNSIGNED, as_number, conversion_hint, convertible, is_untyped
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
@@ -82,7 +82,7 @@ class Operators:
                     return None
             good = is_any(kind, *self._family("AND"))
         else:
-            good = kind in (UNTYPED_INT, UNTYPED_REAL) or is_any(kind, "ANY_NUM", "ANY_DURATION")
+            good = is_untyped(kind) or is_any(kind, "ANY_NUM", "ANY_DURATION")
         if not good:
             self.expressions.error("S0302", expr, f"{expr.op} is not defined for {kind}",
                                    _bit_hint(kind, want) if expr.op == "NOT" else "")
@@ -121,9 +121,9 @@ class Operators:
             self._undefined(expr, left, right, want)
             return None
         kind = self._widened(expr.op, kind)
-        if kind not in (UNTYPED_INT, UNTYPED_REAL):
+        if not is_untyped(kind):
             for side, side_kind in ((expr.left, left), (expr.right, right)):
-                if side_kind in (UNTYPED_INT, UNTYPED_REAL) and self.expressions.adopt(side, kind) is None:
+                if is_untyped(side_kind) and self.expressions.adopt(side, kind) is None:
                     return None
         return self._folded(expr, kind, BOOL if expr.op in COMPARISONS else kind)
 
@@ -162,7 +162,7 @@ class Operators:
     def _lent(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
         """What an operator yields in a dialect that takes bit strings and enumerations as numbers; None if it does not."""
         dialect = self.expressions.project.dialect
-        number = left in (UNTYPED_INT, UNTYPED_REAL) or is_any(left, "ANY_NUM")
+        number = is_untyped(left) or is_any(left, "ANY_NUM")
         if expr.op == "*" and dialect.number_times_duration and is_any(right, "ANY_DURATION") and number:
             turned = tree.Binary(expr.start, expr.end, "*", expr.right, expr.left, expr.op_start)
             self.facts.rewritten[expr] = turned
@@ -178,7 +178,7 @@ class Operators:
             return None
         kind = self._widened(expr.op, kind)
         for side, side_kind in ((expr.left, a), (expr.right, b)):
-            if side_kind in (UNTYPED_INT, UNTYPED_REAL) and self.expressions.adopt(side, kind) is None:
+            if is_untyped(side_kind) and self.expressions.adopt(side, kind) is None:
                 return None
         keeps = left != a and right in (left, UNTYPED_INT) and machine(kind) == machine(left)
         result = left if keeps else kind
@@ -222,8 +222,7 @@ class Operators:
 
     def _operand_type(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
         """The type in which both operands meet."""
-        untyped = (UNTYPED_INT, UNTYPED_REAL)
-        if left in untyped and right in untyped:
+        if is_untyped(left) and is_untyped(right):
             kind = left if left is UNTYPED_REAL else right
             return BOOL if expr.op in ("AND_THEN", "OR_ELSE") else kind
         for side, literal, other in ((expr.left, left, right), (expr.right, right, left)):
@@ -260,7 +259,7 @@ class Operators:
         if op in COMPARISONS:
             if isinstance(kind, EnumType | RefType):
                 return op in ("=", "<>")
-            return kind in (UNTYPED_INT, UNTYPED_REAL) or isinstance(kind, Elementary | StringType)
+            return isinstance(kind, Elementary | StringType)
         if kind is UNTYPED_INT:
             return True
         if kind is UNTYPED_REAL:
@@ -294,7 +293,7 @@ class Operators:
         elif isinstance(left, StructType) or isinstance(right, StructType):
             hint = "compare or combine the members"
         elif expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
-            number = {"BYTE": "USINT", "WORD": "UINT", "DWORD": "UDINT", "LWORD": "ULINT"}.get(left.name, "INT")
+            number = UNSIGNED.get(left.name, "INT")
             hint = f"{left} has no arithmetic: convert with {left}_TO_{number}(...), or take {takers('arithmetic_of_bits')}"
         elif left == right and isinstance(left, EnumType):
             numbers = (f"TO_{left.base}({self.expressions.text(side)})" for side in (expr.left, expr.right))
@@ -314,8 +313,8 @@ class Operators:
             self.facts.operands[expr] = result
             return result
         if expr.op in "*/" and is_any(left, "ANY_DURATION") and \
-                (right in (UNTYPED_INT, UNTYPED_REAL) or is_any(right, "ANY_NUM")):
-            if right in (UNTYPED_INT, UNTYPED_REAL):
+                (is_untyped(right) or is_any(right, "ANY_NUM")):
+            if is_untyped(right):
                 self.expressions.adopt(expr.right, LINT if right is UNTYPED_INT else LREAL)
             self.facts.operands[expr] = left
             return left
@@ -323,18 +322,17 @@ class Operators:
 
     def _power(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
         """`a ** b`: a real base keeps its type, an integer one gives LREAL."""
-        if left in (UNTYPED_INT, UNTYPED_REAL) and right in (UNTYPED_INT, UNTYPED_REAL):
+        if is_untyped(left) and is_untyped(right):
             return self._folded(expr, UNTYPED_REAL, UNTYPED_REAL)
-        numeric = (UNTYPED_INT, UNTYPED_REAL)
-        if not all(k in numeric or is_any(k, "ANY_NUM") for k in (left, right)):
+        if not all(is_untyped(k) or is_any(k, "ANY_NUM") for k in (left, right)):
             self._undefined(expr, left, right, want)
             return None
         kind: Type = left if is_any(left, "ANY_REAL") else LREAL
-        single = left in numeric and right == REAL or left is UNTYPED_REAL and is_any(right, "ANY_INT")
+        single = is_untyped(left) and right == REAL or left is UNTYPED_REAL and is_any(right, "ANY_INT")
         if single and want is not None and base(want) == REAL:
             kind = REAL
         for side, side_kind in ((expr.left, left), (expr.right, right)):
-            if side_kind in numeric and self.expressions.adopt(side, kind) is None:
+            if is_untyped(side_kind) and self.expressions.adopt(side, kind) is None:
                 return None
         return self._folded(expr, kind, kind)
 
@@ -347,9 +345,9 @@ class Operators:
                 self.expressions.error("S0703", expr.right, "this divides by zero")
                 return None
             return result
-        if isinstance(operand, Elementary | EnumType | StringType) or operand in (UNTYPED_INT, UNTYPED_REAL):
+        if isinstance(operand, Elementary | EnumType | StringType):
             try:
-                if operand not in (UNTYPED_INT, UNTYPED_REAL) and not is_any(operand, "ANY_DURATION", "ANY_DATE"):
+                if not is_untyped(operand) and not is_any(operand, "ANY_DURATION", "ANY_DATE"):
                     a, b = constants.convert(a, operand), constants.convert(b, operand)
                 self.facts.constants[expr] = constants.binary(expr.op, operand, a, b)
             except constants.NotConstant as error:

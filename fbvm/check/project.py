@@ -85,7 +85,7 @@ class Project:
         last: Pou | None = None
         for declaration in text.declarations:
             if isinstance(declaration, tree.Refused):
-                self.report.add(declaration.code, source, declaration, _refusal(declaration))
+                self.report.refuse(source, declaration)
                 self._refused.add((source.library, _refused_name(declaration, source)))
             elif isinstance(declaration, tree.Pou):
                 last = self._add_pou(declaration, source)
@@ -97,7 +97,7 @@ class Project:
                 self._add_action(declaration, source, declaration.owner, last)
             elif isinstance(declaration, tree.Actions):
                 for refused in declaration.refused:
-                    self.report.add(refused.code, source, refused, _refusal(refused))
+                    self.report.refuse(source, refused)
                 for action in declaration.actions:
                     self._add_action(action, source, declaration.owner, last)
             elif isinstance(declaration, tree.TypeDecl):
@@ -130,7 +130,7 @@ class Project:
     def _add_pou(self, declaration: tree.Pou, source: Source) -> Pou | None:
         key = (source.library, fold(declaration.name.text))
         for refused in declaration.refused:
-            self.report.add(refused.code, source, refused, _refusal(refused))
+            self.report.refuse(source, refused)
         if not self._twice(key, declaration.name, source, "POU"):
             self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
             pou.other_names = self.libraries.other_pins(source.library, pou.name)
@@ -258,9 +258,3 @@ def _refused_name(node: tree.Refused, source: Source) -> str:
         return fold(source.text[node.start:node.end].split(None, 1)[0].rstrip(":"))
     match = _PART.match(source.text, node.start)
     return fold(match[1]) if match else ""
-
-
-def _refusal(node: tree.Refused) -> str:
-    if node.code == "S0902":
-        return f"{node.what} is object-oriented text, which fbvm does not execute"
-    return f"{node.what} is understood but not executed by this version"

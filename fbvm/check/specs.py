@@ -312,14 +312,10 @@ class Specs:
         element = self._instances(given, source) if given is not None else self.resolve(spec.element, source)
         if element is None:
             return None
-        count = 1
-        for low, high in bounds:
-            count *= high - low + 1
-        if count * max(1, element[0].size) > MAX_SIZE:
+        kind = array(tuple(bounds), element[0])
+        if kind.count * max(1, element[0].size) > MAX_SIZE:
             self.report.add("S0603", source, spec, f"the array takes more than {MAX_SIZE >> 20} MiB")
             return None
-        kind = array(tuple(bounds), element[0])
-        assert isinstance(kind, ArrayType)
         content = element[1] * kind.count
         return kind, self.values.initial(kind, given.values, source, content) if given and given.values else content
 

@@ -26,7 +26,7 @@ from fbvm.base.types import (
 from fbvm.check import foreign, functions, questions, references, unknown
 from fbvm.check.arguments import Arguments, callee
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
-from fbvm.check.fitting import as_number, convertible, same
+from fbvm.check.fitting import as_number, convertible, is_untyped, same
 from fbvm.check.functions import Conversion, Signature
 from fbvm.check.values import MAKERS, is_any
 from fbvm.syntax import tree
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions
 
 _SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations", "ANY_STRING": "STRING and WSTRING"}
-UNTYPED = (UNTYPED_INT, UNTYPED_REAL)
 _NUMBERS = ("ANY_NUM", "ANY_BIT")
 
 
@@ -125,7 +124,7 @@ class StandardCalls:
     def _is_number(self, value: tree.Expr) -> bool:
         """True for a number, whose type stays open if it is a literal; else a diagnostic."""
         kind = self.expressions.infer(value)
-        if kind is not None and kind not in UNTYPED and not is_any(kind, "ANY_NUM"):
+        if kind is not None and not is_untyped(kind) and not is_any(kind, "ANY_NUM"):
             self.error("S0405", value, f"a number is needed here, this is {kind}")
             return False
         return kind is not None
@@ -141,9 +140,9 @@ class StandardCalls:
             for value in values[1:]:
                 meaning = tree.Binary(call.start, call.end, op, meaning, value, value.start)
         result = self.expressions.infer(meaning, kind or want)
-        if result in UNTYPED and kind is not None:
+        if is_untyped(result) and kind is not None:
             result = self.expressions.adopt(meaning, kind)
-        elif result in UNTYPED and call in self.facts.guards:
+        elif is_untyped(result) and call in self.facts.guards:
             result = self.expressions.settle(meaning, want)
         if result is None:
             return None
@@ -244,7 +243,7 @@ class StandardCalls:
         bound: Type | None = None
         for kind in kinds:
             assert kind is not None
-            if kind in UNTYPED:
+            if is_untyped(kind):
                 continue
             met = base(kind) if bound is None or same(kind, bound) else common(bound, kind)
             if isinstance(kind, EnumType) or isinstance(bound, EnumType):

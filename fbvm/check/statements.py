@@ -262,9 +262,7 @@ class Statements:
         """Nothing is wrong with `;`."""
 
     def _refused(self, node: tree.RefusedStatement) -> None:
-        ending = "is object-oriented text, which fbvm does not execute" if node.code == "S0902" else \
-            "is understood but not executed by this version"
-        self.error(node.code, node, f"{node.what} {ending}")
+        self.checker.report.refuse(self.pou.source, node)
 
 
 _CHECK: dict[type, Callable[..., None]] = {

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields
+from collections.abc import Callable, Mapping
 
 from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Source
@@ -14,6 +13,7 @@ from fbvm.check.facts import UNTYPED_INT, Facts, Pou, Value, Variable
 from fbvm.check.foreign import comma_hint
 from fbvm.check.project import Project
 from fbvm.syntax import tree
+from fbvm.syntax.node import walk
 
 
 class Values:
@@ -39,8 +39,8 @@ class Values:
         """The value of a constant integer expression, or None after a diagnostic.
 
         `known` are names, folded, that stand for numbers in it."""
-        for name in names_in(expr) if known else ():
-            if known and fold(name.text) in known:
+        for name in walk(expr) if known else ():
+            if known and isinstance(name, tree.NameRef) and fold(name.text) in known:
                 self.facts.types[name], self.facts.constants[name] = UNTYPED_INT, known[fold(name.text)]
         kind = self._infer(expr, source)
         if kind is None:
@@ -171,19 +171,6 @@ class Values:
                 made = self.initial(member.type, value, source, bytes((content[member.offset] >> member.bit & 1,)))
                 content[member.offset] = content[member.offset] & ~(1 << member.bit) | made[0] << member.bit
         return bytes(content)
-
-
-def names_in(expr: tree.Node) -> Iterator[tree.NameRef]:
-    """The names that stand in an expression by themselves."""
-    todo: list[object] = [expr]
-    while todo:
-        item = todo.pop()
-        if isinstance(item, tree.NameRef):
-            yield item
-        elif isinstance(item, tuple):
-            todo += item
-        elif isinstance(item, tree.Node):
-            todo += [getattr(item, field.name) for field in fields(item)]
 
 
 def flattened(init: tree.ArrayInit) -> tree.ArrayInit:

@@ -249,7 +249,7 @@ class Declaration(Node):
 
 @_node
 class Refused(Declaration):
-    """Understood but not executed: CLASS, INTERFACE, NAMESPACE, SFC text, VAR_CONFIG ...; code S0901 or S0902."""
+    """Understood but not executed: CLASS, INTERFACE, METHOD, NAMESPACE ...; code S0901 or S0902."""
 
     what: str
     code: str
