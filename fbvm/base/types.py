@@ -29,15 +29,18 @@ class Type:
         return self.name
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Elementary(Type):
-    """An elementary type.  `machine` is the form that code works on, `families` the generic types that hold it."""
+    """An elementary type, of which there is one object each.  `machine` is the form that code works on, `families` the
+    generic types that hold it."""
 
     machine: str
     families: frozenset[str]
     low: int = 0
     high: int = 0
     bits: int = 0
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
 
 
 @dataclass(frozen=True)
@@ -282,14 +285,17 @@ def families(kind: Type) -> frozenset[str]:
     if isinstance(kind, Elementary):
         return kind.families
     if isinstance(kind, StringType):
-        return families_of("ANY_STRING")
-    if isinstance(kind, AnyType):
-        return frozenset()
-    return frozenset(("ANY_DERIVED", "ANY"))
+        return _TEXTS
+    return _NO_FAMILIES if isinstance(kind, AnyType) else _DERIVED
+
+
+_TEXTS, _DERIVED, _NO_FAMILIES = families_of("ANY_STRING"), families_of("ANY_DERIVED"), frozenset[str]()
 
 
 def machine(kind: Type) -> str:
     """The machine form of a value of `kind`: b, i8..u64, f32, f64, s8, s16, ref; "" for aggregates."""
+    if isinstance(kind, Elementary):
+        return kind.machine
     kind = base(kind)
     if isinstance(kind, Elementary):
         return kind.machine

@@ -79,6 +79,15 @@ class Project:
         self.new_pous: deque[Pou] = deque()
         """POUs that have been named but not checked yet."""
 
+    def let_go(self) -> None:
+        """Forget everything: POUs, variables and facts refer to each other in circles, and would stay until somebody
+        looks for garbage."""
+        for pou in {*self.pous.values(), *self.made.values(), *(v.owner for v in self.facts.variables.values() if v.owner)}:
+            vars(pou).clear()
+        for table in vars(self.facts).values():
+            table.clear()
+        vars(self).clear()
+
     def collect(self, text: tree.SourceText, source: Source) -> None:
         """Take the declarations of one text; complain about names declared twice."""
         self._absent.clear()

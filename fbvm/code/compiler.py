@@ -130,10 +130,11 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
         (program, runnable, resource, dialect, lint, silenced, warnings_as_errors, drawn))
     if kept and (known := image_cache.read(kept, sources)):
         return Compilation(*known)
-    made = compile_sources(sources, program, libraries, runnable, resource=resource, dialect=dialect, lint=lint,
-                           no_warn=silenced, warnings_as_errors=warnings_as_errors, progress=progress, drawn=drawn)
-    if kept and made.image:
-        image_cache.write(kept, sources, made.image, made.diagnostics)
+    with _deep():
+        made = compile_sources(sources, program, libraries, runnable, resource=resource, dialect=dialect, lint=lint,
+                               no_warn=silenced, warnings_as_errors=warnings_as_errors, progress=progress, drawn=drawn)
+        if kept and made.image:
+            image_cache.write(kept, sources, made.image, made.diagnostics)
     return Compilation(None, unreadable + made.diagnostics) if unreadable else made
 
 
@@ -176,6 +177,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not damage.explains(d)]
         diagnostics = gathered(sorted(silence.heard(found, wanted), key=Diagnostic.order))
         image = None if errors(diagnostics) else _image(checker, progress, drawn)
+        project.let_go()
     return Compilation(image, diagnostics)
 
 
@@ -205,7 +207,7 @@ def _deep() -> Iterator[None]:
     """Room for deep trees; the parser limits how deep they get.
 
     Nobody looks for garbage meanwhile: nodes and facts live until the end, and to visit them all again and again takes a
-    third of the time."""
+    third of the time.  What is left then is an image, which lives on: it counts as old at once."""
     before, collects = sys.getrecursionlimit(), gc.isenabled()
     sys.setrecursionlimit(max(before, _FRAMES))
     gc.disable()
@@ -214,6 +216,9 @@ def _deep() -> Iterator[None]:
     finally:
         sys.setrecursionlimit(before)
         if collects:
+            if not gc.get_freeze_count():
+                gc.freeze()
+                gc.unfreeze()
             gc.enable()
 
 

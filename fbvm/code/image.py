@@ -6,12 +6,17 @@ All code is plain data (see `operations`).  Names of sources stand in `sites`' t
 from __future__ import annotations
 
 import hashlib
+import marshal
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, Area, Mailbox, e_bank
 from fbvm.base.types import Field, Type
 from fbvm.code.operations import Block
+
+SAME_FOR_EQUAL = 2
+"""The version of the host's form for data in which equal data are equal bytes, whatever shares their objects."""
 
 
 @dataclass(frozen=True)
@@ -169,14 +174,22 @@ class Image:
     @cached_property
     def fingerprint(self) -> str:
         """A number in hexadecimal that another program, or the same in another layout, does not have."""
-        said = hashlib.sha256()
-        bodies = tuple((body.name, body.code, body.instance_size) for body in self.bodies)
-        left: list[object] = [(self.layout, self.tasks, self.initial, self.retained, self.objects, bodies)]
-        while left:  # code may be nested deeper than the host recurses
-            item = left.pop()
-            if isinstance(item, tuple):
-                said.update(b"(%d" % len(item))
-                left += item
-            else:
-                said.update(repr(item).encode())
+        around = repr((self.layout, self.tasks, self.initial, self.retained, self.objects)).encode()
+        said = hashlib.sha256(b"%d:" % len(around) + around)
+        for body in self.bodies:
+            content = _plain_bytes((body.name, body.code, body.instance_size))
+            said.update(b"%d:" % len(content) + content)
         return said.hexdigest()[:32]
+
+
+def _plain_bytes(data: Any) -> bytes:
+    """Plain data as bytes that other data does not have; in the host's form, if they are not nested too deep for that."""
+    try:
+        return marshal.dumps(data, SAME_FOR_EQUAL)
+    except ValueError:
+        left, found = [data], []
+        while left:
+            item = left.pop()
+            found.append(f"({len(item)}" if isinstance(item, tuple) else repr(item))
+            left += item if isinstance(item, tuple) else ()
+        return "\n".join(found).encode("utf-8", "surrogatepass")

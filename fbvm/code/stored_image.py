@@ -7,6 +7,7 @@ import json
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields
 from functools import cached_property
+from operator import attrgetter
 from typing import Any
 
 from fbvm.base.areas import Mailbox
@@ -41,8 +42,8 @@ def encode(image: Image) -> bytes:
                   for task in image.tasks],
         "symbols": [[name, types.field(symbol)] for name, symbol in image.symbols.items()],
         "initial": image.initial,
-        "retained": [astuple(row) for row in image.retained],
-        "sites": [astuple(site) for site in image.sites],
+        "retained": [[*vars(row).values()] for row in image.retained],
+        "sites": [[*vars(site).values()] for site in image.sites],
         "objects": astuple(image.objects),
         "rungs": [astuple(rung) for rung in image.rungs],
         "charts": [astuple(chart) for chart in image.charts],
@@ -114,6 +115,7 @@ def _tuples(item: Any) -> Any:
 
 COMMON = ("name", "size", "align")
 FIELD = tuple(each.name for each in fields(Field) if each.name != "type")
+_PARTS = attrgetter(*FIELD)
 
 
 @dataclass(frozen=True)
@@ -146,7 +148,7 @@ class _Writer:
 
     def field(self, field: Field) -> list[Any]:
         """A field as a row."""
-        return [self.number(field.type), *(getattr(field, part) for part in FIELD)]
+        return [self.number(field.type), *_PARTS(field)]
 
 
 class _Reader:

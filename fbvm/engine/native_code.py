@@ -39,7 +39,7 @@ class Code:
 
     @cached_property
     def translation(self) -> Translation:
-        """The image in LLVM's language."""
+        """The image in LLVM's language, as fast code is made of it."""
         return translate(self.image, self.stops)
 
     def prepare(self, level: int | None) -> None:
@@ -75,7 +75,7 @@ class Code:
 
     def _improve(self, compiled: bytes) -> None:
         """Take fast code while quick code runs: all that follows is pointed to it.  The worker's thread does it."""
-        stored = Stored(self._facts(), compiled)
+        stored = Stored(_facts(self.translation), compiled)
         native_cache.write(self._name(FAST), stored)
         self._load(FAST, stored)
         with self._lock:
@@ -89,14 +89,10 @@ class Code:
         return native_cache.read(self._name(level))
 
     def _made(self, level: int) -> Stored:
-        stored = Stored(self._facts(), compile_text(self.translation.text, level))
+        made = self.translation if level == FAST else translate(self.image, self.stops, quick=True)
+        stored = Stored(_facts(made), compile_text(made.text, level))
         native_cache.write(self._name(level), stored)
         return stored
-
-    def _facts(self) -> dict[str, object]:
-        made = self.translation
-        return {"points": made.points, "context": [made.kept_bytes, made.context_bytes],
-                "parts": parts_of(made.routines)}
 
     def _load(self, level: int, stored: Stored) -> None:
         """Take code into use.  What came first stays: somebody may be running it, and what it calls in the library."""
@@ -125,6 +121,10 @@ class Code:
             if level is None:
                 self._followers[entry] = task
             entry.point_to(self.address(task, level))
+
+
+def _facts(made: Translation) -> dict[str, object]:
+    return {"points": made.points, "context": [made.kept_bytes, made.context_bytes], "parts": parts_of(made.routines)}
 
 
 _codes: WeakValueDictionary[tuple[int, bool], Code] = WeakValueDictionary()

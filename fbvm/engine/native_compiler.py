@@ -97,13 +97,15 @@ def compile_text(text: str, level: int) -> bytes:
 
 
 def _optimised(text: str, level: int) -> Any:
-    """The module of a text after the passes of a level."""
+    """The module of a text after the passes of a level; level 0 has none."""
     binding = llvm()
     module = binding.parse_assembly(text, binding.create_context())
     module.triple = host()[1]
     module.data_layout = str(_machine(level).target_data)
+    if not level:
+        return module
     options = binding.create_pipeline_tuning_options(speed_level=level)
-    options.loop_vectorization = options.slp_vectorization = level > 0
+    options.loop_vectorization = options.slp_vectorization = True
     builder = binding.create_pass_builder(_machine(level), options)
     builder.getModulePassManager().run(module, builder)
     return module

@@ -13,7 +13,7 @@ from fbvm.engine import native_cache
 from fbvm.engine.native_cache import Stored, name_of
 from fbvm.engine.native_compiler import Linked, compile_text
 
-BLOCK = 64
+BLOCK = 32
 """Entries that are loaded together."""
 SLOT_BYTES = 24
 _ENTRY = """
@@ -75,7 +75,7 @@ def _compiled() -> bytes:
     name = name_of("entries", text)
     stored = native_cache.read(name)
     if stored is None:
-        stored = Stored({}, compile_text(text, 2))
+        stored = Stored({}, compile_text(text, 0))  # there is nothing to optimise, and much to load for it
         native_cache.write(name, stored)
     return stored.compiled
 

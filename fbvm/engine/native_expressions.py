@@ -21,18 +21,22 @@ Row = Callable[..., str]
 
 
 def _load(w: Writer, machine: str, address: Address) -> str:
-    return from_memory(w, machine, w.pointer(address, SIZES[machine]), 1 if w.loose(address) else SIZES[machine],
-                       w.scope(address, SIZES[machine]))
+    return from_memory(w, machine, *_place(w, machine, address))
+
+
+def _place(w: Writer, machine: str, address: Address) -> tuple[str, int, str]:
+    """Where a value lies, at a multiple of what, and what marks it."""
+    return w.pointer(address, SIZES[machine]), 1 if w.loose(address) else SIZES[machine], w.scope(address, SIZES[machine])
 
 
 def _load_raw(w: Writer, machine: str, address: Address) -> str:
     return from_memory(w, machine, w.pointer(address, SIZES[machine]), 1, w.scope(address, SIZES[machine]))
 
 
-def from_memory(w: Writer, machine: str, pointer: str, align: int, scope: str) -> str:
-    """The value of a machine type at a place."""
+def from_memory(w: Writer, machine: str, pointer: str, align: int, scope: str, test: str = "ne") -> str:
+    """The value of a machine type at a place; of a BOOL whether it stands so to FALSE."""
     value = w.new(f"load {stored(machine)}, ptr {pointer}, align {align}{scope}")
-    return w.new(f"icmp ne i8 {value}, 0") if machine == "b" else value
+    return w.new(f"icmp {test} i8 {value}, 0") if machine == "b" else value
 
 
 def _load_bit(w: Writer, machine: str, address: Address, bit: int) -> str:
@@ -183,6 +187,8 @@ def _extreme(name: str) -> Row:
 
 
 def _not(w: Writer, machine: str, a: Node) -> str:
+    if machine == "b" and a[0] == "load":
+        return from_memory(w, "b", *_place(w, "b", a[2]), test="eq")
     return w.new(f"xor {ir(machine)} {w.value(a)}, {'true' if machine == 'b' else -1}")
 
 

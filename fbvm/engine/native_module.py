@@ -83,16 +83,24 @@ class BodyWriter(Writer):
     statements = EMITTERS
 
 
-def translate(image: Image, stops: bool = False) -> Translation:
-    """The module of an image, whose runs can be stopped at observations or not.
+def translate(image: Image, stops: bool = False, quick: bool = False) -> Translation:
+    """The module of an image, whose runs can be stopped at observations or not; a `quick` one is as short as can be and has
+    the same points.
 
     Raises Unsupported for code that the compiler never makes."""
+    try:
+        return _translated(image, stops, quick)
+    except RecursionError:  # hardly any code is so deep, and to find out how deep it is takes a third of the time
+        with deep(image):
+            return _translated(image, stops, quick)
+
+
+def _translated(image: Image, stops: bool, quick: bool) -> Translation:
     graph = call_graph(image)
     module = Module(image, fixed_bases(image), instance_places(image, graph), heights(graph), [], {}, set(),
-                    stops)
+                    stops, quick)
     metadata: list[str] = []
-    with deep(image):
-        bodies = [_body(module, number, metadata) for number in module.heights]
+    bodies = [_body(module, number, metadata) for number in module.heights]
     tasks = [_task(module, number) for number in range(len(image.tasks))]
     routines = [declaration(name) for name in sorted(module.routines)]
     text = "\n".join([*definitions(module.constants), objects(image.objects), *bodies, *tasks, *routines, *_declarations(),
@@ -146,8 +154,10 @@ def _body(module: Module, number: int, metadata: list[str]) -> str:
     lines += w.lines + w.cold
     apart = len(lines) >= LARGE or module.heights[number] % DEEP == DEEP - 1
     inline = "#4" if apart else "#3" if not module.heights[number] and len(lines) <= SMALL else "#0"
-    text, more = w.regions.resolve("\n".join(lines), FIRST_NUMBER + len(metadata))
-    metadata += more
+    text = "\n".join(lines)
+    if not module.quick:
+        text, more = w.regions.resolve(text, FIRST_NUMBER + len(metadata))
+        metadata += more
     shown = w.body.name.encode("unicode_escape").decode()
     return "\n".join([
         f"; {shown}", f"define internal fastcc i64 @b{number}(ptr noalias %m, ptr noalias %c, i64 %self, i64 %left) "

@@ -39,12 +39,16 @@ class Regions:
     instances: Range
     accesses: dict[Access, int] = field(default_factory=dict)
 
+    def is_apart(self, from_instance: bool, address: Address, count: int) -> bool:
+        """Whether an access cannot meet the words of the system page."""
+        low, high = reached(address, count)
+        return low + (self.instances[0] if from_instance else 0) >= PAGE_BYTES and high <= 1 << 40
+
     def mark(self, from_instance: bool, address: Address, count: int) -> str:
         """A mark for an access, which `resolve` replaces; "" if it could meet the words of the system page."""
-        low, high = reached(address, count)
-        low_in_buffer = low + (self.instances[0] if from_instance else 0)
-        if low_in_buffer < PAGE_BYTES or high > 1 << 40:
+        if not self.is_apart(from_instance, address, count):
             return ""
+        low, high = reached(address, count)
         access = (from_instance, low, high, bool(address[2]))
         return f" §{self.accesses.setdefault(access, len(self.accesses))}"
 

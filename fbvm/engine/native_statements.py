@@ -32,7 +32,7 @@ def _store_raw(w: Writer, machine: str, address: Address, a: Node) -> None:
 def _put(w: Writer, machine: str, address: Address, a: Node, align: int) -> None:
     pointer, scope = w.pointer(address, SIZES[machine]), w.scope(address, SIZES[machine])
     to_memory(w, machine, pointer, a, align, scope)
-    w.reload(scope)
+    w.reload(address, SIZES[machine])
 
 
 def to_memory(w: Writer, machine: str, pointer: str, a: Node, align: int, scope: str) -> None:
@@ -61,7 +61,7 @@ def _store_bit(w: Writer, address: Address, bit: int, a: Node) -> None:
     cleared = w.new(f"and i8 {byte}, {~(1 << bit)}")
     moved = w.new(f"shl i8 {w.new(f'zext i1 {value} to i8')}, {bit}")
     w.emit(f"store i8 {w.new(f'or i8 {cleared}, {moved}')}, ptr {pointer}{scope}")
-    w.reload(scope)
+    w.reload(address, 1)
 
 
 def _store_flag(w: Writer, address: Address, a: Node) -> None:
@@ -76,7 +76,7 @@ def _store_flag(w: Writer, address: Address, a: Node) -> None:
     changed = w.new(f"select i1 {value}, i8 {w.new(f'or i8 {byte}, {mask}')}, i8 {cleared}")
     full = w.new(f"zext i1 {value} to i8")
     w.emit(f"store i8 {w.new(f'select i1 {whole}, i8 {full}, i8 {changed}')}, ptr {pointer}")
-    w.reload("")
+    w.reload(address, 1)
 
 
 def _store_text(w: Writer, address: Address, capacity: int, a: Node) -> None:
@@ -89,13 +89,13 @@ def _store_text(w: Writer, address: Address, capacity: int, a: Node) -> None:
     w.emit(f"call void @llvm.memmove.p0.p0.i64(ptr {pointer}, ptr {text.at}, i64 {count}, i1 false)")
     end = w.new(f"getelementptr inbounds i8, ptr {pointer}, i64 {count}")
     w.emit(f"store i{8 * unit} 0, ptr {end}, align 1")
-    w.reload(w.scope(address, size))
+    w.reload(address, size)
 
 
 def _copy(w: Writer, to: Address, source: Address, size: int) -> None:
     target, origin = w.pointer(to, size), w.pointer(source, size)
     w.emit(f"call void @llvm.memmove.p0.p0.i64(ptr {target}, ptr {origin}, i64 {size}, i1 false)")
-    w.reload(w.scope(to, size))
+    w.reload(to, size)
 
 
 def _fill(w: Writer, address: Address, pattern: bytes) -> None:
@@ -105,14 +105,14 @@ def _fill(w: Writer, address: Address, pattern: bytes) -> None:
     else:
         origin = w.module.constant(pattern)
         w.emit(f"call void @llvm.memcpy.p0.p0.i64(ptr {pointer}, ptr {origin}, i64 {len(pattern)}, i1 false)")
-    w.reload(w.scope(address, len(pattern)))
+    w.reload(address, len(pattern))
 
 
 def _reverse(w: Writer, address: Address, size: int, runs: tuple[tuple[int, ...], ...]) -> None:
     start = w.integer(w.pointer(address, size))
     for offset, count, stride, item in runs:
         w.call("reverse_items", w.new(f"add i64 {start}, {offset}"), str(count), str(stride), str(item))
-    w.reload(w.scope(address, size))
+    w.reload(address, size)
 
 
 def _let(w: Writer, number: int, machine: str, a: Node) -> None:
@@ -130,16 +130,17 @@ def _let(w: Writer, number: int, machine: str, a: Node) -> None:
 
 def _if(w: Writer, rows: tuple[tuple[Node, Block], ...], otherwise: Block) -> None:
     after = w.label()
-    for condition, block in rows:
-        yes, no = w.label(), w.label()
+    for number, (condition, block) in enumerate(rows, 1):
+        yes, no = w.label(), w.label() if otherwise or number < len(rows) else after
         w.branch(w.value(condition), yes, no)
         w.begin(yes)
         w.write(block)
         w.jump(after)
         w.begin(no)
-    w.write(otherwise)
-    w.jump(after)
-    w.begin(after)
+    if otherwise:
+        w.write(otherwise)
+        w.jump(after)
+        w.begin(after)
 
 
 def _case(w: Writer, machine: str, a: Node, rows: tuple[tuple[Any, Block], ...], otherwise: Block) -> None:
@@ -203,12 +204,10 @@ def _call(w: Writer, pou: int, address: Address | None) -> None:
     place = w.offset(address, max(1, size)) if address else "0"
     left = w.new("load i64, ptr %budget")
     result = w.new(f"call fastcc i64 @b{pou}(ptr %m, ptr %c, i64 {place}, i64 {left})")
-    bad, good = w.label("x"), w.label()
-    w.unlikely(w.new(f"icmp slt i64 {result}, {TRAPPED}"), bad, good)
-    with w.aside(bad):
-        w.emit(f"ret i64 {result}")
-    w.begin(good)
+    good = w.label()
     w.emit(f"store i64 {result}, ptr %budget")
+    w.unlikely(w.new(f"icmp slt i64 {result}, {TRAPPED}"), w.passing_on(), good)
+    w.begin(good)
 
 
 def _charge(w: Writer, count: int, site: int) -> None:

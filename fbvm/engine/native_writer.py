@@ -87,6 +87,8 @@ class Module:
     routines: set[str]
     stops: bool = False
     """Whether its runs can be stopped at observations."""
+    quick: bool = False
+    """Whether nothing but soon is wanted: then nothing is said that only helps to optimise."""
     kept_bytes: int = 0
     scratch_end: int = SCRATCH
 
@@ -116,6 +118,7 @@ class Writer:
         self.module, self.body = module, module.image.bodies[number]
         self.base = module.bases.get(number)
         self.regions = Regions(module.instances[number])
+        self._system = "" if module.quick else SYSTEM
         self.lines: list[str] = []
         self.cold: list[str] = []
         self.here = "entry"
@@ -128,7 +131,12 @@ class Writer:
         self.capacities: dict[int, tuple[int, int]] | None = None
         self.next_scratch = SCRATCH
         self.uses_instance = False
+        self.passes_on = False
+        """Whether it ends with what a body that it called ended with."""
         self._names = 0
+        self._prefix = "%"
+        """Of names of values: numbers grow from line to line, which LLVM reads faster than other names; only what is
+        aside stands further down."""
 
     # --- lines
 
@@ -138,7 +146,7 @@ class Writer:
     def new(self, text: str) -> str:
         """The name of what an instruction yields."""
         self._names += 1
-        name = f"%v{self._names}"
+        name = f"{self._prefix}{self._names}"
         self.lines.append(f"{name} = {text}")
         return name
 
@@ -177,10 +185,10 @@ class Writer:
     @contextmanager
     def aside(self, label: str) -> Iterator[None]:
         """What is written meanwhile becomes a block at the end of the body, out of the way."""
-        hot, self.lines = self.lines, [f"{label}:"]
+        (hot, prefix), (self.lines, self._prefix) = (self.lines, self._prefix), ([f"{label}:"], "%c")
         yield
         self.cold += self.lines
-        self.lines = hot
+        self.lines, self._prefix = hot, prefix
 
     # --- operands
 
@@ -231,31 +239,36 @@ class Writer:
 
     def system(self, offset: int) -> str:
         """A word of the system page."""
-        return self.new(f"load i64, ptr {self._system_word(offset)}, align 8{SYSTEM}")
+        return self.new(f"load i64, ptr {self._system_word(offset)}, align 8{self._system}")
 
     def put_system(self, offset: int, value: str) -> None:
-        self.emit(f"store i64 {value}, ptr {self._system_word(offset)}, align 8{SYSTEM}")
+        self.emit(f"store i64 {value}, ptr {self._system_word(offset)}, align 8{self._system}")
 
     def _system_word(self, offset: int) -> str:
         return self.new(f"getelementptr inbounds i8, ptr %m, i64 {offset}")
 
     def scope(self, address: Address, count: int) -> str:
         """What marks an access, so that LLVM knows what it cannot meet."""
-        if self.loose(address):
+        if self.module.quick or self.loose(address):
             return ""
+        from_instance, address = self._seen_from(address)
+        return self.regions.mark(from_instance, address, count)
+
+    def _seen_from(self, address: Address) -> tuple[bool, Address]:
+        """Whether an address counts from the instance, and that address, of which the place may be known."""
         base, offset, terms = address
         if base == "self" and self.base is not None:
-            base, offset = "abs", offset + self.base
-        return self.regions.mark(base == "self", (base, offset, terms), count)
+            return False, ("abs", offset + self.base, terms)
+        return base == "self", address
 
     @staticmethod
     def loose(address: Address) -> bool:
         """True for an address behind a reference, which may lie anywhere."""
         return isinstance(address[0], tuple)
 
-    def reload(self, scope: str) -> None:
-        """Behind a store without mark, which may have met the step budget: read it anew."""
-        if not scope:
+    def reload(self, address: Address, count: int) -> None:
+        """Behind a store that may have met the step budget: read it anew."""
+        if self.loose(address) or not self.regions.is_apart(*self._seen_from(address), count):
             self.emit(f"store i64 {self.system(BUDGET)}, ptr %budget")
 
     # --- traps
@@ -280,6 +293,15 @@ class Writer:
         left = self.new("load i64, ptr %budget")
         self.emit(f"ret i64 {left}")
         self.dead = True
+
+    def passing_on(self) -> str:
+        """The label of the block in which a body ends as one did that it called, whose answer stands in the budget."""
+        if not self.passes_on:
+            self.passes_on = True
+            with self.aside("passing_on"):
+                self.give_back()
+        self.dead = False
+        return "passing_on"
 
     def end(self, code: str, site: int, shown: tuple[Any, ...] = ()) -> None:
         """Leave the body for a point, here."""

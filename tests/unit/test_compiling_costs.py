@@ -33,3 +33,13 @@ def test_functions_that_call_the_next_twice_are_looked_at_once() -> None:
                    for n in range(60))
     text += "FUNCTION F60 : INT\nVAR_INPUT a : INT; END_VAR\nF60 := a;\nEND_FUNCTION\nPROGRAM Main\nF0(1);\nEND_PROGRAM\n"
     assert [d.code for d in compile_text(text).diagnostics] == ["S0491"], "2 ** 60 ways through them"
+
+
+def test_what_a_compilation_leaves_does_not_wait_for_the_collector() -> None:
+    def left(statements: int) -> int:
+        gc.collect()
+        compile_text(TEXT.replace("a := a + 1;\n", "a := a + 1;\n" * statements))
+        return gc.collect()
+
+    left(1)  # what is made once
+    assert left(400) < left(1) + 100

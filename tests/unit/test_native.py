@@ -187,6 +187,25 @@ def test_a_text_that_grows_without_bound_is_not_supported() -> None:
         engine((("let", 1, "s8", const("s8", b"x")), ("loop", (), (grow,), ())))
 
 
+@pytest.mark.parametrize("stops", [False, True])
+def test_quick_code_is_shorter_and_has_the_same_points(stops: bool) -> None:
+    program = image((*COUNT, store("i16", 8, ("div", "i16", ONE, load("i16", 0), 3)), ("call", 1, at(64))),
+                    (*COUNT, ("charge", 1, 2)))
+    fast, quick = translate(program, stops), translate(program, stops, quick=True)
+    assert "alias" in fast.text and "alias.scope" not in quick.text.partition("attributes")[0]
+    assert (quick.points, quick.kept_bytes, quick.context_bytes, quick.routines) == (
+        fast.points, fast.kept_bytes, fast.context_bytes, fast.routines)  # fmt: skip
+
+
+def test_code_deeper_than_the_host_recurses() -> None:
+    deep: Any = load("i16", 0)
+    for _ in range(400):
+        deep = ("add", "i16", deep, ONE)
+    before = sys.getrecursionlimit()
+    e = engine((store("i16", 0, deep),))
+    assert e.run(0) is None and slot(e) == 400 and sys.getrecursionlimit() == before
+
+
 # --- what LLVM must not do --------------------------------------------------------------------------------------------
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -91,6 +92,23 @@ def test_a_run_is_the_same() -> None:
         plc.run(scans=3)
     assert bytes(plcs[0].memory.snapshot()) == bytes(plcs[1].memory.snapshot())
     assert plcs[1].read("Only.C") == plcs[0].read("Only.C")
+
+
+@pytest.mark.parametrize("depth", [1, 5000])
+def test_the_fingerprint_is_that_of_equal_code(depth: int) -> None:
+    def nested(*words: str) -> Any:
+        code: Any = words
+        for _ in range(depth):
+            code = ("not", code)
+        return code
+
+    image = image_of(TYPES)
+
+    def of(*words: str) -> str:
+        return replace(image, bodies=(Body("B", "PROGRAM", nested(*words), 4, 1),)).fingerprint
+
+    assert of("load", "b") == of("".join(["lo", "ad"]), "".join(["b", ""]))
+    assert len({of("load", "b"), of("loadb"), of("load", "b", ""), of("load", "i8")}) == 4
 
 
 def test_the_fingerprint_needs_no_code() -> None:
