@@ -24,6 +24,7 @@ import os
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from functools import cache, lru_cache
 from pathlib import Path
 
@@ -71,27 +72,49 @@ class LibraryError(ValueError):
         return Diagnostic("P0201", Source(str(self.described), text), 0, len(text.partition("\n")[0]), self.why)
 
 
+_KEYS = ("globals", "mailbox", "pins", "spaces", "writes", "by_dialect")
+"""What a `library.toml` can say to the compiler; everything else in it is for people."""
+
+
 def _libraries_below(root: Path) -> Iterator[Library]:
     for folder, names in sorted((Path(at), sorted(names)) for at, _, names in os.walk(root)):
         sources = [name for name in names if name.endswith(".st")]
         if not sources and "library.toml" not in names:
             continue
         described = folder / "library.toml"
-        table: dict[str, object] = {}
-        if described.is_file():
-            try:
-                table = tomllib.loads(described.read_text(encoding="utf-8"))
-            except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-                raise LibraryError(described, str(error)) from error
-        listed = table.get("globals", [])
-        if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
-            raise LibraryError(described, "globals must be a list of file names")
-        spaces = table.get("spaces", [])
+        table = _described(described) if described.is_file() else {}
         name = folder.relative_to(root).as_posix() if folder != root else root.name
         files = {fold(source[:-len(".st")]): folder / source for source in sources}
-        yield Library(name, folder, files, tuple(listed), _mailbox(table, described), _pins(table, described),
-                      frozenset(fold(str(space)) for space in spaces) if isinstance(spaces, list) else frozenset(),
-                      _written(table, described), table.get("by_dialect") is True)
+        spaces = _listed(table, "spaces", described, "a list of names")
+        yield Library(name, folder, files, _listed(table, "globals", described, "a list of file names"),
+                      _mailbox(table, described), _pins(table, described), frozenset(map(fold, spaces)),
+                      _written(table, described), _flag(table, "by_dialect", described))
+
+
+def _described(described: Path) -> dict[str, object]:
+    """What a `library.toml` says; a key that looks like one of ours must be one."""
+    try:
+        table = tomllib.loads(described.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise LibraryError(described, str(error)) from error
+    for key in table:
+        if key not in _KEYS and (meant := get_close_matches(key, _KEYS, n=1, cutoff=0.8)):
+            raise LibraryError(described, f"{key} says nothing; did you mean {meant[0]}?")
+    return table
+
+
+def _listed(table: dict[str, object], key: str, described: Path, what: str) -> tuple[str, ...]:
+    listed = table.get(key, [])
+    if not isinstance(listed, list) or not all(isinstance(name, str) for name in listed):
+        raise LibraryError(described, f"{key} must be {what}")
+    return tuple(listed)
+
+
+def _flag(table: dict[str, object], key: str, described: Path) -> bool:
+    flag = table.get(key, False)
+    if not isinstance(flag, bool):
+        raise LibraryError(described, f"{key} must be true or false")
+    return flag
 
 
 @cache
@@ -113,10 +136,10 @@ def _pins(table: dict[str, object], described: Path) -> dict[str, dict[str, str]
 
 def _written(table: dict[str, object], described: Path) -> tuple[str, ...]:
     """The areas that the library writes though programs only read them."""
-    areas = table.get("writes", [])
-    if not isinstance(areas, list) or not all(area in AREAS for area in areas):
+    areas = _listed(table, "writes", described, "a list of areas")
+    if not set(areas) <= AREAS.keys():
         raise LibraryError(described, "writes must be a list of areas")
-    return tuple(areas)
+    return areas
 
 
 def _mailbox(table: dict[str, object], described: Path) -> Mailbox | None:

@@ -181,6 +181,20 @@ def test_a_mailbox_that_cannot_be(tmp_path: Path, area: str, sizes: tuple[object
     assert why in found.message
 
 
+def test_what_a_library_cannot_mean(tmp_path: Path) -> None:
+    for text, why in (
+        ("global = ['A.st']", "did you mean globals?"), ("by_dialects = true", "did you mean by_dialect?"),
+        ("spaces = 'Standard'", "spaces must be a list of names"), ("by_dialect = 'yes'", "by_dialect must be true or false"),
+        ("writes = ['X']", "writes must be a list of areas"), ("globals = [1]", "globals must be a list of file names"),
+        ("[pins]\nA = 1", "pins has for each POU a table"), ("x =", "Invalid value"),
+    ):
+        (tmp_path / "library.toml").write_text(text, encoding="utf-8")
+        [found] = compile_text("PROGRAM Main END_PROGRAM", libraries=[tmp_path]).diagnostics
+        assert found.code == "P0201" and why in found.message, text
+    (tmp_path / "library.toml").write_text("title = 'x'\nlicence = 'MIT'\npages = 3\n", encoding="utf-8")
+    assert not compile_text("PROGRAM Main END_PROGRAM", libraries=[tmp_path]).diagnostics
+
+
 def test_two_libraries_cannot_mean_different_mailboxes(library: Path) -> None:
     other = library / "other"
     other.mkdir()
