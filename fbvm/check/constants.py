@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-import struct
 
 from fbvm.base import arithmetic
+from fbvm.base.memory import STRUCTS
 from fbvm.base.strings import packed
 from fbvm.base.types import BOOL, DAY_NS, ArrayType, Elementary, EnumType, StringType, SubrangeType, Type, machine
 from fbvm.base.types import base as base_of
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
-
-_FORMATS = {"b": "<B", "i8": "<b", "u8": "<B", "i16": "<h", "u16": "<H", "i32": "<i", "u32": "<I", "i64": "<q",
-            "u64": "<Q", "f32": "<f", "f64": "<d"}
 
 
 class NotConstant(Exception):
@@ -27,10 +24,10 @@ def encode(kind: Type, value: Value) -> bytes:
         return (cut if isinstance(cut, bytes) else packed(cut)).ljust(kind.size, b"\0")
     form = machine(kind)
     if form == "f32" and isinstance(value, float | int):
-        return struct.pack("<f", arithmetic.single(float(value)))
+        return STRUCTS[form].pack(arithmetic.single(float(value)))
     if form == "ref":
         return bytes(8)  # 0, CODESYS's NULL
-    return struct.pack(_FORMATS[form], value)
+    return STRUCTS[form].pack(value)
 
 
 def decode(kind: Type, data: bytes) -> Value:
@@ -41,8 +38,8 @@ def decode(kind: Type, data: bytes) -> Value:
         units = [data[at:at + 2] for at in range(0, len(data), 2)]
         text = units[:units.index(b"\0\0")] if b"\0\0" in units else units
         return b"".join(text).decode("utf-16-le", "surrogatepass")
-    value: Value = struct.unpack(_FORMATS[machine(kind)], data)[0]
-    return bool(value) if machine(kind) == "b" else value
+    value: Value = STRUCTS[machine(kind)].unpack(data)[0]
+    return value
 
 
 def default(kind: Type) -> bytes:

@@ -15,7 +15,7 @@ from fbvm.code.image import Site
 from fbvm.plc import Phase, Plc
 from fbvm.record.branches import Fork, forks, statements
 from fbvm.record.inside import Ended, Event, Frame, Statement
-from fbvm.testing.subject import Subject
+from fbvm.testing.subject import LIBRARY, Subject
 
 Spot = tuple[int, int]
 """Line and column."""
@@ -163,7 +163,3 @@ def _path(name: str, subject: Subject) -> str:
             if path.is_file() and shelf != LIBRARY:
                 return str(path.resolve())
     return ""
-
-
-LIBRARY = Path(__file__).parent / "library"
-"""What tests in ST call."""

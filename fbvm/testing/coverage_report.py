@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
@@ -26,9 +25,9 @@ def _shown(path: str, root: Path) -> str:
 def _missed(coverage: FileCoverage) -> str:
     """`7-9, 12, 14->16, 14->past`"""
     runs: list[list[int]] = []
-    lines = sorted(coverage.lines)
+    number = {line: at for at, line in enumerate(sorted(coverage.lines))}
     for line in coverage.missing:
-        if runs and lines.index(line) == lines.index(runs[-1][1]) + 1:
+        if runs and number[line] == number[runs[-1][1]] + 1:
             runs[-1][1] = line
         else:
             runs.append([line, line])
@@ -55,10 +54,13 @@ def _counts(coverage: FileCoverage) -> tuple[int, int, int, int]:
             sum(not count for count in ways))  # fmt: skip
 
 
+_LINES_OF_A_FILE = 1_000_000
+
+
 def _total(coverage: Coverage) -> FileCoverage:
     total = FileCoverage()
     for number, each in enumerate(coverage.files.values()):
-        shift = number * 1_000_000
+        shift = number * _LINES_OF_A_FILE  # so that lines of two files are not one
         total.statements |= {(line + shift, column): count for (line, column), count in each.statements.items()}
         total.ways |= {(line + shift, column): ways for (line, column), ways in each.ways.items()}
     return total
@@ -84,8 +86,11 @@ def cobertura(coverage: Coverage, root: Path) -> str:
                                      | _rates(each))  # fmt: skip
         ElementTree.SubElement(row, "methods")
         lines = ElementTree.SubElement(row, "lines")
+        taken: dict[int, list[int]] = {}
+        for (line, _), ways in each.ways.items():
+            taken.setdefault(line, []).extend(ways.values())
         for line, count in sorted(each.lines.items()):
-            _line(lines, line, count, each)
+            _line(lines, line, count, taken.get(line, []))
     ElementTree.indent(top)
     return '<?xml version="1.0" encoding="utf-8"?>\n' + ElementTree.tostring(top, encoding="unicode") + "\n"
 
@@ -96,8 +101,8 @@ def _rates(coverage: FileCoverage) -> dict[str, str]:
     return {"line-rate": f"{line_rate:.4f}", "branch-rate": f"{(ways - missed) / ways if ways else 1.0:.4f}"}
 
 
-def _line(parent: ElementTree.Element, line: int, count: int, coverage: FileCoverage) -> None:
-    ways = [taken for (at, _), each in coverage.ways.items() if at == line for taken in each.values()]
+def _line(parent: ElementTree.Element, line: int, count: int, ways: list[int]) -> None:
+    """A line that was executed so often, and how often each way was taken from it."""
     row = {"number": str(line), "hits": str(count), "branch": "true" if ways else "false"}
     if ways:
         taken = sum(count > 0 for count in ways)
@@ -137,7 +142,7 @@ def write_pages(coverage: Coverage, root: Path, folder: Path) -> Path:
     head = "<tr><th>File<th>Statements<th>missed<th>Branches<th>missed<th>Coverage"
     total = percent(_total(coverage).rate())
     index = folder / "index.html"
-    index.write_text(_page(f"Coverage: {total}", f"<table>{head}{os.linesep.join(rows)}</table>"), encoding="utf-8")
+    index.write_text(_page(f"Coverage: {total}", f"<table>{head}{''.join(rows)}</table>"), encoding="utf-8")
     return index
 
 

@@ -25,12 +25,11 @@ from fbvm.syntax.text import read
 from fbvm.testing.pages import write_page
 from fbvm.testing.plugin import counted, library_folders, page_of
 from fbvm.testing.rig import Trapped
-from fbvm.testing.subject import Subject, SubjectError, pous, subject
+from fbvm.testing.subject import LIBRARY, Subject, SubjectError, pous, subject
 from fbvm.testing.warned import warned_of
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value, show_time
 
-LIBRARY = Path(__file__).parent / "library"
 CYCLE_NS = 10_000_000
 PATIENCE_NS = 60_000_000_000
 BANDS, LOOKED_BACK = 4, 100

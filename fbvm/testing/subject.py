@@ -29,6 +29,8 @@ Stub: TypeAlias = "str | Callable[[Any], None]"
 """ST, or a function that is called with the variables of the instance."""
 WRAPPER, INSTANCE = "Test", "Block"
 """The program around a block, and the instance in it."""
+LIBRARY = Path(__file__).parent / "library"
+"""What tests in ST call."""
 _DECLARES = re.compile(r"\s*(FUNCTION|FUNCTION_BLOCK|PROGRAM)\b", re.I)
 _FIRST = re.compile(r"\w+")
 _images: dict[tuple[object, ...], Subject] = {}
