@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 import textwrap
+from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 
 from fbvm.plc import Plc
@@ -20,6 +21,8 @@ QUIET_SCANS = 12
 """A longer stretch in which nothing changes is drawn short where a chart may be compressed."""
 GAP = "~"
 RULER_STEP = 10
+MOST_VALUES = 12
+"""Values that are listed at the right."""
 
 
 class Chart(str):
@@ -95,10 +98,12 @@ def draw(
     left = max(len(track.signal.label) for track in tracks) + 2
     right = max(len(track.signal.description) for track in tracks)
     room = len(columns) if width is None else max(20, width - left - (right + 3 if right else 0))
+    values = [list(track.values(recorder.scans)) for track in tracks]
     blocks = []
     for start in range(0, len(columns), room):
         piece = columns[start : start + room]
-        rows = [(track.signal.label, *_row(track, recorder.scans, piece)) for track in tracks]
+        rows = [(track.signal.label, *_row(track, known, recorder.first, piece))
+                for track, known in zip(tracks, values, strict=True)]  # fmt: skip
         wide = max(min(room, len(columns)), *(len(cells) for _, cells, _ in rows))
         lines = [f"{label:<{left}}{cells:<{wide}}   {note}".rstrip() for label, cells, note in rows]
         blocks.append("\n".join([*([" " * left + _ruler(piece)] if ruler else []), *lines]))
@@ -117,15 +122,14 @@ def _columns(scans: range, tracks: Sequence[Track]) -> list[int | None]:
     return columns
 
 
-def _row(track: Track, scans: range, piece: Sequence[int | None]) -> tuple[str, str]:
-    """The cells of a signal in these scans, and what stands at their right."""
-    values = list(track.values(scans))
+def _row(track: Track, values: Sequence[Value], first: int, piece: Sequence[int | None]) -> tuple[str, str]:
+    """The cells of a signal in these scans, and what stands at their right; `values` are those from scan `first` on."""
     signal = track.signal
     note = signal.description
     if signal.is_bit:
-        cells = "".join(GAP if scan is None else "#" if values[scan - scans.start] else "." for scan in piece)
+        cells = "".join(GAP if scan is None else "#" if values[scan - first] else "." for scan in piece)
     else:
-        texts = [None if scan is None else signal.said(values[scan - scans.start]) for scan in piece]
+        texts = [None if scan is None else signal.said(values[scan - first]) for scan in piece]
         cells, complete = _numbers(texts)
         if not complete:
             note = f"{_sequence(track, piece)}   {note}".rstrip()
@@ -155,13 +159,10 @@ def _numbers(texts: Sequence[str | None]) -> tuple[str, bool]:
 def _sequence(track: Track, piece: Sequence[int | None]) -> str:
     """The values that a word had in these scans, in order: `= 0, 12, 513`."""
     drawn = [scan for scan in piece if scan is not None]
-    texts: list[str] = []
-    for at, (scan, value) in enumerate(track.changes):
-        end = track.changes[at + 1][0] if at + 1 < len(track.changes) else drawn[-1] + 1
-        if scan <= drawn[-1] and end > drawn[0]:
-            texts.append(track.signal.said(value))
-    more = f", ... ({len(texts)} values)" if len(texts) > 12 else ""
-    return "= " + ", ".join(texts[:12]) + more
+    began, ended = (bisect_right(track.changes, scan, key=lambda change: change[0]) for scan in (drawn[0], drawn[-1]))
+    changes = track.changes[max(0, began - 1) : ended]
+    more = f", ... ({len(changes)} values)" if len(changes) > MOST_VALUES else ""
+    return "= " + ", ".join(track.signal.said(value) for _, value in changes[:MOST_VALUES]) + more
 
 
 def _ruler(piece: Sequence[int | None]) -> str:
