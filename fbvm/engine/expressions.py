@@ -9,7 +9,7 @@ from typing import Any
 
 from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import width
-from fbvm.code.operations import BUFFER_OBJECT, INTEGERS, OBJECT_SHIFT, SIZES, TEXT_UNITS, Address, Node
+from fbvm.code.operations import BUFFER_OBJECT, INTEGERS, OBJECT_SHIFT, OFFSET_SHIFT, SIZES, TEXT_UNITS, Address, Node
 from fbvm.engine.ranges import fits, is_float, mask, may_trap, number, span
 from fbvm.engine.writer import Expressions, Rows, bare
 
@@ -240,7 +240,7 @@ def _reference(e: Expressions, machine: str, address: Address, bit: int) -> str:
         delta = bare(e.place(("abs", offset, terms), 1))
         return f"moved({bare(e.value(reference))}, {delta}, {bit}, {site})"
     place, rest = e.place(address, 1), (BUFFER_OBJECT << OBJECT_SHIFT) + bit
-    return str((int(place) << 8) + rest) if place.isdigit() else f"(({place} << 8) + {rest})"
+    return str((int(place) << OFFSET_SHIFT) + rest) if place.isdigit() else f"(({place} << {OFFSET_SHIFT}) + {rest})"
 
 
 def _const(e: Expressions, machine: str, value: Any) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import limits, width
 from fbvm.base.memory import WHOLE_BYTES
-from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, SIZES, TEXT_UNITS, Address, Node
+from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT, SIZES, TEXT_UNITS, Address, Node
 from fbvm.engine.native_conversions import bits, convert, nearest, truncate
 from fbvm.engine.native_writer import NAN_BITS, Text, Writer, ir, literal, signed, stored
 from fbvm.engine.ranges import is_float, may_trap, span
@@ -62,7 +62,7 @@ def flag_mask(w: Writer, address: Address) -> tuple[str, str]:
 
 
 def _reference(w: Writer, machine: str, address: Address, bit: int) -> str:
-    moved = w.new(f"shl i64 {w.offset(address, 1)}, 8")
+    moved = w.new(f"shl i64 {w.offset(address, 1)}, {OFFSET_SHIFT}")
     if not w.loose(address):
         return w.new(f"add i64 {moved}, {(BUFFER_OBJECT << OBJECT_SHIFT) + bit}")
     whose = w.new(f"and i64 {w.value(address[0][1])}, {-1 << OBJECT_SHIFT}")
@@ -74,9 +74,9 @@ def _bit_behind(w: Writer, machine: str, a: Node, n: Node) -> str:
     bit = w.new(f"and i64 {reference}, {WHOLE_BYTES}")
     start = w.new(f"select i1 {w.new(f'icmp eq i64 {bit}, {WHOLE_BYTES}')}, i64 0, i64 {bit}")
     number = w.new(f"add i64 {number}, {start}")
-    offset = w.new(f"add i64 {w.new(f'lshr i64 {reference}, 8')}, {w.new(f'ashr i64 {number}, 3')}")
-    moved = w.new(f"shl i64 {w.new(f'and i64 {offset}, {(1 << 32) - 1}')}, 8")
-    whose = w.new(f"and i64 {reference}, {-1 << 40}")
+    offset = w.new(f"add i64 {w.new(f'lshr i64 {reference}, {OFFSET_SHIFT}')}, {w.new(f'ashr i64 {number}, 3')}")
+    moved = w.new(f"shl i64 {w.new(f'and i64 {offset}, {OFFSET_MASK}')}, {OFFSET_SHIFT}")
+    whose = w.new(f"and i64 {reference}, {-1 << OBJECT_SHIFT}")
     return w.new(f"or i64 {w.new(f'or i64 {whose}, {moved}')}, {w.new(f'and i64 {number}, 7')}")
 
 

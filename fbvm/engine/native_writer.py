@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import single, width
 from fbvm.code.image import Image
-from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, Address, Block, Node
+from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT, Address, Block, Node
 from fbvm.engine.native_calls import Range
 from fbvm.engine.native_context import FIELDS, SCRATCH, Point, Shown
 from fbvm.engine.native_guard import is_seen_later
@@ -363,7 +363,7 @@ class Writer:
             if ir(term[1]) != form:
                 number = self.new(f"{'sext' if term[1][0] == 'i' else 'zext'} {ir(term[1])} {number} to {form}")
             delta = self.new(f"add {form} {delta}, {self.new(f'mul {form} {number}, {stride}')}")
-        start = self.new(f"and i64 {self.new(f'lshr i64 {reference}, 8')}, 4294967295")
+        start = self.new(f"and i64 {self.new(f'lshr i64 {reference}, {OFFSET_SHIFT}')}, {OFFSET_MASK}")
         if form == "i128":
             start = self.new(f"zext i64 {start} to i128")
         total = self.new(f"add {form} {start}, {delta}")

@@ -55,6 +55,7 @@ def within(value: int, low: int, high: int, code: str, site: int) -> int:
 
 
 def quotient(a: int, b: int, site: int) -> int:
+    """That of `base.arithmetic`; written out, as `sited` would cost divisions a call more."""
     if b == 0:
         raise Stop("R0101", site, a, b)
     return a // b if (a < 0) == (b < 0) else -(-a // b)
