@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from fbvm.base.codes import CODES
+from fbvm.base.dialects import DIALECTS
 from fbvm.code.operations import EXPRESSIONS, STATEMENTS
 
 HOUSE = Path(__file__).resolve().parent.parent
@@ -48,6 +49,7 @@ ONLY_IN = {
     "lark": {"syntax"},
 }
 """Modules that are used in these places only."""
+VENDORS = {*DIALECTS, "schneider", "tianxing", "twincat"} - {"standard"}
 DATES = {"datetime", "date", "datetime.datetime", "datetime.date"}
 
 
@@ -157,6 +159,18 @@ def test_what_must_stay_absent() -> None:
 
 def test_files_and_functions_fit_on_a_desk() -> None:
     assert wrong(too_long) == {}
+
+
+def vendors(path: Path) -> list[str]:
+    """The vendors and dialects with whose names a module of the compiler or the engines compares anything."""
+    if path.relative_to(PACKAGE).parts[0] not in STAIRS["language"]:
+        return []
+    return [part.value for node in ast.walk(tree(path)) if isinstance(node, ast.Compare) for part in ast.walk(node)
+            if isinstance(part, ast.Constant) and isinstance(part.value, str) and part.value.lower() in VENDORS]  # fmt: skip
+
+
+def test_nothing_that_compiles_or_executes_asks_for_a_vendor() -> None:
+    assert wrong(vendors) == {}
 
 
 def test_every_module_says_what_it_is_for() -> None:

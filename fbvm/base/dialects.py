@@ -33,7 +33,7 @@ class Dialect:
     integers_are_nanoseconds: bool = False
     mixed_arguments: bool = False
     pointers_count_elements: bool = False
-    pragmas_of_rusty: bool = False
+    pragmas_act: bool = False
     bare_actions: bool = False
     locals_are_read: bool = False
     written_out: bool = False
@@ -71,7 +71,7 @@ QUESTIONS = {
                         "those without a name are for the parameters that none names, in order"),
     "pointers_count_elements": ("p + 1, where p is POINTER TO INT, or REF_TO INT", "the next byte; REF_TO is not moved",
                                 "the next INT; ADR(x) + 1 is the next byte"),
-    "pragmas_of_rusty": ("VAR_INPUT {ref}; {external} in front of a POU", "the pragmas have no effect (S0190)",
+    "pragmas_act": ("VAR_INPUT {ref}; {external} in front of a POU", "the pragmas have no effect (S0190)",
                          "passed by reference, as VAR_IN_OUT; refused, as its body is in another language (S0901)"),
     "bare_actions": ("Reset; where Reset is an ACTION", "an error", "a call of it"),
     "written_out": ("a := [1, 2, 3], F((x := 1, y := 2)): arrays and structures written out in statements", "an error (S0903)",
@@ -114,7 +114,7 @@ _ROWS = (
     Dialect("rusty", "programs for RuSTy", real_bits_by_value=True, loop_ends_each_pass=True, loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
-            pointers_count_elements=True, pragmas_of_rusty=True, initial_variables=True, locals_are_written=True,
+            pointers_count_elements=True, pragmas_act=True, initial_variables=True, locals_are_written=True,
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True),
     Dialect("omron", "programs that shall run in Sysmac Studio",
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),

@@ -150,7 +150,7 @@ class Interfaces:
                 resolved = followed(resolved[0]), resolved[1]  # an in-out of REFERENCE TO is one of what it is bound to
             borrowed = resolved is not None and section.kind == "VAR_INPUT" and \
                 (isinstance(resolved[0], AnyType) or is_block(resolved[0]))
-            by_place = section.kind == "VAR_INPUT" and self.project.dialect.pragmas_of_rusty and \
+            by_place = section.kind == "VAR_INPUT" and self.project.dialect.pragmas_act and \
                 passes_places(pou.source, section)
             for name in declared.names:
                 pou.later.pop(fold(name.text), None)

@@ -98,7 +98,7 @@ class Project:
                 self._refused.add((source.library, _refused_name(declaration, source)))
             elif isinstance(declaration, tree.Pou):
                 last = self._add_pou(declaration, source)
-                if self.dialect.pragmas_of_rusty and external(text, declaration):
+                if self.dialect.pragmas_act and external(text, declaration):
                     name = declaration.name
                     self.report.add("S0901", source, name, f"the body of {name.text} is in another language ({{external}}), "
                                     "which fbvm does not call", "leave {external} out and write its body in Structured Text")

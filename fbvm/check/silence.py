@@ -61,7 +61,7 @@ class Silence:
         """Take the pragmas of one text; warnings for codes that there are not, and for pragmas of other dialects."""
         unknown = []
         for pragma in text.pragmas:
-            if dialectal(pragma.text) and not (dialect.pragmas_of_rusty and in_place(source, pragma)):
+            if dialectal(pragma.text) and not (dialect.pragmas_act and in_place(source, pragma)):
                 unknown.append(Diagnostic("S0190", source, pragma.start, pragma.end, f"the pragma `{{{pragma.text.strip()}}}` "
                                           "is not known and has no effect", NO_EFFECT))
             found = _PRAGMA.fullmatch(pragma.text)

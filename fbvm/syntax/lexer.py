@@ -76,9 +76,6 @@ END_OF_FILE = "\x1a\0"
 NO_VALUE = ("<<", ">>", "++", "--")
 """Operators of other languages for which there is none of ours."""
 _WORDS = r"(?s:\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?)"
-_BY_HAND = {"LOCATION", "SET_ASSIGN"}
-"""Terminals that only exist behind certain others."""
-
 _ORDER = ("NAME", "PART", "COMMENT", "FOREIGN", "SIGN", "NUMBER", "DATE_LITERAL", "TYPED_LITERAL", "STRING_LITERAL", "DIRECT")
 OPERAND_ENDS = {"NAME", "RPAR", "RSQB", "CARET", "DIRECT", "PART"}
 

@@ -14,7 +14,8 @@ from fbvm.base.areas import AREAS
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image, Layout
 from fbvm.code.listing import listing
-from fbvm.code.operations import EXPRESSIONS, Block
+from fbvm.code.operations import EXPRESSIONS, OBSERVATIONS, Block
+from fbvm.code.shapes import statements
 
 
 def code_of(program: Image, observations: bool = False) -> str:
@@ -148,3 +149,9 @@ PROGRAM Main VAR a : ARRAY [0..4] OF INT; p : POINTER TO INT; x : INT; END_VAR p
     assert made is not None
     shown = listing(made)
     assert "number 2, 10 bytes" in shown and "1 of what ends while pointers are kept" in shown
+
+
+def test_lowering_makes_the_observations_of_the_table_and_no_others() -> None:
+    made = compile_text("PROGRAM P VAR a, b : BOOL; END_VAR\na := NOT a;\nLADDER\nLD a\nOUT b\nEND_LADDER\nEND_PROGRAM\n").image
+    assert made is not None
+    assert {node[1] for body in made.bodies for node in statements(body.code) if node[0] == "observe"} == set(OBSERVATIONS)
