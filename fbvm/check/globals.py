@@ -105,6 +105,9 @@ class Globals:
             variable.qualified = turn.section in self.project.qualified_only
             variable.space = Path(turn.source.name).stem if list_name(turn.source) in self.project.lists else ""
             variable.place = "area" if location is not None and not is_open(location, variable.type) else "abs"
+            if not self.project.room.has(variable.type.size, f"{name.text} takes", turn.source, name):
+                self._damaged.add(key)
+                continue
             other = self.project.globals.setdefault(key, variable)
             if other is variable:
                 self.order.append(variable)

@@ -7,6 +7,7 @@ in-outs first, which the caller writes; the rest gets its initial values at each
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
@@ -28,7 +29,6 @@ from fbvm.base.types import (
 from fbvm.check import beginnings
 from fbvm.check.facts import Edge, Pou, Variable, holds_block, is_block, is_open
 from fbvm.check.names import refuse_reserved
-from fbvm.check.specs import MAX_SIZE
 from fbvm.check.statements import assigns_to
 from fbvm.syntax import tree
 from fbvm.syntax.pragmas import passes_places
@@ -390,6 +390,8 @@ class Interfaces:
     def _frame(self, pou: Pou, variables: list[Variable]) -> None:
         passed = [v for v in variables if v.kind in ("VAR_INPUT", "VAR_IN_OUT")]
         rest = [v for v in variables if v not in passed]
+        if not self._fit(pou, variables):
+            return
         content = bytearray()
         for variable in passed:
             _append(content, variable)
@@ -400,24 +402,22 @@ class Interfaces:
             variable.place = "frame"
         pou.frame_size = len(content)
         pou.frame_initial = bytes(content)
-        self._limit(pou, len(content))
 
     def _instance(self, pou: Pou) -> None:
         self._identifiers += 1
         content = bytearray(self._identifiers.to_bytes(4, "little") + bytes(4))
-        for variable in pou.order:
-            if variable.place == "self":
-                _append(content, variable)
+        held = [variable for variable in pou.order if variable.place == "self"]
+        for variable in held if self._fit(pou, held) else ():
+            _append(content, variable)
         content += bytes(-len(content) % 8)
-        self._limit(pou, len(content))
         fields = {fold(v.name): _field(v) for v in pou.order if v.place != "frame"}
         pou.type = StructType(pou.name, len(content), 8, fields, True, pou.other_names)
         pou.initial = bytes(content)
 
-    def _limit(self, pou: Pou, size: int) -> None:
-        if size > MAX_SIZE:
-            self.report.add("S0603", pou.source, pou.tree.name,
-                            f"the variables of {pou.name} take more than {MAX_SIZE >> 20} MiB")
+    def _fit(self, pou: Pou, variables: Iterable[Variable]) -> bool:
+        """Whether there is room for what an instance or a frame holds."""
+        size = sum(8 if variable.reference else variable.type.size for variable in variables)
+        return self.project.room.has(size, f"the variables of {pou.name} take", pou.source, pou.tree.name)
 
 
 def _slot(variable: Variable) -> int:

@@ -17,6 +17,7 @@ from fbvm.base.types import EnumType, RefType, Type, fold
 from fbvm.check.facts import Facts, Pou, Report, Variable, list_name
 from fbvm.check.library import Libraries
 from fbvm.check.names import refuse_reserved
+from fbvm.check.room import Room
 from fbvm.syntax import tree
 from fbvm.syntax.pragmas import attributes, external, pack_mode
 
@@ -52,6 +53,7 @@ class Project:
         self.libraries = libraries
         self.report = report
         self.facts = Facts()
+        self.room = Room(report)
         self.pous: dict[tuple[str, str], Pou] = {}
         self.types: dict[tuple[str, str], TypeEntry] = {}
         self.globals: dict[tuple[str, str], Variable] = {}

@@ -34,6 +34,7 @@ class Settings:
         """Folded name of the RESOURCE, "" if it has none."""
         self.completed: list[Completed] = []
         self.accesses: list[AccessPath] = []
+        self._opens: dict[int, tuple[Type, bool]] = {}
 
     def resolve(self) -> None:
         """Work out all sections; complain about what VAR_CONFIG leaves out."""
@@ -175,8 +176,10 @@ class Settings:
                                     f"write  {path} AT %IX0.0 : {variable.type};  or the whole address here")
 
     def _open_in(self, kind: Type, path: str, key: tuple[object, ...]) -> Iterator[tuple[str, tuple[object, ...], Variable]]:
-        if isinstance(kind, ArrayType) and isinstance(kind.element, ArrayType | StructType):
-            for index in range(kind.count if self._has_open(kind.element) else 0):
+        if not self._has_open(kind):
+            return
+        if isinstance(kind, ArrayType):
+            for index in range(kind.count):
                 yield from self._open_in(kind.element, f"{path}[{kind.bounds[0][0] + index}]", (*key, index))
         elif isinstance(kind, StructType) and not kind.block:
             for field in kind.fields.values():
@@ -190,7 +193,20 @@ class Settings:
                     yield from self._open_in(variable.type, inner, step)
 
     def _has_open(self, kind: Type) -> bool:
-        return next(self._open_in(kind, "", ()), None) is not None
+        """Whether such a variable is in the type, which is looked through once however often it stands in others."""
+        if id(kind) not in self._opens:
+            self._opens[id(kind)] = kind, self._looks_open(kind)
+        return self._opens[id(kind)][1]
+
+    def _looks_open(self, kind: Type) -> bool:
+        if isinstance(kind, ArrayType):
+            return self._has_open(kind.element)
+        if not isinstance(kind, StructType):
+            return False
+        if not kind.block:
+            return any(self._has_open(field.type) for field in kind.fields.values())
+        return any(variable.open or variable.place == "self" and not variable.reference and self._has_open(variable.type)
+                   for variable in self.checker.block_of(kind).order)
 
 
 def _key(spot: Spot) -> tuple[object, ...]:

@@ -38,8 +38,6 @@ from fbvm.check.structures import RELATIVE, Members
 from fbvm.check.values import Values
 from fbvm.syntax import tree
 
-MAX_SIZE = 64 << 20
-"""Largest variable in bytes."""
 MAX_STRING = 65534
 WIDE = {"__UXINT": "ULINT", "__XINT": "LINT", "__XWORD": "LWORD", "UXINT": "ULINT", "XINT": "LINT", "XWORD": "LWORD"}
 """CODESYS's and TwinCAT's names for the types that are as wide as a pointer; here one has 64 bits."""
@@ -313,8 +311,7 @@ class Specs:
         if element is None:
             return None
         kind = array(tuple(bounds), element[0])
-        if kind.count * max(1, element[0].size) > MAX_SIZE:
-            self.report.add("S0603", source, spec, f"the array takes more than {MAX_SIZE >> 20} MiB")
+        if not self.project.room.has(kind.count * max(1, element[0].size), "the array takes", source, spec):
             return None
         content = element[1] * kind.count
         return kind, self.values.initial(kind, given.values, source, content) if given and given.values else content
@@ -385,9 +382,11 @@ class Specs:
             for member in declared.names:
                 if fold(member.text) in made.fields:
                     self.report.add("S0202", source, member, f"{member.text} stands twice in this structure")
+                elif not self.project.room.fits(made.size * (place is None) + kind.size, "the structure takes", source, member):
+                    return None
                 elif wrong := made.add(member.text, kind, initial, place, packed):
                     self.report.add("S0604", source, declared.location or member, wrong, RELATIVE)
-        if not complete:
+        if not complete or not self.project.room.has(made.size, "the structure takes", source, spec):
             return None
         if not name:
             self._anonymous += 1

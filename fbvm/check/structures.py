@@ -9,12 +9,11 @@ import re
 
 from fbvm.base.types import BOOL, Field, StructType, Type, base, fold
 from fbvm.check.facts import holds_block, is_block
+from fbvm.check.room import MAX_SIZE
 from fbvm.syntax import tree
 
 RELATIVE = "a place in a structure is written %B2 (byte 2), %W1 (word 1) or %X2.0 (bit 0 of byte 2)"
 _LOCATION = re.compile(r"%([XBWDL])([0-9]{1,9})(?:\.([0-7]))?", re.I)
-MOST = 1 << 28
-"""Bytes beyond which no structure reaches."""
 _UNITS = {"X": 1, "B": 1, "W": 2, "D": 4, "L": 8}
 
 
@@ -47,7 +46,7 @@ class Members:
                 return f"{name} is {kind} and cannot lie at {location.text}"
             if is_block(kind) and offset % kind.align:
                 return f"an instance lies at a multiple of {kind.align} bytes, not at {location.text}"
-        if offset + kind.size > MOST:
+        if offset + kind.size > MAX_SIZE:
             return f"{name} would lie beyond the end of any structure"
         start = offset * 8 + (bit or 0)
         end = start + 1 if bit is not None else start + kind.size * 8
@@ -57,6 +56,11 @@ class Members:
         self.fields[fold(name)] = Field(name, kind, offset, bit=bit)
         self._fill(offset, bit, initial)
         return ""
+
+    @property
+    def size(self) -> int:
+        """Bytes in front of what is put behind the members so far; none if all share their place."""
+        return 0 if self.shared else len(self._content)
 
     def _next_bit(self) -> tuple[int, int]:
         """Behind the bit that was put in last, or a new byte."""
@@ -70,7 +74,7 @@ class Members:
         content += bytes(max(0, offset + len(initial) - len(content)))
         if bit is not None:
             content[offset] |= (initial[0] & 1) << bit
-        elif not any(content[offset:offset + len(initial)]):
+        elif not content[offset:offset + len(initial)].strip(b"\0"):
             content[offset:offset + len(initial)] = initial
 
     def structure(self, name: str) -> tuple[StructType, bytes]:

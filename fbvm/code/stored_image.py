@@ -4,6 +4,7 @@ read when somebody wants to execute, list or draw it; machine code needs none.""
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import astuple, dataclass, fields
 from functools import cached_property
@@ -75,6 +76,10 @@ def decode(content: bytes) -> Image:
     return image
 
 
+DEEPEST = 20_000
+"""Frames that suffice for the deepest code that the parser lets through."""
+
+
 class _StoredBody(Body):
     """A body whose code is read when somebody wants it."""
 
@@ -86,8 +91,15 @@ class _StoredBody(Body):
 
     @cached_property
     def code(self) -> Block:
-        code: Block = _tuples(json.loads(vars(self)["text"], object_hook=_bytes))
-        return code
+        try:
+            return _code(vars(self)["text"])
+        except RecursionError:
+            before = sys.getrecursionlimit()
+            sys.setrecursionlimit(DEEPEST)
+            try:
+                return _code(vars(self)["text"])
+            finally:
+                sys.setrecursionlimit(before)
 
 
 # --- plain data -----------------------------------------------------------------------------------------------------
@@ -105,6 +117,11 @@ def _plain(item: object) -> object:
 
 def _bytes(row: dict[str, Any]) -> Any:
     return row["bytes"].encode("latin-1") if row.keys() == {"bytes"} else row
+
+
+def _code(text: str) -> Block:
+    code: Block = _tuples(json.loads(text, object_hook=_bytes))
+    return code
 
 
 def _tuples(item: Any) -> Any:

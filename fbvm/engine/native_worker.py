@@ -12,6 +12,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from typing import IO
 
 _SIZE_BYTES = 8
@@ -90,7 +91,8 @@ class Worker:
         process.wait()
         for pipe in (process.stdin, process.stdout):
             if pipe:
-                pipe.close()
+                with suppress(BrokenPipeError):  # what the compiler was being told when it was ended
+                    pipe.close()
 
 
 worker = Worker()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+import tracemalloc
 
 import pytest
 
@@ -43,3 +44,47 @@ def test_what_a_compilation_leaves_does_not_wait_for_the_collector() -> None:
 
     left(1)  # what is made once
     assert left(400) < left(1) + 100
+
+
+BIG = "ARRAY [0..2_000_000] OF LINT"
+DOUBLED = {
+    "structures": [f"TYPE S0 : STRUCT x : {BIG}; END_STRUCT END_TYPE",
+                   *(f"TYPE S{n} : STRUCT a, b : S{n - 1}; END_STRUCT END_TYPE" for n in range(1, 60))],
+    "blocks": [f"FUNCTION_BLOCK S0 VAR x : {BIG}; END_VAR END_FUNCTION_BLOCK",
+               *(f"FUNCTION_BLOCK S{n} VAR a, b : S{n - 1}; END_VAR a(); b(); END_FUNCTION_BLOCK" for n in range(1, 60))],
+    "globals": [f"TYPE S59 : {BIG}; END_TYPE VAR_GLOBAL", *(f"g{n} : S59;" for n in range(1000)), "END_VAR"],
+    "arrays": ["TYPE S59 : INT; END_TYPE VAR_GLOBAL", *(f"g{n} : {BIG};" for n in range(1000)), "END_VAR"],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", DOUBLED)
+def test_what_no_memory_holds_is_refused_before_bytes_are_made_of_it(what: str) -> None:
+    tracemalloc.start()
+    try:
+        made = compile_text("\n".join([*DOUBLED[what], "PROGRAM Main VAR s : S59; END_VAR END_PROGRAM"]), lint=False)
+        assert tracemalloc.get_traced_memory()[1] < 400 << 20
+    finally:
+        tracemalloc.stop()
+    assert made.image is None
+    assert {diagnostic.code for diagnostic in made.diagnostics} == {"S0603"}
+
+
+def test_instances_in_instances_are_looked_through_once_a_type() -> None:
+    """Each of 16 blocks has two of the block before it: 65,536 instances, and 16 types."""
+    blocks = ["FUNCTION_BLOCK S0 VAR x : BOOL; END_VAR END_FUNCTION_BLOCK"]
+    blocks += [f"FUNCTION_BLOCK S{n} VAR a, b : S{n - 1}; END_VAR a(); b(); END_FUNCTION_BLOCK" for n in range(1, 17)]
+    text = "\n".join([*blocks, "PROGRAM Main VAR s : S16; END_VAR s(); END_PROGRAM"])
+    calls = 0
+
+    def count(frame: object, event: str, argument: object) -> None:
+        nonlocal calls
+        calls += event == "call"
+
+    sys.setprofile(count)
+    try:
+        made = compile_text(text)
+    finally:
+        sys.setprofile(None)
+    assert made.image is not None
+    assert calls < 300_000

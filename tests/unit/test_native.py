@@ -152,6 +152,17 @@ def test_the_helper_process_optimises() -> None:
         worker.stop()
 
 
+def test_a_helper_process_that_is_ended_while_it_is_told_something() -> None:
+    helper = type(worker)()
+    process = helper._started()
+    assert process.stdin
+    process.stdin.write(b"x" * 100)
+    process.kill()
+    process.wait()
+    helper.stop()
+    assert process.stdin.closed
+
+
 # --- budget, references and the system page ---------------------------------------------------------------------------
 
 

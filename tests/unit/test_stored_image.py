@@ -124,3 +124,13 @@ def test_the_fingerprint_needs_no_code() -> None:
 def test_what_is_no_image_is_refused(content: bytes) -> None:
     with pytest.raises((ValueError, LookupError, TypeError)):
         decode(content)
+
+
+@pytest.mark.parametrize("body", [
+    "IF x > 0 THEN\n" * 180 + "x := x + 1;\n" + "END_IF\n" * 180,
+    "x := " + "x + " * 990 + "1;",
+])
+def test_code_that_is_nested_deep_comes_back(body: str) -> None:
+    image = image_of(f"PROGRAM Main\nVAR x : LINT := 1; END_VAR\n{body}\nEND_PROGRAM")
+    back = decode(encode(image))
+    assert [plain(stored).code for stored in back.bodies] == [plain(made).code for made in image.bodies]
