@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 import os
+from functools import partial
+from itertools import groupby
 
 import pytest
 from feature_tables import GRAPHIC, HERE, LIST, choices, listing, numbers, titles
-from lang_check import BUDGET, BUILDS, check
+from lang_check import BUDGET, BUILDS, REFERENCE, check
 from lang_corpus import Program, programs, read
+from rows import go_through
 
 from fbvm.code.image import Image
 from fbvm.engine import native
 from fbvm.plc import Plc
 
 
-@pytest.mark.parametrize("program", [pytest.param(p, id=f"{p.path.stem}:{p.line}") for p in programs(HERE)])
-def test_feature(program: Program) -> None:
-    check(program)
+@pytest.mark.parametrize(
+    "table", [pytest.param(list(inside), id=stem) for stem, inside in groupby(programs(HERE), lambda p: p.path.stem)])
+def test_features(table: list[Program]) -> None:
+    go_through((f"{p.path.stem}:{p.line} {p.title}", partial(check, p, REFERENCE)) for p in table)
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
 @pytest.mark.parametrize("program", [pytest.param(p, id=f"{p.path.stem}:{p.line}") for p in programs(HERE) if p.runs])
-def test_feature_as_machine_code(program: Program, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_feature_on_every_engine(program: Program, monkeypatch: pytest.MonkeyPatch) -> None:
     def build(image: Image, cycle_ns: int) -> Plc:
         return Plc(image, cycle_ns, budget=BUDGET, engine="native")
 
-    monkeypatch.setitem(BUILDS, "native", build)
+    if native.available():
+        monkeypatch.setitem(BUILDS, "native", build)
     check(program)
 
 

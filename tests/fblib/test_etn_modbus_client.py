@@ -10,6 +10,7 @@ import pytest
 from etn_modbus_rig import SECOND_NS, image_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import each_of
 
 from fbvm import compile_files
 from fbvm.net.faults import Fault
@@ -125,7 +126,7 @@ def test_a_request_scan_by_scan() -> None:
     """  # fmt: skip
 
 
-@pytest.mark.parametrize("size", [1, 2, 3, 4, 5, 6, 100, 251, 252, 253])
+@each_of("size", [1, 2, 3, 4, 5, 6, 100, 251, 252, 253])
 def test_requests_and_replies_of_any_size(size: int) -> None:
     rig = Rig(answering(lambda frame: [Say(heard())])).connect()
 

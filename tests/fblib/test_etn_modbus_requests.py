@@ -7,6 +7,7 @@ from functools import cache
 
 import pytest
 from etn_modbus_rig import OWN_CIO, Client, Model, Rig
+from rows import each_of
 
 from fbvm.wire.modbus import Adu
 
@@ -23,8 +24,8 @@ EXAMPLES = {  # section of the sheet: words before, request, reply, words after
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("timing", ["exact", "real"])
-@pytest.mark.parametrize("section", EXAMPLES)
+@each_of("timing", ["exact", "real"])
+@each_of("section", EXAMPLES)
 def test_the_examples_of_the_sheet(section: str, timing: str) -> None:
     before, request, reply, after = EXAMPLES[section]
     rig = Rig(timing=timing)
@@ -91,8 +92,8 @@ def test_bits_from_any_bit_on(bit: int, served: tuple[Rig, Client]) -> None:
         assert client.exchange(pdu) == model.answer(pdu)
 
 
-@pytest.mark.parametrize("full_dm", [False, True])
-@pytest.mark.parametrize(
+@each_of("full_dm", [False, True])
+@each_of(
     ("address", "quantity"),
     [*limits(32768, 123), (0x17FF, 1), (0x17FF, 123), (0x1800, 1), (0x1801 - 123, 123), (0x1800 - 10, 20)],
 )
@@ -108,8 +109,8 @@ def test_10_at_its_limits(address: int, quantity: int, full_dm: bool) -> None:
         assert reply == pdu[:5], "only where it begins is limited"
 
 
-@pytest.mark.parametrize("address", [0, 1, 15, 16, 0x22, 5119, 5120, 65520, 65535])
-@pytest.mark.parametrize("value", [0xFF00, 0x0000, 0x0001, 0xFFFF, 0xFE00, 0x00FF])
+@each_of("address", [0, 1, 15, 16, 0x22, 5119, 5120, 65520, 65535])
+@each_of("value", [0xFF00, 0x0000, 0x0001, 0xFFFF, 0xFE00, 0x00FF])
 def test_05_at_its_limits(address: int, value: int) -> None:
     rig, client = served_with("", 3)
     model = Model(rig)
@@ -118,8 +119,8 @@ def test_05_at_its_limits(address: int, value: int) -> None:
     assert model.agrees(rig)
 
 
-@pytest.mark.parametrize("address", [0, 1, 32767, 32768, 65535])
-@pytest.mark.parametrize("value", [0, 1, 0x8000, 0xFFFF])
+@each_of("address", [0, 1, 32767, 32768, 65535])
+@each_of("value", [0, 1, 0x8000, 0xFFFF])
 def test_06_at_its_limits(address: int, value: int) -> None:
     rig, client = served_with("", 4)
     model = Model(rig)
@@ -166,7 +167,7 @@ def test_all_other_function_codes_are_refused(pins: str, codes: set[int]) -> Non
         assert model.agrees(rig)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("address", "quantity"),
     [*limits(65536, 1968), *[(bit, 40) for bit in range(16)], *[(3, count) for count in range(1, 34)]],
 )
@@ -198,7 +199,7 @@ def test_0f_of_the_sheet_of_the_client_blocks() -> None:
     assert rig.plc.read("CIO 1") == 0x13A0
 
 
-@pytest.mark.parametrize("unit", [0, 1, 127, 247, 255])
+@each_of("unit", [0, 1, 127, 247, 255])
 def test_any_unit_identifier_is_answered_with_the_same(unit: int) -> None:
     assert Rig().client().exchange(b"\x03\0\0\0\1", unit) == b"\x03\x02\0\0"
 

@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.code.compiler import compile_text
@@ -80,7 +81,7 @@ def test_rs_reset_wins() -> None:
     """)  # fmt: skip
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("block", "table"),
     [
         ("R_TRIG", "0 0 0 \n 1 1 1 \n 2 1 0 \n 3 0 0 \n 4 1 1"),
@@ -97,7 +98,7 @@ def test_edges(block: str, table: str) -> None:
 # --- counters (table 45) ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("suffix", COUNTERS)
+@each_of("suffix", COUNTERS)
 def test_ctu(suffix: str) -> None:
     plays("CTU" + suffix, "CU R PV", "Q CV", """
         0  1 0 2  0 1
@@ -114,7 +115,7 @@ def test_ctu(suffix: str) -> None:
     """)  # fmt: skip
 
 
-@pytest.mark.parametrize("suffix", COUNTERS)
+@each_of("suffix", COUNTERS)
 def test_ctd(suffix: str) -> None:
     plays("CTD" + suffix, "CD LD PV", "Q CV", """
         0  0 0 2  1 0
@@ -129,7 +130,7 @@ def test_ctd(suffix: str) -> None:
     """)  # fmt: skip
 
 
-@pytest.mark.parametrize("suffix", COUNTERS)
+@each_of("suffix", COUNTERS)
 def test_ctud(suffix: str) -> None:
     plays("CTUD" + suffix, "CU CD R LD PV", "QU QD CV", """
         0  0 0 0 0 2  0 1 0
@@ -146,7 +147,7 @@ def test_ctud(suffix: str) -> None:
     """)  # fmt: skip
 
 
-@pytest.mark.parametrize("suffix", COUNTERS)
+@each_of("suffix", COUNTERS)
 def test_counters_stop_at_the_limits_of_their_type(suffix: str) -> None:
     _, low, high = COUNTERS[suffix]
     plays("CTU" + suffix, "CV CU PV", "CV", f"0 {high - 1} 1 {high} {high} \n 1 - 0 - {high} \n 2 - 1 - {high}")
@@ -163,7 +164,7 @@ def test_counting_down_goes_below_zero(suffix: str) -> None:
 # --- timers (table 46) ------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("form", TIMERS)
+@each_of("form", TIMERS)
 def test_ton(form: str) -> None:
     plays(form.format("TON"), "IN PT", "Q ET", """
         0   0 30  0 0
@@ -180,7 +181,7 @@ def test_ton(form: str) -> None:
     """)  # fmt: skip
 
 
-@pytest.mark.parametrize("form", TIMERS)
+@each_of("form", TIMERS)
 def test_tof(form: str) -> None:
     plays(form.format("TOF"), "IN PT", "Q ET", """
         0   0 30  0 0
@@ -196,7 +197,7 @@ def test_tof(form: str) -> None:
     """)  # fmt: skip
 
 
-@pytest.mark.parametrize("form", TIMERS)
+@each_of("form", TIMERS)
 def test_tp(form: str) -> None:
     plays(form.format("TP"), "IN PT", "Q ET", """
         0   0 30  0 0
@@ -214,15 +215,15 @@ def test_tp(form: str) -> None:
     """)  # fmt: skip
 
 
-@pytest.mark.parametrize("form", TIMERS)
+@each_of("form", TIMERS)
 def test_the_first_call_with_in_true(form: str) -> None:
     plays(form.format("TON"), "IN PT", "Q ET", "100 1 30 0 0 \n 130 1 30 1 30")
     plays(form.format("TOF"), "IN PT", "Q ET", "100 1 30 1 0 \n 110 0 30 1 0")
     plays(form.format("TP"), "IN PT", "Q ET", "100 1 30 1 0 \n 130 1 30 0 30")
 
 
-@pytest.mark.parametrize("pt", [0, -5])
-@pytest.mark.parametrize("form", TIMERS)
+@each_of("pt", [0, -5])
+@each_of("form", TIMERS)
 def test_no_time_at_all(form: str, pt: int) -> None:
     """TON is TRUE in the call in which IN rises, TP never, TOF follows IN."""
     plays(form.format("TON"), "IN PT", "Q ET", f"0 0 {pt} 0 0 \n 1 1 {pt} 1 0 \n 2 1 {pt} 1 0 \n 3 0 {pt} 0 0")
@@ -230,7 +231,7 @@ def test_no_time_at_all(form: str, pt: int) -> None:
     plays(form.format("TOF"), "IN PT", "Q ET", f"0 1 {pt} 1 0 \n 1 0 {pt} 0 0 \n 2 0 {pt} 0 0")
 
 
-@pytest.mark.parametrize("form", TIMERS)
+@each_of("form", TIMERS)
 def test_pt_is_read_in_each_call_until_the_time_is_over(form: str) -> None:
     plays(form.format("TON"), "IN PT", "Q ET", "0 1 30 0 0 \n 20 1 15 1 15 \n 21 1 90 1 15")
     plays(form.format("TOF"), "IN PT", "Q ET", "0 1 30 1 0 \n 5 0 30 1 0 \n 20 0 10 0 10 \n 21 0 90 0 10")
@@ -253,8 +254,8 @@ def test_a_timer_that_is_not_called_does_not_move() -> None:
     assert (plc.read("Main.b.Q"), plc.read("Main.b.ET")) == (True, 30 * MS)
 
 
-@pytest.mark.parametrize("form", TIMERS)
-@pytest.mark.parametrize("kind", ["TON", "TOF", "TP"])
+@each_of("form", TIMERS)
+@each_of("kind", ["TON", "TOF", "TP"])
 def test_a_running_timer_says_when_it_will_end(kind: str, form: str) -> None:
     plc = Plc(image_of(form.format(kind)))
     plc.write("Main.b.PT", 30 * MS)
@@ -278,8 +279,8 @@ def plain(path: Path) -> str:
     return "\n".join(re.sub(r"//.*", "", line).rstrip() for line in path.read_text(encoding="utf-8").splitlines())
 
 
-@pytest.mark.parametrize("kind", ["CTU", "CTD", "CTUD"])
-@pytest.mark.parametrize("suffix", COUNTERS)
+@each_of("kind", ["CTU", "CTD", "CTUD"])
+@each_of("suffix", COUNTERS)
 def test_counters_of_all_types_are_one_text(kind: str, suffix: str) -> None:
     name, low, high = COUNTERS[suffix]
     text = plain(FOLDER / f"{kind}.st")
@@ -288,8 +289,8 @@ def test_counters_of_all_types_are_one_text(kind: str, suffix: str) -> None:
     assert plain(FOLDER / f"{kind}{suffix}.st") == text
 
 
-@pytest.mark.parametrize("kind", ["TON", "TOF", "TP"])
-@pytest.mark.parametrize("form", TIMERS)
+@each_of("kind", ["TON", "TOF", "TP"])
+@each_of("form", TIMERS)
 def test_timers_of_both_types_are_one_text(kind: str, form: str) -> None:
     name = form.format(kind)
     text = plain(FOLDER / f"{name}.st").replace(f"FUNCTION_BLOCK {name}", f"FUNCTION_BLOCK {kind}")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from datetime import date, datetime, timedelta
 from functools import cache
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_of
 
 from fbvm.code.compiler import compile_text
 from fbvm.plc import Plc
@@ -55,8 +55,8 @@ def test_a_moment_is_put_together_and_taken_apart(moment: datetime) -> None:
     assert [machine.read(f"Main.{name}2") for name in ("y", "m", "d", "h", "n", "s", "ms")] == parts
 
 
-@pytest.mark.parametrize("year", [1900, 2000, 2023, 2024])
-@pytest.mark.parametrize("month", range(1, 13))
+@each_of("year", [1900, 2000, 2023, 2024])
+@each_of("month", range(1, 13))
 def test_each_month_ends_with_its_last_day(year: int, month: int) -> None:
     following = date(year + month // 12, month % 12 + 1, 1)
     last = (following - timedelta(days=1)).day
@@ -65,7 +65,7 @@ def test_each_month_ends_with_its_last_day(year: int, month: int) -> None:
     assert trap is not None and trap.code == "R0103" and f"value {last + 1} outside 1..{last}" in trap.message
 
 
-@pytest.mark.parametrize(("day", "good"), [
+@each_of(("day", "good"), [
     (FIRST, True), (FIRST - timedelta(days=1), False), (LAST, True), (LAST + timedelta(days=1), False)])
 def test_a_date_that_64_bits_cannot_hold_stops_the_program(day: date, good: bool) -> None:
     trap = run(Y=day.year, M=day.month, D=day.day, h=12).trap

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import pytest
 from click.testing import CliRunner
+from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.check.instructions import find, flags, meaning, page
@@ -51,7 +51,7 @@ def test_everything_says_what_it_does_or_why_it_is_refused() -> None:
         assert page(row).startswith(row.mnemonic)
 
 
-@pytest.mark.parametrize(("name", "part"), [
+@each_of(("name", "part"), [
     ("mov", "flags: P_ER P_EQ P_N"), ("=", "a contact"), ("SEND", "no FINS network"), ("SFT", "takes 3 conditions"),
     ("@mov", "MOV(021)"), ("MOV(021)", "MOV(021)"), ("21", "MOV(021)"), ("@<>", "a contact")])
 def test_explain(name: str, part: str) -> None:

@@ -6,8 +6,8 @@ import re
 import tomllib
 from pathlib import Path
 
-import pytest
 from mtcp_rig import SERVER
+from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.code.compiler import compile_text
@@ -40,7 +40,7 @@ def test_each_file_holds_one_pou_and_says_what_it_is_for() -> None:
     assert {path.name: wrong for path in FILES if (wrong := wrong_with(path))} == {}
 
 
-@pytest.mark.parametrize("folder", LIBRARIES, ids=lambda path: path.name)
+@each_of("folder", LIBRARIES, ids=lambda path: path.name)
 def test_a_library_is_described(folder: Path) -> None:
     described = tomllib.loads((folder / "library.toml").read_text(encoding="utf-8"))
     assert {"title", "sheet", "globals"} <= described.keys()
@@ -48,7 +48,7 @@ def test_a_library_is_described(folder: Path) -> None:
     assert (folder / "README.md").is_file()
 
 
-@pytest.mark.parametrize("path", BLOCKS, ids=lambda path: path.stem)
+@each_of("path", BLOCKS, ids=lambda path: path.stem)
 def test_no_block_gives_a_message(path: Path) -> None:
     """Functions are checked with the blocks that use them."""
     made = compile_text(f"PROGRAM Main VAR b : {path.stem}; END_VAR b(); END_PROGRAM")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from mb_tcp_rig import ADDRESS, CYCLE_NS, Rig, image_of
+from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopNetwork
@@ -165,7 +166,7 @@ def test_the_statuses_of_a_connection() -> None:
     assert rig.statuses(client, 5) == ["7006", "7007", "7002", "7002", "7002"]
 
 
-@pytest.mark.parametrize(("pdu", "told"), [
+@each_of(("pdu", "told"), [
     ("01 0000 0001", "DR"), ("02 0000 0001", "DR"), ("03 0000 0001", "DR"), ("04 0000 0001", "DR"), ("05 0000 FF00", "NDR"),
     ("06 0000 0001", "NDR"), ("0F 0000 0001 01 01", "NDR"), ("10 0000 0001 02 0001", "NDR"),
 ])  # fmt: skip
@@ -395,7 +396,7 @@ def test_the_local_port() -> None:
     assert is_let_in(rig, 51, 1502)
 
 
-@pytest.mark.parametrize(("remote", "remote_port", "number", "own_port", "expected"), [
+@each_of(("remote", "remote_port", "number", "own_port", "expected"), [
     ("192.168.250.50", 0, 50, 0, True), ("192.168.250.50", 0, 51, 0, False), ("0.0.0.0", 5000, 50, 5000, True),
     ("0.0.0.0", 5000, 50, 5001, False), ("192.168.250.50", 5000, 50, 5000, True), ("192.168.250.51", 5000, 50, 5000, False),
 ])  # fmt: skip

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from mstr_rig import SERVER, SERVER_IP, Rig
+from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.net.faults import Fault
@@ -37,12 +38,12 @@ def changed(control: tuple[int, ...], **words: int) -> tuple[int, ...]:
 # --- what is refused before anything is sent ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("operation", [0, 5, 6, 9, 11, 12, 13, 16, 17, 22, 24, 0x7FFF, 0xFFEF, 0xFFF1, 0xFFFF])
+@each_of("operation", [0, 5, 6, 9, 11, 12, 13, 16, 17, 22, 24, 0x7FFF, 0xFFEF, 0xFFF1, 0xFFFF])
 def test_2001_operations_that_there_are_not(operation: int) -> None:
     assert refused(changed(READ, w1=operation)) == "2001"
 
 
-@pytest.mark.parametrize("control", [
+@each_of("control", [
     changed(READ, w3=0), changed(READ, w3=126), changed(READ, w3=0xFFFF), changed(WRITE, w3=0), changed(WRITE, w3=124),
     changed(BOTH, w3=0), changed(BOTH, w3=122), changed(BOTH, w10=0), changed(BOTH, w10=126), changed(LOCAL, w3=0),
     changed(LOCAL, w3=39), changed(REMOTE, w3=0), changed(REMOTE, w3=39),
@@ -71,19 +72,19 @@ def test_200f_an_answer_that_does_not_fit(control: tuple[int, ...]) -> None:
     assert refused(control, databuf="ARRAY[0..1] OF WORD", options="Old_Codes := TRUE") == "2003"
 
 
-@pytest.mark.parametrize("control", [changed(READ, w4=0), changed(WRITE, w4=0), changed(BOTH, w4=0), changed(BOTH, w11=0),
-                                     changed(LOCAL, w3=1, w4=38), changed(REMOTE, w3=1, w4=0xFFFF)])  # fmt: skip
+@each_of("control", [changed(READ, w4=0), changed(WRITE, w4=0), changed(BOTH, w4=0), changed(BOTH, w11=0),
+                     changed(LOCAL, w3=1, w4=38), changed(REMOTE, w3=1, w4=0xFFFF)])  # fmt: skip
 def test_2004_offsets(control: tuple[int, ...]) -> None:
     assert refused(control) == "2004"
 
 
-@pytest.mark.parametrize("control", [changed(READ, w4=65535), changed(WRITE, w4=65535), changed(BOTH, w4=65535),
-                                     changed(BOTH, w11=65535), changed(LOCAL, w4=1), changed(REMOTE, w3=2, w4=37)])  # fmt: skip
+@each_of("control", [changed(READ, w4=65535), changed(WRITE, w4=65535), changed(BOTH, w4=65535),
+                     changed(BOTH, w11=65535), changed(LOCAL, w4=1), changed(REMOTE, w3=2, w4=37)])  # fmt: skip
 def test_2005_length_and_offset_together(control: tuple[int, ...]) -> None:
     assert refused(control) == "2005"
 
 
-@pytest.mark.parametrize("control", [READ, WRITE, BOTH, REMOTE, CLEAR])
+@each_of("control", [READ, WRITE, BOTH, REMOTE, CLEAR])
 def test_2009_the_module_itself(control: tuple[int, ...]) -> None:
     assert refused(changed(control, w9=22)) == "2009"
 
@@ -111,13 +112,13 @@ def test_2010_of_one_word_is_told_by_error_alone() -> None:
     assert rig.outputs() == "E"
 
 
-@pytest.mark.parametrize("octet", range(6, 10))
+@each_of("octet", range(6, 10))
 def test_2011_octets_above_255_assumed(octet: int) -> None:
     assert refused(changed(READ, **{f"w{octet}": 256})) == "2011"
 
 
-@pytest.mark.parametrize("slot", [0, 6, 8, 16, 17, 100, 253, 254, 255])
-@pytest.mark.parametrize("control", [READ, LOCAL, (4, 0, 0, 0, 0), (10, 0, 0, 0, 0), (0xFFF0, 0, 1, 1, 0, 0, 0, 0, 0)])
+@each_of("slot", [0, 6, 8, 16, 17, 100, 253, 254, 255])
+@each_of("control", [READ, LOCAL, (4, 0, 0, 0, 0), (10, 0, 0, 0, 0), (0xFFF0, 0, 1, 1, 0, 0, 0, 0, 0)])
 def test_6007_slots_without_a_module(slot: int, control: tuple[int, ...]) -> None:
     assert refused(changed(control, w5=slot << 8)) == "6007"
 
@@ -128,8 +129,8 @@ def test_other_slots_with_a_module(slot: int) -> None:
     assert rig.operate(*changed(READ, w5=slot << 8)) == "0000"
 
 
-@pytest.mark.parametrize("control", [READ, LOCAL, REMOTE, (4, 0, 0, 0, 0x0700), (10, 0, 0, 0, 0x0700),
-                                     (0xFFF0, 0, 1, 1, 0x0700, 0, 0, 0, 0)])  # fmt: skip
+@each_of("control", [READ, LOCAL, REMOTE, (4, 0, 0, 0, 0x0700), (10, 0, 0, 0, 0x0700),
+                     (0xFFF0, 0, 1, 1, 0x0700, 0, 0, 0, 0)])  # fmt: skip
 def test_f002_a_module_without_configuration_assumed(control: tuple[int, ...]) -> None:
     noc = Noc()
     noc.configured = False
@@ -247,7 +248,7 @@ def test_a_cold_start_and_an_operation_that_had_ended_are_no_1002() -> None:
     assert rig.outputs() == ""
 
 
-@pytest.mark.parametrize("word", [1, 3, 4, 5, 6, 7, 8, 9, 10, 11])
+@each_of("word", [1, 3, 4, 5, 6, 7, 8, 9, 10, 11])
 def test_2002_control_changed_while_the_operation_runs(word: int) -> None:
     rig = Rig(ScriptedPeer([]))
     rig.control(*BOTH)
@@ -272,8 +273,8 @@ def test_words_that_the_operation_does_not_have_may_change_and_so_may_the_result
 # --- what the server says -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("exception", [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 255])
-@pytest.mark.parametrize(("control", "function"), [(READ, 3), (WRITE, 16), (BOTH, 23), (REMOTE, 8), (CLEAR, 8)])
+@each_of("exception", [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 11, 255])
+@each_of(("control", "function"), [(READ, 3), (WRITE, 16), (BOTH, 23), (REMOTE, 8), (CLEAR, 8)])
 def test_30ss_exceptions(exception: int, control: tuple[int, ...], function: int) -> None:
     """3000, the general failure, is an exception with code 0."""
     rig = Rig(ModbusPeer(ModbusServer(refusals={function: exception}, functions=(3, 8, 16, 23))))
@@ -330,7 +331,7 @@ WRONG_ANSWERS: list[tuple[tuple[int, ...], Callable[[bytes], bytes]]] = [
 ]
 
 
-@pytest.mark.parametrize("number", range(len(WRONG_ANSWERS)))
+@each_of("number", range(len(WRONG_ANSWERS)))
 def test_4001_answers_that_are_inconsistent(number: int) -> None:
     control, change = WRONG_ANSWERS[number]
     rig = Rig(_pdu(change))
@@ -339,7 +340,7 @@ def test_4001_answers_that_are_inconsistent(number: int) -> None:
     assert rig.databuf(1) == [0xEEEE]
 
 
-@pytest.mark.parametrize("header", ["0000 0001 0005", "0000 0000 0001", "0000 0000 00FF", "0000 0000 FFFF"])
+@each_of("header", ["0000 0001 0005", "0000 0000 0001", "0000 0000 00FF", "0000 0000 FFFF"])
 def test_4001_a_stream_that_is_out_of_step(header: str) -> None:
     """The connection is left; the next operation has a new one."""
     replies = [bytes.fromhex(header) + bytes(20)]
@@ -355,7 +356,7 @@ def test_503d_refused() -> None:
     assert Rig(refused=True).operate(*READ) == "503D"
 
 
-@pytest.mark.parametrize(("errno", "number"), [(name, number) for name, number in noc_map.ERRNO.items()])
+@each_of(("errno", "number"), [(name, number) for name, number in noc_map.ERRNO.items()])
 def test_50xx_an_open_that_fails(errno: str, number: int) -> None:
     rig = Rig()
     rig.network.faults.append(Fault(error=errno))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from mstr_rig import SERVER_IP, Rig
+from rows import each_of
 
 from fbvm.net.peers import Leave, ModbusPeer, Say
 from fbvm.units import noc_map
@@ -24,7 +25,7 @@ def sheet_rig() -> tuple[Rig, ModbusPeer]:
     return rig, peer
 
 
-@pytest.mark.parametrize(("control", "sent", "replied"), [
+@each_of(("control", "sent", "replied"), [
     # read from %MW1 and from %MW49
     ((READ, 0, 1, 1, 0x0700), "00 01 00 00 00 06 00 03 00 00 00 01", [0]),
     ((READ, 0, 3, 49, 0x0700), "00 01 00 00 00 06 00 03 00 30 00 03", [48, 49, 50]),
@@ -77,7 +78,7 @@ def test_it_writes_before_it_reads() -> None:
 # --- lengths and registers at their limits ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("control", "length"), [
+@each_of(("control", "length"), [
     ((WRITE, 0, 123, 65414, 0x07FE), 259),
     ((READ, 0, 125, 65412, 0x07FF), 12),
     ((READ_WRITE, 0, 121, 65416, 0x0701), 259),
@@ -101,7 +102,7 @@ def test_the_longest_and_the_last(control: tuple[int, ...], length: int) -> None
         assert list(last[control[3] - 1 : control[3] - 1 + control[2]]) == words[: control[2]]
 
 
-@pytest.mark.parametrize("unit", [0, 1, 247, 254, 255])
+@each_of("unit", [0, 1, 247, 254, 255])
 def test_the_unit_identifier_is_the_low_byte_of_the_routing_register(unit: int) -> None:
     rig = Rig()
     assert rig.operate(READ, 0, 1, 1, 0x0700 | unit, *SERVER_IP) == "0000"
@@ -201,7 +202,7 @@ def test_local_statistics_end_in_the_same_scan_and_send_nothing() -> None:
     assert rig.peer.heard == []
 
 
-@pytest.mark.parametrize(("length", "first"), [(1, 0), (3, 0), (2, 36), (1, 37), (32, 4), (38, 0)])
+@each_of(("length", "first"), [(1, 0), (3, 0), (2, 36), (1, 37), (32, 4), (38, 0)])
 def test_a_part_of_the_table(length: int, first: int) -> None:
     rig = Rig()
     for number in range(4, 36):
@@ -310,7 +311,7 @@ def test_each_module_has_its_own_2_s() -> None:
     assert rig.module(noc_map.SERVICES, 9) == 0
 
 
-@pytest.mark.parametrize(("configured", "wanted", "expected"), [
+@each_of(("configured", "wanted", "expected"), [
     (FTP, BOTH, "5069"), (FTP, HTTP, "5069"), (FTP, 0, "0000"), (FTP, FTP, "4001"), (0, FTP, "5069"), (0, 0, "4001"),
     (HTTP, 0, "0000"), (HTTP, BOTH, "5069"),
 ])  # fmt: skip
@@ -327,7 +328,7 @@ def test_any_action_is_refused_by_the_letter(wanted: int) -> None:
     assert services(rig, wanted) == "5069"
 
 
-@pytest.mark.parametrize("wrong", [
+@each_of("wrong", [
     (0xFFF0, 0, 0, 1, 0x0700, 0, 0, 0, 0), (0xFFF0, 0, 1, 0, 0x0700, 0, 0, 0, 0), (0xFFF0, 0, 2, 1, 0x0700, 0, 0, 0, 0),
     (0xFFF0, 0, 1, 1, 0x0700, 4, 0, 0, 0), (0xFFF0, 0, 1, 1, 0x0700, 0x8000, 0, 0, 0),
     (0xFFF0, 0, 1, 1, 0x0700, 0, 1, 0, 0), (0xFFF0, 0, 1, 1, 0x0700, 0, 0, 1, 0), (0xFFF0, 0, 1, 1, 0x0700, 0, 0, 0, 1),

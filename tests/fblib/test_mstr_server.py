@@ -9,6 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mstr_rig import CYCLE_NS, SERVER_IP, Rig, image_of
+from rows import each_of
 from stream_client import Client
 
 from fbvm.base.areas import AREAS
@@ -64,7 +65,7 @@ def test_registers_are_mw() -> None:
     assert station.plc.read("%MW0..%MW6") == [0, 0x1234, 0xBEEF, 1, 0x8000, 0x7777, 0]
 
 
-@pytest.mark.parametrize("unit", [0, 1, 6, 254])
+@each_of("unit", [0, 1, 6, 254])
 def test_units_0_to_254_are_the_cpu(unit: int) -> None:
     client = Station().client().connect()
     assert client.ask("03 0000 0001", unit) == "03 02 00 00"
@@ -87,7 +88,7 @@ REFUSED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("request_pdu", REFUSED)
+@each_of("request_pdu", REFUSED)
 def test_what_is_refused_changes_nothing(request_pdu: str) -> None:
     station = Station()
     client = station.client().connect()
@@ -100,8 +101,8 @@ def test_what_is_refused_changes_nothing(request_pdu: str) -> None:
     assert client.ask("03 0000 0001") == "03 02 1B 59"
 
 
-@pytest.mark.parametrize("pdu", ["03 7FFE 0001", "06 7FFE 0001", "10 7F84 007B F6" + 123 * "0001", "03 7F82 007D",
-                                 "17 7F82 007D 7F86 0079 F2" + 121 * "0001"])  # fmt: skip
+@each_of("pdu", ["03 7FFE 0001", "06 7FFE 0001", "10 7F84 007B F6" + 123 * "0001", "03 7F82 007D",
+                 "17 7F82 007D 7F86 0079 F2" + 121 * "0001"])  # fmt: skip
 def test_the_last_registers(pdu: str) -> None:
     client = Station().client().connect()
     assert client.ask(pdu)[0] != "8"
@@ -192,7 +193,7 @@ def test_a_client_that_asks_nothing_is_left() -> None:
     assert client.connect().ask("03 0000 0001") == "03 02 00 00"
 
 
-@pytest.mark.parametrize("trash", ["0001 0000 0001", "0001 0000 0000 00 03", "0001 0000 00FF", "0001 0000 FFFF", 300 * "FF"])
+@each_of("trash", ["0001 0000 0001", "0001 0000 0000 00 03", "0001 0000 00FF", "0001 0000 FFFF", 300 * "FF"])
 def test_a_stream_that_is_out_of_step_is_left(trash: str) -> None:
     client = Station().client().connect()
     client.submit(Send(1, bytes.fromhex(trash)))

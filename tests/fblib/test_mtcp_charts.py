@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from mtcp_rig import Rig
+from rows import each_of
 
 BLOCKS = [
     "Fn01(Coil_Address := 0, Coil_Qty := 19, RespData_DM := 200)",
@@ -39,7 +40,7 @@ def test_exact(block: str) -> None:
     )
 
 
-@pytest.mark.parametrize("block", BLOCKS)
+@each_of("block", BLOCKS)
 def test_real(block: str) -> None:
     """Switches and flags are out of step: the reply waits before the Sending flag has fallen."""
     rig = Rig(rd=block, timing="real", seed=1).connect()

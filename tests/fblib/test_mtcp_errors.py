@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import pytest
 from mtcp_rig import SERVER, Rig, answering, saying
+from rows import each_of
 
 from fbvm.net.peers import Action, Fin, Leave, Reset, Say, ScriptedPeer, Station
 from fbvm.units.etn21_dispatch import Fault as UnitFault
@@ -39,7 +40,7 @@ def next_command_is_good(rig: Rig) -> None:
 # --- the server ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("exception", range(1, 12))
+@each_of("exception", range(1, 12))
 def test_an_exception_is_passed_through(exception: int) -> None:
     rig = read_fails(saying(lambda frame: frame[:4] + bytes((0, 3, 255, 0x83, exception))), f"{exception:04X}")
     assert rig.result("rd")[0] == 1, "it was a reply"
@@ -100,7 +101,7 @@ def test_a_wrong_echo_is_no_answer(block: str, echo: int) -> None:
     assert rig.result("rd") == (0, "0080")
 
 
-@pytest.mark.parametrize(
+@each_of(
     "wrong",
     [
         lambda frame: frame[:2] + b"\x00\x01" + frame[4:],
@@ -178,8 +179,8 @@ def test_half_a_reply_and_nothing_more(size: int) -> None:
 # --- the connection ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("size", [0, 3, 6, 8, 14])
-@pytest.mark.parametrize(("end", "expected"), [(Fin(), "0081"), (Leave(), "0081"), (Reset(), "004B")])
+@each_of("size", [0, 3, 6, 8, 14])
+@each_of(("end", "expected"), [(Fin(), "0081"), (Leave(), "0081"), (Reset(), "004B")])
 def test_the_server_closes_in_mid_reply(size: int, end: Action, expected: str) -> None:
     rig = read_fails(answering(lambda frame: [Say(frame[:size]), end] if size else [end]), expected, max_s=1)
     next_command_is_good(rig)
@@ -203,8 +204,8 @@ def test_the_server_closed_between_two_commands() -> None:
     next_command_is_good(rig)
 
 
-@pytest.mark.parametrize("wired", [True, False])
-@pytest.mark.parametrize("after", range(1, 10))
+@each_of("wired", [True, False])
+@each_of("after", range(1, 10))
 def test_connect_falls_in_mid_request(after: int, wired: bool) -> None:
     """With EN from ENO the block finds out when EN returns, else at once.  The exchange takes seven scans."""
     rig = Rig(answering(lambda frame: [Say(frame, 30_000_000)]), rd=READ, wired=wired).connect()
@@ -254,7 +255,7 @@ TOO_MUCH |= {
 """Data in the words in which the exchange takes place, or where the unit keeps its parameters, would be wrong data."""
 
 
-@pytest.mark.parametrize("block", TOO_MUCH)
+@each_of("block", TOO_MUCH)
 def test_what_cannot_be_sent_fails_at_once(block: str) -> None:
     rig = Rig(rd=block).connect()
     words = list(rig.plc.memory.words("D"))
@@ -280,7 +281,7 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize("block", REFUSED)
+@each_of("block", REFUSED)
 def test_what_can_be_sent_is_left_to_the_server(block: str) -> None:
     rig = Rig(rd=block).connect()
     rig.command("rd")
@@ -294,7 +295,7 @@ def test_the_longest_request_that_fits_a_frame() -> None:
     assert rig.words(32630, 1) == [0]
 
 
-@pytest.mark.parametrize(
+@each_of(
     "block",
     [
         "Fn03(Register_Address := 1000, Register_Qty := 8, RespData_DM := 29992)",
@@ -356,8 +357,8 @@ def test_error_and_code_hold_until_the_next_command() -> None:
 UNIT_CODES = ["0302", "1100", "1103", "220F", "2211", "2606", "2607", "0020", "003E", "0045", "004E", "0051", "0053"]
 
 
-@pytest.mark.parametrize("service", [Switch.SEND, Switch.RECEIVE])
-@pytest.mark.parametrize("expected", UNIT_CODES)
+@each_of("service", [Switch.SEND, Switch.RECEIVE])
+@each_of("expected", UNIT_CODES)
 def test_a_code_of_the_unit_is_passed_through(service: Switch, expected: str) -> None:
     """A request that was refused leaves the connection as it was; errors of the stack open it anew."""
     rig = Rig(rd=READ).connect()
@@ -369,8 +370,8 @@ def test_a_code_of_the_unit_is_passed_through(service: Switch, expected: str) ->
     next_command_is_good(rig)
 
 
-@pytest.mark.parametrize("word", [0, 2, 9, 0x0101, 0xFFFF])
-@pytest.mark.parametrize("after", [0, 1, 2, 3, 4])
+@each_of("word", [0, 2, 9, 0x0101, 0xFFFF])
+@each_of("after", [0, 1, 2, 3, 4])
 def test_somebody_overwrites_the_parameter_area(word: int, after: int) -> None:
     """All of it, at any time: a command may fail, the next ones do not."""
     rig = Rig(rd=READ).connect()

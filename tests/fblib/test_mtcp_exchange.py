@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
 from mtcp_rig import Rig, answering
+from rows import each_of
 
 from fbvm.net.peers import Fin, Say, ScriptedPeer
 
@@ -141,7 +141,7 @@ def adu(transaction: int, pdu: str) -> str:
     return f"{transaction:04X} 0000 {size:04X} FF".replace(" ", "") + pdu.replace(" ", "")
 
 
-@pytest.mark.parametrize(("block", "request_pdu", "reply_pdu"), EXAMPLES)
+@each_of(("block", "request_pdu", "reply_pdu"), EXAMPLES)
 def test_the_examples_of_the_sheet(block: str, request_pdu: str, reply_pdu: str) -> None:
     """The address of the 0F example is 0014: with the sheet's 0013 its bytes do not give its table."""
     rig = Rig(rd=block).connect()
@@ -196,7 +196,7 @@ def test_transaction_numbers_differ() -> None:
     assert len(set(numbers)) == 4
 
 
-@pytest.mark.parametrize(("slave", "sent"), [(0, 0xFF), (1, 1), (247, 247), (255, 255)])
+@each_of(("slave", "sent"), [(0, 0xFF), (1, 1), (247, 247), (255, 255)])
 def test_the_slave_id(slave: int, sent: int) -> None:
     rig = Rig(rd=READ.replace(")", f", SlaveID := {slave})")).connect()
     rig.command("rd")

@@ -7,6 +7,7 @@ from array import array
 
 import pytest
 from mtcp_rig import Rig
+from rows import each_of
 
 BITS = [1, 7, 8, 9, 15, 16, 17, 19, 255, 256, 1000, 1968]
 REGISTERS = [1, 2, 3, 64, 122, 123]
@@ -30,8 +31,8 @@ def words_of(bits: bytes) -> list[int]:
     return [number >> 16 * place & 0xFFFF for place in range((len(bits) + 15) // 16)]
 
 
-@pytest.mark.parametrize("quantity", [*BITS, 2000])
-@pytest.mark.parametrize("code", ["01", "02"])
+@each_of("quantity", [*BITS, 2000])
+@each_of("code", ["01", "02"])
 def test_bits_read(code: str, quantity: int) -> None:
     rig = filled(quantity, rd=f"Fn{code}(Coil_Address := 321, Coil_Qty := {quantity}, RespData_DM := 5000)")
     table = rig.server.coils if code == "01" else rig.server.discrete_inputs
@@ -43,8 +44,8 @@ def test_bits_read(code: str, quantity: int) -> None:
     assert rig.all_words() == expected
 
 
-@pytest.mark.parametrize("quantity", [*REGISTERS, 125])
-@pytest.mark.parametrize("code", ["03", "04"])
+@each_of("quantity", [*REGISTERS, 125])
+@each_of("code", ["03", "04"])
 def test_registers_read(code: str, quantity: int) -> None:
     rig = filled(quantity, rd=f"Fn{code}(Register_Address := 321, Register_Qty := {quantity}, RespData_DM := 5000)")
     table = rig.server.holding_registers if code == "03" else rig.server.input_registers

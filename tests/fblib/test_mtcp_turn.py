@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from mtcp_rig import CONNECT, Rig, answering
+from rows import each_of
 
 from fbvm.net.faults import Fault
 from fbvm.net.peers import Say, ScriptedPeer
@@ -89,7 +90,7 @@ def test_nobody_is_overtaken() -> None:
     assert max(served) - min(served) <= 1
 
 
-@pytest.mark.parametrize("after", range(1, 10))
+@each_of("after", range(1, 10))
 def test_a_block_that_is_no_longer_executed_loses_its_turn(after: int) -> None:
     """EN of the first falls: the second is served; when EN returns, the first one's command has ended with 0081."""
     rig = two(segment_bytes=7)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from mtcp_rig import SERVER, Rig
+from rows import each_of
 
 from fbvm.units.etn21_dispatch import Fault
 from fbvm.units.etn21_map import Switch
@@ -148,8 +149,8 @@ def test_a_fault_of_the_unit_while_connecting(switch: Switch, code: int, timing:
     assert rig.result("rd") == (1, "")
 
 
-@pytest.mark.parametrize("switch", [Switch.SEND, Switch.RECEIVE])
-@pytest.mark.parametrize("code", [0x0302, 0x2211])
+@each_of("switch", [Switch.SEND, Switch.RECEIVE])
+@each_of("code", [0x0302, 0x2211])
 def test_a_script_of_faults_hits_one_request_each(code: int, switch: Switch) -> None:
     rig = Rig(rd=READ).connect()
     rig.server.holding_registers[1000] = 7

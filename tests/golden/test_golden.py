@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-import pytest
+from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.syntax.outline import dump
@@ -22,14 +22,14 @@ def check_golden(path: Path, actual: str) -> None:
     assert actual == path.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("path", sorted((HERE / "syntax").glob("*.st")), ids=lambda p: p.stem)
+@each_of("path", sorted((HERE / "syntax").glob("*.st")), ids=lambda p: p.stem)
 def test_tree_of_a_good_source(path: Path) -> None:
     tree, diagnostics = parse(Source(path.name, path.read_text(encoding="utf-8")))
     assert [d.render() for d in diagnostics if d.severity == "error"] == []
     check_golden(path.with_suffix(".tree"), dump(tree))
 
 
-@pytest.mark.parametrize("path", sorted((HERE / "errors").glob("*.st")), ids=lambda p: p.stem)
+@each_of("path", sorted((HERE / "errors").glob("*.st")), ids=lambda p: p.stem)
 def test_messages_of_a_wrong_source(path: Path) -> None:
     tree, diagnostics = parse(Source(path.name, path.read_text(encoding="utf-8")))
     assert diagnostics and tree.end == path.stat().st_size - sum(len(c.encode()) - 1 for c in path.read_text("utf-8"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import pytest
+from rows import each_of
 from test_folding import BITS, INTEGERS, as_variables, edges, literals
 
 WIDTHS = {**INTEGERS, **BITS, "BOOL": 1}
@@ -50,8 +51,8 @@ def test_operators(kind: str) -> None:
         assert as_variables(f"a : {kind}; b : {kind}; r : {kind};", f"a {operator} b", rows) == want, operator
 
 
-@pytest.mark.parametrize("source", [*INTEGERS, *BITS])
-@pytest.mark.parametrize("target", [*INTEGERS, *BITS])
+@each_of("source", [*INTEGERS, *BITS])
+@each_of("target", [*INTEGERS, *BITS])
 def test_conversions(source: str, target: str) -> None:
     rows = [{"a": a} for a in literals(source)]
     function = f"{source}_TO_{target}" if source != target else f"TO_{target}"

@@ -1,17 +1,33 @@
-"""Every program of the corpus does what its comments say, on every build of every engine, with the same memory."""
+"""Every program of the corpus does what its comments say; in the long run on every build of every engine, with the same
+memory (those of machine code are in tests/property/test_engines_agree.py)."""
 
 from __future__ import annotations
 
+from functools import partial
+from itertools import groupby
+
 import pytest
-from lang_check import check
+from lang_check import BUILDS, REFERENCE, check
 from lang_corpus import Program, programs
+from rows import go_through
 
 from fbvm.base.codes import CODES
+from fbvm.engine import native
+
+each_file = pytest.mark.parametrize(
+    "file", [pytest.param(list(inside), id=name) for name, inside in groupby(programs(), lambda p: p.name)])
 
 
-@pytest.mark.parametrize("program", [pytest.param(p, id=f"{p.name}:{p.line}") for p in programs()])
-def test_program(program: Program) -> None:
-    check(program)
+@each_file
+def test_programs(file: list[Program]) -> None:
+    go_through((f"{p.name}:{p.line} {p.title}", partial(check, p, REFERENCE)) for p in file)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(native.available(), reason="machine code is compared with both of these, too")
+@each_file
+def test_programs_on_both_builds_of_python(file: list[Program]) -> None:
+    go_through((f"{p.name}:{p.line} {p.title}", partial(check, p, BUILDS)) for p in file if p.runs)
 
 
 ELSEWHERE = {"S0107", *(code for code in CODES if code.startswith(("P", "X")))}

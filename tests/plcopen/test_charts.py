@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from drawings import RAIL, block, codes, contact, imported, pou, states, value, variable, wires
+from rows import each_of
 
 from fbvm.plcopen.importing import Imported
 
@@ -99,8 +100,8 @@ def test_conditions_that_are_drawn_with_contacts_and_blocks() -> None:
     assert states(made, "x", ["", "go=1", "", "", ""]) == ["0", "0", "0", "1", "1"]
 
 
-@pytest.mark.parametrize("body", ["go AND NOT stop", ":= go AND NOT stop;", "leave := go AND NOT stop;",
-                                  "IF stop THEN leave := FALSE; ELSE leave := go; END_IF;"])
+@each_of("body", ["go AND NOT stop", ":= go AND NOT stop;", "leave := go AND NOT stop;",
+                  "IF stop THEN leave := FALSE; ELSE leave := go; END_IF;"])
 def test_a_transition_by_its_name(body: str) -> None:
     named = f'<transitions><transition name="leave"><body><ST><xhtml:p>{body}</xhtml:p></ST></body></transition></transitions>'
     made = chart(step(1, "s", first=True), transition(2, "1", does("leave")), step(3, "e", "2"), actions(4, "3", does("x")),
@@ -119,7 +120,7 @@ def test_actions_with_bodies_qualifiers_and_times() -> None:
     assert states(made, "n m x", ["", "", "", ""]) == ["1 10 0", "1 20 0", "1 30 1", "1 40 1"]
 
 
-@pytest.mark.parametrize(("part", "says"), [
+@each_of(("part", "says"), [
     ('<macroStep localId="7" name="m"/>', "macro step"),
     (transition(7, "1", inline("TRUE")), "no step stands below"),
     (transition(7, "1", "") + jump(8, "7", "nowhere"), "no step nowhere"),

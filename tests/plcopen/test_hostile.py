@@ -10,6 +10,7 @@ import pytest
 from drawings import RAIL, block, coil, contact, imported, pou, result, value
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic
 from fbvm.plcopen.importing import Imported, import_xml
@@ -35,7 +36,7 @@ def test_a_document_type_is_refused_before_anything_is_expanded_or_fetched(data:
     assert "<!DOCTYPE" in found.source.line(found.line)
 
 
-@pytest.mark.parametrize(("data", "code", "says"), [
+@each_of(("data", "code", "says"), [
     (b"", "X0101", "no element found"),
     (b"PROGRAM Main END_PROGRAM", "X0101", "syntax error"),
     (b"<project><types>", "X0101", "no element found"),
@@ -85,7 +86,7 @@ def test_a_folder_and_a_missing_file_are_messages(tmp_path: Path) -> None:
         assert [d.code for d in import_xml(path).diagnostics] == ["X0101"]
 
 
-@pytest.mark.parametrize(("data", "says"), [
+@each_of(("data", "says"), [
     (b"<a>\xff\xfe</a>", "names no encoding, and so is UTF-8, and is none at byte 3"),
     (b'<?xml version="1.0" encoding="utf-16"?><a/>', "says that it is UTF-16"),
     (b'<?xml version="1.0" encoding="utf-7"?><a/>', "written in utf-7, which is not read"),
@@ -98,7 +99,7 @@ def test_a_wrong_encoding_is_named(data: bytes, says: str) -> None:
     assert says in found.message
 
 
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "latin-1", "cp1252"])
+@each_of("encoding", ["utf-8-sig", "utf-16", "latin-1", "cp1252"])
 def test_encodings_that_tools_write_are_read(encoding: str) -> None:
     name = {"latin-1": "iso-8859-1", "cp1252": "windows-1252"}.get(encoding)
     declared = f'<?xml version="1.0" encoding="{name}"?>' if name else ""

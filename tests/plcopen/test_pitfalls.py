@@ -18,6 +18,7 @@ from drawings import (
     variable,
     wires,
 )
+from rows import each_of
 
 from fbvm.plcopen.importing import import_xml
 
@@ -126,8 +127,8 @@ def test_an_output_that_there_is_not_is_an_error() -> None:
     assert "its outputs are OUT" in made.errors[0].hint
 
 
-@pytest.mark.parametrize("holder", ['<xhtml:p><![CDATA[{}]]></xhtml:p>', '<xhtml xmlns="http://www.w3.org/1999/xhtml">{}</xhtml>',
-                                    "<![CDATA[{}]]>", "<xhtml:p>{}</xhtml:p>"])
+@each_of("holder", ['<xhtml:p><![CDATA[{}]]></xhtml:p>', '<xhtml xmlns="http://www.w3.org/1999/xhtml">{}</xhtml>',
+                    "<![CDATA[{}]]>", "<xhtml:p>{}</xhtml:p>"])
 def test_structured_text_is_found_in_all_its_wrappings_with_its_blanks(holder: str) -> None:
     body = "\n  (* one\n     two *)\n  x := a;\n"
     made = imported(pou(holder.format(body), "a x", language="ST"))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
 from drawings import document, pou
+from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.plcopen.exporting import export_xml
@@ -11,7 +11,7 @@ from fbvm.plcopen.importing import import_xml
 from fbvm.plcopen.read_types import duration
 
 
-@pytest.mark.parametrize(("written", "meant"), [
+@each_of(("written", "meant"), [
     ("T#20ms", "T#20ms"), ("TIME#1s", "TIME#1s"), ("t#1.5s", "t#1.5s"), ("PT0.02S", "T#20ms"), ("PT1M30S", "T#1m30s"),
     ("P1DT2H", "T#1d2h"), ("PT0.000250S", "T#250us"), ("20ms", "T#20ms"), ("1h30m", "T#1h30m"), ("Interval", ""), ("", ""),
     ("P", ""), ("20", ""), (f"PT{'9' * 400}S", ""), (f"P{'9' * 5000}D", ""),
@@ -20,7 +20,7 @@ def test_intervals_in_all_their_spellings(written: str, meant: str) -> None:
     assert duration(written) == meant
 
 
-@pytest.mark.parametrize(("element", "text"), [
+@each_of(("element", "text"), [
     ("<BOOL/>", "BOOL"), ("<bool/>", "BOOL"), ("<string/>", "STRING"), ('<string length="20"/>', "STRING[20]"),
     ('<wstring length="4"/>', "WSTRING[4]"), ('<derived name="TON"/>', "TON"),
     ("<pointer><baseType><INT/></baseType></pointer>", "POINTER TO INT"),
@@ -35,7 +35,7 @@ def test_types(element: str, text: str) -> None:
     assert f"v : {text};" in " ".join(made.files["Main.st"].split())
 
 
-@pytest.mark.parametrize("wrong", ["<type/>", "<type><complex/></type>", '<type><derived name="a b"/></type>', ""])
+@each_of("wrong", ["<type/>", "<type><complex/></type>", '<type><derived name="a b"/></type>', ""])
 def test_a_variable_without_a_type_that_can_be_said_is_named(wrong: str) -> None:
     made = import_xml(document(pou("", f'<variable name="v">{wrong}</variable>', language="ST")))
     assert [d.code for d in made.errors] == ["X0105"]

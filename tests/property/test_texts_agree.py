@@ -10,6 +10,7 @@ import hand_image
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from rows import each_of
 
 from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import Undefined, single
@@ -85,7 +86,7 @@ def edited(seed: str, edits: list[tuple[int, int, str]]) -> bytes:
     return seed.encode("latin-1")
 
 
-@pytest.mark.parametrize("data_type", TYPES)
+@each_of("data_type", TYPES)
 def test_every_seed_is_read(data_type: str) -> None:
     seen = {seed: read(data_type, seed.encode()) for seed in SEEDS}
     assert seen == {seed: wanted(data_type, seed.encode()) for seed in SEEDS}

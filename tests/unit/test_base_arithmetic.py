@@ -6,6 +6,7 @@ import math
 import struct
 
 import pytest
+from rows import each_of
 
 from fbvm.base import arithmetic, strings
 from fbvm.base.arithmetic import NAN, Undefined
@@ -16,7 +17,7 @@ def test_nan_is_the_canonical_one() -> None:
     assert struct.pack("<f", NAN).hex() == "0000c07f"
 
 
-@pytest.mark.parametrize(("machine", "low", "high"),
+@each_of(("machine", "low", "high"),
  [("b", 0, 1), ("i8", -128, 127), ("u64", 0, 2**64 - 1), ("ref", 0, 2**64 - 1)])
 def test_limits(machine: str, low: int, high: int) -> None:
     assert arithmetic.limits(machine) == (low, high)
@@ -24,7 +25,7 @@ def test_limits(machine: str, low: int, high: int) -> None:
     assert arithmetic.wrap(low - 1, machine) == high
 
 
-@pytest.mark.parametrize(("value", "rounded"), [
+@each_of(("value", "rounded"), [
     (2**24 + 1, 2.0**24), (2**24 + 3, 2.0**24 + 4), (2**53 + 2**29 + 1, 2.0**53 + 2**30), (2**53 + 2**29, 2.0**53),
     (-(2**53) - 2**29 - 1, -(2.0**53) - 2**30), (2**64 - 1, 2.0**64), (0, 0.0), (2**63 - 1, 2.0**63),
 ])
@@ -38,7 +39,7 @@ def test_single_overflows_to_infinity_and_keeps_small_numbers() -> None:
     assert arithmetic.single(1e-45) == 2.0**-149
 
 
-@pytest.mark.parametrize(("call", "code", "values"), [
+@each_of(("call", "code", "values"), [
     (lambda: arithmetic.quotient(5, 0), "R0101", (5, 0)),
     (lambda: arithmetic.remainder(5, 0), "R0101", (5, 0)),
     (lambda: arithmetic.nearest(1e9, "i16"), "R0105", (1e9, -32768, 32767)),

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from rows import each_of
 
 from fbvm.base.codes import CODES
 from fbvm.cli.demo import called
@@ -337,7 +338,7 @@ def test_explain_prints_the_page() -> None:
 # --- the command itself -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@each_of("verb", VERBS)
 def test_every_verb_has_help(verb: str) -> None:
     result = fbvm(verb, "--help")
     assert result.exit_code == 0
@@ -353,7 +354,7 @@ def test_an_unknown_verb_is_wrong_usage() -> None:
     assert fbvm("fly").exit_code == 2
 
 
-@pytest.mark.parametrize(("text", "names"), [
+@each_of(("text", "names"), [
     ("Main.a,D5", ["Main.a", "D5"]), ("a[1,2], b", ["a[1,2]", "b"]), ("", []), (",x,", ["x"]),
 ])  # fmt: skip
 def test_names_are_parted_outside_brackets(text: str, names: list[str]) -> None:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import pytest
 from click.testing import CliRunner
+from rows import each_of
 
 from fbvm.cli.map import command
 
@@ -47,6 +47,6 @@ def test_without_an_address_the_ends_of_all_tables() -> None:
     assert ["CIO 5800", "input register", "04", "5800", "16A8", "5801", "35801", "305801"] in lines
 
 
-@pytest.mark.parametrize("text", ["X5", "D5..CIO 7", "D5..D7.01", "D9..D7", "D40000", "D1.."])
+@each_of("text", ["X5", "D5..CIO 7", "D5..D7.01", "D9..D7", "D40000", "D1.."])
 def test_what_is_no_range(text: str) -> None:
     assert CliRunner().invoke(command, [text]).exit_code == 2

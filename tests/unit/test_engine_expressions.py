@@ -6,8 +6,8 @@ import math
 import struct
 from typing import Any
 
-import pytest
 from hand_image import at, behind, const, execute, load, operations_in, store, yields
+from rows import each_of
 
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.base.arithmetic import INF, NAN
@@ -148,7 +148,7 @@ def sited(name: str) -> tuple[int, ...]:
     return (7,) if "site" in EXPRESSIONS[name].operands.split() else ()
 
 
-@pytest.mark.parametrize(("name", "machine", "a", "b", "wanted"), NUMBERS)
+@each_of(("name", "machine", "a", "b", "wanted"), NUMBERS)
 def test_two_operands(name: str, machine: str, a: Any, b: Any, wanted: Any) -> None:
     (left, before), (right, more) = slot(machine, a), slot(machine, b, second=True)
     if wanted is None:
@@ -159,7 +159,7 @@ def test_two_operands(name: str, machine: str, a: Any, b: Any, wanted: Any) -> N
             assert same(yields(machine, (name, machine, x, y, *sited(name)), before | more), wanted), (x, y)
 
 
-@pytest.mark.parametrize(("name", "machine", "a", "b", "wanted"), COMPARISONS)
+@each_of(("name", "machine", "a", "b", "wanted"), COMPARISONS)
 def test_comparison(name: str, machine: str, a: Any, b: Any, wanted: bool) -> None:
     (left, before), (right, more) = slot(machine, a), slot(machine, b, second=True)
     for x in (left, const(machine, a)):
@@ -167,14 +167,14 @@ def test_comparison(name: str, machine: str, a: Any, b: Any, wanted: bool) -> No
             assert yields("b", (name, "b", machine, x, y), before | more) is wanted
 
 
-@pytest.mark.parametrize(("name", "machine", "a", "wanted"), SINGLES)
+@each_of(("name", "machine", "a", "wanted"), SINGLES)
 def test_one_operand(name: str, machine: str, a: Any, wanted: Any) -> None:
     operand, before = slot(machine, a)
     for x in (operand, const(machine, a)):
         assert same(yields(machine, (name, machine, x), before), wanted)
 
 
-@pytest.mark.parametrize(("name", "machine", "a", "n", "wanted"), SHIFTS)
+@each_of(("name", "machine", "a", "n", "wanted"), SHIFTS)
 def test_shift(name: str, machine: str, a: int, n: int, wanted: Any) -> None:
     (operand, before), (by, more) = slot(machine, a), slot("i64", n, second=True)
     for x in (operand, const(machine, a)):
@@ -182,7 +182,7 @@ def test_shift(name: str, machine: str, a: int, n: int, wanted: Any) -> None:
             assert yields(machine, (name, machine, x, y, 7), before | more) == wanted
 
 
-@pytest.mark.parametrize(("name", "machine", "source", "a", "wanted"), CONVERSIONS)
+@each_of(("name", "machine", "source", "a", "wanted"), CONVERSIONS)
 def test_conversion(name: str, machine: str, source: str, a: Any, wanted: Any) -> None:
     operand, before = slot(source, a)
     if wanted is None:
@@ -191,7 +191,7 @@ def test_conversion(name: str, machine: str, source: str, a: Any, wanted: Any) -
         assert same(yields(machine, (name, machine, source, x, *sited(name)), before), wanted)
 
 
-@pytest.mark.parametrize(("function", "a", "wanted"), MATH)
+@each_of(("function", "a", "wanted"), MATH)
 def test_math(function: str, a: float, wanted: float) -> None:
     operand, before = slot("f64", a)
     assert same(yields("f64", ("math", "f64", function, operand), before), wanted)
@@ -312,17 +312,17 @@ STRINGS: list[tuple[Node, Any]] = [
 ]
 
 
-@pytest.mark.parametrize(("machine", "expression", "before", "wanted"), RUNS)
+@each_of(("machine", "expression", "before", "wanted"), RUNS)
 def test_expression(machine: str, expression: Node, before: dict[int, bytes], wanted: Any) -> None:
     assert same(yields(machine, expression, before), wanted)
 
 
-@pytest.mark.parametrize(("expression", "wanted"), STRINGS)
+@each_of(("expression", "wanted"), STRINGS)
 def test_string_function(expression: Node, wanted: Any) -> None:
     assert yields("s8", expression) == wanted
 
 
-@pytest.mark.parametrize(("expression", "wanted"), STRINGS)
+@each_of(("expression", "wanted"), STRINGS)
 def test_wide_string_function(expression: Node, wanted: Any) -> None:
     assert yields("s16", wide(expression)) == wide(wanted)
 
@@ -334,14 +334,14 @@ def wide(item: Any) -> Any:
     return "s16" if item == "s8" else "".join(chr(byte * 257) for byte in item) if isinstance(item, bytes) else item
 
 
-@pytest.mark.parametrize(("bit", "byte", "wanted"),
+@each_of(("bit", "byte", "wanted"),
  [(255, 2, True), (255, 0, False), (0, 2, False), (1, 2, True), (7, 128, True)])
 def test_load_flag_takes_the_bit_that_the_reference_names(bit: int, byte: int, wanted: bool) -> None:
     before = {0: STRUCTS["ref"].pack(1 << 40 | SLOTS_OFFSET + 40 << 8 | bit), 40: bytes([byte])}
     assert yields("b", ("load_flag", "b", behind(load("ref", 0))), before) is wanted
 
 
-@pytest.mark.parametrize("reference", [0, 2 << 40 | SLOTS_OFFSET << 8, 1 << 40 | 0xFFFFFFFF << 8, 255 << 40])
+@each_of("reference", [0, 2 << 40 | SLOTS_OFFSET << 8, 1 << 40 | 0xFFFFFFFF << 8, 255 << 40])
 def test_a_reference_to_nowhere_traps(reference: int) -> None:
     before = {0: STRUCTS["ref"].pack(reference)}
     for machine, name in (("i32", "load"), ("i32", "load_raw"), ("b", "load_flag")):

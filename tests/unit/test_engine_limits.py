@@ -8,6 +8,7 @@ import traceback
 
 import pytest
 from hand_image import at, const, execute, image, load, own, power_on, store
+from rows import each_of
 
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.code.operations import Block, Node
@@ -52,8 +53,8 @@ def test_loops_nest(depth: int) -> None:
     assert rig.slot("i16", 0) == 1
 
 
-@pytest.mark.parametrize("depth", [3, 58, 61, 70, 130])
-@pytest.mark.parametrize(("leave", "counted", "after"), [("exit", 4, 1), ("next", 9, 1), ("return", 4, 0)])
+@each_of("depth", [3, 58, 61, 70, 130])
+@each_of(("leave", "counted", "after"), [("exit", 4, 1), ("next", 9, 1), ("return", 4, 0)])
 def test_leaving_a_loop_from_deep_inside(depth: int, leave: str, counted: int, after: int) -> None:
     t = ("tmp", "i16", 9)
     inside = ("if", ((("eq", "b", "i16", t, const("i16", 4)), ((leave,),)),), ())

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from hand_image import at, behind, const, execute, image, load, operations_in, own, power_on, store
+from rows import each_of
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, SLOTS_OFFSET
 from fbvm.base.memory import STRUCTS
@@ -120,7 +121,7 @@ PROGRAMS: list[tuple[str, Block, dict[int, bytes], Any]] = [
 ]
 
 
-@pytest.mark.parametrize(("name", "code", "before", "wanted"), PROGRAMS, ids=[row[0] for row in PROGRAMS])
+@each_of(("name", "code", "before", "wanted"), PROGRAMS, ids=[row[0] for row in PROGRAMS])
 def test_statement(name: str, code: Block, before: dict[int, bytes], wanted: Any) -> None:
     rig = execute(code, before=before, budget=1000)
     if isinstance(wanted, str):
@@ -301,7 +302,7 @@ MESSAGES: list[tuple[str, Node, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("code", "expression", "words"), MESSAGES)
+@each_of(("code", "expression", "words"), MESSAGES)
 def test_traps_say_their_values(code: str, expression: Node, words: str) -> None:
     rig = execute((store("i16", 0, expression),))
     assert str(rig.trap) == f"{code} Main.st:3:5 in Main: {words}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from common_unit_tests import CommonUnitTests, FakeMemory
 from etn21_rig import SERVER, Rig
+from rows import each_of
 
 from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21_map import LINK_UP, Layout, Switch
@@ -68,7 +69,7 @@ def test_an_unknown_timing_is_a_mistake() -> None:
         Etn21(timing="swift")
 
 
-@pytest.mark.parametrize("area", range(1, 9))
+@each_of("area", range(1, 9))
 def test_each_area_has_its_switches_and_words(area: int) -> None:
     rig = Rig()
     rig.parameters(area, socket=9 - area)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from etn21_rig import CIO, E2, SERVER, A, D, H, Rig, W
+from rows import each_of
 
 from fbvm.units.etn21 import Etn21, Fault
 from fbvm.units.etn21_codes import ERRNO, code_of, meaning_of
@@ -17,8 +18,8 @@ TRANSFERS = [Switch.SEND, Switch.RECEIVE]
 # --- 1100 ---
 
 
-@pytest.mark.parametrize("switch", [*OPENS, *TRANSFERS])
-@pytest.mark.parametrize("socket", [0, 9, 255])
+@each_of("switch", [*OPENS, *TRANSFERS])
+@each_of("socket", [0, 9, 255])
 def test_1100_socket_number(switch: Switch, socket: int) -> None:
     rig = Rig()
     rig.parameters(socket=socket, local_port=3000)
@@ -51,8 +52,8 @@ def test_1100_more_than_1984_bytes(switch: Switch) -> None:
 # --- 1101, 1103 ---
 
 
-@pytest.mark.parametrize("switch", TRANSFERS)
-@pytest.mark.parametrize("address", [(0x00, 0, 0), (0x30, 0, 0), (0xAD, 0, 0), (0xA1, 0, 0), (A, 447, 0)])
+@each_of("switch", TRANSFERS)
+@each_of("address", [(0x00, 0, 0), (0x30, 0, 0), (0xAD, 0, 0), (0xA1, 0, 0), (A, 447, 0)])
 def test_1101_area_not_allowed(switch: Switch, address: tuple[int, int, int]) -> None:
     rig = Rig()
     rig.open()
@@ -60,8 +61,8 @@ def test_1101_area_not_allowed(switch: Switch, address: tuple[int, int, int]) ->
     assert rig.ask(switch) == "1101"
 
 
-@pytest.mark.parametrize("switch", TRANSFERS)
-@pytest.mark.parametrize(
+@each_of("switch", TRANSFERS)
+@each_of(
     "address", [(CIO, 6144, 0), (CIO, 6143, 0), (W, 511, 0), (H, 511, 0), (A, 959, 0), (D, 32767, 0)]
 )
 def test_1101_past_the_end_of_the_area_assumed(switch: Switch, address: tuple[int, int, int]) -> None:
@@ -71,7 +72,7 @@ def test_1101_past_the_end_of_the_area_assumed(switch: Switch, address: tuple[in
     assert rig.ask(switch) == "1101"
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("code", "word", "area"),
     [(CIO, 6143, "CIO"), (W, 511, "W"), (H, 511, "H"), (A, 448, "A"), (D, 32767, "D"), (0x98, 7, "E0"), (E2, 9, "E2")],
 )
@@ -95,7 +96,7 @@ def test_1103_bit_number(switch: Switch) -> None:
 # --- 110C ---
 
 
-@pytest.mark.parametrize("switch", [s for s in Switch if s not in (Switch.ACTIVE_OPEN, Switch.CLOSE)])
+@each_of("switch", [s for s in Switch if s not in (Switch.ACTIVE_OPEN, Switch.CLOSE)])
 def test_110c_during_an_open_assumed(switch: Switch) -> None:
     rig = Rig()
     rig.parameters(local_port=3000)
@@ -144,8 +145,8 @@ def test_110c_of_two_switches_close_goes_first_assumed() -> None:
 # --- 220F, 2210, 2606, 2607 ---
 
 
-@pytest.mark.parametrize("switch", [Switch.PASSIVE_OPEN, Switch.ACTIVE_OPEN])
-@pytest.mark.parametrize("area", [1, 2])
+@each_of("switch", [Switch.PASSIVE_OPEN, Switch.ACTIVE_OPEN])
+@each_of("area", [1, 2])
 def test_220f_open_of_an_open_socket(switch: Switch, area: int) -> None:
     rig = Rig()
     rig.open()
@@ -208,8 +209,8 @@ def test_2606_open_with_the_other_protocol() -> None:
     assert rig.ask(Switch.UDP_OPEN, area=2) == "2606"
 
 
-@pytest.mark.parametrize("switch", [Switch.ACTIVE_OPEN, *TRANSFERS, Switch.CLOSE])
-@pytest.mark.parametrize("socket", [2, 3])
+@each_of("switch", [Switch.ACTIVE_OPEN, *TRANSFERS, Switch.CLOSE])
+@each_of("socket", [2, 3])
 def test_2607_area_is_bound_to_another_socket(switch: Switch, socket: int) -> None:
     rig = Rig()
     rig.open(1, 1)
@@ -262,7 +263,7 @@ def test_checks_come_in_this_order_assumed() -> None:
 # --- from the network ---
 
 
-@pytest.mark.parametrize(("error", "code"), sorted(ERRNO.items()))
+@each_of(("error", "code"), sorted(ERRNO.items()))
 def test_errno_of_an_active_open(error: str, code: int) -> None:
     rig = Rig()
     rig.parameters()
@@ -312,7 +313,7 @@ def test_004c_active_open_to_its_own_port() -> None:
     assert rig.ask(Switch.ACTIVE_OPEN) == "004C"
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("switch", "port"),
     [(Switch.PASSIVE_OPEN, 21), (Switch.PASSIVE_OPEN, 9600), (Switch.ACTIVE_OPEN, 80), (Switch.UDP_OPEN, 9600)],
 )

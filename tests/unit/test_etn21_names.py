@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from images import counter_image
+from rows import each_of
 
 from fbvm.base.areas import parse_address
 from fbvm.net.loop import LoopNetwork
@@ -12,7 +13,7 @@ from fbvm.record.chart import chart
 from fbvm.units.etn21 import Etn21
 
 
-@pytest.mark.parametrize(("number", "address", "name"), [
+@each_of(("number", "address", "name"), [
     (0, "CIO 1519.02", "TCP Active Open Request Switch"),
     (0, "CIO 1519.11", "Send Request Switch 2"),
     (0, "CIO 1522.13", "Close Request Switch 8"),

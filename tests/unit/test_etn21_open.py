@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from etn21_rig import SERVER, Rig
+from rows import each_of
 
 from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21_map import Switch
@@ -81,7 +82,7 @@ def test_an_answer_after_the_end_of_the_open_counts_no_more() -> None:
 # --- passive ---
 
 
-@pytest.mark.parametrize(
+@each_of(
     "remote", [ANYBODY, Peer("0.0.0.0", 5000), Peer("192.168.250.7", 0), Peer("192.168.250.7", 5000)]
 )
 def test_passive_open_passes_its_filter_on_and_writes_the_peer(remote: Peer) -> None:
@@ -112,7 +113,7 @@ def test_passive_open_without_a_timeout_waits_for_ever() -> None:
 # --- options ---
 
 
-@pytest.mark.parametrize(("option", "keep_alive"), [(0, False), (1, True), (2, False), (3, True)])
+@each_of(("option", "keep_alive"), [(0, False), (1, True), (2, False), (3, True)])
 def test_keep_alive_assumed(option: int, keep_alive: bool) -> None:
     rig = Rig()
     rig.parameters(1, 1, option=option)
@@ -121,7 +122,7 @@ def test_keep_alive_assumed(option: int, keep_alive: bool) -> None:
     assert rig.scan(Switch.PASSIVE_OPEN, area=2) == [Listen(2, 502, SERVER, keep_alive)]
 
 
-@pytest.mark.parametrize(("option", "reset"), [(0, False), (1, False), (2, True), (3, True)])
+@each_of(("option", "reset"), [(0, False), (1, False), (2, True), (3, True)])
 def test_linger_of_the_open_closes_by_rst(option: int, reset: bool) -> None:
     rig = Rig()
     rig.open(option=option)
@@ -144,7 +145,7 @@ def test_close_throws_the_buffer_away() -> None:
     assert (rig.waiting(), rig.status()) == (0, 0)
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("switch", "flag"), [(Switch.ACTIVE_OPEN, 0), (Switch.PASSIVE_OPEN, 0), (Switch.SEND, 2), (Switch.RECEIVE, 1)]
 )
 def test_close_ends_a_service_with_0081_a_cycle_before_its_own_result_assumed(switch: Switch, flag: int) -> None:

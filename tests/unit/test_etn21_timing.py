@@ -6,6 +6,7 @@ from copy import deepcopy
 
 import pytest
 from etn21_rig import SERVER, Rig
+from rows import each_of
 
 from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21_map import Switch
@@ -50,7 +51,7 @@ class Watched:
         self.settle()
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@each_of("seed", SEEDS)
 def test_real_open_ends_with_its_words_out_of_step_assumed(seed: int) -> None:
     watched = Watched(seed)
     watched.open()
@@ -88,7 +89,7 @@ def test_real_services_take_3_to_7_refreshes_and_5_to_21_ms_assumed() -> None:
     assert 5_000_000 <= short.rig.now_ns <= 22_000_000
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@each_of("seed", SEEDS)
 def test_real_words_agree_in_the_end(seed: int) -> None:
     watched = Watched(seed)
     rig = watched.rig
@@ -126,7 +127,7 @@ def test_real_punishes_a_send_that_does_not_wait_for_bit_15_assumed() -> None:
     assert codes == {"0000", "2210"}
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@each_of("seed", SEEDS)
 def test_real_results_of_an_interrupted_service_are_a_cycle_apart_assumed(seed: int) -> None:
     watched = Watched(seed)
     rig = watched.rig

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from etn21_rig import Rig
+from rows import each_of
 
 from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21_map import Switch
@@ -42,7 +43,7 @@ def test_an_odd_send_ends_with_a_high_byte() -> None:
     assert rig.scan(Switch.SEND) == [Send(1, b"\xab\x12\x34")]
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("count", "parts"),
     [(1, [1]), (1023, [1023]), (1024, [1024]), (1025, [1024, 1]), (1984, [1024, 960])],
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 
-import pytest
+from rows import each_of
 
 from fbvm.net.faults import KINDS, Fault, random_faults
 from fbvm.net.loop import LoopLink, LoopNetwork
@@ -132,7 +132,7 @@ def test_two_plcs_have_scans_of_their_own() -> None:
     assert not line.network.fault(Peer("10.0.0.2", 1), Peer("10.0.0.3", 1)).silent
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@each_of("kind", KINDS)
 def test_after_each_kind_all_is_well(kind: str) -> None:
     row = KINDS[kind]
     line = Line(Fault(row.peer, row.latency_ns, row.silent, row.error, row.segment_bytes, row.random_cut,

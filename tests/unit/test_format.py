@@ -5,6 +5,7 @@ from __future__ import annotations
 from textwrap import dedent
 
 import pytest
+from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.syntax.format import formatted
@@ -246,7 +247,7 @@ def test_names_are_written_as_declared() -> None:
 # --- the text as a whole ---
 
 
-@pytest.mark.parametrize("wrong", ["PROGRAM p a := ; END_PROGRAM", "x", "(* without end", "PROGRAM p a := 5x; END_PROGRAM"])
+@each_of("wrong", ["PROGRAM p a := ; END_PROGRAM", "x", "(* without end", "PROGRAM p a := 5x; END_PROGRAM"])
 def test_a_text_with_errors_is_left_alone(wrong: str) -> None:
     text, errors = formatted(Source("x.st", wrong))
     assert text == wrong and errors and all(d.severity == "error" for d in errors)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
+from rows import each_of
 
 from fbvm.code.compiler import compile_text
 
@@ -13,7 +13,7 @@ def said(body: str) -> list[str]:
     return [diagnostic.render() for diagnostic in compile_text(text).diagnostics]
 
 
-@pytest.mark.parametrize(("rung", "hint"), [
+@each_of(("rung", "hint"), [
     ("LDN A\nOUT M", "did you mean LDNOT?"), ("LD A\nST M", "did you mean OUT?"), ("XIC A\nOTE M", "did you mean LD?"),
     ("LD A\nADD D0 D1 D2", "did you mean +?"), ("LD A\nTON D0", "did you mean FBCALL TON?"),
     ("LD A OUT M", "OUT begins a line of its own"), ("LD A\nMOV #1 D0 D1", "S is a word or constant, D is a word")])
@@ -21,7 +21,7 @@ def test_ladder(rung: str, hint: str) -> None:
     assert f"help: {hint}" in said(f"LADDER\n{rung}\nEND_LADDER")[0]
 
 
-@pytest.mark.parametrize(("action", "condition", "message"), [
+@each_of(("action", "condition", "message"), [
     ("M(X)", "A", "is a qualifier, and X is none"), ("M(5)", "A", "the first thing in the parentheses is a qualifier"),
     ("M(N)", "s", "the condition of a transition is a step, not BOOL"), ("M(N)", "s", "help: write s.X")])
 def test_charts(action: str, condition: str, message: str) -> None:

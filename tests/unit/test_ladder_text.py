@@ -5,7 +5,7 @@ from __future__ import annotations
 from textwrap import dedent
 from xml.etree import ElementTree
 
-import pytest
+from rows import each_of
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
@@ -79,7 +79,7 @@ def text(drawing: str) -> list[str]:
     return dedent(drawing).strip("\n").rstrip().split("\n")
 
 
-@pytest.mark.parametrize("name", DRAWINGS)
+@each_of("name", DRAWINGS)
 def test_drawing(name: str) -> None:
     rungs, drawing = DRAWINGS[name]
     assert drawn(rungs).split("\n") == text(drawing)
@@ -107,7 +107,7 @@ def test_what_has_no_drawing_is_shown_as_instructions() -> None:
     assert drawn("LD a\nOUT b\nOR c\nOUT d").split("\n") == ["    LD a", "    OUT b", "    OR c", "    OUT d"]
 
 
-@pytest.mark.parametrize("width", range(24, 200, 7))
+@each_of("width", range(24, 200, 7))
 def test_no_line_is_wider_than_asked(width: int) -> None:
     rungs = "LD a\nOR b\n" + "\n".join(f"AND {name}" for name in "cdefab") + "\nOUT a\nAND c\n@MOV #1 D0"
     lines = drawn(rungs, width).split("\n")

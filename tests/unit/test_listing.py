@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from textwrap import dedent
 
-import pytest
 from hand_image import at, behind, const, image, load, own, store
 from images import counter_image, task
+from rows import each_of
 from test_engine_expressions import NUMBERS, RUNS, STRINGS
 from test_engine_statements import OBSERVED, PROGRAMS
 
@@ -126,7 +126,7 @@ def test_observations_are_shown_if_asked_for() -> None:
                   observe write ('s8', 20) ref (load ref 180240)+8""")
 
 
-@pytest.mark.parametrize("code", [code for _, code, _, _ in PROGRAMS], ids=[name for name, *_ in PROGRAMS])
+@each_of("code", [code for _, code, _, _ in PROGRAMS], ids=[name for name, *_ in PROGRAMS])
 def test_every_statement_can_be_listed(code: Block) -> None:
     helpers: tuple[Block, ...] = ((), ())
     assert listing(image(code, *helpers), observations=True).count("\n") >= len(code)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from datetime import date, datetime, timedelta
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.syntax import literals
@@ -61,7 +61,7 @@ GOOD = [
 ]
 
 
-@pytest.mark.parametrize(("text", "kind", "value", "type_name"), GOOD, ids=[ascii(g[0]) for g in GOOD])
+@each_of(("text", "kind", "value", "type_name"), GOOD, ids=[ascii(g[0]) for g in GOOD])
 def test_a_literal_is_decoded_exactly(text: str, kind: str, value: object, type_name: str | None) -> None:
     found, errors = literal(text)
     assert (found.kind, found.value, found.type_name, found.text, errors) == (kind, value, type_name, text, [])
@@ -85,7 +85,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("text", "code"), BAD, ids=[b[0][:40] for b in BAD])
+@each_of(("text", "code"), BAD, ids=[b[0][:40] for b in BAD])
 def test_what_is_no_literal_has_one_error(text: str, code: str) -> None:
     _, errors = literal(text)
     assert errors == [code]

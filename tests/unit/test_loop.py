@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_of
 
 from fbvm.net.faults import Fault
 from fbvm.net.loop import CONNECT_TIMEOUT_NS, LoopLink, LoopNetwork
@@ -180,7 +181,7 @@ def test_an_open_that_fails_at_once(error: str) -> None:
     assert link.events(0) == [Failed(1, "open", error)]
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("remote", "error"),
     [
         (Peer("255.255.255.255", 502), "EACCES"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-import pytest
+from rows import each_of
 
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.tcp import TcpNetwork
@@ -131,7 +131,7 @@ class Play:
         return {name: plain(told) for name, told in self.told.items()}
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@each_of("name", SCENARIOS)
 def test_the_same_is_told(name: str) -> None:
     memory = Play(LoopNetwork())
     network = TcpNetwork({Peer(host, 0): ("127.0.0.1", 0) for host in HOSTS.values()})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
+from rows import each_of
 
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.misdeeds import FLOOD_BYTES, LATE_NS, MISDEEDS, NEXT_NS, RUDE_PEERS, RudePeer, by_script, by_seed
@@ -52,73 +52,72 @@ def client(network: LoopNetwork, until_ns: int) -> list[str]:
 RIGHT = "030400000000"
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("late", []),
-        ("late by one request", []),
-        ("again later", [RIGHT, RIGHT]),
-        ("a wrong one first", ["not mine", RIGHT]),
-        ("a wrong one last", [RIGHT, "not mine"]),
-        ("garbage behind", [RIGHT, "length 12081 outside 2..254"]),
-        ("a byte behind", [RIGHT, "1 pending"]),
-        ("flood behind", [RIGHT] + ["not mine"] * (FLOOD_BYTES // 13)),
-        ("right, then fin", [RIGHT, "fin"]),
-        ("right, then closed", [RIGHT, "fin"]),
-        ("right, then reset", [RIGHT, "ECONNRESET"]),
-        ("transaction swapped", ["not mine"]),
-        ("neighbour's function", ["function code 02 instead of 03"]),
-        ("two bytes more", ["6 data bytes instead of 4"]),
-        ("function only", ["too short"]),
-        ("exception 00", ["wrong length"]),
-        ("illegal function", ["8301"]),
-        ("gateway without target", ["830b"]),
-        ("exception 0C", ["830c"]),
-        ("exception FF", ["83ff"]),
-        ("another's exception", ["function code 02 instead of 03"]),
-        ("exception without code", ["exception reply without code"]),
-        ("exception with more", ["wrong length"]),
-        ("length 0", ["length 0 outside 2..254"]),
-        ("length 1", ["length 1 outside 2..254"]),
-        ("length 255", ["length 255 outside 2..254"]),
-        ("length one less", ["byte count 4, 3 follow", "1 pending"]),
-        ("length one more", ["13 pending"]),
-        ("length 254", ["13 pending"]),
-        ("garbage first", ["length 12081 outside 2..254"]),
-        ("flood", ["length 65535 outside 2..254"]),
-        ("one byte", ["1 pending"]),
-        ("all but one byte", ["12 pending"]),
-        ("half, the rest late", ["9 pending"]),
-        ("half closed", ["fin"]),
-        ("one byte, then reset", ["ECONNRESET", "1 pending"]),
-        ("header, then closed", ["fin", "7 pending"]),
-        ("two pieces", [RIGHT]),
-        ("byte by byte", [RIGHT]),
-        ("twice", [RIGHT, RIGHT]),
-        ("wrong transaction", ["not mine"]),
-        ("wrong unit", ["not mine"]),
-        ("wrong function", ["function code 2B instead of 03"]),
-        ("wrong content", ["byte count 251, 4 follow"]),
-        ("one byte short", ["byte count 4, 3 follow"]),
-        ("server failure", ["8304"]),
-        ("wrong protocol", ["protocol id 1 is not 0"]),
-        ("impossible length", ["length 65287 outside 2..254"]),
-        ("garbage", ["length 12081 outside 2..254"]),
-        ("silence", []),
-        ("half", ["6 pending"]),
-        ("half, then fin", ["fin", "6 pending"]),
-        ("fin", ["fin"]),
-        ("reset", ["ECONNRESET"]),
-        ("half, then reset", ["ECONNRESET", "6 pending"]),
-    ],
-)
+AFTER_A_MISDEED = [
+    ("late", []),
+    ("late by one request", []),
+    ("again later", [RIGHT, RIGHT]),
+    ("a wrong one first", ["not mine", RIGHT]),
+    ("a wrong one last", [RIGHT, "not mine"]),
+    ("garbage behind", [RIGHT, "length 12081 outside 2..254"]),
+    ("a byte behind", [RIGHT, "1 pending"]),
+    ("flood behind", [RIGHT] + ["not mine"] * (FLOOD_BYTES // 13)),
+    ("right, then fin", [RIGHT, "fin"]),
+    ("right, then closed", [RIGHT, "fin"]),
+    ("right, then reset", [RIGHT, "ECONNRESET"]),
+    ("transaction swapped", ["not mine"]),
+    ("neighbour's function", ["function code 02 instead of 03"]),
+    ("two bytes more", ["6 data bytes instead of 4"]),
+    ("function only", ["too short"]),
+    ("exception 00", ["wrong length"]),
+    ("illegal function", ["8301"]),
+    ("gateway without target", ["830b"]),
+    ("exception 0C", ["830c"]),
+    ("exception FF", ["83ff"]),
+    ("another's exception", ["function code 02 instead of 03"]),
+    ("exception without code", ["exception reply without code"]),
+    ("exception with more", ["wrong length"]),
+    ("length 0", ["length 0 outside 2..254"]),
+    ("length 1", ["length 1 outside 2..254"]),
+    ("length 255", ["length 255 outside 2..254"]),
+    ("length one less", ["byte count 4, 3 follow", "1 pending"]),
+    ("length one more", ["13 pending"]),
+    ("length 254", ["13 pending"]),
+    ("garbage first", ["length 12081 outside 2..254"]),
+    ("flood", ["length 65535 outside 2..254"]),
+    ("one byte", ["1 pending"]),
+    ("all but one byte", ["12 pending"]),
+    ("half, the rest late", ["9 pending"]),
+    ("half closed", ["fin"]),
+    ("one byte, then reset", ["ECONNRESET", "1 pending"]),
+    ("header, then closed", ["fin", "7 pending"]),
+    ("two pieces", [RIGHT]),
+    ("byte by byte", [RIGHT]),
+    ("twice", [RIGHT, RIGHT]),
+    ("wrong transaction", ["not mine"]),
+    ("wrong unit", ["not mine"]),
+    ("wrong function", ["function code 2B instead of 03"]),
+    ("wrong content", ["byte count 251, 4 follow"]),
+    ("one byte short", ["byte count 4, 3 follow"]),
+    ("server failure", ["8304"]),
+    ("wrong protocol", ["protocol id 1 is not 0"]),
+    ("impossible length", ["length 65287 outside 2..254"]),
+    ("garbage", ["length 12081 outside 2..254"]),
+    ("silence", []),
+    ("half", ["6 pending"]),
+    ("half, then fin", ["fin", "6 pending"]),
+    ("fin", ["fin"]),
+    ("reset", ["ECONNRESET"]),
+    ("half, then reset", ["ECONNRESET", "6 pending"]),
+]
+
+
+@each_of(("name", "words"), AFTER_A_MISDEED)
 def test_a_misdeed(name: str, words: list[str]) -> None:
     assert seen(name, SECOND_NS) == words
 
 
 def test_every_misdeed_is_tried() -> None:
-    [mark] = test_a_misdeed.pytestmark  # type: ignore[attr-defined]
-    assert {name for name, _ in mark.args[1]} == set(MISDEEDS)
+    assert {name for name, _ in AFTER_A_MISDEED} == set(MISDEEDS)
     assert seen("late", LATE_NS) == [RIGHT]
     assert seen("late by one request", NEXT_NS) == [RIGHT]
 
@@ -148,32 +147,32 @@ def said(event: Event) -> list[str]:
     return [f"{adu.transaction}" if isinstance(adu, Adu) else adu.reason for adu in found] or ["part"]
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    [
-        ("nobody listens", ["ECONNREFUSED", "ENOTCONN", "ENOTCONN", "ENOTCONN"]),
-        ("never accepts", ["ENOTCONN"] * 3),
-        ("closes at once", ["PeerClosed", "ECONNRESET", "EPIPE", "EPIPE"]),
-        ("half closes at once", ["PeerClosed"]),
-        ("resets at once", ["ECONNRESET", "EPIPE", "EPIPE", "EPIPE"]),
-        ("closes after a while", ["0", "1", "2", "PeerClosed"]),
-        ("closes between requests", ["0", "1", "2", "PeerClosed"]),
-        ("resets between requests", ["0", "1", "2", "ECONNRESET"]),
-        ("takes one connection only", ["0", "PeerClosed", "ECONNRESET", "EPIPE"]),
-        ("never reads", []),
-        ("never reads, then resets", ["ECONNRESET"]),
-        ("closes in mid-request", ["PeerClosed", "ECONNRESET", "EPIPE"]),
-        ("resets in mid-request", ["ECONNRESET", "EPIPE", "EPIPE"]),
-        ("hears every second request", ["1"]),
-        ("previous reply instead", ["0", "1"]),
-        ("previous reply first", ["0", "0", "1", "1", "2"]),
-        ("previous reply behind", ["0", "1", "0", "2", "1"]),
-        ("speaks first", ["32768", "0", "1", "2"]),
-        ("speaks first, garbage", ["length 12081 outside 2..254", "0", "1", "2"]),
-        ("drips for ever", ["part", "part", "part", "part"]),
-        ("floods from the start", ["32768"]),
-    ],
-)
+AFTER_A_RUDE_PEER = [
+    ("nobody listens", ["ECONNREFUSED", "ENOTCONN", "ENOTCONN", "ENOTCONN"]),
+    ("never accepts", ["ENOTCONN"] * 3),
+    ("closes at once", ["PeerClosed", "ECONNRESET", "EPIPE", "EPIPE"]),
+    ("half closes at once", ["PeerClosed"]),
+    ("resets at once", ["ECONNRESET", "EPIPE", "EPIPE", "EPIPE"]),
+    ("closes after a while", ["0", "1", "2", "PeerClosed"]),
+    ("closes between requests", ["0", "1", "2", "PeerClosed"]),
+    ("resets between requests", ["0", "1", "2", "ECONNRESET"]),
+    ("takes one connection only", ["0", "PeerClosed", "ECONNRESET", "EPIPE"]),
+    ("never reads", []),
+    ("never reads, then resets", ["ECONNRESET"]),
+    ("closes in mid-request", ["PeerClosed", "ECONNRESET", "EPIPE"]),
+    ("resets in mid-request", ["ECONNRESET", "EPIPE", "EPIPE"]),
+    ("hears every second request", ["1"]),
+    ("previous reply instead", ["0", "1"]),
+    ("previous reply first", ["0", "0", "1", "1", "2"]),
+    ("previous reply behind", ["0", "1", "0", "2", "1"]),
+    ("speaks first", ["32768", "0", "1", "2"]),
+    ("speaks first, garbage", ["length 12081 outside 2..254", "0", "1", "2"]),
+    ("drips for ever", ["part", "part", "part", "part"]),
+    ("floods from the start", ["32768"]),
+]
+
+
+@each_of(("name", "words"), AFTER_A_RUDE_PEER)
 def test_a_rude_peer(name: str, words: list[str]) -> None:
     seen = conversation(name, 3)
     if name == "floods from the start":
@@ -183,8 +182,7 @@ def test_a_rude_peer(name: str, words: list[str]) -> None:
 
 
 def test_every_rude_peer_is_tried() -> None:
-    [mark] = test_a_rude_peer.pytestmark  # type: ignore[attr-defined]
-    assert {name for name, _ in mark.args[1]} == set(RUDE_PEERS)
+    assert {name for name, _ in AFTER_A_RUDE_PEER} == set(RUDE_PEERS)
 
 
 def test_a_rude_peer_may_reform() -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_of
 
 from fbvm.wire import modbus
 from fbvm.wire.modbus import Adu, Fault, Splitter, decode_reply, decode_request, mismatch
@@ -39,7 +39,7 @@ def a_server(**options: object) -> ModbusServer:
     return server
 
 
-@pytest.mark.parametrize(("request_hex", "reply_hex"), VECTORS)
+@each_of(("request_hex", "reply_hex"), VECTORS)
 def test_the_sheets_frames(request_hex: str, reply_hex: str) -> None:
     request = bytes.fromhex(request_hex)
     reply = a_server().answer(Adu(7, 1, request).to_bytes())
@@ -47,7 +47,7 @@ def test_the_sheets_frames(request_hex: str, reply_hex: str) -> None:
     assert mismatch(request, bytes.fromhex(reply_hex)) == ""
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("request_hex", "reply_hex"),
     [
         ("07", "87 01"),  # a function that is not served
@@ -132,7 +132,7 @@ def test_long_identity_goes_on_in_the_next_request() -> None:
     assert server.answer_pdu(modbus.identify(1, 1))[3:7] == bytes((0x81, 0, 0, 2))
 
 
-@pytest.mark.parametrize("frame", ["", "0001", "000100000002FF", "00010000 0002 FF03 00", "00010001 0002 FF03"])
+@each_of("frame", ["", "0001", "000100000002FF", "00010000 0002 FF03 00", "00010001 0002 FF03"])
 def test_what_is_no_frame_gets_no_answer(frame: str) -> None:
     assert ModbusServer().answer(bytes.fromhex(frame)) is None
 
@@ -149,7 +149,7 @@ def test_a_foreign_protocol_is_skipped_and_an_impossible_length_ends_the_stream(
     assert splitter.feed(good.to_bytes()) == []
 
 
-@pytest.mark.parametrize("length", [0, 1, 255, 65535])
+@each_of("length", [0, 1, 255, 65535])
 def test_impossible_lengths(length: int) -> None:
     [fault] = Splitter().feed(b"\0\1\0\0" + length.to_bytes(2, "big"))
     assert isinstance(fault, Fault)
@@ -201,7 +201,7 @@ def test_registers_survive_packing(values: list[int]) -> None:
     assert modbus.unpack_registers(modbus.pack_registers(values)) == values
 
 
-@pytest.mark.parametrize(
+@each_of(
     ("request_hex", "reply_hex", "why"),
     [
         ("03 03 E8 00 03", "04 06 AB 12 56 78 97 13", "function code 04 instead of 03"),

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from hand_image import at, behind, const, image, load, own, power_on, store
+from rows import each_of
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS, SLOTS_OFFSET
 from fbvm.base.arithmetic import FUNCTIONS, NAN, limits, power, single
@@ -259,9 +260,9 @@ def test_crc_bit_by_bit(level: int) -> None:
     assert (slot(e, "u16", 104), slot(e, "i16", 100), slot(e, "i16", 102)) == (crc, 64, 8)
 
 
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("machine", ["u8", "u16", "u32", "u64"])
-@pytest.mark.parametrize("operation", ["truncate", "nearest"])
+@each_of("level", LEVELS)
+@each_of("machine", ["u8", "u16", "u32", "u64"])
+@each_of("operation", ["truncate", "nearest"])
 def test_the_lesser_of_a_converted_float_and_0(level: int, machine: str, operation: str) -> None:
     """On `fptoui` and `umin` with 0 LLVM aborts at level 0."""
     made = (operation, machine, "f32", ("load", "f32", at(0)), 1)
@@ -273,9 +274,9 @@ def test_the_lesser_of_a_converted_float_and_0(level: int, machine: str, operati
     assert (slot(e, machine, 8), slot(e, "u8", 24)) == (200, 1)
 
 
-@pytest.mark.parametrize("level", LEVELS)
-@pytest.mark.parametrize("number", [0.0, 0.9, 2.0**62, 2.0**63, 2.0**63 + 2.0**11, 2.0**64 - 2.0**11, -0.4])
-@pytest.mark.parametrize("operation", ["truncate", "nearest"])
+@each_of("level", LEVELS)
+@each_of("number", [0.0, 0.9, 2.0**62, 2.0**63, 2.0**63 + 2.0**11, 2.0**64 - 2.0**11, -0.4])
+@each_of("operation", ["truncate", "nearest"])
 def test_large_floats_become_ulint(level: int, number: float, operation: str) -> None:
     e = engine((("store", "u64", at(8), (operation, "u64", "f64", ("load", "f64", at(0)), 1)),),
                before={0: STRUCTS["f64"].pack(number)}, level=level)

@@ -7,6 +7,7 @@ import ctypes
 from typing import Any
 
 import pytest
+from rows import each_of
 
 from fbvm.engine import native, native_routines
 
@@ -49,14 +50,14 @@ def steps(n, most):
 """
 
 
-@pytest.mark.parametrize("n", [1, 2, 7, 27, 97])
+@each_of("n", [1, 2, 7, 27, 97])
 def test_control_flow(n: int) -> None:
     space: dict[str, Any] = {}
     exec(COLLATZ, space)
     assert compiled(COLLATZ)(n, 1000) == space["steps"](n, 1000)
 
 
-@pytest.mark.parametrize("expression", [
+@each_of("expression", [
     "a + b * 2", "a - b", "a << b", "a | b ^ 1 & 7", "-a", "(a < b) + 1", "1 <= a <= 5", "1 <= a <= b <= 7", "LIMIT",
     "ord('x')", "a // 2", "a % 3", "a >> 1", "(a == b) + (a != b) * 2 + (a >= 5) * 4 + (b > a) * 8",
 ])  # fmt: skip

@@ -9,6 +9,7 @@ import pytest
 from common_unit_tests import CYCLE_NS, CommonUnitTests, FakeMemory
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopLink, LoopNetwork
@@ -140,7 +141,7 @@ def test_the_board_status_follows_the_settings() -> None:
     assert rig.head()[noc_map.STATUS] == noc_map.UNCONFIGURED
 
 
-@pytest.mark.parametrize(("rack_slot", "place"), [(0, 0), (7, 7), (16, 16), (254, 17)])
+@each_of(("rack_slot", "place"), [(0, 0), (7, 7), (16, 16), (254, 17)])
 def test_the_head_of_each_slot(rack_slot: int, place: int) -> None:
     rig = Rig(Noc(rack_slot, http=False))
     head = rig.head(place)
@@ -150,7 +151,7 @@ def test_the_head_of_each_slot(rack_slot: int, place: int) -> None:
     assert rig.noc.name == f"NOC {rack_slot}"
 
 
-@pytest.mark.parametrize("wrong", [
+@each_of("wrong", [
     {"rack_slot": -1}, {"rack_slot": 17}, {"rack_slot": 255}, {"module_type": 6}, {"module_type": 22}, {"mac": "00:11"},
     {"mac": "00:00:54:00:12:3g"},
 ])  # fmt: skip
@@ -298,7 +299,7 @@ def test_keep_alive_is_an_option() -> None:
     assert rig.requests == [Connect(0, SERVER, 0, True)]
 
 
-@pytest.mark.parametrize("errno", [*noc_map.ERRNO, "EUNHEARDOF"])
+@each_of("errno", [*noc_map.ERRNO, "EUNHEARDOF"])
 def test_errors_by_their_numbers(errno: str) -> None:
     noc, memory = Noc(), FakeMemory()
     noc.reset(memory)
@@ -324,7 +325,7 @@ def counted(*events: Event, link_up: bool = True) -> list[int]:
     return memory.words("NOC")[first + 4 : first + 36].tolist()
 
 
-@pytest.mark.parametrize(("events", "expected"), [
+@each_of(("events", "expected"), [
     ([], {}),
     ([Opened(0, 1, SERVER)], {4: 1}),
     ([Opened(0, 1, SERVER), Received(0, b"1"), Received(0, b"2"), PeerClosed(0)], {4: 4}),

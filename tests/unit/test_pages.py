@@ -9,6 +9,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
+from rows import each_of
 
 from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Diagnostic, Source
@@ -119,25 +120,25 @@ def test_no_page_is_left_over() -> None:
 # --- what its programs do ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("code", source_codes)
+@each_of("code", source_codes)
 def test_the_wrong_program_gives_this_diagnostic_and_no_other(code: str) -> None:
     compilation = compiled(parts(code)["wrong"])
     assert [diagnostic.code for diagnostic in compilation.diagnostics] == [code], shown(compilation)
 
 
-@pytest.mark.parametrize("code", [code for code in source_codes if CODES[code].severity == "warning"])
+@each_of("code", [code for code in source_codes if CODES[code].severity == "warning"])
 def test_a_program_with_a_warning_runs(code: str) -> None:
     assert trap_of(compiled(parts(code)["wrong"])) == ""
 
 
-@pytest.mark.parametrize("code", trap_codes)
+@each_of("code", trap_codes)
 def test_the_wrong_program_compiles_and_traps(code: str) -> None:
     compilation = compiled(parts(code)["wrong"])
     assert not compilation.diagnostics, shown(compilation)
     assert trap_of(compilation) == code
 
 
-@pytest.mark.parametrize("code", program_codes)
+@each_of("code", program_codes)
 def test_the_right_program_compiles_without_a_word_and_runs(code: str) -> None:
     compilation = compiled(parts(code)["right"])
     assert not compilation.diagnostics, shown(compilation)
@@ -164,7 +165,7 @@ def test_the_wrong_library_gives_this_diagnostic_and_the_right_one_none(code: st
         assert [diagnostic.code for diagnostic in found] == expected
 
 
-@pytest.mark.parametrize("code", xml_codes)
+@each_of("code", xml_codes)
 def test_the_wrong_document_gives_this_diagnostic_and_the_right_one_none(code: str) -> None:
     for half, expected in (("wrong", [code]), ("right", [])):
         text = parts(code)[half]
@@ -191,7 +192,7 @@ def test_case_and_spaces_do_not_matter() -> None:
     assert page(" s0203 ") == page("S0203")
 
 
-@pytest.mark.parametrize(("misspelt", "meant"), [
+@each_of(("misspelt", "meant"), [
     ("S203", "S0203"), ("S02003", "S0203"), ("SO203", "S0203"), ("0203", "S0203"), ("R0112", "R0111"),
     ("s0299", "S0294"), ("watchdog", "R0104"), ("Division", "R0101"),
 ])
@@ -206,7 +207,7 @@ def test_a_code_of_a_known_range_lists_that_range_only() -> None:
     assert {row.code[:3] for row in near("S0299")} == {"S02"}
 
 
-@pytest.mark.parametrize("nonsense", ["", "   ", "q1y2", "../codes"])
+@each_of("nonsense", ["", "   ", "q1y2", "../codes"])
 def test_nonsense_lists_nothing(nonsense: str) -> None:
     with pytest.raises(UnknownCode) as raised:
         page(nonsense)

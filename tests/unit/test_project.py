@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.engine import native
@@ -166,7 +167,7 @@ def test_a_project_is_a_folder_or_its_file(folder: Path) -> None:
     assert project_file(folder / "counter.st") is None
 
 
-@pytest.mark.parametrize(("path", "line"), [
+@each_of(("path", "line"), [
     (("a",), 1), (("t", "b"), 3), (("t", "b", "deeper"), 3), (("t", "inner", "c"), 5), (("rows", 0, "d"), 7),
     (("rows", 1, "d"), 9), (("rows", 1, "sub", 0, "e"), 11), (("rows", 1, "absent"), 8), (("q r", "f"), 13),
 ])  # fmt: skip

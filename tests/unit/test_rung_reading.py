@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from textwrap import dedent
 
-import pytest
+from rows import each_of
 
 from fbvm.code.compiler import compile_text
 from fbvm.plc import Plc
@@ -96,7 +96,7 @@ GOOD = {
 }
 
 
-@pytest.mark.parametrize("name", GOOD)
+@each_of("name", GOOD)
 def test_drawings_are_read(name: str) -> None:
     drawing, said = GOOD[name]
     assert read(drawing) == (said.split(", "), [])
@@ -201,7 +201,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize("name", BAD)
+@each_of("name", BAD)
 def test_what_is_wrong_is_said_with_its_place(name: str) -> None:
     drawing, row, column, said = BAD[name]
     assert read(drawing)[1] == [(row, column, said)]

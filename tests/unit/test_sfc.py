@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import pytest
+from rows import each_of
 
 from fbvm.code.compiler import compile_text
 from fbvm.plc import RUN, Plc
@@ -77,7 +77,7 @@ def test_times_do_not_drift() -> None:
     assert plc.read("Main.rounds") == 101
 
 
-@pytest.mark.parametrize(("association", "due_ms"), [
+@each_of(("association", "due_ms"), [
     ("x(L, T#70ms)", 70), ("x(D, T#80ms)", 80), ("x(DS, T#90ms)", 90), ("x(SD, T#60ms)", 60), ("x(SL, T#50ms)", 50)])  # fmt: skip
 def test_it_is_known_when_an_action_changes_by_itself(association: str, due_ms: int) -> None:
     plc = made(f"PROGRAM Main VAR x : BOOL; END_VAR INITIAL_STEP a: {association}; END_STEP END_PROGRAM")

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from rows import each_of
 
 from fbvm import Source, compile_files, compile_sources, compile_text
 from fbvm.base.diagnostics import errors
@@ -28,7 +29,7 @@ def test_codes_are_left_out() -> None:
     assert codes(TEXT, no_warn=["all"]) == codes(TEXT, lint=False) == []
 
 
-@pytest.mark.parametrize("code", ["S0201", "S0999", "R0101", "", "C0195"])
+@each_of("code", ["S0201", "S0999", "R0101", "", "C0195"])
 def test_what_is_no_code_of_a_warning_is_misuse(code: str) -> None:
     with pytest.raises(ValueError, match="is no code of a warning; there are S0190"):
         Wanted.of([code], False)
@@ -73,7 +74,7 @@ FLAGS = re.compile(r"\b(P_(ER|GT|EQ|N|OF|UF|CY)|CX_(Failure|Stopped)) +:=")
 """Only a library may write condition flags and the words of failures."""
 
 
-@pytest.mark.parametrize("files", OWN, ids=lambda files: files[0].parent.name + "/" + files[0].stem)
+@each_of("files", OWN, ids=lambda files: files[0].parent.name + "/" + files[0].stem)
 def test_what_fbvm_brings_is_clean(files: list[Path]) -> None:
     ordinary = [path for path in files if not FLAGS.search(path.read_text(encoding="utf-8"))]
     asked_for = ["S0390"] if files[0].parent.name == "ladder" else []  # equality is what an instruction asks there

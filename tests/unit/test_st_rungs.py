@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from textwrap import dedent
 
-import pytest
+from rows import each_of
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
@@ -60,12 +60,12 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("body", RUNGS)
+@each_of("body", RUNGS)
 def test_a_statement_is_a_rung(body: str) -> None:
     assert steps(body)[0] == RUNGS[body]
 
 
-@pytest.mark.parametrize("body", REFUSED)
+@each_of("body", REFUSED)
 def test_what_is_no_rung_is_named_with_its_line_and_the_rest_is_drawn(body: str) -> None:
     assert steps(f"{body}\na := b;") == [REFUSED[body], "LD b; OUT a"]
 

@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import each_of
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_text
@@ -186,7 +187,7 @@ def test_mode_and_power_between_scans_only() -> None:
     assert commands.session.read("Main.N") == 1
 
 
-@pytest.mark.parametrize("line", [
+@each_of("line", [
     "nonsense", "print", "print Nobody", "run 33", "run x.st:1", "step -1", "goto x", "write Main.N", "Main.N = 99999",
     "unbreak 3", "mode x", "power x", "table", "why Main.T", "run", "expect Main.N", "help x", "run Main.N", "D0..D1 = 1",
     "force D0..D1 = 1,2", "rung",

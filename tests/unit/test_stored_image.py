@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from rows import each_of
 
 from fbvm.base.types import ELEMENTARY, Field, RefType, StructType, Type
 from fbvm.code.compiler import compile_text
@@ -120,7 +121,7 @@ def test_the_fingerprint_needs_no_code() -> None:
     assert again.fingerprint == image.fingerprint
 
 
-@pytest.mark.parametrize("content", [b"", b"{}", b"[]", b"3", b'{"types": 3}', b'{"layout": [1]}', b"\xff"])
+@each_of("content", [b"", b"{}", b"[]", b"3", b'{"types": 3}', b'{"layout": [1]}', b"\xff"])
 def test_what_is_no_image_is_refused(content: bytes) -> None:
     with pytest.raises((ValueError, LookupError, TypeError)):
         decode(content)

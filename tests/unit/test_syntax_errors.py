@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.parser import parse
@@ -72,7 +73,7 @@ ONE_ERROR = [
 ]
 
 
-@pytest.mark.parametrize(("text", "message", "statements"), ONE_ERROR, ids=[e[0].replace("\n", " ") for e in ONE_ERROR])
+@each_of(("text", "message", "statements"), ONE_ERROR, ids=[e[0].replace("\n", " ") for e in ONE_ERROR])
 def test_one_mistake_gives_one_message_and_the_rest_is_read(text: str, message: str, statements: int) -> None:
     pou, diagnostics = body(text)
     assert [d.message for d in diagnostics] == ([message] if message else [])
@@ -164,7 +165,7 @@ def test_names_the_standard_forbids_are_warned_of_where_they_are_declared(name: 
     assert [(d.code, d.severity) for d in diagnostics] == [("S0191", "warning")]
 
 
-@pytest.mark.parametrize(("pragma", "known"), [
+@each_of(("pragma", "known"), [
     ("{region 'x'}", True), ("{ENDREGION}", True), ("{attribute 'qualified_only'}", True), ("{ }", True),
     ("{attribute 'pack_mode' := '1'}", True), ("{attribute 'pack_mode' := '3'}", False), ("{IF defined(x)}", False),
     ("{??}", False)])

@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import pytest
+from rows import each_of
 
 from fbvm.base.diagnostics import Source
 from fbvm.syntax.parser import parse
@@ -24,7 +24,7 @@ def children(value: Any) -> Iterator[Node]:
             yield from children(item)
 
 
-@pytest.mark.parametrize("path", sorted(GOLDEN.glob("*.st")), ids=lambda p: p.stem)
+@each_of("path", sorted(GOLDEN.glob("*.st")), ids=lambda p: p.stem)
 def test_spans(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     todo: list[Node] = [parse(Source(path.name, text))[0]]

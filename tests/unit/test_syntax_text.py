@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.code.compiler import compile_text
@@ -30,7 +31,7 @@ def test_bytes_that_windows_does_not_know_are_latin_1() -> None:
     assert isinstance(source, Source) and source.text == "(* \x81 *)"
 
 
-@pytest.mark.parametrize("data", [
+@each_of("data", [
     b"\x7fELF\0\0", b"PROGRAM\0", TEXT.encode("utf-16-le"), b"\xff\xfea", b"\x1b[0m", b"\xef\xbb\xbf\xff"],
     ids=["program", "nul", "no mark", "half a word", "escape", "wrong utf-8"])
 def test_binary_files_are_refused(data: bytes) -> None:
@@ -63,7 +64,7 @@ def test_lines_may_end_with_cr_alone() -> None:
     assert "a := c;" in made.diagnostics[0].render().splitlines()[1]
 
 
-@pytest.mark.parametrize("rest", ["\x1a", "\x1a\x1a\r\n", "\0\0\0", "\x1a\0 \n"])
+@each_of("rest", ["\x1a", "\x1a\x1a\r\n", "\0\0\0", "\x1a\0 \n"])
 def test_what_old_machines_write_behind_a_text_is_passed_over(rest: str) -> None:
     assert compile_text("PROGRAM Main\r\nEND_PROGRAM\r\n" + rest).diagnostics == []
     assert [d.code for d in compile_text(f"PROGRAM Main {rest} END_PROGRAM").diagnostics] == ["S0102"]

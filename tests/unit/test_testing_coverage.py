@@ -7,6 +7,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from rows import each_of
 from test_testing_plugin import run
 
 from fbvm.code.compiler import compile_text
@@ -175,7 +176,7 @@ def test_a_table_of_files(file: Path) -> None:
     assert lines[2].split() == ["TOTAL", "9", "3", "6", "4", "53%"]
 
 
-@pytest.mark.parametrize(("rate", "said"), [(0.0, "0%"), (0.001, "1%"), (0.5, "50%"), (0.999, "99%"), (1.0, "100%")])
+@each_of(("rate", "said"), [(0.0, "0%"), (0.001, "1%"), (0.5, "50%"), (0.999, "99%"), (1.0, "100%")])
 def test_only_all_is_all(rate: float, said: str) -> None:
     assert percent(rate) == said
 

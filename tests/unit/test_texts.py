@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_of
 
 from fbvm.base.arithmetic import Undefined
 from fbvm.base.types import ELEMENTARY
@@ -32,7 +33,7 @@ SHOWN = [
 ]
 
 
-@pytest.mark.parametrize(("data_type", "value", "text"), SHOWN)
+@each_of(("data_type", "value", "text"), SHOWN)
 def test_a_value_as_text_and_back(data_type: str, value: Any, text: str) -> None:
     assert to_text(data_type, value).decode() == text
     if (data_type, value) != ("DATE", -1):
@@ -46,7 +47,7 @@ def test_what_no_literal_says_has_a_word_assumed(value: float, text: str) -> Non
         assert repr(from_text(data_type, text.encode())) == repr(value)
 
 
-@pytest.mark.parametrize(("data_type", "text", "wanted"), [
+@each_of(("data_type", "text", "wanted"), [
     ("INT", "  42  ", 42), ("INT", "INT#42", 42), ("INT", "int#-1_000", -1000), ("INT", "+7", 7), ("INT", "16#7F", 127),
     ("WORD", "WORD#16#FFFF", 65535), ("BYTE", "2#1010_1010", 170), ("BOOL", "1", True), ("BOOL", "BOOL#false", False),
     ("REAL", "5", 5.0), ("REAL", "REAL#1.5e3", 1500.0), ("LREAL", "-1E-3", -0.001), ("TIME", "T#1m30s", 90 * 10**9),
@@ -57,7 +58,7 @@ def test_a_literal_with_or_without_prefix(data_type: str, text: str, wanted: Any
     assert from_text(data_type, text.encode()) == wanted
 
 
-@pytest.mark.parametrize(("data_type", "text", "code"), [
+@each_of(("data_type", "text", "code"), [
     ("INT", "", "R0111"), ("INT", "   ", "R0111"), ("INT", "1.5", "R0111"), ("INT", "DINT#5", "R0111"),
     ("INT", "32768", "R0105"), ("USINT", "-1", "R0105"), ("INT", "16#FFFF", "R0105"), ("BOOL", "2", "R0111"),
     ("BOOL", "yes", "R0111"), ("REAL", "1e39", "R0105"), ("REAL", "x", "R0111"), ("TIME", "5", "R0111"),

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_of
 from trace_rig import TEXT, image, press, record, traced
 
 from fbvm.base.types import ArrayType, EnumType, StringType, StructType, SubrangeType
@@ -176,7 +177,7 @@ def test_the_engine_is_given_back() -> None:
 # --- selection --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("patterns", "found"), [
+@each_of(("patterns", "found"), [
     (["Main.Delay.Q"], ["Main.Delay.Q"]),
     (["main.*.q"], ["Main.Delay.Q", "Main.Starts.Q"]),
     (["Main.Both[*].b"], ["Main.Both[1].b", "Main.Both[2].b"]),

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rows import each_of
 from trace_rig import image, traced
 
 from fbvm.plc import Plc
@@ -67,7 +68,7 @@ def test_a_table_from_elsewhere_becomes_a_trace() -> None:
     assert (trace.at(4).read("D5"), trace.at(4).read("Speed"), trace.at(3).now_ns) == (9, 2.0, 500_000)
 
 
-@pytest.mark.parametrize(("text", "said"), [
+@each_of(("text", "said"), [
     ("", "line 1: the first two columns"),
     ("time,scan\n", "line 1: the first two columns"),
     ("scan,time_ms,a\n1,2\n", "line 2: 2 cells, 3 expected"),

@@ -1,6 +1,7 @@
 """Conditions about values: what they mean and what is none."""
 
 import pytest
+from rows import each_of
 
 from fbvm.base import types as t
 from fbvm.base.areas import AREAS, SLOTS_OFFSET, e_bank
@@ -29,7 +30,7 @@ def holds(text: str) -> bool:
     return parse_condition(text, resolve).holds(lambda place: VALUES[place.name])
 
 
-@pytest.mark.parametrize("text", [
+@each_of("text", [
     "done", "NOT NOT done", "n = -7", "n <> 7", "n < 0 AND D200 > 512", "D200 = 16#201", "D200=513 OR 1 = 2",
     "CIO 1509.15", "cio1509.15 & TRUE", "r >= 0.5", "wait = 1.5s", "wait > T#1s400ms", "text = 'ok'",
     "c = Colour#Green",
@@ -41,7 +42,7 @@ def test_holds(text: str) -> None:
     assert holds(text)
 
 
-@pytest.mark.parametrize("text", [
+@each_of("text", [
     "tenth = 0.1", "0.1 = tenth", "tenth + 0.1 = 0.2", "long = 0.1", "tenth = REAL#0.1", "tenth > -0.1", "tenth * 10 = 1",
 ])  # fmt: skip
 def test_a_number_beside_a_real_is_rounded_to_32_bits_as_in_a_program(text: str) -> None:
@@ -53,7 +54,7 @@ def test_64_bits_are_not_rounded(text: str) -> None:
     assert not holds(text)
 
 
-@pytest.mark.parametrize("text", [
+@each_of("text", [
     "W 0 = 0", "D 10 = 0", "D  10=0 AND W 0 = 0", "W 0.00", "NOT (D 10 <> 0)", "E0 : 5 = 9", "e0_5 = 9", "% D 10 = 0",
     "DM 10 = 0",
 ])
@@ -61,14 +62,14 @@ def test_an_address_may_have_a_space_within(text: str) -> None:
     assert holds(text)
 
 
-@pytest.mark.parametrize("text", [
+@each_of("text", [
     "c = Green", "green = c", "c = Colour.Green", "c <> Red", "c = Colour#green", "(c = Green) = TRUE",
 ])
 def test_a_name_beside_an_enumeration_is_its_member(text: str) -> None:
     assert holds(text)
 
 
-@pytest.mark.parametrize("text", [
+@each_of("text", [
     "done = ON", "CIO 1509.15 = on", "done <> OFF", "when = DT#1970-01-02-00:00:00", "when > DT#1970-01-01-00:00:00",
     "day < D#2024-01-31", "wait + 500ms = 2s", "wait * 2 = 3s", "when - DT#1970-01-01-00:00:00 = 1d", "text = 'o$6B'",
 ])
@@ -76,7 +77,7 @@ def test_literals_are_those_of_a_program(text: str) -> None:
     assert holds(text)
 
 
-@pytest.mark.parametrize(("text", "message"), [
+@each_of(("text", "message"), [
     ("wait > 10", "wait is TIME and takes a time such as 10ms, not 10"),
     ("10 < wait", "wait is TIME and takes a time such as 10ms, not 10"),
     ("wait + 5 > 1s", "+ needs numbers"),
@@ -111,12 +112,12 @@ def test_what_could_never_hold_is_refused(text: str, message: str) -> None:
     assert message in str(error.value)
 
 
-@pytest.mark.parametrize("text", ["NOT done", "n > 0", "c = Colour#Red", "1 / (n + 7) = 1", "text < 'a'", "done AND n = 0"])
+@each_of("text", ["NOT done", "n > 0", "c = Colour#Red", "1 / (n + 7) = 1", "text < 'a'", "done AND n = 0"])
 def test_does_not_hold(text: str) -> None:
     assert not holds(text)
 
 
-@pytest.mark.parametrize(("text", "message"), [
+@each_of(("text", "message"), [
     ("", "ends too early"),
     ("n", "is no condition: it is not BOOL"),
     ("n + 1", "is no condition"),

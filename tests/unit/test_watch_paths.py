@@ -1,6 +1,7 @@
 """Names and addresses to places."""
 
 import pytest
+from rows import each_of
 
 from fbvm.base import types as t
 from fbvm.base.areas import AREAS
@@ -27,7 +28,7 @@ def place(text: str) -> Place:
     return find_place(SYMBOLS, AREAS, text)
 
 
-@pytest.mark.parametrize(("text", "name", "type_name", "offset", "bit"), [
+@each_of(("text", "name", "type_name", "offset", "bit"), [
     ("Main.conn.ENO", "Main.conn.ENO", "BOOL", 180224 + 16, None),
     ("main . CONN.eno", "Main.conn.ENO", "BOOL", 180224 + 16, None),
     ("Main.a[1, 0].y", "Main.a[1, 0].y", "DINT", 180224 + 28, None),
@@ -63,7 +64,7 @@ def test_constants_are_known() -> None:
     assert place("Main.limit").constant
 
 
-@pytest.mark.parametrize(("text", "names"), [
+@each_of(("text", "names"), [
     ("D300..D302", ["D300", "D301", "D302"]),
     ("%D200..%D201", ["D200", "D201"]),
     ("CIO 1519.14..CIO 1520.01", ["CIO 1519.14", "CIO 1519.15", "CIO 1520.00", "CIO 1520.01"]),
@@ -115,7 +116,7 @@ LISTS = {**SYMBOLS, "GVL.LEVEL": Field("GVL.level", t.INT, 182000, "VAR_GLOBAL",
          "FREE": Field("free", t.INT, 182024, "VAR_GLOBAL", space="Two")}
 
 
-@pytest.mark.parametrize(("text", "offset"), [
+@each_of(("text", "offset"), [
     ("GVL.level", 182000), ("gvl . LEVEL", 182000), ("level", 182000), ("GVL.tank.y", 182012), ("two.tank.x", 182016),
     ("free", 182024), ("Two.free", 182024), ("Main.x2", 180324)])
 def test_lists_of_global_variables_stand_in_front(text: str, offset: int) -> None:

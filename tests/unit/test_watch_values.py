@@ -3,6 +3,7 @@
 import math
 
 import pytest
+from rows import each_of
 
 from fbvm.base import types as t
 from fbvm.base.areas import AREAS, SLOTS_OFFSET
@@ -18,7 +19,7 @@ CHAR, WCHAR, WIDE = t.ELEMENTARY["CHAR"], t.ELEMENTARY["WCHAR"], t.string(3, wid
 PAIR = StructType("Pair", 16, 8, {"N": Field("n", t.INT, 0), "S": Field("s", t.string(5), 2)})
 
 
-@pytest.mark.parametrize(("text", "time_ns"), [
+@each_of(("text", "time_ns"), [
     ("10ms", 10_000_000), ("1.5s", 1_500_000_000), ("T#10ms", 10_000_000), ("time#1m30s", 90_000_000_000),
     ("LT#5us3ns", 5003), ("-2s", -2_000_000_000), ("T#-2s", -2_000_000_000), ("1d_2h", 93_600_000_000_000), ("0s", 0),
     ("0.5ms", 500_000),
@@ -27,13 +28,13 @@ def test_times_are_read(text: str, time_ns: int) -> None:
     assert parse_time_ns(text) == time_ns
 
 
-@pytest.mark.parametrize("text", ["", "10", "ms", "10 ms x", "5s,", "T#"])
+@each_of("text", ["", "10", "ms", "10 ms x", "5s,", "T#"])
 def test_what_is_no_time_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="is no time; write 10ms"):
         parse_time_ns(text)
 
 
-@pytest.mark.parametrize(("time_ns", "text"), [
+@each_of(("time_ns", "text"), [
     (0, "T#0s"), (90_000_000_000, "T#1m30s"), (-1_500_000_000, "T#-1s500ms"), (5003, "T#5us3ns"),
 ])  # fmt: skip
 def test_times_are_shown_as_a_program_writes_them(time_ns: int, text: str) -> None:
@@ -41,7 +42,7 @@ def test_times_are_shown_as_a_program_writes_them(time_ns: int, text: str) -> No
     assert parse_time_ns(text) == time_ns
 
 
-@pytest.mark.parametrize(("text", "value"), [
+@each_of(("text", "value"), [
     ("TRUE", True), ("false", False), ("12", 12), ("-1_000", -1000), ("16#FF", 255), ("0xff", 255), ("2#101", 5),
     ("INT#5", 5), ("WORD#16#10", 16), ("1.5", 1.5), ("-2e3", -2000.0), ("'a b'", "a b"), ("T#1s", 1_000_000_000),
     ("1s", 1_000_000_000),
@@ -51,7 +52,7 @@ def test_literals(text: str, value: object) -> None:
     assert type(literal(text)[0]) is type(value)
 
 
-@pytest.mark.parametrize(("kind", "text", "value"), [
+@each_of(("kind", "text", "value"), [
     (t.INT, "-5", -5), (t.WORD, "16#FFFF", 65535), (t.BOOL, "TRUE", True), (t.BOOL, "1", True), (t.REAL, "2", 2.0),
     (t.TIME, "10ms", 10_000_000), (t.string(), "a, b", "a, b"), (t.string(), "'x'", "x"), (COLOUR, "green", 5),
     (COLOUR, "Colour#Red", 0), (COLOUR, "Colour.Red", 0), (t.BOOL, "on", True), (t.BOOL, "OFF", False),
@@ -66,7 +67,7 @@ def test_text_becomes_a_value_of_the_type(kind: Type, text: str, value: object) 
     assert parse_value(kind, text, "x") == value
 
 
-@pytest.mark.parametrize(("kind", "value", "message"), [
+@each_of(("kind", "value", "message"), [
     (t.INT, 32768, "x: 32768 is out of range of INT, which holds -32768..32767"),
     (t.WORD, -1, "x: -1 is out of range of WORD, which holds 0..65535"),
     (LEVEL, 101, "x: 101 is out of range of Level, which holds 0..100"),
@@ -88,7 +89,7 @@ def test_a_value_out_of_range_is_refused(kind: Type, value: object, message: str
     assert message in str(error.value)
 
 
-@pytest.mark.parametrize(("kind", "value"), [
+@each_of(("kind", "value"), [
     (t.INT, 1.0), (t.INT, True), (t.BOOL, 2), (t.BOOL, "TRUE"), (t.REAL, "1"), (t.REAL, True), (t.string(), 5),
     (CHAR, 65), (WCHAR, 65), (WIDE, 5), (PAIR, 5), (t.array(((0, 1),), t.INT), [1, 2]),
 ])  # fmt: skip
@@ -97,7 +98,7 @@ def test_a_value_of_another_kind_is_refused(kind: Type, value: object) -> None:
         conform(kind, value, "x")
 
 
-@pytest.mark.parametrize(("kind", "text", "message"), [
+@each_of(("kind", "text", "message"), [
     (t.TIME, "10", "x is TIME and takes a time such as 10ms, not 10"),
     (t.INT, "10ms", "x is INT and takes a whole number, not 10ms"),
     (t.INT, "ten", "x: 'ten' is no literal"),
@@ -117,7 +118,7 @@ def test_text_of_another_kind_is_refused(kind: Type, text: str, message: str) ->
     assert str(error.value) == message
 
 
-@pytest.mark.parametrize(("kind", "value", "text"), [
+@each_of(("kind", "value", "text"), [
     (t.BOOL, True, "TRUE"), (t.INT, -5, "-5"), (t.WORD, 255, "255"), (t.TIME, 1_500_000_000, "T#1s500ms"),
     (t.string(), "a", "'a'"), (COLOUR, 5, "Green (5)"), (COLOUR, 3, "? (3)"), (t.REAL, math.inf, "inf"),
     (t.array(((0, 1),), t.BOOL), [True, False], "[TRUE, FALSE]"), (PAIR, {"n": 1, "s": "x"}, "(n := 1, s := 'x')"),
