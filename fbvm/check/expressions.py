@@ -31,9 +31,8 @@ from fbvm.base.types import (
     Type,
     base,
     fold,
-    string,
 )
-from fbvm.check import anything, qualified, unknown
+from fbvm.check import anything, literals, qualified, unknown
 from fbvm.check.aggregates import Aggregates
 from fbvm.check.constants import convert, cut, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
@@ -42,7 +41,6 @@ from fbvm.check.operators import Operators
 from fbvm.check.subscripts import Subscripts
 from fbvm.check.values import is_any
 from fbvm.syntax import ladder, tree
-from fbvm.syntax.literals import WRONG
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
@@ -125,10 +123,8 @@ class Expressions:
         return False
 
     def _in_range(self, expr: tree.Expr, value: Value, target: Type, code: str) -> bool:
-        if isinstance(target, StringType) and isinstance(value, bytes) and code != "S0503":
-            length = len(value) // (2 if target.wide else 1)
-            if length > target.capacity:
-                self._loses(expr, "S0790", f"the text has {length} characters, and {target} keeps {target.capacity} of them")
+        if isinstance(target, StringType) and isinstance(value, bytes | str) and len(value) > target.capacity and code != "S0503":
+            self._loses(expr, "S0790", f"the text has {len(value)} characters, and {target} keeps {target.capacity} of them")
         if isinstance(target, SubrangeType) and isinstance(value, int) and not target.low <= value <= target.high:
             self.error("S0702", expr, f"{value} is outside {target.low}..{target.high} of {target}")
             return False
@@ -181,71 +177,7 @@ class Expressions:
         if self.pou is not None:
             self.pou.calls.setdefault(pou, node)
 
-    # --- literals and names -----------------------------------------------------------------------------------------
-
-    def _literal(self, expr: tree.Literal, want: Type | None) -> Type | None:
-        if expr.kind == WRONG:
-            return None
-        if isinstance(expr.value, str):
-            return self._text_literal(expr, expr.value, want)
-        value = self.facts.constants[expr] = expr.value
-        if expr.type_name is None and expr.kind in ("int", "real"):
-            return UNTYPED_INT if expr.kind == "int" else UNTYPED_REAL
-        name = expr.type_name or {"bool": "BOOL", "time": "TIME"}.get(expr.kind, "")
-        kind = ELEMENTARY.get(name)
-        if kind is None:
-            declared = self.checker.specs.named_type(name, self.source)
-            if not isinstance(declared, Elementary | SubrangeType):
-                self.error("S0204", expr, f"there is no elementary type {name}")
-                return None
-            self.facts.types[expr] = UNTYPED_REAL if expr.kind == "real" else UNTYPED_INT
-            return self.adopt(expr, declared)
-        if is_any(kind, "ANY_REAL"):
-            assert isinstance(value, int | float)
-            self.facts.constants[expr] = convert(value, kind)
-        span = limits(kind)
-        if span and isinstance(value, int) and not span[0] <= value <= span[1]:
-            self.error("S0108", expr, f"{expr.text} is outside {kind}, which holds {span[0]} to {span[1]}")
-            return None
-        if expr.kind == "int" and kind == BOOL:
-            self.facts.constants[expr] = bool(value)
-        return kind
-
-    def _text_literal(self, expr: tree.Literal, text: str, want: Type | None) -> Type:
-        """A STRING or WSTRING, or of one character a CHAR or WCHAR where that is wanted."""
-        kind = string(max(1, len(text)), expr.kind == "wstring")
-        if expr.type_name in ("CHAR", "WCHAR"):
-            self.facts.constants[expr] = ord(text)
-            return ELEMENTARY[expr.type_name]
-        ended = text.partition("\0")[0]
-        self.facts.constants[expr] = ended if kind.wide else ended.encode("latin-1")
-        return self.as_character(expr, want) or kind
-
-    def as_character(self, expr: tree.Expr, want: Type | None) -> Type | None:
-        """The type of a text literal without type as one character, which becomes its constant; None if it is none."""
-        if not isinstance(expr, tree.Literal) or expr.type_name is not None or not isinstance(expr.value, str) or \
-                len(expr.value) != 1 or want is None or \
-                base(want).name != ("WCHAR" if expr.kind == "wstring" else "CHAR"):
-            return None
-        self.facts.constants[expr] = ord(expr.value)
-        self.facts.types[expr] = base(want)
-        return base(want)
-
-    def _enum_literal(self, expr: tree.EnumLiteral, want: Type | None) -> Type | None:
-        kind = self.checker.specs.named_type(expr.type_name.text, self.source)
-        if not isinstance(kind, EnumType):
-            self.error("S0204", expr.type_name, f"there is no enumeration {expr.type_name.text}")
-            return None
-        return self._enum_value(expr, kind, expr.member)
-
-    def _enum_value(self, expr: tree.Expr, kind: EnumType, member: tree.Name) -> Type | None:
-        value = kind.members.get(fold(member.text))
-        if value is None:
-            self.error("S0210", member, f"{kind} has no member {member.text}",
-                       self.project.choices(member.text, kind.shown.values()))
-            return None
-        self.facts.constants[expr] = value
-        return kind
+    # --- names --------------------------------------------------------------------------------------------------------
 
     def variable(self, name: str) -> Variable | None:
         """The variable that a name means here: the POU's own, else a global one."""
@@ -311,7 +243,7 @@ class Expressions:
     def _member(self, expr: tree.Member, want: Type | None) -> Type | None:
         meant = qualified.member(self, expr)
         if isinstance(meant, EnumType):
-            return self._enum_value(expr, meant, expr.name)
+            return literals.enum_value(self, expr, meant, expr.name)
         if isinstance(meant, Variable):
             return self._variable(expr, meant)
         if isinstance(expr.of, tree.NameRef) and qualified.is_space(self, expr.of):
@@ -333,7 +265,7 @@ class Expressions:
                 return self._part(self.facts.bits[expr], want)
             if isinstance(whole, EnumType) and isinstance(expr.of, tree.NameRef) and \
                     self.checker.specs.named_type(expr.of.text, self.source) is whole:
-                return self._enum_value(expr, whole, expr.name)  # a variable that is called like its type
+                return literals.enum_value(self, expr, whole, expr.name)  # a variable that is called like its type
             self.error("S0304", expr.of, f"this is {whole} and has no members",
                        f"what it points to has: write {self.text(expr.of)}^.{expr.name.text}"
                        if isinstance(whole, RefType) and isinstance(whole.target, StructType) else "")
@@ -438,7 +370,7 @@ _KNOWN = ("S0503", "S0705", "S0801")
 READABLE = ("", "VAR_INPUT", "VAR_OUTPUT")
 """Kinds of members that may be named from outside."""
 _INFER: dict[type, Callable[..., Type | None]] = {
-    tree.Literal: Expressions._literal, tree.EnumLiteral: Expressions._enum_literal, tree.NameRef: Expressions._name,
+    tree.Literal: literals.literal, tree.EnumLiteral: literals.enum_literal, tree.NameRef: Expressions._name,
     tree.Direct: Expressions._direct, tree.Member: Expressions._member, tree.Index: Expressions._index,
     tree.Part: Expressions._part, tree.Deref: Expressions._deref, tree.NullLiteral: Expressions._null,
     tree.ArrayInit: Expressions._aggregate, tree.StructInit: Expressions._aggregate,

@@ -33,6 +33,7 @@ from fbvm.base.types import (
 from fbvm.check import constants
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
 from fbvm.check.fitting import UNSIGNED, as_number, conversion_hint, convertible, is_untyped
+from fbvm.check.literals import as_character
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
@@ -104,8 +105,8 @@ class Operators:
         left, right = base(left), base(right)
         if self._chained(expr, right):
             return None
-        left = self.expressions.as_character(expr.left, right) or left
-        right = self.expressions.as_character(expr.right, left) or right
+        left = as_character(self.expressions, expr.left, right) or left
+        right = as_character(self.expressions, expr.right, left) or right
         if expr.op == "**":
             return self._power(expr, left, right, want)
         if isinstance(left, RefType) or isinstance(right, RefType):

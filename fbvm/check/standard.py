@@ -28,6 +28,7 @@ from fbvm.check.arguments import Arguments, callee
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
 from fbvm.check.fitting import as_number, convertible, is_untyped, same
 from fbvm.check.functions import Conversion, Signature
+from fbvm.check.literals import as_character
 from fbvm.check.values import MAKERS, is_any
 from fbvm.syntax import tree
 
@@ -239,7 +240,7 @@ class StandardCalls:
         if None in kinds:
             return None
         character = next((kind for kind in kinds if kind is not None and is_any(kind, "ANY_CHAR")), None)
-        kinds = [self.expressions.as_character(value, character) or kind for value, kind in zip(values, kinds, strict=True)]
+        kinds = [as_character(self.expressions, value, character) or kind for value, kind in zip(values, kinds, strict=True)]
         bound: Type | None = None
         for kind in kinds:
             assert kind is not None

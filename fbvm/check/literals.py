@@ -1,0 +1,88 @@
+"""Types of literals; one without a prefix stays untyped until it meets a context."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.types import BOOL, ELEMENTARY, Elementary, EnumType, SubrangeType, Type, base, fold, string
+from fbvm.check.constants import convert, limits
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
+from fbvm.check.values import is_any
+from fbvm.syntax import tree
+from fbvm.syntax.literals import WRONG
+
+if TYPE_CHECKING:
+    from fbvm.check.expressions import Expressions
+
+
+def literal(expressions: Expressions, expr: tree.Literal, want: Type | None) -> Type | None:
+    """The type of a number, text, time or truth, or None after a diagnostic."""
+    if expr.kind == WRONG:
+        return None
+    if isinstance(expr.value, str):
+        return _text(expressions, expr, expr.value, want)
+    constants = expressions.facts.constants
+    value = constants[expr] = expr.value
+    if expr.type_name is None and expr.kind in ("int", "real"):
+        return UNTYPED_INT if expr.kind == "int" else UNTYPED_REAL
+    name = expr.type_name or {"bool": "BOOL", "time": "TIME"}.get(expr.kind, "")
+    kind = ELEMENTARY.get(name)
+    if kind is None:
+        declared = expressions.checker.specs.named_type(name, expressions.source)
+        if not isinstance(declared, Elementary | SubrangeType):
+            expressions.error("S0204", expr, f"there is no elementary type {name}")
+            return None
+        expressions.facts.types[expr] = UNTYPED_REAL if expr.kind == "real" else UNTYPED_INT
+        return expressions.adopt(expr, declared)
+    if is_any(kind, "ANY_REAL"):
+        assert isinstance(value, int | float)
+        constants[expr] = convert(value, kind)
+    span = limits(kind)
+    if span and isinstance(value, int) and not span[0] <= value <= span[1]:
+        expressions.error("S0108", expr, f"{expr.text} is outside {kind}, which holds {span[0]} to {span[1]}")
+        return None
+    if expr.kind == "int" and kind == BOOL:
+        constants[expr] = bool(value)
+    return kind
+
+
+def _text(expressions: Expressions, expr: tree.Literal, text: str, want: Type | None) -> Type:
+    """A STRING or WSTRING, or of one character a CHAR or WCHAR where that is wanted."""
+    kind = string(max(1, len(text)), expr.kind == "wstring")
+    if expr.type_name in ("CHAR", "WCHAR"):
+        expressions.facts.constants[expr] = ord(text)
+        return ELEMENTARY[expr.type_name]
+    ended = text.partition("\0")[0]
+    expressions.facts.constants[expr] = ended if kind.wide else ended.encode("latin-1")
+    return as_character(expressions, expr, want) or kind
+
+
+def as_character(expressions: Expressions, expr: tree.Expr, want: Type | None) -> Type | None:
+    """The type of a text literal without type as one character, which becomes its constant; None if it is none."""
+    if not isinstance(expr, tree.Literal) or expr.type_name is not None or not isinstance(expr.value, str) or \
+            len(expr.value) != 1 or want is None or \
+            base(want).name != ("WCHAR" if expr.kind == "wstring" else "CHAR"):
+        return None
+    expressions.facts.constants[expr] = ord(expr.value)
+    expressions.facts.types[expr] = base(want)
+    return base(want)
+
+
+def enum_literal(expressions: Expressions, expr: tree.EnumLiteral, want: Type | None) -> Type | None:
+    """The type of `Colour#Red`, or None after a diagnostic."""
+    kind = expressions.checker.specs.named_type(expr.type_name.text, expressions.source)
+    if not isinstance(kind, EnumType):
+        expressions.error("S0204", expr.type_name, f"there is no enumeration {expr.type_name.text}")
+        return None
+    return enum_value(expressions, expr, kind, expr.member)
+
+
+def enum_value(expressions: Expressions, expr: tree.Expr, kind: EnumType, member: tree.Name) -> Type | None:
+    """The type of a member of an enumeration, whose number is the constant; None after a diagnostic."""
+    value = kind.members.get(fold(member.text))
+    if value is None:
+        expressions.error("S0210", member, f"{kind} has no member {member.text}",
+                          expressions.project.choices(member.text, kind.shown.values()))
+        return None
+    expressions.facts.constants[expr] = value
+    return kind
