@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
+from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import (
     BOOL,
@@ -18,7 +18,6 @@ from fbvm.base.types import (
     ArrayType,
     Field,
     OpenArrayType,
-    StringType,
     StructType,
     Type,
     base,
@@ -27,7 +26,8 @@ from fbvm.base.types import (
     on_bits,
 )
 from fbvm.check import beginnings
-from fbvm.check.facts import Edge, Pou, Variable, holds_block, is_block, is_open
+from fbvm.check.facts import Edge, Pou, Variable, is_block, is_open
+from fbvm.check.locations import location_of
 from fbvm.check.names import refuse_reserved
 from fbvm.check.statements import assigns_to
 from fbvm.syntax import tree
@@ -229,58 +229,11 @@ class Interfaces:
                 made.wrong = declared.initial in self.project.facts.wrong
                 made.value = None if made.wrong else self.project.facts.constants.get(declared.initial)
         if declared.location is not None:
-            made.location = self.location(declared, kind, source)
+            made.location = location_of(self.checker, declared, kind, source)
             place = made.location
             if isinstance(kind, ArrayType) and place is not None and (place.bit is not None or place.area in FLAG_AREAS):
                 made.type = on_bits(kind)
         return made
-
-    def location(self, declared: tree.VarDecl, kind: Type, source: Source) -> Address | None:
-        """The address behind AT, checked against the type; None after a diagnostic."""
-        node = declared.location
-        assert node is not None
-        if is_open(node, kind):
-            return None
-        try:
-            address = parse_address(node.text, self.checker.areas)
-        except AddressError as error:
-            self.report.add("S0601", source, node, str(error))
-            return None
-        if address.area in ("T", "C") and base(kind) == BOOL:
-            address = Address("TF" if address.area == "T" else "CNF", address.number)
-        if len(declared.names) > 1:
-            self.report.add("S0604", source, node, "one location cannot serve several names")
-            return None
-        return address if self._fits(address, kind, source, node) else None
-
-    def _fits(self, address: Address, kind: Type, source: Source, node: tree.Node) -> bool:
-        is_bit = address.bit is not None or address.area in FLAG_AREAS
-        if is_bit and isinstance(kind, ArrayType) and kind.element == BOOL:
-            self.checker.use_area(address.area)
-            end = address.byte_offset() * 8 + address.bit_in_byte() + kind.count
-            if end > self.checker.areas[address.area].size_bytes * 8:
-                self.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
-                return False
-            return True
-        if is_bit != (base(kind) == BOOL):
-            self.report.add("S0602", source, node,
-                            f"{address} is one bit and {kind} is not BOOL" if is_bit else
-                            f"{address} is a word and {kind} needs " + ("a bit" if base(kind) == BOOL else "more"),
-                            "name a bit, such as CIO 1519.03" if base(kind) == BOOL else "")
-            return False
-        if holds_block(kind):
-            self.report.add("S0604", source, node, "instances of blocks have no location")
-            return False
-        self.checker.use_area(address.area)
-        size = self.checker.areas[address.area].size_bytes
-        if address.size_bits and not isinstance(kind, ArrayType | StructType | StringType) \
-                and kind.size * 8 != max(8, address.size_bits):
-            self.report.add("S0602", source, node, f"{address} has {address.size_bits} bits, {kind} {kind.size * 8}")
-            return False
-        if address.byte_offset() + kind.size > size:
-            self.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
-            return False
-        return True
 
     def _place(self, variable: Variable, declared: tree.VarDecl, pou: Pou) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"

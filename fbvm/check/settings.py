@@ -15,6 +15,7 @@ from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, Field, StructType, Type, fold
 from fbvm.check.facts import AccessPath, Completed, Spot, Variable
+from fbvm.check.locations import location_of
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ class Settings:
                                 "declare it  AT %I*")
                 return
             shown = tree.VarDecl(row.start, row.end, (), row.location, row.spec, None)
-            address = self.checker.interfaces.location(shown, spot.type, source)
+            address = location_of(self.checker, shown, spot.type, source)
             if address is None:
                 return
         initial = self.checker.values.initial(spot.type, row.initial, source, resolved[1]) if row.initial is not None else None

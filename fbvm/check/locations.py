@@ -1,0 +1,65 @@
+"""Where variables are declared AT: the address behind it, checked against the area and the type."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import BOOL, ArrayType, StringType, StructType, Type, base
+from fbvm.check.facts import holds_block, is_open
+from fbvm.syntax import tree
+
+if TYPE_CHECKING:
+    from fbvm.check.checker import Checker
+
+
+def location_of(checker: Checker, declared: tree.VarDecl, kind: Type, source: Source) -> Address | None:
+    """The address behind AT, checked against the type; None after a diagnostic."""
+    node = declared.location
+    assert node is not None
+    if is_open(node, kind):
+        return None
+    try:
+        address = parse_address(node.text, checker.areas)
+    except AddressError as error:
+        checker.report.add("S0601", source, node, str(error))
+        return None
+    if address.area in ("T", "C") and base(kind) == BOOL:
+        address = Address("TF" if address.area == "T" else "CNF", address.number)
+    if len(declared.names) > 1:
+        checker.report.add("S0604", source, node, "one location cannot serve several names")
+        return None
+    return address if _fits(checker, address, kind, source, node) else None
+
+
+def _fits(checker: Checker, address: Address, kind: Type, source: Source, node: tree.Node) -> bool:
+    """True if the address has room for the type; else a diagnostic."""
+    is_bit = address.bit is not None or address.area in FLAG_AREAS
+    if is_bit and isinstance(kind, ArrayType) and kind.element == BOOL:
+        checker.use_area(address.area)
+        end = address.byte_offset() * 8 + address.bit_in_byte() + kind.count
+        if end > checker.areas[address.area].size_bytes * 8:
+            checker.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
+            return False
+        return True
+    if is_bit != (base(kind) == BOOL):
+        if is_bit:
+            checker.report.add("S0602", source, node, f"{address} is one bit and {kind} is not BOOL")
+        else:
+            checker.report.add("S0602", source, node, f"{address} is a word and {kind} needs a bit",
+                               "name a bit, such as CIO 1519.03")
+        return False
+    if holds_block(kind):
+        checker.report.add("S0604", source, node, "instances of blocks have no location")
+        return False
+    checker.use_area(address.area)
+    size = checker.areas[address.area].size_bytes
+    if address.size_bits and not isinstance(kind, ArrayType | StructType | StringType) \
+            and kind.size * 8 != max(8, address.size_bits):
+        checker.report.add("S0602", source, node, f"{address} has {address.size_bits} bits, {kind} {kind.size * 8}")
+        return False
+    if address.byte_offset() + kind.size > size:
+        checker.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
+        return False
+    return True
