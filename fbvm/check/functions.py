@@ -161,6 +161,11 @@ def typed_name(name: str) -> tuple[str, Elementary | StringType] | None:
     return None
 
 
+def is_standard(name: str) -> bool:
+    """True for the folded name of a standard function, overloaded or typed."""
+    return name in SIGNATURES or name in OPERATORS or name in TIME_OPERATORS or bool(conversion(name) or typed_name(name))
+
+
 def names() -> list[str]:
     """All names of standard functions, for hints."""
     return [*SIGNATURES, *OPERATORS, *(f"{a}_TO_{b}" for a in ELEMENTARY for b in ELEMENTARY if a != b)]

@@ -16,7 +16,9 @@ import click
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source, whole_lines
 from fbvm.base.types import fold
-from fbvm.check.functions import OPERATORS, SIGNATURES, conversion, typed_name
+from fbvm.check.functions import is_standard
+from fbvm.check.questions import NAMES, REFUSED
+from fbvm.check.values import MAKERS
 from fbvm.cli import status
 from fbvm.cli.files import writing
 from fbvm.cli.sources import show
@@ -155,8 +157,8 @@ def _library_declaration(key: str) -> Declaration | None:
 
 
 def _standard(name: str) -> bool:
-    """Whether a name in capitals is that of a standard function."""
-    return name in SIGNATURES or name in OPERATORS or bool(conversion(name) or typed_name(name))
+    """Whether a name in capitals is that of a standard function, or of what looks like one."""
+    return is_standard(name) or name in MAKERS or name in NAMES and name not in REFUSED
 
 
 OUTSIDE = Outside(lambda name: _library_declaration(fold(name)), _standard)

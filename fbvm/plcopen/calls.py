@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.check.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversion, typed_name
+from fbvm.check.functions import is_standard
 from fbvm.plcopen.diagram import Object, Pin, Wire
 from fbvm.plcopen.rung_parts import instruction
 from fbvm.plcopen.scope import SHARED
@@ -32,7 +32,7 @@ class Calls:
             raise Unexecutable(item, f"the instruction {item.mnemonic} cannot stand outside of a rung", "")
         if item.instance:
             self._instance(item)
-        elif _is_standard(item.text) and not item.in_outs:
+        elif is_standard(item.text.upper()) and not item.in_outs:
             self._standard(item)
         else:
             self._function(item)
@@ -246,9 +246,3 @@ class Calls:
             statements.give(Wire(item, "ENO"), eno)
         if wire is not None:
             statements.give(wire, Value(target, ATOM, frozenset((target.upper(),))))
-
-
-def _is_standard(name: str) -> bool:
-    folded = name.upper()
-    return bool(folded in SIGNATURES or folded in OPERATORS or folded in TIME_OPERATORS or conversion(folded)
-                or typed_name(folded))

@@ -102,3 +102,12 @@ def test_lines_that_end_with_cr_alone_become_lines() -> None:
     Path("wild.st").write_bytes(f"// \N{DEGREE SIGN}\r{WILD}\r\x1a".encode("cp1252"))
     assert fmt("wild.st").exit_code == 0
     assert Path("wild.st").read_bytes() == f"// \N{DEGREE SIGN}\n{CANONICAL}".encode("cp1252")
+
+
+def test_names_of_standard_functions_are_capitals_whatever_they_ask() -> None:
+    body = "    n := add_int(sizeof(n), dint_to_int(n));\n    t := add_tod_time(t, t#1s);\n    n := ini(adr);\n"
+    given = f"PROGRAM p\nVAR\n    n, adr : INT;\n    t      : TOD;\nEND_VAR\n{body}END_PROGRAM\n"
+    wanted = given.replace("t#", "T#")
+    for name in ("add_int", "sizeof", "dint_to_int", "add_tod_time"):
+        wanted = wanted.replace(name, name.upper())
+    assert fmt("-", given=given).stdout == wanted, "ini is none of these"
