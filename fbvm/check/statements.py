@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -178,10 +179,9 @@ class Statements:
         if low > high:
             self.error("S0503", label[0], f"the range {low}..{high} is empty")
             return None
-        if any(low <= other_high and other_low <= high for other_low, other_high in taken):
+        if _take(taken, low, high):
             shown = f"{low}" if low == high else f"{low}..{high}"
             self.error("S0503", label[0], f"the label {shown} is taken by a label above")
-        taken.append((low, high))
         return low, high
 
     def _label_value(self, expr: tree.Expr, kind: Type) -> int | None:
@@ -272,6 +272,15 @@ _CHECK: dict[type, Callable[..., None]] = {
     ladder.Ladder: Statements._rungs, ladder.Rung: Statements._rungs, sfc.Sfc: Statements._sfc,
     tree.Return: Statements._return, tree.Empty: Statements._empty, tree.RefusedStatement: Statements._refused,
 }
+
+
+def _take(taken: list[tuple[int, int]], low: int, high: int) -> bool:
+    """Adds low..high to the labels taken, which stay sorted and apart; True if any of them was taken before."""
+    start = bisect_left(taken, low, key=lambda span: span[1])
+    end = bisect_right(taken, high, key=lambda span: span[0])
+    met = taken[start:end]
+    taken[start:end] = [(min(low, met[0][0]), max(high, met[-1][1])) if met else (low, high)]
+    return bool(met)
 
 
 def assigns_to(statements: tree.Block, name: str) -> bool:
