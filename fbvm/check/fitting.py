@@ -219,7 +219,8 @@ def literal_hint(value: Value | None, kind: Type) -> str:
     if isinstance(kind, EnumType):
         same = kind.shown.get(value) if isinstance(value, int) else None
         return f"name a member, such as {kind}#{same or next(iter(kind.shown.values()))}"
-    for name, written in (("DURATION", "a duration is written T#500ms"), ("DATE", f"a literal is written {_dated(kind)}")):
+    time_ms = value if isinstance(value, int) and value > 0 and not isinstance(value, bool) else 500
+    for name, written in (("DURATION", f"a duration is written T#{time_ms}ms"), ("DATE", f"a literal is written {_dated(kind)}")):
         if f"ANY_{name}" in families(kind):
             return written
     if is_any(kind, "ANY_INT") and isinstance(value, float):

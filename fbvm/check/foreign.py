@@ -14,8 +14,10 @@ VALUES = dict.fromkeys(("DEFAULT", "OTHERS", "OTHERWISE"), "the rest of a CASE s
     "BREAK": "EXIT leaves a loop", "END_DO": "FOR ends with END_FOR, WHILE with END_WHILE", "GOTO": "write JMP and a label",
     "INF_REAL": "write STRING_TO_REAL('INF')", "INF_LREAL": "write STRING_TO_LREAL('INF')",
     "NAN_REAL": "write STRING_TO_REAL('NAN')", "NAN_LREAL": "write STRING_TO_LREAL('NAN')",
-    "LET": "write x := 5;"} | dict.fromkeys((*ELEMENTARY, "STRING", "WSTRING"), "it is a type: variables are declared between "
-                                            "VAR and END_VAR, in front of all statements")
+    **dict.fromkeys(("END", "FI", "ENDLOOP", "END_LOOP", "DONE"), "blocks end with END_IF, END_FOR, END_WHILE, END_CASE"),
+    **dict.fromkeys(("ON", "YES", "HIGH"), "write TRUE"), **dict.fromkeys(("OFF", "NO", "LOW"), "write FALSE"),
+    **dict.fromkeys((*ELEMENTARY, "STRING", "WSTRING"),
+                    "it is a type: variables are declared between VAR and END_VAR, in front of all statements")}
 """Names of values."""
 FUNCTIONS = {
     "SWITCH": "a choice among values is CASE x OF 1: .. END_CASE", "POW": "write a ** b, or EXPT(a, b)",
@@ -51,6 +53,15 @@ _LIBRARIES = (
     (r"(?:BLINK|GEN|HYSTERESIS|LIMITALARM|RAMP_INT|RAMP_REAL|VARIANCE|STATISTICS_\w+|CHARCURVE|LIN_TRAFO)", "CODESYS's Util"),
 )
 """Patterns of names, and the library that they come from."""
+
+
+_DURATION = re.compile(r"T_?([0-9]+(?:[mun]s|[dhms]))", re.IGNORECASE)
+
+
+def duration(name: str) -> str:
+    """A hint for `T5s`; "" for any other name."""
+    match = _DURATION.fullmatch(name)
+    return f"a duration is written T#{match[1]}" if match else ""
 
 
 def library_of(name: str) -> str:

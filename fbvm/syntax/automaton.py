@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from itertools import chain, repeat
 from typing import Any, Protocol
 
 from fbvm.syntax.builder import TooDeep
@@ -54,7 +55,8 @@ class Automaton:
             getattr(builder, r.action) if r.action else None for r in self.tables.rules]
         self.states: list[int] = [self.tables.start]
         self.values: list[Any] = []
-        self.stream = stream
+        self.stream = chain(stream, repeat(Token("$END", "", len(text), len(text))))
+        """The tokens; whoever passes over text may have taken the end away, so it comes again."""
         self.mender: Mender | None = None
         self.before = Token("", "", 0, 0)
         """The last token that was taken."""

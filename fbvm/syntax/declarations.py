@@ -109,7 +109,7 @@ class Declarations(SfcElements):
             self.report("S0201", jump.start, jump.end, f"there is no label {self.targets[jump]} here",
                         "write `name:` in front of the statement to go on with")
         try:
-            made = jumps.body(body) if self.targets else body
+            made = jumps.body(body) if self.targets or self.labels else body
         except Tangled:
             made = body
         else:

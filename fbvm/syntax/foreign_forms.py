@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
+
 from fbvm.syntax.automaton import Automaton
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.literals import ELEMENTARY
 from fbvm.syntax.mend import Mend
 from fbvm.syntax.phrases import found, sign
-from fbvm.syntax.prospect import advance
+from fbvm.syntax.prospect import advance, expected
 from fbvm.syntax.tree import NameRef, Node
 
 OPERANDS = {"NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "LPAR", "DIRECT", "NOT"}
@@ -19,6 +21,7 @@ SIGNS = {"DIV": ("SLASH", ", which drops the fraction between integers"), "POW":
 """Words between two values: our terminal, and more advice."""
 UNARY = {"ABS", "SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN", "TRUNC", "LEN"}
 """Functions of one input that are written without brackets."""
+_CONVERSION = re.compile(r"(?:[A-Z]+_)?TO_[A-Z]+", re.IGNORECASE)
 NUMBERS = {"FLOAT": "REAL", "DOUBLE": "LREAL", "INTEGER": "INT", "LONG": "DINT", "SHORT": "INT", "UNSIGNED": "UDINT"}
 """Types of other languages in front of what is to be converted."""
 WEAKER = ("PLUS", "LESS", "EQUAL", "AND", "OR")
@@ -55,6 +58,8 @@ def decimal_comma(automaton: Automaton, token: Token, following: list[Token]) ->
     number = following[1]
     if before.end != token.start or number.start != token.end or not before.text.isdigit():
         return None
+    if "RANGE" in expected(automaton.states):
+        return None
     automaton.next()
     advice = f"thousands have no sign, or `_`: {before.text}_{number.text}" if "." in number.text else \
         f"the decimal sign is a point: {before.text}.{number.text}"
@@ -85,7 +90,7 @@ def bare_function(automaton: Automaton, token: Token, following: list[Token]) ->
     before, behind = automaton.before, token.text if token.type in ("NAME", "NUMBER") else "x"
     if token.type not in ("NAME", "NUMBER", "TYPED_LITERAL", "LPAR") or not automaton.values:
         return None
-    if before.type == "NAME" and before.text.upper() in UNARY:
+    if before.type == "NAME" and (before.text.upper() in UNARY or _CONVERSION.fullmatch(before.text)):
         return Mend([], before.start, before.end, f"{found(before)} is a function", f"write {before.text.upper()}({behind})",
                     lossless=False)
     value = automaton.values[-1]

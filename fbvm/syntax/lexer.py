@@ -33,7 +33,9 @@ MISSPELT = {
     "ENDCASE": "END_CASE", "ENDREPEAT": "END_REPEAT", "ENDVAR": "END_VAR", "ENDSTRUCT": "END_STRUCT",
     "ENDTYPE": "END_TYPE", "ENDFUNCTION": "END_FUNCTION", "ENDFUNCTION_BLOCK": "END_FUNCTION_BLOCK",
     "ENDPROGRAM": "END_PROGRAM", "ENDSTEP": "END_STEP", "ENDTRANSITION": "END_TRANSITION", "ENDACTION": "END_ACTION",
-    "END_TRANS": "END_TRANSITION", "SWITCH": "CASE", "BREAK": "EXIT", "END": "END_"}
+    "END_TRANS": "END_TRANSITION", "END_VAR_INPUT": "END_VAR", "END_VAR_OUTPUT": "END_VAR", "END_VARS": "END_VAR",
+    "VARINPUT": "VAR", "VAROUTPUT": "VAR", "VARINOUT": "VAR", "FUNCTIONBLOCK": "FUNCTION_BLOCK",
+    "SWITCH": "CASE", "BREAK": "EXIT", "END": "END_"}
 """Words of other languages, and ours without their `_`: of the type MISSPELT, and names where they fit as such.  So are
 END with a space behind it, and words that begin with VAR_."""
 
@@ -56,6 +58,10 @@ _FOREIGN = {"==": ("EQUAL", "=", "`=` compares"), "!=": ("UNEQUAL", "<>", "write
             "&&": ("AND", "AND", "write AND"), "||": ("OR", "OR", "write OR"), "|": ("OR", "OR", "write OR"),
             "!": ("NOT", "NOT", "write NOT, or `<>` for unequal"), "~": ("NOT", "NOT", "write NOT"),
             "=:": ("ASSIGN", ":=", "write `:=`"), "=<": ("LESS_EQUAL", "<=", "write `<=`"),
+            "><": ("UNEQUAL", "<>", "write `<>`"), ":==": ("ASSIGN", ":=", "write `:=`"),
+            "> =": ("GREATER_EQUAL", ">=", "`>=` is one sign, without a space inside"),
+            "< =": ("LESS_EQUAL", "<=", "`<=` is one sign, without a space inside"),
+            "< >": ("UNEQUAL", "<>", "`<>` is one sign, without a space inside"),
             "->": ("DOT", ".", "write `^.` behind a reference"),
             "<<": ("STAR", "*", "write SHL(value, count)"), ">>": ("STAR", "*", "write SHR(value, count)"),
             "++": ("", "", "write `x := x + 1`"), "--": ("", "", "write `x := x - 1`"),
@@ -65,10 +71,17 @@ _FOREIGN = {"==": ("EQUAL", "=", "`=` compares"), "!=": ("UNEQUAL", "<>", "write
 _SIGNS = tuple((re.compile(shape), advice) for shape, advice in (
     (r"\?", "write SEL(condition, if_false, if_true)"),
     (r"#[ \t]*(?:include|define|if|ifdef|ifndef|pragma)\b", "there is no preprocessor: declare constants in VAR CONSTANT"),
-    (r"[#$]([0-9A-Fa-f]+)\b", r"hexadecimal digits are written 16#\1"),
+    (r"(?<!\.)%[A-Za-z]", "an address has a number behind its letters: %QX0.0, %MW10"),
     (r"#", "a type stands in front of `#`, and no space"),
     (r"\\", "the escape in a string is `$`")))
 """What no word begins with, and advice."""
+_WRITTEN = tuple((re.compile(row[0]), *row[1:]) for row in (
+    (r"#([0-9.]+(?:[mun]s|[dhms]))\b", "TYPED_LITERAL", r"T#\1", r"`\g<0>` is no duration", r"a duration is written T#\1"),
+    (r"[#$]([0-9A-Fa-f]+)\b", "NUMBER", r"16#\1", r"`\g<0>` is no number", r"hexadecimal digits are written 16#\1"),
+    (r"[\u2018-\u201f`\u00b4]([^'\u2018-\u201f`\u00b4\r\n]*)[\u2018-\u201f`\u00b4]", "STRING_LITERAL", r"'\1'",
+     "the quotes are not straight", r"a text is written '\1'"),
+    (r"#[ \t]+[A-Za-z][^\r\n]*", "", "", "`#` begins no comment", "a comment begins with // or stands in (* *)")))
+"""What other languages write: pattern, our terminal and its text, message, advice."""
 _DRAWN = re.compile(r"(?:[ \t]*[│├┃┣][^\n]*\n)+")
 """Lines that begin with the left rail of a rung."""
 END_OF_FILE = "\x1a\0"
@@ -121,7 +134,8 @@ def lexis() -> Lexis:
         else:
             patterns[terminal.name] = _pattern(terminal)
     patterns["COMMENT"] = r"//[^\n]*|\(\*|/\*"
-    patterns["FOREIGN"] = r"==|=<|<<|>>|->|!=|&&|\|\||[-+*/]=|=:|:[ \t]+=(?!>)|(?:\+\+|--)(?=\s*;)|[!|~]|%(?![A-Za-z*])"
+    patterns["FOREIGN"] = r"==|:==|><|>[ \t]+=|<[ \t]+[=>]" + (
+        r"|=<|<<|>>|->|!=|&&|\|\||[-+*/]=|=:|:[ \t]+=(?!>)|(?:\+\+|--)(?=\s*;)|[!|~]|%(?![A-Za-z*])")
     patterns["SIGN"] = "|".join(re.escape(sign) for sign in sorted(signs, key=len, reverse=True))
     alternatives = "|".join(f"(?P<{name}>{patterns[name]})" for name in _ORDER)
     known = re.escape("".join(sorted(set("".join(signs) + "'\"{%"))))
@@ -227,11 +241,21 @@ class Lexer:
                         f"`{_short(word[0])}` is no name: of letters only A to Z can be part of one",
                         "comments and strings may have any character")
             return Token("NAME", word[0], at, word.end()), word.end()
+        if written := next((row for row in _WRITTEN if row[0].match(text, at)), None):
+            return self._meant(at, *written)
         run = lex.unknown.match(text, at + 1)
         end = run.end() if run else at + 1
         advice = next((match.expand(words) for shape, words in _SIGNS if (match := shape.match(text, at))), "")
         self.report("S0102", at, end, f"unexpected {_characters(text[at:end])}", advice)
         return None, end
+
+    def _meant(self, at: int, shape: re.Pattern[str], kind: str, ours: str, message: str,
+               advice: str) -> tuple[Token | None, int]:
+        """What other languages write with these characters: a number, a text, a comment (of which nothing is left)."""
+        match = shape.match(self.text, at)
+        assert match is not None
+        self.report("S0102", at, match.end(), match.expand(message), match.expand(advice))
+        return Token(kind, match.expand(ours), at, match.end()) if kind else None, match.end()
 
     def _open_string(self, at: int) -> tuple[Token, int]:
         quote = self.text[at]
@@ -242,8 +266,8 @@ class Lexer:
 
     def _foreign(self, word: str, start: int, end: int) -> tuple[str, str]:
         """Our operator for one of other languages: terminal and text, which are empty if we have none."""
-        kind, ours, advice = _FOREIGN.get(word, ("ASSIGN", ":=", f"write out `x := x {word[0]} ..`"))
-        if word.startswith(":"):
+        kind, ours, advice = _FOREIGN.get(re.sub(r"[ \t]+", " ", word), ("ASSIGN", ":=", f"write out `x := x {word[0]} ..`"))
+        if word[:1] == ":" and word != ":==":
             advice = "`:=` is one sign, without a space inside"
         self.report("S0101", start, end, f"`{word}` is no operator of Structured Text", advice, word not in NO_VALUE)
         return kind, ours

@@ -17,7 +17,8 @@ from fbvm.syntax.tree import EnumLiteral, Literal
 INSERTED = ("SEMICOLON", "RPAR", "RSQB", "THEN", "DO", "OF", "COLON", "ASSIGN", "COMMA", "END_REPEAT")
 """Words that may be put in, the most likely first."""
 
-REPLACED = {"EQUAL": ("ASSIGN",), "ASSIGN": ("EQUAL", "COLON"), "COLON": ("SEMICOLON", "ASSIGN"),
+REPLACED = {"EQUAL": ("ASSIGN", "COLON"), "OUTPUT": ("GREATER_EQUAL",),
+            "ASSIGN": ("EQUAL", "COLON"), "COLON": ("SEMICOLON", "ASSIGN"),
             "SEMICOLON": ("COLON",), "COMMA": ("SEMICOLON",), "DOT": ("SEMICOLON",)}
 """Signs that are mistaken for others."""
 
@@ -92,6 +93,8 @@ def _replacements(automaton: Automaton, following: list[Token]) -> Iterator[Tria
     token = following[0]
     for rank, kind in enumerate(REPLACED.get(token.type, ())):
         score = 1 + _score(automaton, advance(automaton.states, kind), following[1:])
+        if kind == "GREATER_EQUAL" and advance(automaton.states, "COLON"):
+            continue  # behind a label of CASE
         if score >= GOOD:
             message = f"{quoted(kind)} expected, but {found(token)} found"
             advice = hint(token, {kind})

@@ -28,6 +28,9 @@ CONTINUATIONS = {
     "UNEQUAL", "LESS", "GREATER", "LESS_EQUAL", "GREATER_EQUAL", "DOT", "PART", "CARET", "LSQB"}
 """What may always follow an operand, and is nobody's news."""
 
+STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "DIRECT"}
+"""With these and names statements begin."""
+
 LABEL_SIGNS = {"COLON", "COMMA", "RANGE", "SET_ASSIGN", "ATTEMPT"}
 """What may follow a name at the start of a statement, beside `:=`, `(` and `;`."""
 
@@ -42,6 +45,12 @@ SHOWN = 4
 
 MEANT = {"STEP": ("BY", "the step of a loop stands behind BY"), "DOWNTO": ("TO", "write TO, and BY -1")}
 """Words of other languages -> ours, and advice."""
+
+
+OPENING = {"THEN": ("IF", "IF"), "DO": ("FOR", "FOR or WHILE"), "OF": ("CASE", "CASE"), "BY": ("FOR", "FOR")}
+"""Words in the middle of a statement -> the word that shows that one begins here, and what stands in front of them."""
+MIDDLE = {"THEN", "DO", "OF", "TO", "BY", "AND", "OR", "XOR", "MOD"}
+"""Reserved words that nobody takes for a name."""
 
 
 def sign(kind: str) -> str:
@@ -96,6 +105,8 @@ def unlike(token: Token, kinds: set[str]) -> str:
     """The message for a token where `kinds` are expected."""
     if token.type == "VAR" and kinds & {"END_PROGRAM", "END_FUNCTION_BLOCK", "END_FUNCTION"} and "VAR" not in kinds:
         return f"{found(token)} behind the first statement"
+    if token.type in OPENING and OPENING[token.type][0] in kinds:
+        return f"{found(token)} without {OPENING[token.type][1]}"
     want = wanted(kinds)
     return f"{want} expected, but {found(token)} found" if want else f"unexpected {found(token)}"
 
@@ -113,6 +124,8 @@ def hint(token: Token, kinds: set[str]) -> str:
         return "write FOR i := 0 TO 9 DO"
     if token.type == "OUTPUT" and "ASSIGN" in kinds:
         return "`:` stands behind a label of CASE, `:=` assigns"
+    if token.type == "OUTPUT" and "GREATER_EQUAL" in kinds:
+        return "`>=` compares; `=>` takes an output of a call"
     if token.type == "EQUAL" and "ASSIGN" in kinds:
         return "`:=` assigns and gives initial values, `=` compares"
     if token.type == "ASSIGN" and "EQUAL" in kinds:
@@ -123,11 +136,19 @@ def hint(token: Token, kinds: set[str]) -> str:
         return "a declaration has a type, and then its value: `x : INT := 5;`"
     if token.type == "VAR" and "SEMICOLON" in kinds:
         return "VAR sections stand in front of the first statement"
-    if token.type in ("IF", "CASE") and "NUMBER" in kinds and "IF" not in kinds:
-        return f"{token.type} is a statement and has no value: SEL(condition, if_false, if_true) has one"
-    if token.type in lexis().reserved and "NAME" in kinds and "IF" not in kinds and token.type[:4] != "END_":
+    if token.type == "NOT" and "UNEQUAL" in kinds:
+        return "unequal is written `<>`"
+    if token.type == "CARET" and "POWER" in kinds:
+        return "a power is written 2 ** 3"
+    if token.type == "DO" and "FOR" in kinds:
+        return "a loop that tests at its end is REPEAT .. UNTIL condition END_REPEAT"
+    if {"FUNCTION", "TYPE"} <= kinds and (token.type == "NAME" or "FOR" in kinds or token.type in STATEMENTS):
+        return "statements stand in a POU: PROGRAM Main .. END_PROGRAM"
+    if token.type in ("STRUCT", "UNION") and {"FUNCTION", "TYPE"} <= kinds:
+        return f"write TYPE Name : {token.type} .. END_{token.type} END_TYPE"
+    if token.type in lexis().reserved - MIDDLE and "NAME" in kinds and "IF" not in kinds and token.type[:4] != "END_":
         return f"{token.text} is a reserved word and cannot be a name"
-    if (token.type == "RSQB" and "RANGE" in kinds and "COMMA" not in kinds) or (token.type == "LPAR" and kinds == {"LSQB"}):
+    if (token.type in ("RSQB", "COLON", "COMMA") and "RANGE" in kinds and "COMMA" not in kinds) or kinds == {"LSQB"}:
         return "an array is written ARRAY [0..9] OF INT"
     if token.type == "PART" and "NUMBER" in kinds:
         return "a number has digits in front of its point, as 0.5"

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 
 from fbvm.syntax.automaton import Automaton
+from fbvm.syntax.declaration_slips import braces, function_head, misnamed, sized_text, two_names
 from fbvm.syntax.foreign_forms import bare_function, bare_point, decimal_comma, doubled_quote, infix
 from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, cut, frames
 from fbvm.syntax.lexer import Token, lexis, meant
@@ -15,6 +16,7 @@ from fbvm.syntax.pasted import INSTRUCTION_LIST, ladder_lines
 from fbvm.syntax.phrases import found
 from fbvm.syntax.prospect import advance, symbols
 from fbvm.syntax.tree import Deref, Name
+from fbvm.syntax.word_slips import colon_behind, comment_signs, foreign_word, networks, statement_as_value, until
 
 ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
 POU_ENDS = {ENDS[word] for word in POUS}
@@ -58,7 +60,7 @@ def _statement_word(automaton: Automaton, token: Token, following: list[Token]) 
         return None
     name = Token("NAME", word.text, word.start, word.end)
     return Mend([name, token], word.start, word.end, f"{found(word)} is a reserved word and cannot be a name",
-                "choose another name", cut=True, lossless=True)
+                "choose another name", cut=True, lossless=False)
 
 
 def _reserved_name(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -69,7 +71,7 @@ def _reserved_name(automaton: Automaton, token: Token, following: list[Token]) -
     if sign != "ASSIGN" and (sign not in ("COLON", "COMMA") or advance(automaton.states, "NUMBER")):
         return None
     return Mend([Token("NAME", token.text, token.start, token.end)], token.start, token.end,
-                f"{found(token)} is a reserved word and cannot be a name", "choose another name")
+                f"{found(token)} is a reserved word and cannot be a name", "choose another name", lossless=sign != "ASSIGN")
 
 
 NEXT_WORD = re.compile(r"(?i)\b(?:(END_VAR)|VAR\w*|END_\w+|FUNCTION\w*|PROGRAM)\b")
@@ -88,13 +90,6 @@ def _end_of_section(automaton: Automaton, token: Token, following: list[Token]) 
         return None
     return Mend([Token("END_VAR", "END_VAR", before.start, before.start), before, token], before.start, before.end,
                 f"END_VAR expected before {found(before)}, which begins a statement", "", word, cut=True, lossless=True)
-
-
-def _colon_behind_else(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """`ELSE: ..`"""
-    if token.type != "COLON" or automaton.before.type != "ELSE":
-        return None
-    return Mend([], token.start, token.end, "`:` behind ELSE", "ELSE is no label: it has no `:`", lossless=True)
 
 
 def _semicolon_in_call(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
@@ -290,8 +285,9 @@ def _instruction_list(automaton: Automaton, token: Token, following: list[Token]
 
 
 SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
-    _ladder, _misspelt, _statement_word, _nameless, _reserved_name, _end_of_section,
-    _colon_behind_else, _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end,
+    networks, _ladder, _misspelt, _statement_word, function_head, _nameless, _reserved_name, _end_of_section,
+    colon_behind, _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end,
     _location_behind_type, _caret, _begin, infix, decimal_comma, bare_point, doubled_quote, bare_function, _c_loop,
-    _declared_in_body, _instruction_list)
+    _declared_in_body, _instruction_list, foreign_word, comment_signs, until, statement_as_value,
+    two_names, misnamed, sized_text, braces)
 """Asked one after the other; the first that knows the mistake mends it."""

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 
 from fbvm.syntax.expressions import Expressions
 from fbvm.syntax.ladder import Ladder
 from fbvm.syntax.lexer import Token
+from fbvm.syntax.literals import ELEMENTARY
 from fbvm.syntax.refused import refused_what
 from fbvm.syntax.tree import (
     Assign,
     Block,
+    Call,
     CallStatement,
     Case,
     CaseBranch,
@@ -65,7 +67,31 @@ class Statements(Expressions):
 
     def block(self, items: Items) -> Block:
         """A list as it stands outside CASE: a label of one name is one for JMP, another one is misplaced."""
-        return tuple(self._outside_case(item) if isinstance(item, Label) else item for item in items)
+        made: list[Statement] = []
+        for item, behind in zip_longest(items, items[1:]):
+            if not isinstance(item, Label):
+                made.append(item)
+            elif not self._no_label(item, behind):
+                made.append(self._outside_case(item))
+        return tuple(made)
+
+    def _no_label(self, label: Label, behind: Label | Statement | None) -> bool:
+        """Whether `a : INT;` or `a : 5;` stands there, which is told; a label has nothing behind it, or what is executed."""
+        value, high = label.values[0]
+        first = behind.targets[0] if isinstance(behind, Assign) else behind.call if isinstance(behind, CallStatement) else None
+        if high is not None or first is None or not isinstance(value, NameRef):
+            return False
+        if "\n" in self.source.text[label.start:first.start]:
+            return False
+        if isinstance(first, NameRef) and first.text.upper() in {*ELEMENTARY, "STRING", "WSTRING"}:
+            self.report("S0101", label.start, first.end, "a declaration stands in front of all statements",
+                        f"write it between VAR and END_VAR: {value.text} : {first.text.upper()};", False)
+            return True
+        if isinstance(behind, CallStatement) and not isinstance(first, Call | NameRef):
+            self.report("S0101", label.end - 1, label.end, "`:=` expected, but `:` found",
+                        "`:=` assigns, `:` stands behind a label", False)
+            return True
+        return False
 
     def _outside_case(self, label: Label) -> Statement:
         value, high = label.values[0]

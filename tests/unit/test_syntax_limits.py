@@ -97,6 +97,7 @@ ODD = {
     "types": "TYPE a : " * 1000, "at": "VAR_GLOBAL " + "AT " * 1000, "not closed": "PROGRAM p x := f(a := [1, (",
     "digits": "9" * MANY,
     "repetitions": "VAR_GLOBAL a : ARRAY[0..1] OF INT := [999999999(1, 2)]; END_VAR", "bidi": "PROGRAM \u202e p",
+    "a place cut off": "PROGRAM p VAR x : AT", "a head cut off": "FUNCTION F(:):",
 }
 
 
