@@ -20,7 +20,7 @@ from fbvm.check.interfaces import Interfaces
 from fbvm.check.project import Project
 from fbvm.check.settings import Settings
 from fbvm.check.specs import Specs, settle
-from fbvm.check.statements import Statements, assigns_to
+from fbvm.check.statements import Statements, writes_eno
 from fbvm.check.values import Values
 from fbvm.syntax import tree
 
@@ -189,7 +189,7 @@ class Checker:
             return
         pou.number = len(self.bodies)
         self.bodies.append(pou)
-        pou.writes_eno = assigns_to(pou.tree.body, "ENO")
+        pou.writes_eno = writes_eno(pou)
         Statements(self, pou).block(pou.tree.body)
         for action in pou.actions.values():
             self._body(action)

@@ -45,6 +45,10 @@ from fbvm.syntax import ladder, tree
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
 
+_BEHIND = tree.Deref | tree.Index | ladder.Memory | ladder.Words
+"""What names a place by itself."""
+_PLACES = _BEHIND | tree.NameRef | tree.Direct | tree.Member | tree.Part
+"""What a place may look like."""
 PARTS = {"X": BOOL, "B": BYTE, "W": WORD, "D": DWORD, "L": LWORD}
 
 
@@ -188,7 +192,7 @@ class Expressions:
         return self.project.global_variable(name, self.source)
 
     def _name(self, expr: tree.NameRef, want: Type | None) -> Type | None:
-        if self.pou is not None and fold(expr.text) in self.pou.later:
+        if self.pou is not None and self.pou.later and fold(expr.text) in self.pou.later:
             early = self.checker.interfaces.early(expr, self.pou)
             return self._variable(expr, early) if early is not None else None
         variable = self.variable(expr.text)
@@ -307,8 +311,7 @@ class Expressions:
 
     def _is_variable(self, expr: tree.Expr) -> bool:
         expr = self.facts.root(expr)
-        places = tree.Deref | tree.Index | ladder.Memory | ladder.Words
-        return isinstance(expr, places) or expr in self.facts.variables or expr in self.facts.directs or \
+        return isinstance(expr, _BEHIND) or expr in self.facts.variables or expr in self.facts.directs or \
             expr in self.facts.followed
 
     def is_variable(self, expr: tree.Expr) -> bool:
@@ -316,9 +319,7 @@ class Expressions:
         if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
             return anything.is_array(expr)
         return expr not in self.facts.rewritten and self._is_variable(expr) and \
-            (expr in self.facts.followed or isinstance(
-                expr, tree.NameRef | tree.Direct | tree.Index | tree.Member | tree.Part | tree.Deref | ladder.Memory |
-                ladder.Words))
+            (isinstance(expr, _PLACES) or expr in self.facts.followed)
 
     def _deref(self, expr: tree.Deref, want: Type | None) -> Type | None:
         kind = self.infer(expr.of)

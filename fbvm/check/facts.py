@@ -18,6 +18,9 @@ Value = int | float | bool | bytes | str
 """A constant: bool for BOOL, int for integers, bits, times, enumerations and characters, float for reals, bytes for STRING,
 for WSTRING a str of UTF-16 units."""
 
+PartOf = tree.Member | tree.Index | tree.Part
+"""What may name a part of something."""
+
 UNTYPED_INT = Elementary("an integer literal", 0, 1, "i64", frozenset())
 UNTYPED_REAL = Elementary("a real literal", 0, 1, "f64", frozenset())
 """Types of literals (and of expressions of nothing but literals) that have not met a context yet."""
@@ -286,10 +289,10 @@ class Facts:
     losses: list[tuple[Source, tree.Expr, str, str]] = field(default_factory=list)
     """Constants that their places do not keep as they are written: where, code and message of the warning."""
 
-    def is_part(self, expr: tree.Expr) -> TypeGuard[tree.Member | tree.Index | tree.Part]:
+    def is_part(self, expr: tree.Expr) -> TypeGuard[PartOf]:
         """True for a member, element or bit, which lies in what it is of; not for an element behind a pointer, nor for
         what a member that is declared REFERENCE TO is bound to."""
-        return isinstance(expr, tree.Member | tree.Index | tree.Part) and expr not in self.variables and \
+        return isinstance(expr, PartOf) and expr not in self.variables and \
             expr not in self.followed and not isinstance(self.types.get(expr.of), RefType)
 
     def root(self, expr: tree.Expr) -> tree.Expr:

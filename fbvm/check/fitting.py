@@ -27,6 +27,8 @@ from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
+_BORROWED = OpenArrayType | AnyType
+
 
 def is_untyped(kind: Type | None) -> bool:
     """True for a literal, or an expression of nothing but literals, that has not met a context yet."""
@@ -35,7 +37,9 @@ def is_untyped(kind: Type | None) -> bool:
 
 def assignable(kind: Type, target: Type) -> bool:
     """True if a value of `kind` may be stored where `target` is declared, arrays and structures as a whole included."""
-    if isinstance(target, OpenArrayType | AnyType) or isinstance(kind, OpenArrayType | AnyType):
+    if kind is target and isinstance(kind, Elementary):
+        return True
+    if isinstance(target, _BORROWED) or isinstance(kind, _BORROWED):
         return False
     if isinstance(target, ArrayType) and isinstance(kind, ArrayType):
         return kind.bounds == target.bounds and same(kind.element, target.element) and not (kind.packed or target.packed)

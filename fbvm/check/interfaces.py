@@ -29,7 +29,7 @@ from fbvm.check import beginnings
 from fbvm.check.facts import Edge, Pou, Variable, is_block, is_open
 from fbvm.check.locations import location_of
 from fbvm.check.names import refuse_reserved
-from fbvm.check.statements import assigns_to
+from fbvm.check.statements import writes_eno
 from fbvm.syntax import tree
 from fbvm.syntax.pragmas import passes_places
 
@@ -82,7 +82,7 @@ class Interfaces:
             del self._begun[mark:]
         if pou.tree.result is not None:
             self._result(pou, pou.tree.result)
-        if "ENO" not in pou.variables and assigns_to(pou.tree.body, "ENO"):
+        if "ENO" not in pou.variables and writes_eno(pou):
             eno = Variable("ENO", BOOL, "VAR_OUTPUT", pou.source, pou.tree.name, pou, initial=b"\x01")
             self._register(eno, pou)
             pou.enables_itself = True

@@ -6,7 +6,8 @@ never at libraries.  Which of the warnings are wanted is asked elsewhere (`silen
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from fbvm.check import lint_declared, lint_sfc, lint_values
 from fbvm.check.facts import Pou, Variable
@@ -18,6 +19,9 @@ from fbvm.syntax import sfc
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
 
+_RULES: dict[type, Callable[[Body, Any], None]] = {**lint_values.RULES, sfc.Sfc: lint_sfc.look_at}
+"""What looks at a node, by its kind."""
+
 
 def lint(checker: Checker, program: str | None) -> None:
     """Report what the bodies and declarations of a checked project are to be warned of; `program` is the one to run."""
@@ -26,10 +30,9 @@ def lint(checker: Checker, program: str | None) -> None:
     uses, writes = lint_declared.Uses(facts), Writes()
     for pou in own:
         body = Body(pou, facts, report)
-        for node in body.nodes():
-            lint_values.look_at(body, node)
-            if isinstance(node, sfc.Sfc):
-                lint_sfc.look_at(body, node)
+        for node in body.nodes:
+            if rule := _RULES.get(type(node)):
+                rule(body, node)
         flow(body)
         writes.body(body)
         lint_declared.result(body)

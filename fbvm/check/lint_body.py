@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
+from functools import cached_property
 from typing import Any
 
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Source
 from fbvm.check.facts import Facts, Pou, Report
 from fbvm.syntax import ladder, sfc, tree
+
+Nodes = tuple[tree.Node | None, ...]
 
 
 class Body:
@@ -29,27 +32,31 @@ class Body:
         """A piece of the program as it is written, on one line."""
         return " ".join(self.pou.source.text[node.start:node.end].split())
 
-    def below(self, node: tree.Node) -> Iterable[tree.Node | None]:
+    def below(self, node: tree.Node) -> Nodes:
         """The nodes directly below one; of a call that means an operator, those of the operator."""
         if isinstance(node, tree.Call) and (meaning := self.facts.rewritten.get(node)) is not None:
             return (meaning,)
         return _BELOW[type(node)](node)
 
-    def nodes(self) -> Iterator[tree.Node]:
+    @cached_property
+    def nodes(self) -> list[tree.Node]:
         """All statements and expressions, each once, in the order of the text."""
-        todo: list[tree.Node | None] = list(reversed(self.pou.tree.body))
+        found: list[tree.Node] = []
+        todo: list[tree.Node | None] = [*self.pou.tree.body[::-1]]
         while todo:
             node = todo.pop()
             if node is not None:
-                yield node
-                todo.extend(reversed([*self.below(node)]))
+                found.append(node)
+                if below := self.below(node):
+                    todo += below[::-1]
+        return found
 
     def numbered(self) -> Iterator[tuple[tree.Call, Address]]:
         """Timers and counters of rungs that have a number, each with its completion flag.
 
         What an interlock does with an instruction are more calls in the same place; they are one."""
         seen: set[int] = set()
-        for node in self.nodes():
+        for node in self.nodes:
             if (isinstance(node, tree.Call) and isinstance(node.callee, tree.NameRef) and node.callee.text.startswith("$")
                     and node.start not in seen):
                 seen.add(node.start)
@@ -73,25 +80,19 @@ class Body:
         return value
 
 
-def _branches(node: tree.If) -> Iterator[tree.Node]:
-    for condition, block in node.branches:
-        yield condition
-        yield from block
-    yield from node.otherwise or ()
+def _branches(node: tree.If) -> Nodes:
+    return *(part for condition, block in node.branches for part in (condition, *block)), *(node.otherwise or ())
 
 
-def _labels(node: tree.Case) -> Iterator[tree.Node]:
-    yield node.selector
-    for branch in node.branches:
-        yield from branch.body
-    yield from node.otherwise or ()
+def _labels(node: tree.Case) -> Nodes:
+    return node.selector, *(part for branch in node.branches for part in branch.body), *(node.otherwise or ())
 
 
-def _nothing(node: tree.Node) -> Iterable[tree.Node]:
+def _nothing(node: tree.Node) -> Nodes:
     return ()
 
 
-_BELOW: dict[type, Callable[[Any], Iterable[tree.Node | None]]] = {
+_BELOW: dict[type, Callable[[Any], Nodes]] = {
     tree.Assign: lambda n: (*n.targets, n.value),
     tree.CallStatement: lambda n: (n.call,),
     tree.If: _branches,
@@ -108,7 +109,8 @@ _BELOW: dict[type, Callable[[Any], Iterable[tree.Node | None]]] = {
     tree.Part: lambda n: (n.of,),
     tree.Index: lambda n: (n.of, *n.subscripts),
     tree.Deref: lambda n: (n.of,),
-    tree.ArrayInit: lambda n: (value for _, value in n.items), tree.StructInit: lambda n: (value for _, value in n.fields),
+    tree.ArrayInit: lambda n: tuple(value for _, value in n.items),
+    tree.StructInit: lambda n: tuple(value for _, value in n.fields),
     tree.Literal: _nothing, tree.EnumLiteral: _nothing, tree.NullLiteral: _nothing, tree.NameRef: _nothing,
     tree.Direct: _nothing,
     ladder.Ladder: lambda n: n.body, ladder.Rung: lambda n: n.body, sfc.Sfc: lambda n: n.body,

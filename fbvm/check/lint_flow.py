@@ -16,6 +16,9 @@ def flow(body: Body) -> None:
     _Flow(body).block(body.pou.tree.body)
 
 
+_GOES_ON = tree.Assign | tree.CallStatement
+
+
 class _Flow:
     def __init__(self, body: Body) -> None:
         self.body = body
@@ -39,6 +42,8 @@ class _Flow:
 
     def ends(self, statement: tree.Statement) -> bool:
         """Look at a statement; whether what stands behind it is never reached."""
+        if isinstance(statement, _GOES_ON):
+            return False
         if isinstance(statement, tree.If):
             return self.choice(statement)
         if isinstance(statement, tree.Case):

@@ -14,12 +14,7 @@ from fbvm.check.values import is_any
 from fbvm.check.writes import place
 from fbvm.syntax import tree
 
-
-def look_at(body: Body, node: tree.Node) -> None:
-    """Warn of what is wrong with one node of a body."""
-    rule = _RULES.get(type(node))
-    if rule is not None:
-        rule(body, node)
+_NO_PLACES = tree.Binary | tree.Unary | tree.Literal
 
 
 def _binary(body: Body, node: tree.Binary) -> None:
@@ -98,6 +93,8 @@ def _assign(body: Body, node: tree.Assign) -> None:
         _fraction(body, node.value, kind)
     if node.op != ":=" or len(node.targets) > 1:
         return
+    if isinstance(node.value, _NO_PLACES):
+        return
     there = place(facts, node.targets[0])
     if there is not None and there == place(facts, node.value):
         body.warn("S0594", node, f"{body.text(node.targets[0])} is assigned to itself")
@@ -138,7 +135,7 @@ def _silent(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
 
 
 def _changes_nothing(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
-    for node in Body(pou, body.facts, body.report).nodes():
+    for node in Body(pou, body.facts, body.report).nodes:
         called = body.facts.calls.get(node) if isinstance(node, tree.Call) else None
         if isinstance(called, PouCall) and not _silent(body, called.pou, known):
             return False
@@ -156,6 +153,7 @@ def _own(variable: Variable | None, pou: Pou) -> bool:
 
 
 _EXACT: dict[str, Callable[[int, int], int]] = {"+": operator.add, "-": operator.sub, "*": operator.mul}
-_RULES: dict[type, Callable[[Body, Any], None]] = {
+RULES: dict[type, Callable[[Body, Any], None]] = {
     tree.Binary: _binary, tree.Assign: _assign, tree.Call: _call, tree.CallStatement: _statement,
 }
+"""What looks at a node, by its kind."""

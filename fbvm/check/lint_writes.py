@@ -27,6 +27,10 @@ SCANNED = frozenset((
 MANY_WORDS = 16
 """An access to more words than that counts as one to the whole area."""
 
+_NAMES = tree.NameRef | tree.Direct
+_FOLLOWING = tree.Deref | tree.Index
+_PARTS = _FOLLOWING | tree.Member | tree.Part
+
 Key = Hashable
 """A place that can be written: its variable or address, and the steps to the part."""
 
@@ -197,9 +201,9 @@ class _Order:
         todo: list[tree.Node | None] = [expr]
         while todo and self.stores:
             node = todo.pop()
-            if isinstance(node, tree.NameRef | tree.Direct):
+            if isinstance(node, _NAMES):
                 self.forget(node)
-            elif isinstance(node, tree.Deref | tree.Index) and not self.facts.is_part(node):
+            elif isinstance(node, _FOLLOWING) and not self.facts.is_part(node):
                 self.stores.clear()
             called = self.facts.calls.get(node) if isinstance(node, tree.Call) else None
             if isinstance(called, PouCall):
@@ -212,7 +216,7 @@ class _Order:
 
     def steps(self, target: tree.Expr) -> None:
         """The subscripts of a place that is written are read; a reference to it is no output."""
-        while isinstance(target, tree.Index | tree.Member | tree.Part | tree.Deref):
+        while isinstance(target, _PARTS):
             if isinstance(target, tree.Index):
                 for subscript in target.subscripts:
                     self.read(subscript)

@@ -103,6 +103,20 @@ class Operators:
         if left is None or right is None:
             return None
         left, right = base(left), base(right)
+        if expr.left in self.facts.constants or expr.right in self.facts.constants:
+            return self._meant(expr, left, right, want)
+        known = self.expressions.project.meanings.get((expr.op, left, right))
+        if known is not None:
+            self.facts.operands[expr], result = known
+            return result
+        found = self._meant(expr, left, right, want)
+        if isinstance(left, Elementary) and isinstance(right, Elementary) and found is not None and \
+                expr not in self.facts.rewritten:
+            self.expressions.project.meanings[expr.op, left, right] = self.facts.operands[expr], found
+        return found
+
+    def _meant(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
+        """The type of an operator's result, or None after a diagnostic."""
         if self._chained(expr, right):
             return None
         left = as_character(self.expressions, expr.left, right) or left

@@ -76,6 +76,8 @@ class Project:
         self._absent: set[tuple[bool, str, str]] = set()
         """Names of types (True) and POUs that were looked for and are nowhere, and the library that asked."""
         self._compared = 0
+        self.meanings: dict[tuple[str, Type, Type], tuple[Type, Type]] = {}
+        """For operators between elementary types that are no constants: the type in which they work, and that of the result."""
         self.made: dict[tuple[Pou, tuple[tuple[str, str], ...]], Pou] = {}
         """Functions made of generic ones, by the types that these stand for."""
         self.new_pous: deque[Pou] = deque()

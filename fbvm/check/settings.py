@@ -15,6 +15,7 @@ from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, Field, StructType, Type, fold
 from fbvm.check.facts import AccessPath, Completed, Spot, Variable
+from fbvm.check.inside import Inside
 from fbvm.check.locations import location_of
 from fbvm.syntax import tree
 
@@ -35,7 +36,7 @@ class Settings:
         """Folded name of the RESOURCE, "" if it has none."""
         self.completed: list[Completed] = []
         self.accesses: list[AccessPath] = []
-        self._opens: dict[int, tuple[Type, bool]] = {}
+        self._opens = Inside(checker, lambda pou: any(variable.open for variable in pou.order))
 
     def resolve(self) -> None:
         """Work out all sections; complain about what VAR_CONFIG leaves out."""
@@ -177,7 +178,7 @@ class Settings:
                                     f"write  {path} AT %IX0.0 : {variable.type};  or the whole address here")
 
     def _open_in(self, kind: Type, path: str, key: tuple[object, ...]) -> Iterator[tuple[str, tuple[object, ...], Variable]]:
-        if not self._has_open(kind):
+        if not self._opens(kind):
             return
         if isinstance(kind, ArrayType):
             for index in range(kind.count):
@@ -192,22 +193,6 @@ class Settings:
                     yield inner, step, variable
                 elif variable.place == "self" and not variable.reference:
                     yield from self._open_in(variable.type, inner, step)
-
-    def _has_open(self, kind: Type) -> bool:
-        """Whether such a variable is in the type, which is looked through once however often it stands in others."""
-        if id(kind) not in self._opens:
-            self._opens[id(kind)] = kind, self._looks_open(kind)
-        return self._opens[id(kind)][1]
-
-    def _looks_open(self, kind: Type) -> bool:
-        if isinstance(kind, ArrayType):
-            return self._has_open(kind.element)
-        if not isinstance(kind, StructType):
-            return False
-        if not kind.block:
-            return any(self._has_open(field.type) for field in kind.fields.values())
-        return any(variable.open or variable.place == "self" and not variable.reference and self._has_open(variable.type)
-                   for variable in self.checker.block_of(kind).order)
 
 
 def _key(spot: Spot) -> tuple[object, ...]:

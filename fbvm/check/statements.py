@@ -283,23 +283,34 @@ def _take(taken: list[tuple[int, int]], low: int, high: int) -> bool:
     return bool(met)
 
 
-def assigns_to(statements: tree.Block, name: str) -> bool:
-    """True if a variable of that name is assigned anywhere in a body."""
+def writes_eno(pou: Pou) -> bool:
+    """True if ENO is assigned anywhere in a body; most do not even name it."""
+    node = pou.tree
+    return "ENO" in fold(pou.source.text[node.start:node.end]) and _assigns_to(node.body, "ENO")
+
+
+def _assigns_to(statements: tree.Block, name: str) -> bool:
     for statement in statements:
         if isinstance(statement, tree.Assign) and any(
                 isinstance(t, tree.NameRef) and fold(t.text) == name for t in statement.targets):
             return True
-        if any(assigns_to(body, name) for body in bodies(statement)):
+        if any(_assigns_to(body, name) for body in bodies(statement)):
             return True
     return False
 
 
+_PLAIN = tree.Assign | tree.CallStatement
+_AROUND = tree.For | tree.While | tree.Repeat | ladder.Ladder | ladder.Rung | sfc.Sfc
+
+
 def bodies(statement: tree.Statement) -> list[tree.Block]:
     """The statement lists inside a statement."""
+    if isinstance(statement, _PLAIN):
+        return []
     if isinstance(statement, tree.If):
         return [body for _, body in statement.branches] + [statement.otherwise or ()]
     if isinstance(statement, tree.Case):
         return [branch.body for branch in statement.branches] + [statement.otherwise or ()]
-    if isinstance(statement, tree.For | tree.While | tree.Repeat | ladder.Ladder | ladder.Rung | sfc.Sfc):
+    if isinstance(statement, _AROUND):
         return [statement.body]
     return []

@@ -110,6 +110,8 @@ def place(facts: Facts, expr: tree.Expr) -> Path | None:
 
 def note_count(expressions: Expressions, expr: tree.Expr) -> None:
     """Warn of a write to the counter of a loop around it, to a part of it, or to what it is part of."""
+    if not expressions.counting:
+        return
     written = place(expressions.facts, expr)
     for counter in expressions.counting if written else ():
         if counter and all(a == b for a, b in zip(written or (), counter, strict=False)):

@@ -19,7 +19,7 @@ def written_out(body: BodyLowering, expr: tree.ArrayInit | tree.StructInit) -> P
     whole = body.facts.aggregates[expr]
     place, site = body.places.slot(whole.place), body.site(expr)
     single = [part for part in whole.parts if machine(part.kind)]
-    nodes = body.values.sequence([lambda part=part: _value(body, part) for part in single])  # type: ignore[misc]
+    nodes = body.values.sequence(_value(body, part) for part in single)
     body.out.append(("fill", place.address, whole.content))
     for at, start in body.program.held.within(place.type, whole.content):
         body.out.append(body.places.store(place.moved(at, start.kind), body.pointers.to(start.place), site))

@@ -234,6 +234,7 @@ def _image(checker: Checker, progress: Progress, drawn: bool) -> Image:
     for (_, name), entry in checker.project.types.items():
         if entry.resolved is not None:
             types.setdefault(name, entry.resolved[0])
+    del program.held  # which leads back to it
     return Image(placed.layout, bodies, tuple(tasks), placed.symbols, (*placed.initial, *held.in_slots()), tuple(placed.retained),
                  tuple(program.sites), types, program.objects, tuple(program.rungs), tuple(program.charts))
 

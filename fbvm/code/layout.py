@@ -10,14 +10,13 @@ from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import ArrayType, Field, StructType, Type, fold
 from fbvm.check.checker import Checker
 from fbvm.check.facts import Completed, Pou, Spot, Variable, holds_block
+from fbvm.check.inside import Inside
 from fbvm.code.image import Layout, Objects, Retained
 from fbvm.code.objects import Numbering
 from fbvm.code.operations import BUFFER_OBJECT, LEASE_BYTES, OBJECT_SHIFT, OFFSET_SHIFT
 
 _CHUNK = 64
 """Initial bytes are kept in runs of chunks that are not all zero."""
-Retaining = dict[int, tuple[Type, bool]]
-"""By the identity of types, which it keeps: whether something in them is RETAIN."""
 
 
 @dataclass
@@ -60,10 +59,11 @@ def place(checker: Checker) -> Placed:
         _complete(row, slots, placed)
     placed.objects = Objects(_numbered(checker, slots), leases, leases_at)
     placed.initial += _runs(slots)
-    retaining: Retaining = {}
+    retaining = Inside(checker, lambda pou: any(variable.retain for variable in pou.order))
     for variable in checker.global_order:
         placed.symbols.setdefault(fold(_path(variable)), _symbol(variable))
-        placed.retained += _retained(variable, checker, retaining)
+        if variable.place == "abs" and not variable.reference:
+            placed.retained += _retained_in(variable.type, variable.offset, _path(variable), retaining, variable.retain)
     for access in checker.settings.accesses:
         offset, bit = _where(access.spot, placed)
         placed.symbols.setdefault(fold(access.name), Field(
@@ -197,40 +197,21 @@ def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:
             start = None
 
 
-def _retained(variable: Variable, checker: Checker, retaining: Retaining) -> Iterator[Retained]:
-    if variable.place == "abs" and not variable.reference:
-        yield from _retained_in(variable.type, variable.offset, _path(variable), checker, variable.retain, retaining)
-
-
-def _retains(kind: Type, checker: Checker, known: Retaining) -> bool:
-    """Whether something in a type is RETAIN; each type is looked through once, however often it stands in others."""
-    if id(kind) not in known:
-        parts: list[tuple[Type, bool]] = []
-        if isinstance(kind, ArrayType):
-            parts = [(kind.element, False)]
-        elif isinstance(kind, StructType) and not kind.block:
-            parts = [(field.type, False) for field in kind.fields.values()]
-        elif isinstance(kind, StructType):
-            parts = [(v.type, v.retain) for v in checker.block_of(kind).order if v.place == "self" and not v.reference]
-        known[id(kind)] = kind, any(retain or _retains(part, checker, known) for part, retain in parts)
-    return known[id(kind)][1]
-
-
-def _retained_in(kind: Type, offset: int, path: str, checker: Checker, whole: bool, known: Retaining) -> Iterator[Retained]:
+def _retained_in(kind: Type, offset: int, path: str, retaining: Inside, whole: bool) -> Iterator[Retained]:
     """A `whole` value, or RETAIN variables of instances inside it; headers of instances belong to the program."""
-    if not whole and not _retains(kind, checker, known):
+    if not whole and not retaining(kind):
         return
     if whole and not holds_block(kind):
         yield Retained(path, offset, kind.size)
     elif isinstance(kind, ArrayType) and isinstance(kind.element, StructType | ArrayType):
         for index in range(kind.count):
-            yield from _retained_in(kind.element, offset + index * kind.element.size, f"{path}[{index}]", checker, whole, known)
+            yield from _retained_in(kind.element, offset + index * kind.element.size, f"{path}[{index}]", retaining, whole)
     elif isinstance(kind, StructType) and not kind.block:
         for member in kind.fields.values():
-            yield from _retained_in(member.type, offset + member.offset, f"{path}.{member.name}", checker, whole, known)
-    elif isinstance(kind, StructType) and kind.block:
-        for variable in checker.block_of(kind).order:
+            yield from _retained_in(member.type, offset + member.offset, f"{path}.{member.name}", retaining, whole)
+    elif isinstance(kind, StructType):
+        for variable in retaining.checker.block_of(kind).order:
             if variable.place != "self" or variable.reference:
                 continue
             name = f"{path}.{variable.name}"
-            yield from _retained_in(variable.type, offset + variable.offset, name, checker, whole or variable.retain, known)
+            yield from _retained_in(variable.type, offset + variable.offset, name, retaining, whole or variable.retain)

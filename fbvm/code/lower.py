@@ -39,6 +39,7 @@ class BodyLowering:
         self.dialect = checker.project.dialect
         self.pou = pou
         self.out: list[Node] = []
+        self._sites: dict[int, int] = {}
         self.reads: list[Place] = []
         self.places = Places(self)
         self.values = ValueLowering(self)
@@ -56,7 +57,7 @@ class BodyLowering:
         self._heights: dict[int, tuple[int, Node]] = {}
 
     def body(self) -> Body:
-        """The code of the POU."""
+        """The code of the POU, which is all that can be had of this."""
         count = counted(self.pou.tree.body)
         self.out.append(("charge", count + 1, self.entry_site))
         self._entry()
@@ -65,7 +66,9 @@ class BodyLowering:
         self.block_into(self.pou.tree.body)
         self.out += self.pointers.released()
         size = self.pou.type.size if self.pou.type is not None else 0
-        return Body(self.pou.name, self.pou.kind, tuple(self.out), size, count)
+        made = Body(self.pou.name, self.pou.kind, tuple(self.out), size, count)
+        vars(self).clear()  # its parts lead back to it, and would wait for the collector
+        return made
 
     def _draw(self, statements: tree.Block) -> None:
         """Note what is seen of statements of Structured Text where they are drawn as rungs."""
@@ -106,7 +109,10 @@ class BodyLowering:
     # --- what the parts share ---------------------------------------------------------------------------------------
 
     def site(self, node: tree.Node) -> int:
-        return self.program.site(self.pou, node)
+        number = self._sites.get(node.start)
+        if number is None:
+            number = self._sites[node.start] = self.program.site(self.pou, node)
+        return number
 
     def temporary(self) -> int:
         self._temporaries += 1
@@ -130,11 +136,15 @@ class BodyLowering:
 
     def measured(self, node: Node) -> Node:
         """The same operation, or a temporary for it if it is nested too deep."""
-        height = 1 + max((self._heights.get(id(part), (1, part))[0] for part in node[2:] if isinstance(part, tuple)),
-                         default=0)
+        heights, height = self._heights, 1
+        for part in node[2:]:
+            if isinstance(part, tuple):
+                known = heights.get(id(part))
+                if height <= (1 if known is None else known[0]):
+                    height = 2 if known is None else known[0] + 1
         if height > DEEPEST:
             return self.keep(node)
-        self._heights[id(node)] = height, node
+        heights[id(node)] = height, node
         return node
 
     def as_i64(self, expr: tree.Expr) -> Node:
@@ -163,9 +173,14 @@ class BodyLowering:
     def note_read(self, place: Place, expr: tree.Expr) -> None:
         """Remember a variable that the statement reads, if looking at it beforehand can do no harm: its place needs no
         subscripts, and no reference that might be null."""
-        root = self.facts.variables.get(self.facts.root(expr))
-        if not place.address[2] and (not place.is_reference or (root is not None and root.kind == "VAR_IN_OUT")):
-            self.reads.append(place)
+        start, _, terms = place.address
+        if terms:
+            return
+        if isinstance(start, tuple):
+            root = self.facts.variables.get(self.facts.root(expr))
+            if root is None or root.kind != "VAR_IN_OUT":
+                return
+        self.reads.append(place)
 
     def observe_reads(self, mark: int, site: int) -> None:
         """Put the observations of what was read since `mark` of the block in front of it."""
@@ -184,8 +199,7 @@ class BodyLowering:
             if isinstance(statement, tree.Empty):
                 continue
             site = self.site(statement)
-            own = isinstance(statement, ladder.Ladder | ladder.Rung | sfc.Sfc)  # these say themselves what there is to see
-            if statement.end > statement.start and not own and not self.unseen:
+            if statement.end > statement.start and not self.unseen and not isinstance(statement, _SEEN_BY_THEMSELVES):
                 rung = self._rungs.get(site)
                 self.out.append(("observe", "statement" if rung is None else "rung", site, rung))
             mark = len(self.out)
@@ -376,6 +390,7 @@ class BodyLowering:
         self.out += [*self.pointers.released(), ("return",)]
 
 
+_SEEN_BY_THEMSELVES = ladder.Ladder | ladder.Rung | sfc.Sfc
 _LOWER: dict[type, Callable[..., None]] = {
     tree.Assign: BodyLowering._assign, tree.CallStatement: BodyLowering._call, tree.If: BodyLowering._if,
     tree.Case: BodyLowering._case, tree.For: BodyLowering._for, tree.While: BodyLowering._while,

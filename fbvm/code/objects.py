@@ -8,6 +8,7 @@ from __future__ import annotations
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.base.types import ArrayType, StructType, Type
 from fbvm.check.checker import Checker
+from fbvm.check.inside import Inside
 from fbvm.check.interfaces import OBJECTS_AT
 from fbvm.code.operations import FIRST_OBJECT
 
@@ -18,7 +19,7 @@ class Numbering:
     def __init__(self, checker: Checker) -> None:
         self.checker = checker
         self.extents: list[tuple[int, int]] = []
-        self._holds: dict[int, bool] = {}
+        self._has_objects = Inside(checker, lambda pou: bool(pou.referred))
 
     def single(self) -> None:
         """Number the variables that have one place."""
@@ -50,20 +51,3 @@ class Numbering:
         elif isinstance(kind, StructType):
             for member in kind.fields.values():
                 self.instances(content, member.type, at + member.offset, start)
-
-    def _has_objects(self, kind: Type) -> bool:
-        """True if a value of this type holds an instance that has objects."""
-        known = self._holds.get(id(kind))
-        if known is None:
-            known = self._holds[id(kind)] = self._look(kind)
-        return known
-
-    def _look(self, kind: Type) -> bool:
-        if isinstance(kind, ArrayType):
-            return self._has_objects(kind.element)
-        if not isinstance(kind, StructType):
-            return False
-        if not kind.block:
-            return any(self._has_objects(member.type) for member in kind.fields.values())
-        pou = self.checker.block_of(kind)
-        return bool(pou.referred) or any(self._has_objects(v.type) for v in pou.order if v.place == "self" and not v.reference)

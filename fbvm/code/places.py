@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import FLAG_AREAS
@@ -36,13 +36,21 @@ if TYPE_CHECKING:
     from fbvm.code.lower import BodyLowering
 
 
-@dataclass(frozen=True)
+Detail = tuple[object, Address, int]
+"""Form, address, and the bit or WHOLE_BYTES."""
+
+
+@dataclass(slots=True)
 class Place:
-    """An address with the type of what lies there; `bit` for a located BOOL or a bit of a word."""
+    """An address with the type of what lies there; `bit` for a located BOOL or a bit of a word.  It never changes."""
 
     address: Address
     type: Type
     bit: int | None = None
+    loaded: Node | None = field(default=None, compare=False)
+    """What loads it, once somebody wanted that."""
+    detail: Detail | None = field(default=None, compare=False)
+    """What its observations carry, once there was one."""
 
     def moved(self, offset: int, kind: Type, bit: int | None = None) -> Place:
         """A part of this place, `offset` bytes further on."""
@@ -66,11 +74,11 @@ class Places:
     def __init__(self, body: BodyLowering) -> None:
         self.body = body
         self.facts = body.facts
+        self._slots: dict[Variable, Place] = {}
 
     def of(self, expr: tree.Expr) -> Place:
         """The place that an expression names; of a REFERENCE TO what it is bound to."""
-        reference = self.facts.followed.get(expr)
-        if reference is None:
+        if expr not in self.facts.followed:
             return self._named(expr, self.facts.types[expr])
         bound = self.body.values.call(expr) if isinstance(expr, tree.Call) else self.load(self.binding(expr))
         return Place((("ref", bound, self.body.site(expr)), 0, ()), self.facts.types[expr])
@@ -80,8 +88,9 @@ class Places:
         return self._named(expr, self.facts.followed[expr])
 
     def _named(self, expr: tree.Expr, kind: Type) -> Place:
-        if expr in self.facts.variables:
-            return self.variable(self.facts.variables[expr], expr)
+        variable = self.facts.variables.get(expr)
+        if variable is not None:
+            return self.variable(variable, expr)
         if isinstance(expr, tree.Direct):
             address = self.facts.directs[expr]
             offset = self.body.program.areas[address.area].offset + address.byte_offset()
@@ -131,6 +140,12 @@ class Places:
 
     def slot(self, variable: Variable) -> Place:
         """The place of a variable itself (of the reference, for an in-out)."""
+        slot = self._slots.get(variable)
+        if slot is None:
+            slot = self._slots[variable] = self._slot(variable)
+        return slot
+
+    def _slot(self, variable: Variable) -> Place:
         if variable.place == "self":
             return Place(("self", variable.offset, ()), variable.type)
         offset = variable.offset
@@ -275,6 +290,11 @@ class Places:
 
     def load(self, place: Place) -> Node:
         """The value that lies at a place (not for arrays and structures)."""
+        if place.loaded is None:
+            place.loaded = self._load(place)
+        return place.loaded
+
+    def _load(self, place: Place) -> Node:
         kind = base(place.type)
         if isinstance(kind, StringType):
             return ("load_text", machine(kind), place.address, kind.capacity)
@@ -311,18 +331,22 @@ class Places:
     def fixed(self, place: Place) -> Place:
         """The same place with computed subscripts kept in temporaries, so that it can be used twice."""
         start, offset, terms = place.address
+        if not terms and not isinstance(start, tuple):
+            return place
         if isinstance(start, tuple) and start[1][0] != "tmp":
             start = ("ref", self.body.keep(start[1]), start[2])
         terms = tuple((stride, self.body.keep(index)) for stride, index in terms)
-        return replace(place, address=(start, offset, terms))
+        return Place((start, offset, terms), place.type, place.bit)
 
 
-def detail(place: Place) -> tuple[object, Address, int]:
+def detail(place: Place) -> Detail:
     """What an observation of this place carries."""
-    kind = base(place.type)
-    form: object = machine(kind)
-    if isinstance(kind, StringType):
-        form = (machine(kind), kind.capacity)
-    elif form == "":
-        form = ("", kind.size)
-    return form, place.address, WHOLE_BYTES if place.bit is None else place.bit
+    if place.detail is None:
+        kind = base(place.type)
+        form: object = machine(kind)
+        if isinstance(kind, StringType):
+            form = (machine(kind), kind.capacity)
+        elif form == "":
+            form = ("", kind.size)
+        place.detail = form, place.address, WHOLE_BYTES if place.bit is None else place.bit
+    return place.detail

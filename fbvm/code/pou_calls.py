@@ -135,7 +135,7 @@ class CallLowering:
         passed = sorted([*called.inputs, *called.in_outs], key=lambda pair: pair[1].start)
         aggregates = [(v, e) for v, e in passed if v.kind == "VAR_INPUT" and is_aggregate(v.type)]
         passed = [pair for pair in passed if pair not in aggregates]
-        nodes = body.values.sequence([lambda v=v, e=e: self._argument(v, e) for v, e in passed])  # type: ignore[misc]
+        nodes = body.values.sequence(self._argument(variable, expr) for variable, expr in passed)
         for variable, expr in aggregates:
             body.copy(self._place(called, variable, instance), body.aggregate(expr), site)
         for (variable, expr), node in zip(passed, nodes, strict=True):

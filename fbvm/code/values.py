@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import (
@@ -10,10 +10,8 @@ from fbvm.base.types import (
     BOOL,
     DAY_NS,
     LREAL,
-    NULL,
     AnyType,
-    EnumType,
-    StringType,
+    RefType,
     Type,
     base,
     machine,
@@ -34,6 +32,7 @@ DEEPEST = 40
 """Operations nested deeper than this are cut by a temporary, so that no back end meets deep nesting."""
 _ARITHMETIC = {"+": "add", "-": "sub", "*": "mul", "/": "div", "MOD": "mod", "**": "pow",
                "AND": "and", "OR": "or", "XOR": "xor"}
+_SEEN = ladder.Edge | ladder.Element
 _COMPARE = {"=": "eq", "<>": "ne", "<": "lt", ">": "gt", "<=": "le", ">=": "ge"}
 
 
@@ -94,27 +93,27 @@ class ValueLowering:
             return saturated(self.body, "truncate", node, wanted)
         return ("convert", wanted, source, node)
 
-    def sequence(self, thunks: list[Callable[[], Node]]) -> list[Node]:
-        """Operands in order; what was worked out before a call is kept in a temporary across it."""
+    def sequence(self, values: Iterable[Node]) -> list[Node]:
+        """Operands in order, each lowered when it is asked for; what was worked out before a call is kept in a temporary
+        across it."""
         nodes: list[Node] = []
-        for thunk in thunks:
-            mark = len(self.body.out)
-            node = thunk()
+        mark = len(self.body.out)
+        for node in values:
             if len(self.body.out) > mark:
                 nodes = [self.body.keep_at(mark, earlier) for earlier in reversed(nodes)][::-1]
+                mark = len(self.body.out)
             nodes.append(node)
         return nodes
 
     def operands(self, *wanted: tuple[tree.Expr, Type | None]) -> list[Node]:
         """The values of several expressions, in order."""
-        return self.sequence([lambda e=e, t=t: self.value(e, t) for e, t in wanted])  # type: ignore[misc]
+        return self.sequence(self.value(expr, kind) for expr, kind in wanted)
 
     # --- kinds of expressions ---------------------------------------------------------------------------------------
 
     def _plain(self, expr: tree.Expr) -> Node:
         """The value of a non-constant expression in its own type."""
-        guard = self.facts.guards.get(expr) if isinstance(expr, tree.Call) else None
-        if guard is not None and isinstance(expr, tree.Call):
+        if isinstance(expr, tree.Call) and (guard := self.facts.guards.get(expr)) is not None:
             return self._guarded(expr, guard)
         return self._unguarded(expr)
 
@@ -146,7 +145,7 @@ class ValueLowering:
             return self.body.pointers.to_parameter(expr)
         if isinstance(expr, tree.NullLiteral):
             return ("const", "ref", 0)
-        if isinstance(expr, ladder.Edge | ladder.Element):
+        if isinstance(expr, _SEEN):
             return self._edge(expr) if isinstance(expr, ladder.Edge) else self._element(expr)
         place = self.body.places.of(expr)
         self.body.note_read(place, expr)
@@ -201,24 +200,28 @@ class ValueLowering:
         if expr.op in ("AND_THEN", "OR_ELSE"):
             return self._short(expr)
         operand = base(self.facts.operands[expr])
-        if operand == NULL:
+        if isinstance(operand, RefType):
             return self.body.pointers.binary(expr)
-        left, right = base(self.facts.types[expr.left]), base(self.facts.types[expr.right])
-        if is_any(operand, "ANY_DURATION", "ANY_DATE") and expr.op not in _COMPARE:
-            return self._time(expr, left, right, operand)
+        compares = expr.op in _COMPARE
+        if not compares and is_any(operand, "ANY_DURATION", "ANY_DATE"):
+            return self._time(expr, operand)
         if expr.op == "**":
-            exponent = operand if is_any(right, "ANY_REAL") else LREAL
-            a, b = self.operands((expr.left, None), (expr.right, None))
-            form = machine(operand)
-            return ("pow", form, self._to_float(a, left, form), self._to_float(b, right, machine(exponent), form))
+            return self._power(expr, operand)
         a, b = self.operands((expr.left, operand), (expr.right, operand))
         form = machine(operand)
-        if expr.op in _COMPARE:
+        if compares:
             return (_COMPARE[expr.op], "b", form, a, b)
         name = _ARITHMETIC[expr.op]
         if name in ("and", "or", "xor"):
             return _on_bits(name, form, a, b)
         return (name, form, a, b, self.body.site(expr)) if name in ("div", "mod") else (name, form, a, b)
+
+    def _power(self, expr: tree.Binary, operand: Type) -> Node:
+        left, right = base(self.facts.types[expr.left]), base(self.facts.types[expr.right])
+        exponent = operand if is_any(right, "ANY_REAL") else LREAL
+        a, b = self.operands((expr.left, None), (expr.right, None))
+        form = machine(operand)
+        return ("pow", form, self._to_float(a, left, form), self._to_float(b, right, machine(exponent), form))
 
     def _to_float(self, node: Node, kind: Type, *forms: str) -> Node:
         form = forms[-1]
@@ -239,8 +242,9 @@ class ValueLowering:
         self.body.out.append(("if", ((condition, tuple(inner)),), ()))
         return kept
 
-    def _time(self, expr: tree.Binary, left: Type, right: Type, operand: Type) -> Node:
+    def _time(self, expr: tree.Binary, operand: Type) -> Node:
         """Sums and differences of times and dates, products with numbers."""
+        right = base(self.facts.types[expr.right])
         if expr.op in "+-":
             a, b = self.operands((expr.left, None), (expr.right, None))
             node = (_ARITHMETIC[expr.op], "i64", a, b)
@@ -274,4 +278,4 @@ def _on_bits(name: str, form: str, *operands: Node) -> Node:
 
 def is_aggregate(kind: Type) -> bool:
     """True for arrays and structures, which are copied as bytes."""
-    return machine(kind) == "" and not isinstance(kind, StringType | EnumType)
+    return machine(kind) == ""

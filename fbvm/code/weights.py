@@ -5,12 +5,14 @@ from __future__ import annotations
 from fbvm.check.statements import bodies
 from fbvm.syntax import tree
 
+_LOOPS = tree.For | tree.While | tree.Repeat
+
 
 def counted(statements: tree.Block) -> int:
     """Statements of a block that are not inside a loop: what it charges to the step budget."""
     total = 0
     for statement in statements:
         total += 1
-        if not isinstance(statement, tree.For | tree.While | tree.Repeat):
+        if not isinstance(statement, _LOOPS):
             total += sum(counted(inner) for inner in bodies(statement))
     return total
