@@ -25,7 +25,7 @@ class Source:
     """One source text and its name (relative to its library or project).  Positions in it are character offsets."""
 
     name: str
-    text: str
+    text: str = field(repr=False)
     library: str = ""
     """Name of the library that the text belongs to, "" for the user's own."""
 

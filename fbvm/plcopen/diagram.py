@@ -19,7 +19,7 @@ OBJECTS = {"leftPowerRail", "rightPowerRail", "contact", "coil", "block", "inVar
 """What can be executed, or carries power."""
 SFC_OBJECTS = {"step", "macroStep", "jumpStep", "transition", "selectionDivergence", "selectionConvergence",
                "simultaneousDivergence", "simultaneousConvergence", "actionBlock"}
-RETURN_OF_NOTHING = ("", "none")
+NAMELESS = ("", "none")
 """Pins that are named so have no name (CODESYS exporters)."""
 
 
@@ -268,7 +268,7 @@ def _merge_in_outs(made: Object) -> None:
 
 def pin_name(text: str) -> str:
     """The name of a pin, "" for those that have none."""
-    return "" if text.strip().lower() in RETURN_OF_NOTHING else text.strip()
+    return "" if text.strip().lower() in NAMELESS else text.strip()
 
 
 def _pin(element: Element, point: Element | None, name: str) -> Pin:

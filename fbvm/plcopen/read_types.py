@@ -7,11 +7,12 @@ import re
 from fbvm.plcopen.document import Reading
 from fbvm.plcopen.markup import Element
 
-_WORDS = (
-    "BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD LTIME LDATE LDT LTOD "
-    "CHAR WCHAR ANY ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE")
-ELEMENTARY = frozenset(_WORDS.split())
-"""Empty elements that are types (TC6 2.01 elementaryTypes; the long forms and CHAR are extensions)."""
+_NAMES = ("BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD "
+          "ANY ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE")
+ELEMENTARY = frozenset(_NAMES.split())
+"""Types that are empty elements of their name (TC6 2.01 elementaryTypes)."""
+_LATER = frozenset(("LTIME", "LDATE", "LDT", "LTOD", "CHAR", "WCHAR"))
+"""Types of edition 3, that documents have in the same way, and that are not written."""
 LOCATION = "urn:fbvm:location"
 """Our `addData`: an address that is no IEC location."""
 MNEMONIC = "urn:fbvm:mnemonic"
@@ -27,7 +28,7 @@ def type_text(reading: Reading, holder: Element | None, owner: Element) -> str:
         reading.report("X0105", owner, f"{owner.get('name') or owner.name} has no type")
         return ""
     name = inner.name.upper()
-    if name in ELEMENTARY:
+    if name in ELEMENTARY | _LATER:
         return name
     if name in ("STRING", "WSTRING"):
         return f"{name}[{inner.get('length')}]" if inner.get("length") else name
@@ -64,7 +65,7 @@ def _struct(reading: Reading, element: Element) -> str:
         kind = type_text(reading, variable.one("type"), variable)
         initial = value_text(variable.one("initialValue"))
         address = f" AT {place}" if (place := location(variable)) else ""
-        members.append(f"    {variable.get('name')}{address} : {kind}{initial and f' := {initial}'};{remark(variable)}\n")
+        members.append(f"    {variable.get('name')}{address} : {kind}{initial and f' := {initial}'};{remark(note(variable))}\n")
     return f"STRUCT\n{''.join(members)}END_STRUCT"
 
 
@@ -134,7 +135,6 @@ def note(element: Element) -> str:
     return " ".join(inner.text.split()) if inner else ""
 
 
-def remark(element: Element) -> str:
-    """The same as a comment behind a declaration."""
-    text = note(element)
+def remark(text: str) -> str:
+    """A note as a comment behind a declaration."""
     return f" // {text}" if text else ""

@@ -10,6 +10,7 @@ from fbvm.plcopen.networks import Network
 from fbvm.plcopen.scope import Scope
 from fbvm.syntax.instruction_set import Instruction, instruction_set
 from fbvm.syntax.operands import Operands, Wrong
+from fbvm.syntax.rung_text import instruction_text
 from fbvm.syntax.tree import Index, Member, NameRef
 
 CONTACTS = {(False, ""): "", (True, ""): "NOT", (False, "rising"): "@", (False, "falling"): "%"}
@@ -18,7 +19,6 @@ COILS = {(False, "", ""): "OUT", (True, "", ""): "OUT NOT", (False, "", "set"): 
          (False, "rising", ""): "DIFU", (False, "falling", ""): "DIFD", (False, "rising", "set"): "@SET",
          (False, "rising", "reset"): "@RSET", (False, "falling", "set"): "%SET", (False, "falling", "reset"): "%RSET"}
 """Negation, edge and storage of a coil."""
-OPERANDS_AT = 8
 _CONDITION = re.compile(r"EN|C\d+")
 
 
@@ -133,20 +133,17 @@ class Parts:
 
     # --- text ---
 
-    def line(self, mnemonic: str, *operands: str) -> str:
-        return f"{mnemonic:{OPERANDS_AT - 1}} {' '.join(operands)}".rstrip()
-
     def contact(self, how: str, item: Object) -> str:
         """A contact or a comparison."""
         if item.kind == "block":
             operands = [_constant(self._operand_of(pin)) for pin in item.inputs]
             if not all(operands):
                 raise Inexact
-            return self.line(f"{how}{item.mnemonic}", *operands)
+            return instruction_text(f"{how}{item.mnemonic}", *operands)
         form = CONTACTS.get((item.negated, item.edge))
         if form is None or item.storage:
             raise Inexact
-        return self.line(f"{form}{how}" if form in ("@", "%") else f"{how} {form}".rstrip(), self._bit(item))
+        return instruction_text(f"{form}{how}" if form in ("@", "%") else f"{how} {form}".rstrip(), self._bit(item))
 
     def through(self, item: Object) -> str:
         """FBCALL or NOT."""
@@ -157,19 +154,19 @@ class Parts:
         pins += [f"{wire.pin}=>{consumer.text}" for consumer, wire in self.asked.get(item, ()) if wire.pin.upper() != "ENO"]
         if any(" " in pin for pin in pins):
             raise Inexact
-        return self.line("FBCALL", item.text, item.instance, *pins)
+        return instruction_text("FBCALL", item.text, item.instance, *pins)
 
     def output(self, item: Object) -> str:
         """A coil, an instruction, or an FBCALL behind which nothing comes."""
         if item in self.calls:
             return self.through(item)
         if item.kind == "block":
-            return self.line(item.mnemonic, *(self._operand_of(pin) for pin in item.inputs
-                                              if not _CONDITION.fullmatch(pin.name.upper())))
+            return instruction_text(item.mnemonic, *(self._operand_of(pin) for pin in item.inputs
+                                                     if not _CONDITION.fullmatch(pin.name.upper())))
         mnemonic = COILS.get((item.negated, item.edge, item.storage))
         if mnemonic is None:
             raise Inexact
-        return self.line(mnemonic, self._bit(item))
+        return instruction_text(mnemonic, self._bit(item))
 
     def _bit(self, item: Object) -> str:
         """A variable, if rungs read it as one, or an address that nobody declares: T1 and D5 are addresses there."""

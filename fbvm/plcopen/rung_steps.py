@@ -12,6 +12,7 @@ from fbvm.plcopen.diagram import Object, Wire
 from fbvm.plcopen.networks import Network
 from fbvm.plcopen.rung_parts import Inexact, Parts
 from fbvm.plcopen.scope import Scope
+from fbvm.syntax.rung_text import instruction_text
 
 BRANCHES = 16
 """TR0 to TR15, each for one branch point of a rung."""
@@ -96,7 +97,7 @@ class _Rung:
     def _always(self) -> None:
         if not self.ours:
             raise Inexact
-        self.steps.append(self.parts.line("LD", "P_On"))
+        self.steps.append(instruction_text("LD", "P_On"))
 
     # --- shape ---
 
@@ -152,11 +153,11 @@ class _Rung:
             self.points += 1
             if self.points > BRANCHES:
                 raise Inexact
-            self.steps.append(self.parts.line("OUT", point))
+            self.steps.append(instruction_text("OUT", point))
         moved = False
         for part in parts:
             if moved:
-                self.steps.append(self.parts.line("LD", point))
+                self.steps.append(instruction_text("LD", point))
             if isinstance(part, Object):
                 self._output(part)
                 moved = False

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 from fbvm.base.diagnostics import Source
 from fbvm.plcopen.bodies import Bodies
 from fbvm.plcopen.document import Configuration, DataType, Document, Pou, Reading, Resource, Variable, VarList
+from fbvm.plcopen.read_types import remark
 from fbvm.syntax.format import formatted
 
 GLOBALS = "globals"
@@ -20,8 +21,11 @@ def sources(reading: Reading, document: Document) -> dict[str, str]:
     files: dict[str, list[str]] = {}
     if document.types:
         files[TYPES] = [line for data_type in document.types for line in _data_type(data_type)]
+    lists: dict[str, list[str]] = {}
     for listed in document.globals:
-        files.setdefault(listed.name or GLOBALS, []).extend(_section(listed))
+        lists.setdefault(listed.name or GLOBALS, []).extend(_section(listed))
+    for name, lines in lists.items():
+        _add(files, name, lines)
     for pou in document.pous:
         reading.where = pou.name
         _add(files, pou.name, _pou(reading, document, pou))
@@ -30,21 +34,18 @@ def sources(reading: Reading, document: Document) -> dict[str, str]:
         lines = _configuration(configuration)
         if lines:
             _add(files, configuration.name, lines)
-    return {_file_name(name): _canonical(lines) for name, lines in files.items()}
+    return {f"{name}.st": _canonical(lines) for name, lines in files.items()}
 
 
 def _add(files: dict[str, list[str]], name: str, lines: list[str]) -> None:
     """Put lines into a file of their own; no two files differ by case only."""
     taken = {known.casefold() for known in files}
+    name = re.sub(r"[^\w-]", "_", name)
     free, number = name, 1
     while free.casefold() in taken:
         number += 1
         free = f"{name}_{number}"
     files[free] = lines
-
-
-def _file_name(name: str) -> str:
-    return re.sub(r"[^\w-]", "_", name) + ".st"
 
 
 def _canonical(lines: Iterable[str]) -> str:
@@ -53,13 +54,9 @@ def _canonical(lines: Iterable[str]) -> str:
     return formatted(Source("", text))[0]
 
 
-def _remark(text: str) -> str:
-    return f" // {text}" if text else ""
-
-
 def _data_type(data_type: DataType) -> list[str]:
     initial = f" := {data_type.initial}" if data_type.initial else ""
-    return [f"TYPE{_remark(data_type.note)}", f"{data_type.name} : {data_type.text}{initial};", "END_TYPE", ""]
+    return [f"TYPE{remark(data_type.note)}", f"{data_type.name} : {data_type.text}{initial};", "END_TYPE", ""]
 
 
 def _section(listed: VarList) -> list[str]:
@@ -70,7 +67,7 @@ def _section(listed: VarList) -> list[str]:
 def _variable(variable: Variable) -> str:
     address = f" AT {variable.address}" if variable.address else ""
     initial = f" := {variable.initial}" if variable.initial else ""
-    return f"{variable.name}{address} : {variable.type}{initial};{_remark(variable.note)}"
+    return f"{variable.name}{address} : {variable.type}{initial};{remark(variable.note)}"
 
 
 # --- POUs -------------------------------------------------------------------------------------------------------------

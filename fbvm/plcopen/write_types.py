@@ -9,13 +9,9 @@ from fbvm.base.diagnostics import Source
 from fbvm.plcopen.layout import own_data
 from fbvm.plcopen.markup import Element, element
 from fbvm.plcopen.read_project import QUALIFIERS, SECTIONS
-from fbvm.plcopen.read_types import LOCATION
+from fbvm.plcopen.read_types import ELEMENTARY, LOCATION
 from fbvm.syntax import tree
 
-_NAMES = ("BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD "
-          "ANY ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE")
-ELEMENTARY = set(_NAMES.split())
-"""Types that are empty elements of their name (TC6 2.01 elementaryTypes)."""
 LONG = {"DATE_AND_TIME": "DT", "TIME_OF_DAY": "TOD"}
 UNSIGNED = {"USINT", "UINT", "UDINT", "ULINT", "BYTE", "WORD", "DWORD", "LWORD"}
 LISTS = {word: name for name, word in SECTIONS.items()}

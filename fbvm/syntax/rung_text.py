@@ -62,4 +62,9 @@ def _steps(rung: RungText) -> list[str]:
 def _instruction(line: Line) -> str:
     step = line.step
     name = step.prefix + step.mnemonic + (f"({line.row.code})" if line.row.code and line.coded else "")
-    return f"{name:{OPERANDS_AT - 1}} {' '.join(step.operands)}".rstrip()
+    return instruction_text(name, *step.operands)
+
+
+def instruction_text(mnemonic: str, *operands: str) -> str:
+    """One instruction with its operands in their column."""
+    return f"{mnemonic:{OPERANDS_AT - 1}} {' '.join(operands)}".rstrip()

@@ -73,3 +73,14 @@ def test_a_program_that_lacks_something_has_status_3(tmp_path: Path) -> None:
     done = CliRunner().invoke(main, ["import", str(file), "-o", str(tmp_path / "made"), "--json"])
     assert done.exit_code == 3
     assert '"code": "X0104"' in done.output
+
+
+def test_no_list_of_globals_is_lost_when_files_of_two_would_have_one_name() -> None:
+    listed = "".join(f'<globalVars name="{name}"><variable name="{variable}"><type><INT/></type></variable></globalVars>'
+                     for name, variable in (("Line 1", "a"), ("Line.1", "b"), ("line_1", "c"), ("Line 1", "d"), ("Types", "e")))
+    made = import_xml(f'<project xmlns="http://www.plcopen.org/xml/tc6_0201"><types><dataTypes><dataType name="Level">'
+                      f'<baseType><INT/></baseType></dataType></dataTypes><pous/></types><addData><data>{listed}</data></addData>'
+                      f'</project>'.encode())
+    assert not made.errors
+    declared = {name: [variable for variable in "abcde" if f"{variable} : INT" in text] for name, text in made.files.items()}
+    assert declared == {"types.st": [], "Line_1.st": ["a", "d"], "Line_1_2.st": ["b"], "line_1_3.st": ["c"], "Types_2.st": ["e"]}
