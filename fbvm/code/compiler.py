@@ -33,6 +33,8 @@ from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 
+LONG = 50_000
+"""Characters of sources from which on looking for garbage takes tenths of a second."""
 _FRAMES = 20_000
 """Python frames that checking and lowering may use for the deepest tree that the parser lets through."""
 
@@ -130,7 +132,7 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
         (program, runnable, resource, dialect, lint, silenced, warnings_as_errors, drawn))
     if kept and (known := image_cache.read(kept, sources)):
         return Compilation(*known)
-    with _deep():
+    with _deep(sources):
         made = compile_sources(sources, program, libraries, runnable, resource=resource, dialect=dialect, lint=lint,
                                no_warn=silenced, warnings_as_errors=warnings_as_errors, progress=progress, drawn=drawn)
         if kept and made.image:
@@ -158,7 +160,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         shelves = Libraries([Path(folder) for folder in libraries], preferred=spoken.libraries)
     except LibraryError as error:
         return Compilation(None, [error.diagnostic])
-    with _deep():
+    with _deep(sources):
         project = Project(shelves, report, spoken)
         damage = Damage()
         for source in sources:
@@ -203,11 +205,12 @@ def _demand_program(checker: Checker, program: str | None, sources: Sequence[Sou
 
 
 @contextmanager
-def _deep() -> Iterator[None]:
+def _deep(sources: Sequence[Source]) -> Iterator[None]:
     """Room for deep trees; the parser limits how deep they get.
 
     Nobody looks for garbage meanwhile: nodes and facts live until the end, and to visit them all again and again takes a
-    third of the time.  What is left then is an image, which lives on: it counts as old at once."""
+    third of the time.  What is left of a long text is an image, which lives on: it counts as old at once.  After short
+    texts, of which tests compile thousands, to ask for that would take longer, and what they leave behind would stay."""
     before, collects = sys.getrecursionlimit(), gc.isenabled()
     sys.setrecursionlimit(max(before, _FRAMES))
     gc.disable()
@@ -216,7 +219,7 @@ def _deep() -> Iterator[None]:
     finally:
         sys.setrecursionlimit(before)
         if collects:
-            if not gc.get_freeze_count():
+            if sum(len(source.text) for source in sources) >= LONG and not gc.get_freeze_count():
                 gc.freeze()
                 gc.unfreeze()
             gc.enable()
