@@ -3,40 +3,64 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import click
 
-from fbvm.base.diagnostics import errors
+from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.check.silence import Wanted
 from fbvm.cli import status
 from fbvm.cli.patience import patience
-from fbvm.cli.sources import chosen, report, source_arguments
+from fbvm.cli.project import check_options, project_named
+from fbvm.cli.sources import chosen, report, source_options
 from fbvm.code.compiler import compile_files
+from fbvm.run.plant import Plant
+from fbvm.run.project import Project, read_project
+
+BESIDE_PROJECTS = {"no_warn": "--no-warn", "warnings_as_errors": "--warnings-as-errors", "as_json": "--json"}
+"""What may be said beside a project."""
 
 
 @click.command("check")
-@source_arguments
+@source_options
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=click.Path(exists=True, path_type=Path))
 @click.option("--no-warn", metavar="CODE", multiple=True,
               help="Do not warn of that, such as S0390, or of `all`; may be repeated, or a list with commas.")
 @click.option("--warnings-as-errors", is_flag=True, help="A warning counts as an error.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], no_warn: tuple[str, ...],
             warnings_as_errors: bool, as_json: bool) -> None:
-    """Say what is wrong with the files; silent, and status 0, when nothing is.
+    """Say what is wrong with the files; silent, and status 0, when nothing is.  Of a PROJECT, a folder with an fbvm.toml
+    or the one where you are, the programs of all PLCs are checked and what else its file says.
 
     Status 3 if there is an error; warnings are shown and leave the status 0.  In a text, `{warning disable S0390}` ..
     `{warning restore S0390}` switches a warning off."""
     codes = [code for listed in no_warn for code in listed.split(",")]
     try:
-        Wanted.of(codes, warnings_as_errors)
+        wanted = Wanted.of(codes, warnings_as_errors)
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--no-warn") from None
     with patience(f"checking {', '.join(path.name for path in files)}") as progress:
-        compilation = compile_files(files, program=program, libraries=libraries, no_warn=codes,
-                                    warnings_as_errors=warnings_as_errors, progress=progress,
-                                    **chosen())
-    if compilation.diagnostics or as_json:
-        report(compilation.diagnostics, as_json)
-    if errors(compilation.diagnostics):
+        if project := project_named(files):
+            check_options(click.get_current_context(), BESIDE_PROJECTS)
+            diagnostics = _of_project(project, wanted)
+        else:
+            made = compile_files(files, program=program, libraries=libraries, no_warn=codes,
+                                 warnings_as_errors=warnings_as_errors, progress=progress, **chosen())
+            diagnostics = made.diagnostics
+    if diagnostics or as_json:
+        report(diagnostics, as_json)
+    if errors(diagnostics):
         sys.exit(status.PROGRAM_ERRORS)
+
+
+def _of_project(file: Path, wanted: Wanted) -> list[Diagnostic]:
+    """What is wrong with a project: its file, and the programs of its PLCs, each thing once."""
+    project = read_project(file)
+    if not isinstance(project, Project):
+        return project
+    one_each = tuple(replace(row, count=row.count and 1) for row in project.plcs)
+    plant = Plant(replace(project, plcs=one_each), net="loop", wanted=wanted)
+    plant.close()
+    return list({diagnostic.render(): diagnostic for diagnostic in plant.diagnostics}.values())

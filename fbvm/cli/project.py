@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import click
@@ -40,7 +40,7 @@ def project_named(files: tuple[Path, ...]) -> Path | None:
 def run_project(file: Path, context: click.Context) -> int:
     """Runs it to its end, with the options of the command line; the exit status."""
     given = {name for name in context.params if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
-    _check_options(given - {"files"}, context)
+    check_options(context, OPTIONS)
     net = context.params["net"] if "net" in given else None
     for_ns, scans = context.params["for_ns"], context.params["scans"]
     as_json = context.params["as_json"]
@@ -68,11 +68,15 @@ def run_project(file: Path, context: click.Context) -> int:
     return max(EXIT_STATUS.get(run.reason, status.GOOD) for run in plant.runs)
 
 
-def _check_options(given: set[str], context: click.Context) -> None:
-    wrong = [parameter.opts[0] for parameter in context.command.params if parameter.name in given - set(OPTIONS)]
+def check_options(context: click.Context, allowed: Mapping[str, str]) -> None:
+    """Refuse what may not be said beside a project; `allowed` are the names of parameters and of their options."""
+    given = {name for name in context.params if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
+    given |= {option for option in ("resource", "dialect") if context.meta.get(f"fbvm.{option}") is not None}
+    wrong = [parameter.opts[0] for parameter in context.command.params
+             if parameter.name in given - set(allowed) - {"files"}]
     if wrong:
         raise click.UsageError(f"{', '.join(wrong)}: what a project does stands in its file; beside it there are "
-                               f"{', '.join(OPTIONS.values())}")  # fmt: skip
+                               f"{', '.join(allowed.values())}")  # fmt: skip
 
 
 def _refuse(diagnostics: list[Diagnostic], as_json: bool) -> int:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from ipaddress import IPv4Address
 
 from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.check.silence import ANY, Wanted
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.engine import native
@@ -54,13 +55,14 @@ class Kind:
 class Plant:
     """A project that can run.  `net` stands in for the file's.  Its mistakes are in `diagnostics`; then there is no PLC.
 
-    `for_ns` and `scans` end PLCs that have no end of their own, in place of what the file says.  Raises OSError if the
-    host's network cannot be used."""
+    `wanted` says which warnings; `for_ns` and `scans` end PLCs that have no end of their own, in place of what the file
+    says.  Raises OSError if the host's network cannot be used."""
 
     def __init__(
-        self, project: Project, *, net: str | None = None, for_ns: int | None = None, scans: int | None = None
-    ) -> None:
-        self.project = project
+        self, project: Project, *, net: str | None = None, for_ns: int | None = None, scans: int | None = None,
+        wanted: Wanted = ANY,
+    ) -> None:  # fmt: skip
+        self.project, self._wanted = project, wanted
         self.diagnostics: list[Diagnostic] = []
         self.kinds = [Kind(row) for row in project.plcs]
         self.network = _network(project, net or project.net)
@@ -93,7 +95,8 @@ class Plant:
                 self._report(("plc", row.name, "libraries"), f"there is no folder {folder}")
                 return None
         compilation = compile_files(row.sources, program=row.program, libraries=row.libraries, runnable=True,
-                                    resource=row.resource, dialect=row.dialect)
+                                    resource=row.resource, dialect=row.dialect, no_warn=self._wanted.no_warn,
+                                    warnings_as_errors=self._wanted.as_errors)
         self.diagnostics += compilation.diagnostics
         return compilation.image
 

@@ -152,3 +152,32 @@ def test_where_there_is_no_project(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     result = run("--scans", "1")
     assert result.exit_code == 2
     assert f"there is no fbvm.toml in {tmp_path}; give a FILE, or a folder with a project" in result.stderr
+
+
+def check(*arguments: str) -> Result:
+    return CliRunner().invoke(main, ["check", *arguments])
+
+
+def test_a_project_is_checked_with_all_its_plcs(folder: Path) -> None:
+    assert (check().exit_code, check(".").output, check("fbvm.toml").output) == (0, "", "")
+    (folder / "counter.st").write_text(PROGRAM.replace("step / divisor", "steps / divisor"), encoding="utf-8")
+    found = check()
+    assert found.exit_code == 3
+    assert found.stderr.count("error S0201: steps is not declared") == 1, "both kinds of PLC have the file"
+    (folder / "counter.st").write_text(PROGRAM.replace("step :", "unused, step :"), encoding="utf-8")
+    assert "warning S0290: unused is never used" in check(".").stderr
+    assert check(".", "--no-warn", "S0290").output == ""
+    assert check(".", "--warnings-as-errors").exit_code == 3
+    assert json.loads(check(".", "--json").stdout)["diagnostics"][0]["code"] == "S0290"
+
+
+def test_what_the_file_of_a_project_says_is_checked(folder: Path) -> None:
+    text = PROJECT.replace('watch = ["Main.n", "D0"]', 'watch = ["Main.m"]')
+    (folder / "fbvm.toml").write_text(text, encoding="utf-8")
+    assert "Main has no m; it has n, step, divisor" in check().stderr
+    assert check().exit_code == 3
+    (folder / "fbvm.toml").write_text("[plc.pump]\n", encoding="utf-8")
+    assert "fbvm.toml" in check().stderr
+    assert "what a project does stands in its file" in check("--dialect", "codesys").stderr
+    (folder / "fbvm.toml").unlink()
+    assert "there is no fbvm.toml" in check().stderr
