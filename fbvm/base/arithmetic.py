@@ -57,6 +57,17 @@ def single(value: float) -> float:
     return _SINGLE[0]
 
 
+def shortest(value: float) -> float:
+    """Of all numbers that are read as the same 32-bit float the one with the shortest text: 0.1, not 0.10000000149011612."""
+    if not math.isfinite(value):
+        return value
+    for digits in range(1, 10):
+        short = float(f"{value:.{digits}g}")
+        if single(short) == value:
+            return short
+    return value
+
+
 def single_of_integer(value: int) -> float:
     """The 32-bit float nearest to an integer, rounded once (by way of 64 bits would round twice)."""
     if -(1 << 53) <= value <= 1 << 53:

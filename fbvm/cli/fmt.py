@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import codecs
 import os
 import shutil
 import sys
@@ -25,13 +24,12 @@ from fbvm.cli.sources import show
 from fbvm.syntax.format import formatted
 from fbvm.syntax.format_names import Outside
 from fbvm.syntax.parser import parse
-from fbvm.syntax.text import decode, read
+from fbvm.syntax.text import MARKS, decode, read
 from fbvm.syntax.tree import Declaration, Pou, TypeDecl
 
 STREAM = Path("-")
-ENCODINGS = (("utf-8", codecs.BOM_UTF8), ("utf-16-le", codecs.BOM_UTF16_LE), ("utf-16-be", codecs.BOM_UTF16_BE),
-             ("utf-8", b""), ("cp1252", b""), ("latin-1", b""))
-"""Encodings and their marks, in the order in which they are recognised."""
+ENCODINGS = (*MARKS, (b"", "utf-8"), (b"", "cp1252"), (b"", "latin-1"))
+"""Marks and their encodings, in the order in which they are recognised."""
 
 
 @click.command("fmt")
@@ -108,7 +106,7 @@ def _read(path: Path) -> tuple[Source | None, bytes]:
 
 def _encoded(before: str, after: str, data: bytes) -> bytes:
     """The new text in the encoding of the old one's bytes, and with its mark."""
-    for encoding, mark in ENCODINGS:
+    for mark, encoding in ENCODINGS:
         if data.startswith(mark):
             try:
                 if whole_lines(data[len(mark):].decode(encoding)) == before:

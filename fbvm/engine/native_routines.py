@@ -9,12 +9,11 @@ import struct
 
 from fbvm.base.types import DAY_NS
 from fbvm.engine.native_subset import data, float_text, free_text, peek, poke, single_bits, text_float
-from fbvm.syntax.literals import UNITS_NS
+from fbvm.syntax.literals import SECOND_NS, UNITS_NS
 
-UNITS = b"d\0h\0m\0s\0msusns"
+UNITS = b"".join(unit.encode().ljust(2, b"\0") for unit in UNITS_NS)
 SIZES = b"".join(struct.pack("<Q", size) for size in UNITS_NS.values())
 MAGNITUDE, INFINITE = 0x7FFFFFFFFFFFFFFF, 0x7FF0000000000000
-SECOND_NS = 1_000_000_000
 
 
 # --- bytes ----------------------------------------------------------------------------------------------------------

@@ -16,12 +16,12 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.syntax.text import MARKS
 
 MAX_BYTES = 64 << 20
 MAX_DEPTH = 200
 """Deepest nesting; projects of editors have less than 40."""
 MAX_ELEMENTS = 1_000_000
-MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
 _DECLARED = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z][\w.-]*)["']""")
 _ENCODINGS = re.compile(r"utf-8|utf-16|ascii|iso8859-\d+|cp125\d|cp437|cp850|koi8-[ru]|gbk|gb2312|gb18030|big5|"
                         r"shift_jis|euc_\w+")
@@ -122,10 +122,9 @@ def _too_large(name: str) -> Diagnostic:
 
 
 def _decoded(data: bytes) -> str:
-    encoding = next((name for mark, name in MARKS if data.startswith(mark)), "")
-    if encoding:
-        data = data[len(next(mark for mark, name in MARKS if name == encoding)):]
-    elif found := _DECLARED.match(data[:200]):
+    mark, encoding = next((known for known in MARKS if data.startswith(known[0])), (b"", ""))
+    data = data.removeprefix(mark)
+    if not mark and (found := _DECLARED.match(data[:200])):
         encoding = _known(found[1].decode("ascii"))
     try:
         return data.decode(encoding or "utf-8")

@@ -6,7 +6,9 @@ import unicodedata
 from functools import cache
 
 LEFT, RIGHT, UP, DOWN = range(4)
-_WAYS = {"LEFT": (LEFT,), "RIGHT": (RIGHT,), "UP": (UP,), "DOWN": (DOWN,), "HORIZONTAL": (LEFT, RIGHT), "VERTICAL": (UP, DOWN)}
+WAY_WORDS = {"LEFT": (LEFT,), "RIGHT": (RIGHT,), "UP": (UP,), "DOWN": (DOWN,), "HORIZONTAL": (LEFT, RIGHT),
+             "VERTICAL": (UP, DOWN)}
+"""Words in the names of box drawing characters, and the ways in which lines leave these."""
 THIN, THICK, DOUBLE = 1, 2, 3
 _WEIGHTS = {"LIGHT": THIN, "SINGLE": THIN, "HEAVY": THICK, "DOUBLE": DOUBLE}
 
@@ -19,7 +21,7 @@ def _characters() -> dict[tuple[int, int, int, int], str]:
     found = {(0, 0, 0, 0): " "}
     for code in range(0x2500, 0x2580):
         words = unicodedata.name(chr(code)).removeprefix("BOX DRAWINGS ").split()
-        if not set(words) <= {*_WAYS, *_WEIGHTS, "AND"}:
+        if not set(words) <= {*WAY_WORDS, *_WEIGHTS, "AND"}:
             continue
         weights = [0, 0, 0, 0]
         for ways, weight in _parts(words):
@@ -39,7 +41,7 @@ def _parts(words: list[str]) -> list[tuple[tuple[int, ...], int]]:
         if word in _WEIGHTS:
             weight = _WEIGHTS[word]
         elif word != "AND":
-            parts.append((_WAYS[word], weight))
+            parts.append((WAY_WORDS[word], weight))
     return parts
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import re
 
+from fbvm.base.types import DAY_NS
+
 Value = int | float | bool | str
 Decoded = tuple[str, Value, str | None]
 """kind, value and type name of a Literal."""
@@ -39,7 +41,6 @@ MOMENTS = {"DT": "DATE_AND_TIME", "DATE_AND_TIME": "DATE_AND_TIME", "LDT": "LDAT
 ELEMENTARY = {"BOOL", *SIGNED, *UNSIGNED, *REALS, *TEXTS, *TIMES, *DATES, *CLOCKS, *MOMENTS}
 
 SECOND_NS = 1_000_000_000
-DAY_NS = 86_400 * SECOND_NS
 UNITS_NS = {"d": DAY_NS, "h": 3600 * SECOND_NS, "m": 60 * SECOND_NS, "s": SECOND_NS, "ms": 1_000_000, "us": 1000,
             "ns": 1}
 DAYS_1970 = 719_163

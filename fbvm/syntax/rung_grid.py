@@ -12,13 +12,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 
-from fbvm.syntax.box_lines import DOWN, LEFT, RIGHT, UP
+from fbvm.syntax.box_lines import DOWN, LEFT, RIGHT, UP, WAY_WORDS
 from fbvm.syntax.instruction_set import instruction_set
 
 Cell = tuple[int, int]
 WAYS = {LEFT: (-1, 0), RIGHT: (1, 0), UP: (0, -1), DOWN: (0, 1)}
 BACK = {LEFT: RIGHT, RIGHT: LEFT, UP: DOWN, DOWN: UP}
-_WORDS = {"LEFT": {LEFT}, "RIGHT": {RIGHT}, "UP": {UP}, "DOWN": {DOWN}, "HORIZONTAL": {LEFT, RIGHT}, "VERTICAL": {UP, DOWN}}
 _MARK = r"!?/?[↑↓PN]?|[!@%]{0,2}(?:TSTN?|[<>=]{1,2}[A-Z]*\$?)"
 _CONTACT = re.compile(r"[┤┫┥┨|\]]([^─━|┤┫\[\]├┣-]{0,8}?)[├┣┝┠|\[]")
 _COIL = re.compile(r"\(([^()]{0,8})\)")
@@ -70,7 +69,7 @@ def ways(character: str) -> frozenset[int]:
     words = unicodedata.name(character, "").split()
     if words[:2] != ["BOX", "DRAWINGS"] or "DIAGONAL" in words:
         return frozenset()
-    return frozenset(way for word in words for way in _WORDS.get(word, ()))
+    return frozenset(way for word in words for way in WAY_WORDS.get(word, ()))
 
 
 class Grid:

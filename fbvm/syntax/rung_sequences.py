@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.syntax.rung_spans import Interlock
+from fbvm.syntax.rung_spans import Interlock, StepRefused
 from fbvm.syntax.tree import Statement
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ class Steps:
         rungs, spans = self.rungs, self.rungs.spans
         self.close()
         if spans.jumps or spans.interlocks or len(spans.frames) > 1:
-            raise spans.refused("STEP stands inside of a loop, a jump, an interlock or a subroutine", "steps stand by themselves")
+            raise StepRefused("STEP stands inside of a loop, a jump, an interlock or a subroutine", "steps stand by themselves")
         if not rungs.line.step.operands:
             return
         bit, before = rungs.operand(0), rungs.variable(rungs.name("step"))

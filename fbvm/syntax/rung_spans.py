@@ -28,6 +28,10 @@ WITHOUT_NUMBER = "0 without number"
 """The number of JMP0 and JME0."""
 
 
+class StepRefused(Exception):
+    """A step cannot be executed; the arguments are a message and a hint."""
+
+
 @dataclass
 class Frame:
     """A loop that is open: what began it, and what stands in it so far."""
@@ -158,7 +162,7 @@ class Spans:
         rungs = self.rungs
         number = self._number(rungs.line.step.operands[0], "subroutine")
         if any(frame.what == f"SBN{number}" for frame in self.frames):
-            raise self.refused(f"subroutine {number} calls itself", "FOR and NEXT repeat rungs")
+            raise StepRefused(f"subroutine {number} calls itself", "FOR and NEXT repeat rungs")
         self._visited.setdefault(number, (rungs.start, rungs.end))
         return rungs.called(f"$SBN{number}")
 
@@ -166,17 +170,17 @@ class Spans:
         """SBN: what follows, up to RET, is executed by SBS only."""
         number = self._number(self.rungs.line.step.operands[0], "subroutine")
         if len(self.frames) > 1 or self.jumps or self.interlocks:
-            raise self.refused("SBN stands inside of a loop, a jump, an interlock or another subroutine",
-                                "subroutines stand by themselves, before END")
+            raise StepRefused("SBN stands inside of a loop, a jump, an interlock or another subroutine",
+                              "subroutines stand by themselves, before END")
         if number in self._begun:
-            raise self.refused(f"there is another SBN {number}", "")
+            raise StepRefused(f"there is another SBN {number}", "")
         self._begun.add(number)
         self._opening = Frame(f"SBN{number}")
 
     def go_back(self) -> None:
         """RET ends a subroutine."""
         if not self.frames[-1].what.startswith("SBN"):
-            raise self.refused("RET without SBN", "")
+            raise StepRefused("RET without SBN", "")
         self._closing = "RET"
 
     def _close_subroutine(self) -> None:
@@ -212,7 +216,7 @@ class Spans:
         rungs = self.rungs
         number = self._number(rungs.line.step.operands[0], "interlock", INTERLOCKS)
         if number in self.interlocks:
-            raise self.refused(f"there is an interlock {number} already", f"MILC {number} ends it")
+            raise StepRefused(f"there is an interlock {number} already", f"MILC {number} ends it")
         power, inhibits = rungs.power(), f"$MIL{number}"
         shown, hidden = rungs.operand(1), rungs.operand(1)
         rungs.emit(*rungs.reaching(rungs.assign(shown, power)),
@@ -225,7 +229,7 @@ class Spans:
         """MILC ends the interlock of its number."""
         number = self._number(self.rungs.line.step.operands[0], "interlock", INTERLOCKS)
         if self.interlocks.pop(number, None) is None:
-            raise self.refused(f"MILC {number} without MILH or MILR", "it ends the interlock of its number")
+            raise StepRefused(f"MILC {number} without MILH or MILR", "it ends the interlock of its number")
 
     # --- jumps ------------------------------------------------------------------------------------------------------
 
@@ -240,7 +244,7 @@ class Spans:
         elif number in self._landings:
             self._jump_back(number, leaves)
         else:
-            raise self.refused(f"there is no JME {number}", "a jump leads to the JME of its number")
+            raise StepRefused(f"there is no JME {number}", "a jump leads to the JME of its number")
 
     def _jump_over(self, number: str, leaves: Expr) -> None:
         rungs = self.rungs
@@ -256,7 +260,7 @@ class Spans:
     def _jump_back(self, number: str, leaves: Expr) -> None:
         rungs, frame = self.rungs, self.frames[-1]
         if frame.what != f"JME{number}" or frame.again is None:
-            raise self.refused(f"the jump back to JME {number} leads into or out of a loop", "")
+            raise StepRefused(f"the jump back to JME {number} leads into or out of a loop", "")
         again = rungs.temporary(f"$JME{number}")
         rungs.emit(rungs.when(leaves, rungs.assign(again, rungs.truth(True)), Continue(rungs.start, rungs.end)))
         if rungs.start == max(self._takeoffs[number]):
@@ -269,8 +273,8 @@ class Spans:
         passing = self.jumps.pop(number, None)
         if passing is not None:
             if self._inside() != self._around[number]:
-                raise self.refused(f"a loop or an interlock begins or ends between JMP {number} and JME {number}",
-                                    "it stands inside of a jump, or around it")
+                raise StepRefused(f"a loop or an interlock begins or ends between JMP {number} and JME {number}",
+                                  "it stands inside of a jump, or around it")
             rungs.out.append(rungs.assign(rungs.temporary(f"$JMP{number}"), rungs.truth(False)))
         elif self._comes_back(number):
             again = rungs.temporary(f"$JME{number}")
@@ -289,8 +293,8 @@ class Spans:
     def _number(self, operand: str, what: str, numbers: int = NUMBERS) -> str:
         number = _number(operand)
         if not number.isdigit() or int(number) >= numbers:
-            raise self.refused(f"{operand} is no number of {'an' if what[0] in 'aeiou' else 'a'} {what}",
-                                f"numbers are 0 to {numbers - 1}")
+            raise StepRefused(f"{operand} is no number of {'an' if what[0] in 'aeiou' else 'a'} {what}",
+                              f"numbers are 0 to {numbers - 1}")
         return number
 
     def _close_again(self) -> None:
@@ -307,7 +311,7 @@ class Spans:
         """FOR: what follows is executed so many times, up to NEXT."""
         rungs = self.rungs
         if sum(frame.what == "FOR" for frame in self.frames) >= DEEPEST_LOOPS:
-            raise self.refused(f"loops stand in each other more than {DEEPEST_LOOPS} deep", "")
+            raise StepRefused(f"loops stand in each other more than {DEEPEST_LOOPS} deep", "")
         count = tree.Call(rungs.start, rungs.end, NameRef(rungs.start, rungs.end, "TO_UINT"),
                           (tree.Argument(rungs.start, rungs.end, "", None, rungs.operand(0)),))
         kept = rungs.temporary(rungs.name("times"), "UINT")
@@ -319,16 +323,16 @@ class Spans:
     def next(self) -> None:
         """NEXT."""
         if self.frames[-1].what != "FOR":
-            raise self.refused("NEXT without FOR", "")
+            raise StepRefused("NEXT without FOR", "")
         self._closing = "FOR"
         if self.frames[-1].around != (*self.interlocks, *self.jumps):
-            raise self.refused("a jump or an interlock begins or ends between FOR and NEXT", "it stands inside, or around them")
+            raise StepRefused("a jump or an interlock begins or ends between FOR and NEXT", "it stands inside, or around them")
 
     def leave(self) -> None:
         """BREAK: with the condition ON the innermost loop is left."""
         rungs = self.rungs
         if self.frames[-1].what != "FOR":
-            raise self.refused("BREAK stands outside FOR and NEXT", "")
+            raise StepRefused("BREAK stands outside FOR and NEXT", "")
         rungs.emit(rungs.when(rungs.power(), Exit(rungs.start, rungs.end)))
 
     def _close_loop(self) -> None:
@@ -337,11 +341,6 @@ class Spans:
         one = tree.Literal(rungs.start, rungs.end, "int", 1, None, "1")
         self.frames[-1].statements.append(
             For(rungs.start, rungs.end, frame.counter, one, frame.count, None, tuple(frame.statements)))
-
-    def refused(self, message: str, hint: str) -> Exception:
-        from fbvm.syntax.rungs import Refused
-
-        return Refused(message, hint)
 
 
 _OPEN = {"FOR": ("FOR without NEXT", "FOR and NEXT stand in pairs"),

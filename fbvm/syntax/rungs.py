@@ -17,16 +17,12 @@ from fbvm.syntax.mnemonics import Line, RungText, is_input, read_rungs
 from fbvm.syntax.operands import Operands, Wrong
 from fbvm.syntax.rung_blocks import LadderBlocks
 from fbvm.syntax.rung_sequences import Steps
-from fbvm.syntax.rung_spans import Spans
+from fbvm.syntax.rung_spans import Spans, StepRefused
 from fbvm.syntax.symbols import declaration, number
 from fbvm.syntax.tree import Assign, Binary, Expr, If, NameRef, Statement, Unary
 
 DEEPEST = 32
 """Most conditions that may be saved (8 on the real CPU units; assumed)."""
-
-
-class Refused(Exception):
-    """A step cannot be executed; the arguments are a message and a hint."""
 
 
 class Rungs:
@@ -86,7 +82,7 @@ class Rungs:
             self.line, self.step, self.reached = line, step, {}
             try:
                 self._step(line.row)
-            except (Refused, Wrong) as refusal:
+            except (StepRefused, Wrong) as refusal:
                 start, end = refusal.place if isinstance(refusal, Wrong) and refusal.place else (self.start, self.end)
                 self.report("S0110", start, end, *refusal.args)
                 text.damaged = True
@@ -110,7 +106,7 @@ class Rungs:
 
     def _step(self, row: Instruction) -> None:
         if not row.does:
-            raise Refused(f"{row.mnemonic} is understood and not executed", row.words)
+            raise StepRefused(f"{row.mnemonic} is understood and not executed", row.words)
         self._count(row)
         if row.kind == "?":
             self._join(row.join, self.contact(self.seen(self.call())))
@@ -125,10 +121,10 @@ class Rungs:
         wanted = len(row.operands)
         if row.does != ".call" and not row.least <= given <= wanted:
             names = f" ({', '.join(row.names)})" if wanted else ""
-            raise Refused(f"{row.mnemonic} takes {wanted or 'no'} operand{'s' * (wanted != 1)}{names}, not {given}",
-                          self._too_many(wanted) or row.described)
+            raise StepRefused(f"{row.mnemonic} takes {wanted or 'no'} operand{'s' * (wanted != 1)}{names}, not {given}",
+                              self._too_many(wanted) or row.described)
         if row.inputs and self.condition is None:
-            raise Refused(f"{row.mnemonic} needs an execution condition", "write LD in front of it; LD P_On is always ON")
+            raise StepRefused(f"{row.mnemonic} needs an execution condition", "write LD in front of it; LD P_On is always ON")
 
     def _too_many(self, wanted: int) -> str:
         """What to do if one of the operands in excess is an instruction; "" otherwise."""
@@ -312,7 +308,7 @@ class Rungs:
             if self.condition is not None:
                 self.saved.append(self.condition)
             if len(self.saved) > DEEPEST:
-                raise Refused(f"more than {DEEPEST} conditions are saved", "")
+                raise StepRefused(f"more than {DEEPEST} conditions are saved", "")
             self.condition = contact
         else:
             assert self.condition is not None
@@ -322,7 +318,7 @@ class Rungs:
         text = self.line.step.operands[0].upper()
         if text.startswith("TR") and text[2:].isdigit():
             if text not in self.branches:
-                raise Refused(f"nothing was written to {text} in this rung", f"OUT {text} comes first")
+                raise StepRefused(f"nothing was written to {text} in this rung", f"OUT {text} comes first")
             self.condition = self.temporary(f"${text}")
         else:
             self._join("LD", self._contact())
@@ -335,7 +331,7 @@ class Rungs:
 
     def _block(self, how: str) -> None:
         if not self.saved:
-            raise Refused(f"{how} LD joins two blocks, and there is one", "each block begins with LD")
+            raise StepRefused(f"{how} LD joins two blocks, and there is one", "each block begins with LD")
         assert self.condition is not None
         self.condition = self.binary(how, self.saved.pop(), self.condition)
 
@@ -361,9 +357,9 @@ class Rungs:
 
     def _branch(self, text: str) -> None:
         if int(text[2:]) > 15:
-            raise Refused(f"there is no {text}", "TR0 to TR15 are there")
+            raise StepRefused(f"there is no {text}", "TR0 to TR15 are there")
         if text in self.branches:
-            raise Refused(f"{text} is written twice in this rung", "each branch point has one of its own, TR0 to TR15")
+            raise StepRefused(f"{text} is written twice in this rung", "each branch point has one of its own, TR0 to TR15")
         self.branches.add(text)
         assert self.condition is not None
         self._settle()
@@ -374,8 +370,8 @@ class Rungs:
     def inputs(self, count: int) -> list[Expr]:
         """The conditions of an instruction with several inputs, the upper one first."""
         if len(self.saved) < count - 1:
-            raise Refused(f"{self.line.step.mnemonic} takes {count} conditions, {len(self.saved) + 1} are there",
-                          "each of them begins with LD")
+            raise StepRefused(f"{self.line.step.mnemonic} takes {count} conditions, {len(self.saved) + 1} are there",
+                              "each of them begins with LD")
         power = self.power()
         first = len(self.saved) - count + 1
         taken = self.saved[first:]

@@ -9,7 +9,8 @@ from pathlib import Path
 from fbvm.base.diagnostics import Diagnostic, Source
 
 MAX_BYTES = 64 << 20
-_MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
+MARKS = ((codecs.BOM_UTF8, "utf-8"), (codecs.BOM_UTF16_LE, "utf-16-le"), (codecs.BOM_UTF16_BE, "utf-16-be"))
+"""What texts of these encodings may begin with."""
 _CONTROLS = frozenset(range(32)) - frozenset(b"\t\n\r\f\v\x1a")
 
 
@@ -31,7 +32,7 @@ def read(path: Path, name: str, library: str = "") -> Source | Diagnostic:
 
 def decode(data: bytes, name: str, library: str = "") -> Source | Diagnostic:
     """The same for bytes already read."""
-    for mark, encoding in _MARKS:
+    for mark, encoding in MARKS:
         if data.startswith(mark):
             try:
                 return Source(name, data[len(mark):].decode(encoding), library)

@@ -9,13 +9,12 @@ import math
 from collections.abc import Callable, Mapping
 from datetime import date, timedelta
 
-from fbvm.base.arithmetic import INF, NAN, Undefined, single
+from fbvm.base.arithmetic import INF, NAN, Undefined, shortest, single
 from fbvm.base.types import DAY_NS, SHORT_NAMES
-from fbvm.syntax.literals import ELEMENTARY, UNITS_NS, Malformed, OutOfRange, typed
+from fbvm.syntax.literals import ELEMENTARY, SECOND_NS, UNITS_NS, Malformed, OutOfRange, typed
 
 LEADING = 64
 """How many characters may belong to a literal that a text begins with."""
-_SECOND_NS = UNITS_NS["s"]
 _FLOATS = {"NAN": NAN, "INF": INF, "+INF": INF, "-INF": -INF}
 """What no literal can say; written and read all the same."""
 
@@ -80,11 +79,7 @@ def _lreal(value: float) -> str:
 
 def _real(value: float) -> str:
     """Fewest digits that round to the same 32 bits."""
-    for digits in range(1, 10):
-        shortest = float(f"{value:.{digits}g}")
-        if single(shortest) == value:
-            return _lreal(shortest)
-    return _lreal(value)
+    return _lreal(shortest(value))
 
 
 def _duration(prefix: str) -> Callable[[float], str]:
@@ -104,7 +99,7 @@ def _day(value: float) -> str:
 
 
 def _clock(value: float) -> str:
-    seconds, fraction_ns = divmod(int(value) % DAY_NS, _SECOND_NS)
+    seconds, fraction_ns = divmod(int(value) % DAY_NS, SECOND_NS)
     fraction = f".{fraction_ns:09}".rstrip("0").rstrip(".")
     return f"{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}{fraction}"
 

@@ -12,6 +12,7 @@ import re
 import struct
 from typing import TypeAlias
 
+from fbvm.base.arithmetic import shortest
 from fbvm.base.strings import packed
 from fbvm.base.types import (
     BOOL,
@@ -39,10 +40,6 @@ from fbvm.syntax.texts import to_text
 Value: TypeAlias = "bool | int | float | str | list[Value] | dict[str, Value] | None"
 """What a place holds, as a Python value; None is a null reference."""
 
-UNITS_NS = {
-    "d": 86_400_000_000_000, "h": 3_600_000_000_000, "m": 60_000_000_000, "s": 1_000_000_000, "ms": 1_000_000,
-    "us": 1_000, "ns": 1,
-}
 _PIECE = re.compile(r"(\d[\d_]*(?:\.\d+)?)(ms|us|ns|d|h|m|s)_?", re.I)
 _PREFIX = re.compile(r"(?:TIME|LTIME|LT|T)#", re.I)
 _REAL = re.compile(r"[+-]?\d[\d_]*(\.\d[\d_]*)?([eE][+-]?\d+)?")
@@ -56,7 +53,7 @@ def parse_time_ns(text: str) -> int:
     total, at = 0, 0
     while piece := _PIECE.match(rest, at):
         whole, _, part = piece[1].replace("_", "").partition(".")
-        unit = UNITS_NS[piece[2].lower()]
+        unit = literals.UNITS_NS[piece[2].lower()]
         total += int(whole) * unit + (int(part) * unit // 10 ** len(part) if part else 0)
         at = piece.end()
     if not at or at != len(rest):
@@ -66,14 +63,7 @@ def parse_time_ns(text: str) -> int:
 
 def show_time(time_ns: int) -> str:
     """`T#1m30s`, the way it is written in a program."""
-    if time_ns == 0:
-        return "T#0s"
-    rest, pieces = abs(time_ns), []
-    for unit, size_ns in UNITS_NS.items():
-        count, rest = divmod(rest, size_ns)
-        if count:
-            pieces.append(f"{count}{unit}")
-    return "T#" + ("-" if time_ns < 0 else "") + "".join(pieces)
+    return to_text("TIME", time_ns).decode("ascii")
 
 
 def sort_of(kind: Type) -> str:
@@ -110,20 +100,6 @@ def refusal(kind: Type, name: str, text: str) -> TypeError:
 def nearest_real(value: float) -> float:
     """The REAL (32 bits) that is nearest.  Raises OverflowError."""
     return float(struct.unpack("<f", struct.pack("<f", value))[0])
-
-
-def shortest_real(value: float) -> float:
-    """Of all numbers that are read as the same REAL the one with the shortest text: 0.1, not 0.10000000149011612."""
-    if not math.isfinite(value):
-        return value
-    for digits in range(1, 9):
-        short = float(f"{value:.{digits}g}")
-        if abs(short) <= _REAL_LARGEST and nearest_real(short) == value:
-            return short
-    return float(f"{value:.9g}")
-
-
-_REAL_LARGEST = 3.4028234663852886e38
 
 
 # --- in: a Python value for a type ------------------------------------------------------------------------------------
@@ -319,7 +295,7 @@ def plain_value(kind: Type, value: Value) -> Value:
         return {f.name: plain_value(f.type, value[f.name]) for f in plain.fields.values() if f.name in value}
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
-    return shortest_real(value) if isinstance(value, float) and plain is REAL else value
+    return shortest(value) if isinstance(value, float) and plain is REAL else value
 
 
 def in_hexadecimal(kind: Type, value: int) -> str:
@@ -364,7 +340,7 @@ def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
     if isinstance(plain, RefType):
         return f"reference {value}"
     if isinstance(value, float) and plain is REAL:
-        return str(shortest_real(value))
+        return str(shortest(value))
     if isinstance(value, int) and plain.name in ("TIME", "LTIME"):
         return show_time(value)
     if isinstance(value, int) and isinstance(plain, Elementary) and "ANY_DATE" in plain.families:

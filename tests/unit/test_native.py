@@ -323,7 +323,7 @@ def test_crc_bit_by_bit_shows_the_fault_that_is_switched_off() -> None:
                "cache.switch(False); import test_native; test_native.test_crc_bit_by_bit(2)")
     folder = Path(__file__).parent
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True,
-                         env={**os.environ, "PYTHONPATH": os.pathsep.join([str(folder), str(folder.parent.parent)])})
+                         env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (folder, *folder.parents[:2])))})
     assert ran.returncode == 1 and "AssertionError" in ran.stderr
 
 
