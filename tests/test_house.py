@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+
+import pytest
 
 from fbvm.base.codes import CODES
 from fbvm.base.dialects import DIALECTS
@@ -59,6 +61,14 @@ def tree(path: Path) -> ast.Module:
 
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _let_go() -> Iterator[None]:
+    """A million nodes that no other test wants."""
+    yield
+    for known in (tree, statements, imports):
+        known.cache_clear()
 
 
 def name_of(path: Path) -> str:

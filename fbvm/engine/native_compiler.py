@@ -28,6 +28,7 @@ _PYTHON = {"double_to_string": "PyOS_double_to_string", "string_to_double": "PyO
 in C, which are called with its lock held."""
 
 
+@cache
 def available() -> bool:
     """True if llvmlite is installed."""
     return find_spec("llvmlite") is not None

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from types import CodeType
 from typing import Any
-from weakref import WeakValueDictionary, finalize
+from weakref import finalize
 
 from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Body, Image, ProgramRun
@@ -35,7 +35,6 @@ FRAMES_A_LEVEL = 5
 class Program:
     """The Python code of an image, which any number of memories can share."""
 
-    image: Image
     source: str
     code: CodeType
     constants: dict[str, Any] = field(repr=False)
@@ -45,11 +44,12 @@ class Program:
     """Python frames that a run takes at most: every body once (there is no recursion), and every part outlined."""
 
 
-_programs: WeakValueDictionary[tuple[int, bool, bool], Program] = WeakValueDictionary()
+_programs: dict[tuple[int, bool, bool], Program] = {}
+"""What has been made of the images that there are, which one test after the other may want."""
 
 
 def translate(image: Image, observed: bool = False, anywhere: bool = False) -> Program:
-    """The code of an image; the same object as long as somebody has it.
+    """The code of an image; the same object as long as there is the image.
 
     Bodies that have one instance are written for it, unless they shall run `anywhere`."""
     key = id(image), observed, anywhere
@@ -67,11 +67,16 @@ def translate(image: Image, observed: bool = False, anywhere: bool = False) -> P
             lines += [*writer.write(number), ""]
             frames += 1 + len(writer.routines)
         source = "\n".join(lines)
-        program = Program(image, source, compile(source, name, "exec"), constants, bases, frames)
+        program = Program(source, compile(source, name, "exec"), constants, bases, frames)
     linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
-    finalize(program, linecache.cache.pop, name, None)
     _programs[key] = program
+    finalize(image, _forget, key, name)
     return program
+
+
+def _forget(key: tuple[int, bool, bool], name: str) -> None:
+    del _programs[key]
+    linecache.cache.pop(name, None)
 
 
 def height(code: Block) -> int:

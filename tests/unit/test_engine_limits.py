@@ -130,10 +130,15 @@ def test_tracebacks_show_the_generated_source() -> None:
 
 def test_a_program_that_nobody_has_leaves_nothing() -> None:
     program = image((store("u8", 0, const("u8", 1)),))
-    engine: PythonEngine | None = PythonEngine(program, power_on(program))
-    assert engine is not None
+    engine = PythonEngine(program, power_on(program))
     names = {name for name in linecache.cache if name.startswith("<fbvm")}
     mine = [name for name in names if linecache.getlines(name) == engine.source.splitlines(keepends=True)]
     assert mine
-    engine = None
+    del engine, program
     assert not names.issubset(linecache.cache)
+
+
+def test_an_image_is_made_into_python_once() -> None:
+    program = image((store("u8", 0, const("u8", 1)),))
+    before = PythonEngine(program, power_on(program)).source
+    assert PythonEngine(program, power_on(program)).source is before
