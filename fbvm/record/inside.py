@@ -112,17 +112,20 @@ class Inside:
         for body, function in substitutes_of(known).items():
             self._engine.substitute(body, function)
         self._shadow = bytearray(memory.size)
-        self._frame = OUTSIDE
+        self._frame, self._unwritten = OUTSIDE, 0
+        """What is executed, and how many bodies are over it that no statement calls."""
 
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of one task once, telling what they do."""
         observations, tell, event = self._observe(task_index), self.tell, self._event
         while True:
             try:
-                tell(event(next(observations)))
+                told = event(next(observations))
             except StopIteration as end:
                 trap: Trap | None = end.value
                 return trap
+            if told is not None:
+                tell(told)
 
     def steps(self, task_index: int) -> Generator[Event, None, Trap | None]:
         """The events of one execution of a task; execution stands still between two of them."""
@@ -133,19 +136,22 @@ class Inside:
             except StopIteration as end:
                 trap: Trap | None = end.value
                 return trap
-            yield self._event(seen)
+            event = self._event(seen)
+            if event is not None:
+                yield event
 
     def _observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
         self._shadow[:] = self.memory.u8
-        self._frame = OUTSIDE
+        self._frame, self._unwritten = OUTSIDE, 0
         return self._engine.observe(task_index)
 
-    def _event(self, seen: Observation) -> Event:
-        """What an observation means; follows calls."""
+    def _event(self, seen: Observation) -> Event | None:
+        """What an observation means; follows calls.  None for a statement of a body that no statement calls, such as one
+        that the front end has called at the beginning of rungs: nobody stands still there."""
         kind, site, detail = seen
         frame = self._frame
         if kind == "statement" or kind == "rung":
-            return Statement(site, frame, kind == "rung")
+            return None if self._unwritten else Statement(site, frame, kind == "rung")
         if kind == "read" or kind == "write":
             form, offset, bit = detail
             size = detail_size(form)
@@ -159,10 +165,12 @@ class Inside:
         if kind == "call":
             body, base = detail
             self._frame = Frame(body, base, site, frame)
+            self._unwritten += bool(self._unwritten) or frame is not OUTSIDE and site == NO_SITE
             return Began(self._frame)
         if kind == "return":
             assert frame.caller is not None
             self._frame = frame.caller
+            self._unwritten -= bool(self._unwritten)
             return Ended(frame)
         return Contact(site, frame, *detail)
 

@@ -383,3 +383,18 @@ def test_one_plc_of_a_project_while_the_others_scan_along(tmp_path: Path) -> Non
 def test_errors_raised_for_scripts_are_told_apart() -> None:
     with pytest.raises(ExpectationError):
         said(made(), "expect Main.N = 1")
+
+
+def test_nobody_stands_in_what_no_statement_calls() -> None:
+    """At the beginning of a scan with rungs the front end calls CX_Begin."""
+    commands = made("PROGRAM Main\nLADDER\nLD 0.00\nTIM 1 #0002\nLD T0001\nOUT W0.00\nEND_LADDER\nEND_PROGRAM")
+    session = commands.session
+    stands = []
+    while session.here.scan < 2:
+        if session.statement is not None:
+            stands.append(session.plc.image.sites[session.statement.site].pou)
+        session.step()
+    assert stands[0] == "Main" and "CX_TIM" in stands and "CX_Begin" not in stands
+    session.goto(1)
+    session.back()
+    assert session.statement is None and session.here.scan == 0
