@@ -1,4 +1,4 @@
-"""Tables of short cases that one test goes through."""
+"""Tables of cases: short ones that one test goes through, long ones of which the inner loop tries a few."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from functools import partial, wraps
 from typing import Any
 
 import pytest
+
+ROW = type(pytest.param())
 
 
 def each_of(names: str | tuple[str, ...], table: Iterable[Any],
@@ -34,6 +36,17 @@ def each_of(names: str | tuple[str, ...], table: Iterable[Any],
     return decorate
 
 
+def first_quick(table: Iterable[Any], quick: int = 1) -> list[Any]:
+    """Rows for `pytest.mark.parametrize`: the first ones for every run, the others for the long one."""
+    return [row if number < quick else _slow(row) for number, row in enumerate(table)]
+
+
+def _slow(row: Any) -> Any:
+    if isinstance(row, ROW):
+        return pytest.param(*row.values, id=row.id, marks=[*row.marks, pytest.mark.slow])
+    return pytest.param(*(row if isinstance(row, tuple) else [row]), marks=pytest.mark.slow)
+
+
 def go_through(cases: Iterable[tuple[str, Callable[[], None]]]) -> None:
     """Try all of some named cases; what fails names its row."""
     failed: list[Exception] = []
@@ -55,7 +68,7 @@ def go_through(cases: Iterable[tuple[str, Callable[[], None]]]) -> None:
 
 def _named(arguments: list[str], row: Any, name: str | None) -> tuple[str, dict[str, Any]]:
     """A row's name and its values by argument."""
-    if isinstance(row, type(pytest.param())):
+    if isinstance(row, ROW):
         assert not row.marks, "a row with marks is a test of its own"
         name, row = row.id or name, row.values if len(arguments) > 1 else row.values[0]
     values = dict(zip(arguments, row if len(arguments) > 1 else [row], strict=True))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from rows import first_quick
 
 from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopNetwork
@@ -26,7 +27,9 @@ NEEDED = {name: {"Socket": 1} for name in ("ETN_Modbus_Line", "ETN_Modbus_Sessio
 """Parts of other blocks that are never without these."""
 
 
-@pytest.mark.parametrize("path", [path for path in BLOCKS if path not in ANY], ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", [
+    pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * ("iec" not in path.parts)) for path in BLOCKS if path not in ANY
+])
 def test_it_stands_on_a_rig_without_inputs(fb: Fb, path: Path) -> None:
     """100 ms with every input at its initial value: no trap, and twice the same memory."""
     one, two = fb(path.stem), fb(path.stem)
@@ -79,7 +82,7 @@ QUANTITIES = {"Fn01": "Coil_Qty", "Fn02": "Coil_Qty", "Fn03": "Register_Qty", "F
               "Fn0F": "Coil_Qty", "Fn10": "Register_Qty"}  # fmt: skip
 
 
-@pytest.mark.parametrize("name", QUANTITIES)
+@pytest.mark.parametrize("name", first_quick(QUANTITIES))
 def test_each_client_block_on_a_network(fb: Fb, network: LoopNetwork, name: str) -> None:
     """The block beside MTCP_ETN_Connect, as its library's README has them: one command, one good reply."""
     network.place(Peer("192.168.250.2", 502), ModbusPeer())

@@ -9,6 +9,7 @@ import pytest
 from etn_modbus_rig import SECOND_NS, SERVER, Client, Rig, image_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import first_quick
 
 from fbvm.base.data import data_folder
 from fbvm.net.faults import Fault
@@ -229,7 +230,7 @@ def test_a_configured_port_is_the_only_one() -> None:
     assert rig.client(port=502).ask(ECHO) == ECHO
 
 
-@pytest.mark.parametrize("pins", ["IP_Address2 := 256", "Sockets := 0", "Sockets := 9", "IP_Address4 := 65535"])
+@pytest.mark.parametrize("pins", first_quick(["IP_Address2 := 256", "Sockets := 0", "Sockets := 9", "IP_Address4 := 65535"]))
 def test_settings_that_cannot_be(pins: str) -> None:
     rig = Rig(pins)
     rig.scan(50)
@@ -296,6 +297,7 @@ def test_half_a_frame_does_not_hold_up_the_others() -> None:
     assert slow.hear() == 2 * ECHO_FRAME
 
 
+@pytest.mark.slow
 def test_everybody_gets_a_turn() -> None:
     """One that asks without a pause and one that asks now and then."""
     rig = Rig("Sockets := 3")
@@ -445,6 +447,7 @@ def test_a_client_writes_into_the_words_of_the_unit(timing: str, pins: str) -> N
         assert client.ask(ECHO) == ECHO, request
 
 
+@pytest.mark.slow
 def test_a_client_writes_all_words_of_the_unit_at_once() -> None:
     rig = Rig("Full_DM := TRUE")
     client = rig.client()

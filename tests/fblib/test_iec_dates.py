@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import date, datetime, timedelta
 from functools import cache
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rows import each_of
@@ -43,6 +44,7 @@ def run(**inputs: int) -> Plc:
     return machine
 
 
+@pytest.mark.slow
 @given(st.datetimes(datetime(1677, 9, 23), datetime(2262, 4, 10)))
 def test_a_moment_is_put_together_and_taken_apart(moment: datetime) -> None:
     parts = [moment.year, moment.month, moment.day, moment.hour, moment.minute, moment.second, moment.microsecond // 1000]

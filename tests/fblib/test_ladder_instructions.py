@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import first_quick
 
 from fbvm.code.compiler import compile_text
 from fbvm.plc import Plc
@@ -46,7 +47,7 @@ def words(text: str) -> dict[int, int]:
     return {int(number): int(value, 16) for number, value in pairs}
 
 
-@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.stem)
+@pytest.mark.parametrize("table", first_quick(TABLES), ids=lambda table: table.stem)
 def test_results_and_flags(table: Path) -> None:
     """Each row is a rung of one program, and each scan executes one of them."""
     rows = [row.split("|") for row in table.read_text(encoding="utf-8").splitlines() if row and not row.startswith("#")]
@@ -110,6 +111,7 @@ def signed(word: int, bits: int = 16) -> int:
     return word - (1 << bits) if word >> bits - 1 else word
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(WORD, WORD, st.booleans())
 def test_sums_and_differences(a: int, b: int, carry: bool) -> None:

@@ -62,6 +62,7 @@ def test_as_the_model_answers(seed: int, cut: int) -> None:
     assert [rig.get(f"holding[{number}]") for number in range(HOLDING)] == list(model.holding_registers)
 
 
+@pytest.mark.slow
 @COMMON
 @given(st.binary(max_size=600), st.integers(1, 100))
 def test_any_bytes_leave_it_serving(data: bytes, cut: int) -> None:

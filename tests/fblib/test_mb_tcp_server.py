@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from mb_tcp_rig import ADDRESS, CYCLE_NS, Rig, image_of
-from rows import each_of
+from rows import each_of, first_quick
 
 from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopNetwork
@@ -278,10 +278,10 @@ def test_a_connection_that_breaks() -> None:
 # --- data areas ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("kind", "value", "registers"), [
+@pytest.mark.parametrize(("kind", "value", "registers"), first_quick([
     ("ARRAY[5..6] OF INT", "holding[5]", [0x8001, 0]), ("UINT", "holding", [0x8001]), ("WORD", "holding", [0x8001]),
     ("DINT", "holding", [0x8001, 0]), ("ARRAY[0..3] OF BYTE", "holding[0]", [0x0001, 0]), ("LINT", "holding", [0x8001, 0, 0, 0]),
-])  # fmt: skip
+]))  # fmt: skip
 def test_registers_of_any_type_the_low_half_first(kind: str, value: str, registers: list[int]) -> None:
     rig = Rig(holding=kind)
     rig.set(value, {"ARRAY[5..6] OF INT": -32767, "ARRAY[0..3] OF BYTE": 1}.get(kind, 0x8001))
@@ -315,7 +315,7 @@ def test_a_real_a_structure_and_an_odd_number_of_bytes() -> None:
     assert rig.get("c") is True
 
 
-@pytest.mark.parametrize("kind", ["WORD", "INT", "ARRAY[0..1] OF BYTE", "ARRAY[0..0] OF UINT"])
+@pytest.mark.parametrize("kind", first_quick(["WORD", "INT", "ARRAY[0..1] OF BYTE", "ARRAY[0..0] OF UINT"]))
 def test_bits_of_what_is_not_bool_are_packed(kind: str) -> None:
     rig = Rig(coils=kind)
     client = rig.client().connect()
@@ -326,11 +326,11 @@ def test_bits_of_what_is_not_bool_are_packed(kind: str) -> None:
     assert client.ask("01 0010 0001") == "81 02"
 
 
-@pytest.mark.parametrize(("passed", "overlaps"), [
+@pytest.mark.parametrize(("passed", "overlaps"), first_quick([
     ({"coils": "holding"}, True), ({"coils": "holding[199]"}, True), ({"inputs": "holding[3]", "coils": "holding[4]"}, True),
     ({"registers": "holding"}, True), ({"registers": "holding[0]", "holding": "holding[1]"}, False),
     ({"coils": "coils[1]", "inputs": "coils[1]"}, True), ({"coils": "coils[1]", "inputs": "coils[2]"}, False), ({}, False),
-])  # fmt: skip
+]))  # fmt: skip
 def test_areas_that_overlap(passed: dict[str, str], overlaps: bool) -> None:
     rig = Rig(passed=passed)
     client = rig.client()
@@ -441,7 +441,7 @@ def several(count: int) -> str:
     """
 
 
-@pytest.mark.parametrize(("model", "at_most"), [("T3", 8), ("T4", 32)])
+@pytest.mark.parametrize(("model", "at_most"), first_quick([("T3", 8), ("T4", 32)]))
 def test_as_many_instances_as_the_controller_has_connections(model: str, at_most: int) -> None:
     """Each on its own port; one more waits for ever."""
     rig = Rig(text=several(at_most + 1), model=model)

@@ -158,7 +158,9 @@ TIMINGS = pytest.mark.parametrize("timing", ["exact", pytest.param("real", marks
 
 
 @TIMINGS
-@pytest.mark.parametrize("name", MISDEEDS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name not in EXPECTED)) for name in MISDEEDS]
+)
 def test_a_wrong_answer(name: str, timing: str) -> None:
     rig = rig_with(timing=timing, seed=len(name)).connect()
     watch = Watch(rig)

@@ -194,6 +194,7 @@ def many(count: int, options: str = "", control: tuple[int, ...] = READ) -> Rig:
     return rig
 
 
+@pytest.mark.slow
 def test_sixteen_blocks_at_once() -> None:
     rig = many(17)
     for number in range(1, 18):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from mstr_rig import SERVER, SERVER_IP, Rig
-from rows import each_of
+from rows import each_of, first_quick
 
 from fbvm.base.data import data_folder
 from fbvm.net.faults import Fault
@@ -59,6 +59,7 @@ def test_2003_where_a_library_takes_100_words(control: tuple[int, ...]) -> None:
     assert Rig(options="Max_Words := 100").operate(*changed(READ, w3=100)) == "0000"
 
 
+@pytest.mark.slow
 def test_2003_a_write_from_a_buffer_that_is_too_short() -> None:
     for control in (WRITE, BOTH):
         assert refused(control, databuf="ARRAY[0..1] OF WORD") == "2003"
@@ -97,7 +98,7 @@ def test_200e_what_is_no_array_assumed() -> None:
     assert (rig.outputs(), rig.status()) == ("E", "200E")
 
 
-@pytest.mark.parametrize(("length", "control"), [(8, READ), (8, LOCAL), (2, CLEAR), (10, BOTH), (9, BOTH)])
+@pytest.mark.parametrize(("length", "control"), first_quick([(8, READ), (8, LOCAL), (2, CLEAR), (10, BOTH), (9, BOTH)]))
 def test_2010_a_control_array_that_is_too_short(length: int, control: tuple[int, ...]) -> None:
     rig = Rig(control=f"ARRAY[1..{length}] OF INT")
     assert rig.operate(*control[:length]) == "2010"

@@ -40,6 +40,7 @@ def test_words_of_the_mailbox_are_shown(name: str) -> None:
     assert json.loads(result.stdout)["values"] == {name: 0 if name == "NOC0" else 7}
 
 
+@pytest.mark.slow
 def test_a_stepped_program_goes_back_with_its_module() -> None:
     script = "run Main.Step = Writing\nprint NOC350\nback 3\nprint Main.Step\nrun Main.Step = Ready\nprint Main.Sent\nquit\n"
     result = CliRunner().invoke(main, ["step", EXAMPLE, *PEER], input=script)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from mstr_rig import SERVER_IP, Rig
-from rows import each_of
+from rows import each_of, first_quick
 
 from fbvm.net.peers import Leave, ModbusPeer, Say
 from fbvm.units import noc_map
@@ -157,8 +157,8 @@ def test_the_lines_are_used_again_when_all_are_taken() -> None:
 # --- arrays -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("kind", ["INT", "UINT", "WORD"])
-@pytest.mark.parametrize("bounds", ["1..11", "0..10", "-5..5", "100..200"])
+@pytest.mark.parametrize("kind", first_quick(["INT", "UINT", "WORD"]))
+@pytest.mark.parametrize("bounds", first_quick(["1..11", "0..10", "-5..5", "100..200"]))
 def test_control_and_databuf_of_any_type_and_base(kind: str, bounds: str) -> None:
     rig = Rig(control=f"ARRAY[{bounds}] OF {kind}", databuf=f"ARRAY[{bounds}] OF {kind}")
     rig.fill([0x8001, 0x7FFF])

@@ -38,6 +38,7 @@ def test_any_control_ends_with_a_documented_code(operations: list[tuple[int, lis
             assert code == "0000"
 
 
+@pytest.mark.slow
 @settings(COMMON, max_examples=25)
 @given(st.integers(0, 2**32), st.integers(1, 30), st.sampled_from([1, 2, 23]), st.booleans())
 def test_registers_arrive_right_however_frames_are_cut(seed: int, cut: int, operation: int, random_cut: bool) -> None:

@@ -109,6 +109,7 @@ def test_the_last_registers(pdu: str) -> None:
     assert client.ask(pdu)[0] != "9"
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.integers(0, 2**32), st.integers(1, 40), st.booleans())
 def test_reads_and_writes_agree_with_a_model_however_they_are_cut(seed: int, cut: int, is_joined: bool) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from mtcp_rig import Rig
-from rows import each_of
+from rows import each_of, first_quick
 
 BLOCKS = [
     "Fn01(Coil_Address := 0, Coil_Qty := 19, RespData_DM := 200)",
@@ -21,7 +21,7 @@ EXCHANGE = (*PINS, "CIO 1519.03", "CIO 1509.02", "CIO 1519.04", "CIO 1509.01", "
 CONNECTION = ("Connect", "conn.ENO", "conn.Waiting_Server", "CIO 1519.02", "CIO 1519.05", "CIO 1509.15")
 
 
-@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize("block", first_quick(BLOCKS))
 def test_exact(block: str) -> None:
     rig = Rig(rd=block).connect()
     rig.set("rd_Cmd", True)

@@ -47,6 +47,7 @@ def test_an_exception_is_passed_through(exception: int) -> None:
     next_command_is_good(rig)
 
 
+@pytest.mark.slow
 def test_exceptions_that_modbus_does_not_know_are_no_answer() -> None:
     """All from 00 to FF, one after the other on one connection: only those of Modbus count as replies."""
     said: list[int] = []

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 from mtcp_rig import CONNECT, Rig, answering
-from rows import each_of
+from rows import each_of, first_quick
 
 from fbvm.net.faults import Fault
 from fbvm.net.peers import Say, ScriptedPeer
@@ -78,6 +78,7 @@ def test_any_order_of_calls(order: int, connect_last: bool) -> None:
     assert (bytes(server.coils[70:75]), list(server.holding_registers[80:82])) == (bytes([0, 1, 0, 1, 0]), [77, 88])
 
 
+@pytest.mark.slow
 def test_nobody_is_overtaken() -> None:
     """All blocks command again as soon as they have ended: each gets as many turns as the others."""
     rig = Rig(**ALL).connect()  # type: ignore[arg-type]
@@ -184,7 +185,7 @@ END_CONFIGURATION
 """
 
 
-@pytest.mark.parametrize("slow", [10, 20, 50, 100, 150])
+@pytest.mark.parametrize("slow", first_quick([10, 20, 50, 100, 150]))
 def test_blocks_in_tasks_of_different_intervals(slow: int) -> None:
     """A block that is called seldom keeps its turn, and gets it although another always wants it."""
     text = TASKS.format(connect=CONNECT, a=A[5:-1], b=B[5:-1], slow=slow)

@@ -34,6 +34,7 @@ def scene(name: str, net: str = "loop", fault: Fault | None = None, max_s: int =
     return values
 
 
+@pytest.mark.slow
 def test_a_panel_fills_the_tank() -> None:
     values = scene("tank")
     assert values["panel"] == {"Main.Set_Point": 800, "Main.Level": 800}
@@ -69,6 +70,7 @@ def test_the_row_over_real_tcp() -> None:
     assert values["gateway"]["Main.Failures"] == 0
 
 
+@pytest.mark.slow
 def test_two_omron_plcs() -> None:
     project = read_project(SCENES / "pair" / "fbvm.toml")
     assert isinstance(project, Project)

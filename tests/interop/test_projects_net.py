@@ -53,6 +53,7 @@ address = "192.168.250.21"
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("net", "make"), [("loop", ""), ("tcp", "libmodbus"), ("tcp", "pyModbusTCP")])
 def test_many_plcs_read_from_one_server(tmp_path: Path, net: str, make: str) -> None:
     (tmp_path / "client.st").write_text(CLIENT % 1, encoding="utf-8")
@@ -66,6 +67,7 @@ def test_many_plcs_read_from_one_server(tmp_path: Path, net: str, make: str) -> 
         assert (plc["stopped"], plc["values"]) == ("until", {"D200..D201": [1005, 1006], "Main.read.Error_Code": 0})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("net", ["loop", "tcp"])
 def test_plcs_talk_to_each_other(tmp_path: Path, net: str) -> None:
     example = Path(__file__).resolve().parents[2] / "examples" / "server.st"

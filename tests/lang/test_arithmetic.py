@@ -41,7 +41,12 @@ def calculated(operator: str, kind: str, a: int, b: int) -> str:
     return str(wrapped(kind, OPERATORS[operator](a, b)))
 
 
-@pytest.mark.parametrize("kind", [*INTEGERS, *BITS])
+QUICK = ("INT", "ULINT", "BYTE")
+each_kind = pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.slow] * (kind not in QUICK)) for kind in (*INTEGERS, *BITS)])
+
+
+@each_kind
 def test_operators(kind: str) -> None:
     operators = ("+", "-", "*", "/", "MOD") if kind in INTEGERS else ("AND", "OR", "XOR")
     values = edges(WIDTHS[kind])
@@ -60,7 +65,7 @@ def test_conversions(source: str, target: str) -> None:
     assert as_variables(f"a : {source}; r : {target};", f"{function}(a)", rows) == want
 
 
-@pytest.mark.parametrize("kind", [*INTEGERS, *BITS])
+@each_kind
 def test_unary_and_shifts(kind: str) -> None:
     values, rows = edges(WIDTHS[kind]), [{"a": a} for a in literals(kind)]
     bits, mask = abs(WIDTHS[kind]), (1 << abs(WIDTHS[kind])) - 1

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from rows import first_quick
 
 from fbvm.code.compiler import compile_text
 from fbvm.engine import native
@@ -99,7 +100,7 @@ def test_integers(kind: str) -> None:
     check()
 
 
-@pytest.mark.parametrize("kind", BITS)
+@pytest.mark.parametrize("kind", first_quick(BITS))
 def test_bit_strings(kind: str) -> None:
     declared = f"a, b, both, one, other, inv, l, r, rl, rr, mx, mn : {kind}; n : INT; lt, le, gt, ge, eq, ne : BOOL;"
     body = f"both := a AND b; one := a OR b; other := a XOR b; inv := NOT a; l := SHL(a, n); r := SHR(a, n); " \
@@ -194,7 +195,7 @@ def test_times_of_day(clock: str, duration: str) -> None:
     check()
 
 
-@pytest.mark.parametrize("source", [*WIDTHS])
+@pytest.mark.parametrize("source", first_quick([*WIDTHS]))
 def test_conversions_between_integers_and_bits(source: str) -> None:
     targets = [target for target in WIDTHS if target != source]
     declared = f"a : {source}; " + " ".join(f"to_{target} : {target};" for target in targets)
@@ -208,7 +209,7 @@ def test_conversions_between_integers_and_bits(source: str) -> None:
     check()
 
 
-@pytest.mark.parametrize("kind", UNSIGNED)
+@pytest.mark.parametrize("kind", first_quick(UNSIGNED))
 def test_decimal_digits_in_nibbles(kind: str) -> None:
     word = {8: "BYTE", 16: "WORD", 32: "DWORD", 64: "LWORD"}[UNSIGNED[kind]]
     declared = f"a, back : {kind}; digits : {word}; ok : BOOL;"

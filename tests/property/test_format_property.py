@@ -105,7 +105,7 @@ def each_file(quick: tuple[str, ...]) -> pytest.MarkDecorator:
         for path in FILES for name in [path.relative_to(ROOT).as_posix()]])
 
 
-@each_file(("tests/golden", "examples", "tests/lang/statements", "tests/conformance"))
+@each_file(("tests/golden", "examples"))
 def test_every_program_keeps_its_meaning(path: Path) -> None:
     assert all(check(text) for text in programs(path))
 
@@ -123,7 +123,7 @@ def image(text: str) -> object:
     return replace(made, sites=sites, charts=(), bodies=empty), code, repr(made.charts).casefold()
 
 
-@each_file(("tests/golden", "examples", "fblib/iec"))
+@each_file(("tests/golden", "examples/project", "examples/row", "examples/tank"))
 def test_every_program_is_compiled_to_the_same_image(path: Path) -> None:
     assert all(image(text) == image(write(text)) for text in programs(path))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from rows import first_quick
 from test_arithmetic_model import compare
 
 CAPACITY = 12
@@ -14,7 +15,7 @@ POSITIONS = st.integers(1, CAPACITY + 3)
 PLAIN = "ab"
 
 
-@pytest.mark.parametrize("kind", ["STRING", "WSTRING"])
+@pytest.mark.parametrize("kind", first_quick(["STRING", "WSTRING"]))
 def test_functions(kind: str) -> None:
     declared = f"a, b, l, r, m, c, i, d, s, mx, mn, chosen : {kind}[{CAPACITY}]; long : {kind}[40]; n, p, size, place : INT; " \
                "lt, eq, ge : BOOL;"
@@ -38,6 +39,7 @@ def test_functions(kind: str) -> None:
     check()
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(st.text(LETTERS["WSTRING"], max_size=CAPACITY), st.text(LETTERS["STRING"], max_size=CAPACITY))
 def test_conversions(wide: str, narrow: str) -> None:

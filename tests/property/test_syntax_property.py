@@ -39,6 +39,7 @@ def check_places(text: str) -> None:
             assert value is None or isinstance(value, (bool, int, float, str))
 
 
+@pytest.mark.slow
 @given(st.text(max_size=400))
 def test_any_text(text: str) -> None:
     check_places(text)
@@ -71,6 +72,7 @@ def test_any_change_of_a_program(data: st.DataObject) -> None:
     check_places("".join(pieces))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=30)
 @given(st.sampled_from(sorted((GOLDEN / "syntax").glob("*.st"))), st.sampled_from([str.upper, str.lower, str.swapcase]))
 def test_case_does_not_matter_to_the_structure(path: Path, change: Any) -> None:

@@ -6,6 +6,7 @@ import json
 from array import array
 from collections.abc import Iterator, Sequence
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -186,6 +187,7 @@ class CommonUnitTests:
         unit.refresh(memory, answer(asked), 3 * CYCLE_NS)
         assert self.is_answered(memory)
 
+    @pytest.mark.slow
     @inherited
     @given(st.lists(st.lists(events(st.integers(-1, 20)), max_size=4), max_size=12), st.data())
     def test_any_order_of_events_is_survived(self, scans: list[list[Event]], data: st.DataObject) -> None:
@@ -212,6 +214,7 @@ class CommonUnitTests:
         unit.refresh(memory, told, 4 * CYCLE_NS)
         assert unit.wake_ns == 0
 
+    @pytest.mark.slow
     @inherited
     @given(st.lists(st.lists(events(st.integers(0, 3)), max_size=4), max_size=12))
     def test_nothing_happens_before_its_time(self, scans: list[list[Event]]) -> None:
@@ -229,6 +232,7 @@ class CommonUnitTests:
                 assert not any(memory.differences(before))
             now_ns += CYCLE_NS
 
+    @pytest.mark.slow
     @inherited
     @given(st.data(), st.booleans())
     def test_what_it_does_not_watch_does_not_matter(self, data: st.DataObject, is_asked: bool) -> None:
@@ -250,6 +254,7 @@ class CommonUnitTests:
         assert unit.refresh(memory, [], number * CYCLE_NS) == []
         assert not any(memory.differences(before))
 
+    @pytest.mark.slow
     @inherited
     @given(st.lists(st.lists(events(st.integers(0, 3)), max_size=4), max_size=12))
     def test_same_inputs_give_the_same_memory_and_requests(self, scans: list[list[Event]]) -> None:

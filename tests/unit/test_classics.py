@@ -9,6 +9,7 @@ from random import Random
 
 import pytest
 from click.testing import CliRunner
+from rows import first_quick
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files
@@ -46,6 +47,7 @@ def states(plc: Plc) -> dict[str, list[int]]:
     return {area: list(plc.memory.words(area)[words.start:words.stop]) for area, words in WORDS.items()}
 
 
+@pytest.mark.slow
 def test_they_are_drawn_as_fmt_draws_them() -> None:
     made = CliRunner().invoke(main, ["fmt", "--check", str(FOLDER), str(FOLDER.parent / "ladder.st")])
     assert (made.exit_code, made.output) == (0, "")
@@ -55,7 +57,7 @@ def test_each_classic_has_its_twin() -> None:
     assert {path.stem for path in FOLDER.glob("*.st")} == {form for name in ACTIVE for form in (name, f"{name}_ladder")}
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", first_quick(NAMES))
 def test_twins_have_equal_memory_after_each_scan(name: str) -> None:
     ladder, text = Plc(image(f"{name}_ladder")), Plc(image(name))
     active = False

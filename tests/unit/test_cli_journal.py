@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
+from rows import first_quick
 
 from fbvm.cli.main import main
 
@@ -28,7 +29,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("timing", ["exact", "real"])
+@pytest.mark.parametrize("timing", first_quick(["exact", "real"]))
 def test_a_run_is_done_again(here: Path, timing: str) -> None:
     asked = ["--show", "D200..D204", "--show", "Main.Read.Rcv_Counter", "--json"]
     first = fbvm("run", DEMO, *PEER, "--until", "Main.Done", "--timing", timing, "--seed", "9",
@@ -41,6 +42,7 @@ def test_a_run_is_done_again(here: Path, timing: str) -> None:
     assert found["values"]["D200..D204"] == [1000, 1001, 1002, 1003, 1004]
 
 
+@pytest.mark.slow
 def test_the_same_seed_is_the_same_run(here: Path) -> None:
     for name, seed in (("a", "1"), ("b", "1"), ("c", "2")):
         fbvm("run", DEMO, *PEER, "--scans", "60", "--timing", "real", "--seed", seed, "--journal", name)

@@ -16,6 +16,7 @@ from fbvm.cli.main import VERBS, main
 needs_signals = pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM to react to")
 
 
+@pytest.mark.slow
 @needs_signals
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_peer_ends_cleanly_also_in_the_middle_of_a_connection(number: int) -> None:

@@ -175,6 +175,7 @@ def test_real_is_rounded_once(a: float, b: float, name: str) -> None:
         assert repr(seen) == repr(wide)
 
 
+@pytest.mark.slow
 @given(value=st.integers(-(2**63), 2**64 - 1))
 @settings(max_examples=300, deadline=None)
 def test_an_integer_becomes_the_nearest_real(value: int) -> None:

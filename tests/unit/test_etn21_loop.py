@@ -166,6 +166,7 @@ def test_udp_between_two_units() -> None:
     assert (other.received(), other.rig.result(4)) == (b"datagram", 3000)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.binary(min_size=1, max_size=6000), st.integers(1, 1984), st.integers(1, 700), timings)
 def test_the_stream_arrives_whole_however_it_is_cut(data: bytes, count: int, cut: int, timing: str) -> None:

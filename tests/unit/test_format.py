@@ -264,6 +264,7 @@ def test_a_text_without_declarations(given: str, wanted: str) -> None:
     assert formatted(Source("x", given)) == (wanted, [])
 
 
+@pytest.mark.slow
 def test_depth_is_no_limit() -> None:
     assert body("a := " + "(" * 150 + "b" + ")" * 150 + ";").count("(") == 150
     assert body("a := " + " + ".join(["b"] * 900) + ";").count("\n") == 900

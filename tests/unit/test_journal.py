@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from images import counter_image
+from rows import first_quick
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
@@ -190,6 +191,7 @@ def test_whatever_is_done_from_outside_is_done_again(deed: Callable[[Plc], None]
     same_again(run.plc, run.text())
 
 
+@pytest.mark.slow
 @given(
     st.sampled_from(["exact", "real"]),
     st.integers(0, 10**6),
@@ -234,7 +236,7 @@ def test_a_replay_stops_where_one_wants_to_look() -> None:
     assert (replay.run(), replay.plc.scans, replay.complete) == ("end", 60, True)
 
 
-@pytest.mark.parametrize("options", [{"observed": True}, {"engine": "python"}, {"engine": "native"}], ids=str)
+@pytest.mark.parametrize("options", first_quick([{"observed": True}, {"engine": "python"}, {"engine": "native"}]), ids=str)
 def test_any_engine_replays(options: dict[str, Any]) -> None:
     if options.get("engine") == "native":
         pytest.importorskip("llvmlite")
@@ -401,6 +403,7 @@ def test_a_changed_value_is_found_out(good: str, old: str, new: str, scan: int) 
     assert (replay.run(), replay.differs) == ("differs", scan)
 
 
+@pytest.mark.slow
 @given(st.data())
 @settings(max_examples=80, deadline=None)
 def test_any_damage_gives_a_clear_error_or_is_found_out(good: str, data: st.DataObject) -> None:

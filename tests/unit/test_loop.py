@@ -322,6 +322,7 @@ def test_pieces_come_one_after_another() -> None:
     assert times == {10: reply[:4], 11: reply[4:8], 12: reply[8:12], 13: reply[12:], 14: b""}
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32), st.integers(1, 20), st.integers(0, 300))
 def test_any_cut_carries_the_same_bytes_and_the_seed_repeats_them(seed: int, segment: int, size: int) -> None:
     def pieces() -> list[bytes]:

@@ -162,6 +162,7 @@ def test_every_order_of_requests(
     assert play(script, table, steps) == play(script, table, steps)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.binary(max_size=50), max_size=8), st.integers(1, 9), st.integers(0, 5), st.integers(1, 40))
 def test_a_stream_arrives_whole_and_in_order(parts: list[bytes], segment: int, gap_ns: int, grant: int) -> None:

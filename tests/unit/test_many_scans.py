@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rows import first_quick
 
 from fbvm import Etn21, LoopNetwork, ModbusPeer, Peer, Plc, compile_text
 from fbvm.code.image import Image
@@ -171,6 +172,7 @@ def test_a_task_that_a_variable_starts_is_looked_at_in_every_scan() -> None:
     assert many.read("Q.n") == 1
 
 
+@pytest.mark.slow
 def test_with_breakpoints_they_end_before_the_scan_that_stops() -> None:
     seen = []
     for choice in ("python", "native"):
@@ -187,6 +189,7 @@ def test_with_breakpoints_they_end_before_the_scan_that_stops() -> None:
     assert seen[0] == seen[1]
 
 
+@pytest.mark.slow
 def test_with_breakpoints_they_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
     plc = Plc(IMAGE, engine="native")
     plc.breakpoints.change("P.n", when="P.n = 5000")
@@ -232,8 +235,8 @@ def with_unit(engine: str, wanted: int, timing: str = "exact") -> Plc:
     return plc
 
 
-@pytest.mark.parametrize("timing", ["exact", "real"])
-@pytest.mark.parametrize("wanted", [2, 3, 40, 4000])
+@pytest.mark.parametrize("timing", first_quick(["exact", "real"]))
+@pytest.mark.parametrize("wanted", first_quick([2, 3, 40, 4000]))
 def test_a_unit_with_nothing_to_do_does_not_hinder_them(wanted: int, timing: str) -> None:
     many, one, python = (with_unit(engine, wanted, timing) for engine in ("native", "native", "python"))
     single(one)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rows import each_of
@@ -161,6 +162,7 @@ ADUS = st.lists(
 )
 
 
+@pytest.mark.slow
 @given(ADUS, st.data())
 def test_any_cut_gives_the_same_frames(adus: list[Adu], data: st.DataObject) -> None:
     stream = b"".join(adu.to_bytes() for adu in adus)
@@ -191,11 +193,13 @@ def test_every_pdu_gets_one_well_formed_answer(pdu: bytes, unit: int) -> None:
     assert str(decode_request(pdu))
 
 
+@pytest.mark.slow
 @given(st.lists(st.booleans(), max_size=100))
 def test_bits_survive_packing(states: list[bool]) -> None:
     assert modbus.unpack_bits(modbus.pack_bits(states), len(states)) == states
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(0, 65535), max_size=100))
 def test_registers_survive_packing(values: list[int]) -> None:
     assert modbus.unpack_registers(modbus.pack_registers(values)) == values

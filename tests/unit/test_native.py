@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from hand_image import at, behind, const, image, load, own, power_on, store
-from rows import each_of
+from rows import each_of, first_quick
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS, SLOTS_OFFSET
 from fbvm.base.arithmetic import FUNCTIONS, NAN, limits, power, single
@@ -284,8 +284,8 @@ def test_large_floats_become_ulint(level: int, number: float, operation: str) ->
     assert slot(e, "u64", 8) == (int(number) if operation == "truncate" else round(number))
 
 
-@pytest.mark.parametrize("one_step", [False, True])
-@pytest.mark.parametrize("operation", ["truncate", "nearest"])
+@pytest.mark.parametrize("one_step", first_quick([False, True]))
+@pytest.mark.parametrize("operation", first_quick(["truncate", "nearest"]))
 def test_what_does_not_fit_an_integer_with_the_instruction_of_a_processor_and_without(
         monkeypatch: pytest.MonkeyPatch, operation: str, one_step: bool) -> None:
     if one_step and not native_conversions.ONE_STEP:

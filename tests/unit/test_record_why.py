@@ -51,6 +51,7 @@ def test_the_chain_goes_back_to_what_came_from_outside(trace: Trace) -> None:
     assert "(see above)" in text
 
 
+@pytest.mark.slow
 def test_each_scan_has_its_own_answer(trace: Trace) -> None:
     assert "FALSE since power-on" in told(trace, ask(trace, "Main.Pump", 7))
     assert "FALSE since scan 150" in told(trace, ask(trace, "Main.Pump", 299))
@@ -116,6 +117,7 @@ def _causes(text: str, name: str, *ons: str) -> list[tuple[str, str]]:
     return [(inner.place.name, inner.value) for inner in cause.causes]
 
 
+@pytest.mark.slow
 def test_contacts_of_a_rung_are_what_its_coil_read() -> None:
     rungs = "LD Start\nOR Motor\nANDNOT Stop\nOUT Motor\nLD Motor\nTIM 0001 #0002\nLD T0001\nANDNOT C0001\nOUT Lamp"
     text = f"PROGRAM Main VAR Start, Stop, Motor, Lamp : BOOL; END_VAR LADDER\n{rungs}\nEND_LADDER END_PROGRAM"

@@ -74,6 +74,7 @@ FLAGS = re.compile(r"\b(P_(ER|GT|EQ|N|OF|UF|CY)|CX_(Failure|Stopped)) +:=")
 """Only a library may write condition flags and the words of failures."""
 
 
+@pytest.mark.slow
 @each_of("files", OWN, ids=lambda files: files[0].parent.name + "/" + files[0].stem)
 def test_what_fbvm_brings_is_clean(files: list[Path]) -> None:
     ordinary = [path for path in files if not FLAGS.search(path.read_text(encoding="utf-8"))]

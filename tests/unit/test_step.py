@@ -328,6 +328,7 @@ def called(script: str, *arguments: str) -> tuple[int, str]:
     return result.exit_code, result.output
 
 
+@pytest.mark.slow
 def test_a_script_from_a_pipe() -> None:
     code, output = called("// until it is done\nrun Main.Done\nexpect D200 = 1002\nnet 20\nquit\nnonsense\n",
                           "--map", "192.168.250.1:502=peer", "--set", "Main.Source=2", "--watch", "D200")  # fmt: skip

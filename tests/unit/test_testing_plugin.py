@@ -10,6 +10,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
+from rows import first_quick
 
 import fbvm.testing.rig  # noqa: F401 - what is loaded before pytest runs within pytest stays loaded
 
@@ -154,6 +155,7 @@ def test_a_condition_that_never_holds(project: pytest.Pytester) -> None:
     result.stdout.no_fnmatch_line("*__tracebackhide__*")
 
 
+@pytest.mark.slow
 def test_forces_left_behind_fail(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def test_left(fb):
@@ -220,6 +222,7 @@ def test_libraries_of_the_project(project: pytest.Pytester) -> None:
     run(project).assert_outcomes(passed=2)
 
 
+@pytest.mark.slow
 def test_a_trace_of_a_rig(project: pytest.Pytester) -> None:
     project.makepyfile("""
         def test_it(fb, trace):
@@ -308,12 +311,12 @@ END_PROGRAM
     ])  # fmt: skip
 
 
-@pytest.mark.parametrize(("text", "said"), [
+@pytest.mark.parametrize(("text", "said"), first_quick([
     ("PROGRAM Test_nothing VAR n : INT; END_VAR n := 1; END_PROGRAM", "Test_nothing ended without one ASSERT"),
     ("PROGRAM Test_late VAR Done : BOOL; END_VAR ASSERT(TRUE); END_PROGRAM", "Done is still FALSE after 1m"),
     ("PROGRAM Test_trap VAR n : INT; END_VAR n := 1 / n; ASSERT(TRUE); END_PROGRAM", "R0101*1 divided by 0"),
     ("PROGRAM Test_unknown VAR n : INT; END_VAR ASSERT(m); END_PROGRAM", "*error S0201*"),
-], ids=["no assert", "never done", "trap", "unknown name"])  # fmt: skip
+]), ids=["no assert", "never done", "trap", "unknown name"])  # fmt: skip
 def test_what_else_fails(project: pytest.Pytester, text: str, said: str) -> None:
     project.makefile(".st", test_it=text)
     result = run(project)
@@ -321,6 +324,7 @@ def test_what_else_fails(project: pytest.Pytester, text: str, said: str) -> None
     result.stdout.fnmatch_lines([said])
 
 
+@pytest.mark.slow
 def test_a_file_that_cannot_be_read_is_an_error(project: pytest.Pytester) -> None:
     project.makefile(".st", test_it="PROGRAM Test IF END_PROGRAM")
     result = run(project)
@@ -430,6 +434,7 @@ def test_warnings_are_shown_once_at_the_end(slack: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["*= warnings of PLC code =*", "*pump.st:12:5: warning S0290: Idle is never used"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("argument", ["--fbvm-no-warn=S0290", "--fbvm-no-warn=S0390,s0290", "--fbvm-no-warn=all"])
 def test_warnings_that_are_not_wanted_are_not_shown(slack: pytest.Pytester, argument: str) -> None:
     assert "S0290" not in run(slack, argument).stdout.str()
@@ -476,6 +481,7 @@ END_PROGRAM
 """
 
 
+@pytest.mark.slow
 def test_a_network_of_plcs_from_a_project_file(project: pytest.Pytester) -> None:
     (project.path / "fbvm.toml").write_text(PROJECT, encoding="utf-8")
     (project.path / "src" / "main.st").write_text(MAIN, encoding="utf-8")
@@ -529,6 +535,7 @@ CALLER = """
 """
 
 
+@pytest.mark.slow
 def test_a_failure_with_a_unit_shows_the_network_and_the_units_words(project: pytest.Pytester) -> None:
     project.makepyfile(CALLER)
     run(project).stdout.fnmatch_lines([

@@ -36,6 +36,7 @@ def test_values_fit_their_type(kind: Type) -> None:
     fits()
 
 
+@pytest.mark.slow
 @settings(max_examples=30, deadline=None)
 @given(st.data())
 def test_inputs_are_those_of_the_block(data: st.DataObject) -> None:
@@ -84,6 +85,7 @@ TestGood = block_machine(pump, [_only_with_start], "100ms", Wait=delays("50ms"))
 TestGood.settings = settings(max_examples=15, stateful_step_count=15, deadline=None)  # type: ignore[attr-defined]
 
 
+@pytest.mark.slow
 def test_a_rule_that_does_not_hold_is_found() -> None:
     case = block_machine(pump, [_never], "1s")
     case.settings = settings(max_examples=50, deadline=None, database=None, print_blob=False,

@@ -298,6 +298,7 @@ def test_a_damaged_block_is_told() -> None:
         trace.at(49)
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=200), st.integers(0, 400))
 def test_any_bytes_give_a_trace_or_an_error(noise: bytes, at: int) -> None:
     data = bytearray(GOOD)

@@ -73,6 +73,7 @@ def test_states_of_sockets_have_names(fbvm: Fbvm) -> None:
     assert Path("demo.csv").read_text(encoding="utf-8").splitlines()[-1].endswith(",4")
 
 
+@pytest.mark.slow
 def test_a_run_as_a_page(fbvm: Fbvm) -> None:
     arguments = ("run", "pump.st", "--scans", "60", "--set", "CIO 0.00=TRUE@30ms")
     assert fbvm(*arguments, "--html", "run.html").exit_code == 0
