@@ -20,6 +20,7 @@ from fbvm.syntax.instruction_set import JOINS, Instruction, instruction_set
 from fbvm.syntax.ladder import Ladder, Rung, Step
 from fbvm.syntax.mnemonics import Symbol, read_rungs
 from fbvm.syntax.operands import SYMBOLS, Operands, Wrong
+from fbvm.syntax.rung_diagram import WIRE
 from fbvm.syntax.symbols import number
 
 COILS = {"OUT": {}, "OUTNOT": {"negated": "true"}, "SET": {"storage": "set"}, "RSET": {"storage": "reset"},
@@ -353,10 +354,12 @@ class RungWriter:
     def _call(self) -> None:
         kind, instance, *pins = self.step.operands
         ends, column, row = self._output()
-        inputs: list[tuple[str, Ends | str]] = [("EN", ends)]
-        outputs = [("ENO", "")]
-        for pin in pins:
-            name, sign, text = re.split(r"(:=|=>)", pin, maxsplit=1)
+        parts = [re.split(r"(:=|=>)", pin, maxsplit=1) for pin in pins]
+        wired = {sign: name for name, sign, text in parts if text == WIRE}
+        inputs: list[tuple[str, Ends | str]] = [(wired.get(":=", "EN"), ends)]
+        leaving = wired.get("=>", "ENO")
+        outputs = [(leaving, "")]
+        for name, sign, text in (part for part in parts if part[2] != WIRE):
             if sign == ":=":
                 inputs.append((name, self._operand(text)))
             else:
@@ -365,7 +368,7 @@ class RungWriter:
         self.rows = max(self.rows, row + len(inputs) // 2 + 1)
         self.columns = max(self.columns, column + 4)
         below = self.rows if len(outputs) > 1 else row
-        self.now = Power((made["ENO"],), [], column + 3, below)
+        self.now = Power((made[leaving],), [], column + 3, below)
 
     def _operand(self, text: str) -> str:
         """What enters a pin, as Structured Text."""

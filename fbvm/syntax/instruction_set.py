@@ -96,7 +96,7 @@ _SPACED = re.compile(r"(LD|AND|OR|OUT)(NOT|LD|TSTN?)")
 def _pattern(rows: dict[str, Instruction]) -> re.Pattern[str]:
     """Longest first; a blank may stand where manuals have one."""
     words = [_SPACED.sub(r"\1 ?\2", re.escape(name)) for name in rows]
-    return re.compile(rf"(?:{'|'.join(sorted(words, key=len, reverse=True))})(?![A-Za-z0-9+*/<>=$-])", re.I)
+    return re.compile(rf"(?:{'|'.join(sorted(words, key=len, reverse=True))})(?![A-Za-z0-9_+*/<>=$-])", re.I)
 
 
 ELSEWHERE = {
@@ -106,6 +106,11 @@ ELSEWHERE = {
     "MOVE": "MOV", "ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/",
     **{block: f"FBCALL {block}" for block in ("TON", "TOF", "TP", "CTU", "CTD", "CTUD", "R_TRIG", "F_TRIG", "SR", "RS")}}
 """What other tools call an instruction: instruction lists of the standard, Mitsubishi, Rockwell; and blocks."""
+
+
+NO_INSTRUCTIONS = {"NETWORK": "a rung begins with a line RUNG", "END_NETWORK": "a rung ends where the next one begins",
+                   "END_RUNG": "a rung ends where the next one begins"}
+"""Words around rungs of other tools, and what stands here."""
 
 
 def meant(name: str) -> list[str]:

@@ -9,7 +9,7 @@ from functools import cache
 from typing import NamedTuple
 
 from fbvm.syntax.automaton import Automaton, Mender
-from fbvm.syntax.instruction_set import Instruction, instruction_set, meant, spelling
+from fbvm.syntax.instruction_set import NO_INSTRUCTIONS, Instruction, instruction_set, meant, spelling
 from fbvm.syntax.ladder import Step
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.rung_grid import Bad
@@ -162,9 +162,10 @@ def instruction(prefix: str, mnemonic: str, start: int, end: int) -> Instruction
     row = instruction_set().rows.get(name)
     if row is None:
         near = meant(name)
+        advice = "write END_LADDER" if name.startswith("END_LA") else NO_INSTRUCTIONS.get(name, "")
         raise Refusal(start, end, f"`{mnemonic}` is no instruction of this instruction set",
-                      f"did you mean {' or '.join(near)}?" if near else
-                      "an unknown instruction is never left out: say what it does with others")
+                      advice or (f"did you mean {' or '.join(near)}?" if near else
+                                 "an unknown instruction is never left out: say what it does with others"))
     if missing := [sign for sign in prefix if sign not in row.variations]:
         raise Refusal(start, end, f"there is no {missing[0]}{name}",
                       f"{name} has {', '.join(row.variations) or 'no variations'}")
@@ -285,6 +286,7 @@ class _LineReader:
     def step(self, number: Token | None, prefix: Token | None, mnemonic: Token, code: Token | None,
              operands: list[Token], remark: Token | None) -> None:
         written = prefix.text if prefix else ""
+        self._refuse_statement(mnemonic, operands)
         row = instruction("", mnemonic.text, mnemonic.start, mnemonic.end)
         if code and int(code.text[1:-1]) != int(row.code or 1000):
             raise Refusal(code.start, code.end,
@@ -297,6 +299,17 @@ class _LineReader:
                     tuple(operand.text for operand in operands))
         self.rungs[-1].lines.append(Line(row, step, [(o.start, o.end) for o in operands],
                                          code is not None, remark.text.strip() if remark else ""))
+
+    def _refuse_statement(self, mnemonic: Token, operands: list[Token]) -> None:
+        """Say so where signs of Structured Text stand."""
+        if operands and operands[0].text.startswith(":="):
+            raise Refusal(mnemonic.start, operands[-1].end, "this is a statement of Structured Text",
+                          "it stands behind END_LADDER; a rung writes a bit by OUT, a word by MOV")
+        for at, operand in enumerate(operands):
+            if operand.text.endswith(";") and operand is operands[-1]:
+                raise Refusal(operand.end - 1, operand.end, "`;` ends no instruction", "an instruction ends with its line")
+            if operand.text.endswith(",") and at + 1 < len(operands) and len(operand.text) > 1:
+                raise Refusal(operand.end - 1, operand.end, "`,` separates no operands", "a space stands between them")
 
     def _begin(self, row: Instruction, mnemonic: Token) -> None:
         """Begin another rung if this instruction does."""

@@ -9,6 +9,7 @@ from fbvm.syntax.instruction_set import Instruction, instruction_set
 from fbvm.syntax.ladder import Ladder
 from fbvm.syntax.mnemonics import RungText
 from fbvm.syntax.operands import SYMBOLS, Wrong
+from fbvm.syntax.rung_diagram import WIRE
 from fbvm.syntax.tree import (
     Argument,
     Assign,
@@ -16,6 +17,7 @@ from fbvm.syntax.tree import (
     CallStatement,
     Direct,
     Expr,
+    Member,
     Name,
     NamedType,
     NameRef,
@@ -174,7 +176,8 @@ class LadderBlocks:
     # --- function blocks of the user --------------------------------------------------------------------------------
 
     def call(self) -> None:
-        """FBCALL Type instance PIN:=operand PIN=>operand: the condition is EN, and ENO is the condition behind it.
+        """FBCALL Type instance PIN:=operand PIN=>operand: the condition is EN, and ENO is the condition behind it; an input
+        `:=*` takes the condition in place of EN, an output `=>*` gives the one behind in place of ENO.
 
         No text form of Omron's own was found; this one is ours."""
         rungs, line = self.rungs, self.rungs.line
@@ -184,11 +187,17 @@ class LadderBlocks:
         (start, end), (at, until) = line.places[:2]
         block, instance = line.step.operands[:2]
         eno = rungs.temporary(rungs.name("ENO"))
-        arguments = [_named(start, end, "EN", ":=", rungs.power())]
-        arguments += [self._pin(position) for position in range(2, len(line.step.operands))]
-        arguments.append(_named(start, end, "ENO", "=>", eno))
+        wired = {text[:-3]: text[-3:] for text in line.step.operands[2:] if text[-3:] in (f":={WIRE}", f"=>{WIRE}")}
+        entry = next((name for name, sign in wired.items() if sign[0] == ":"), "EN")
+        leaving = next((name for name, sign in wired.items() if sign[0] == "="), "")
+        arguments = [_named(start, end, entry, ":=", rungs.power())]
+        arguments += [self._pin(position) for position, text in enumerate(line.step.operands) if position > 1
+                      and text[:-3] not in wired]
+        if not leaving:
+            arguments.append(_named(start, end, "ENO", "=>", eno))
         call = Call(start, rungs.end, NameRef(at, until, instance), tuple(arguments))
-        seen = Assign(start, start, (eno,), ":=", rungs.contact(eno))  # of no length: for those who look at power, no statement
+        behind = Member(at, until, NameRef(at, until, instance), Name(at, until, leaving)) if leaving else eno
+        seen = Assign(start, start, (eno,), ":=", rungs.contact(behind))  # of no length: for those who see power
         rungs.emit(rungs.assign(eno, rungs.truth(False)), CallStatement(rungs.start, rungs.end, call), seen)
         rungs.instances.append(VarDecl(at, until, (Name(at, until, instance),), None, NamedType(start, end, block), None))
         rungs.condition = rungs.temporary(rungs.name("ENO"))

@@ -50,7 +50,7 @@ def shape(box: Box, values: Values) -> Shape:
 
 def _block(box: Box, values: Values) -> Shape:
     """A function block: its instance and type in its upper side, operands beside its pins."""
-    heads = tuple(Row(name, "ENO" if box.through else "") for name in box.entries)
+    heads = tuple(Row(name, box.leaves if box.through else "") for name in box.entries)
     rows = tuple(_rows(box, values))
     everything = (*heads, *rows)
     title = f" {box.instance} : {box.name} "

@@ -37,7 +37,8 @@ class Pin:
 class Box:
     """What is drawn as a box.  `inputs` are the conditions below the first one; one with `through` lets power on.
 
-    A function block has an `instance`, and names of the pins that conditions enter; others have operands."""
+    A function block has an `instance`, names of the pins that conditions enter, and of the one that power leaves; others
+    have operands."""
 
     step: int
     name: str
@@ -47,6 +48,7 @@ class Box:
     instance: str = ""
     pins: tuple[Pin, ...] = ()
     entries: tuple[str, ...] = ()
+    leaves: str = "ENO"
 
 
 @dataclass(eq=False)
@@ -77,6 +79,8 @@ class Point:
 Part = Contact | Box | Parallel
 Out = Coil | Box | Point
 
+WIRE = "*"
+"""The operand of a pin of FBCALL that the condition enters in place of EN, or that power leaves in place of ENO."""
 CALL = "CALL"
 """The call of a block in Structured Text, as a step: type, instance, pins; a pin takes a condition where nothing enters it."""
 COILS = {"OUT": " ", "OUTNOT": "/", "SET": "S", "RSET": "R", "DIFU": "↑", "DIFD": "↓"}
@@ -175,8 +179,10 @@ class _Reader:
             self._point().outs.append(Coil(number, coil_mark(prefix, mnemonic), operands))
         elif mnemonic == "FBCALL":
             block, instance, *pins = operands
-            self.now.path.parts.append(
-                Box(number, block, (), (), True, instance, tuple(map(_pin, pins)), ("EN",)))
+            wired = {pin.output: pin.name for pin in map(_pin, pins) if pin.operand == WIRE}
+            others = tuple(pin for pin in map(_pin, pins) if pin.operand != WIRE)
+            self.now.path.parts.append(Box(number, block, (), (), True, instance, others,
+                                           (wired.get(False, "EN"),), wired.get(True, "ENO")))
         elif mnemonic == CALL:
             block, instance, *pins = operands
             entries = tuple(pin.name for pin in map(_pin, pins) if not pin.operand)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from fbvm.syntax.box_lines import DOWN, LEFT, RIGHT, UP, WAY_WORDS
-from fbvm.syntax.instruction_set import instruction_set
+from fbvm.syntax.instruction_set import instruction_set, spelling
 
 Cell = tuple[int, int]
 WAYS = {LEFT: (-1, 0), RIGHT: (1, 0), UP: (0, -1), DOWN: (0, 1)}
@@ -23,8 +23,14 @@ _CONTACT = re.compile(r"[┤┫┥┨|\]]([^─━|┤┫\[\]├┣-]{0,8}?)[├
 _COIL = re.compile(r"\(([^()]{0,8})\)")
 _KNOWN = re.compile(rf" ?(?:{_MARK}) ?")
 _COIL_KNOWN = re.compile(r" ?[!@%]{0,2}(?:[/↑↓PN]|S|R|SET|RSET|)(?: ?)")
+_OPERAND = r"[A-Za-z_%][\w.]*(?:\[\d+\][\w.]*)*|\d+\.\d+"
+_NAMED = {False: re.compile(rf"[\[\]|┤┫](?: ?(/)| ?([PN↑↓])(?= )|) ?({_OPERAND}) ?[\]\[|├┣]"),
+          True: re.compile(rf"\((?: ?(/)| ?([PNSR↑↓]|SET|RSET)(?= )|) ?({_OPERAND}) ?\)")}
+"""Contacts and coils with their operand inside, as others type them: `[ a ]`, `[/a]`, `( b )`, `(S b)`."""
+_BRACKETS = re.compile(r"\[[^\[\]|]*\w[^\[\]|]*\]")
 _LINK = re.compile(r"[►▶>](\d+)")
 _TITLE = re.compile(r"([A-Za-z_]\w*) ?: ?([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)")
+_NAME = re.compile(r" *([A-Za-z_]\w*) *")
 _STUB = frozenset("─━-╶╴╺╸")
 _BOX_TEXT = re.compile(r" ?[A-Za-z0-9@%!&#+]")
 _TEXT = re.compile(r"= [^\s─-╿|]+(?:, [^\s─-╿|]+)*|[^\s─-╿|]+")
@@ -46,7 +52,8 @@ class Drawn:
     is_coil: bool
     operands: tuple[str, ...] = ()
     operand_at: list[tuple[int, int]] = field(default_factory=list)
-    """Of each operand the columns, in the row above."""
+    """Of each operand the columns, in the row above, or inside."""
+    inside: bool = False
 
 
 @dataclass(eq=False)
@@ -58,6 +65,9 @@ class DrawnBox:
     until: int
     bottom: int
     title: tuple[str, str] | None
+    """Instance and type of a block."""
+    heads: tuple[int, int]
+    """The rows in which these stand."""
     rows: dict[int, str] = field(default_factory=dict)
     stubs: dict[tuple[int, int], str] = field(default_factory=dict)
     """Operands beside a side, by side (LEFT, RIGHT) and row."""
@@ -153,7 +163,26 @@ class Grid:
         if upper[1] and not named:
             raise Bad(x + 2, y, len(upper[1].strip()), f"`{upper[1].strip()}` is no title of a block",
                       "write instance : type")
-        return DrawnBox(x, y, until, bottom, (named[1], named[2]) if named else None, rows)
+        if named:
+            return DrawnBox(x, y, until, bottom, (named[1], named[2]), (y, y), rows)
+        return self._headed(DrawnBox(x, y, until, bottom, None, (y, y), rows))
+
+    def _headed(self, box: DrawnBox) -> DrawnBox:
+        """A box with its type in its first row and its instance above it is one of a block, as other tools draw it."""
+        first = box.rows[box.y + 1]
+        if named := _TITLE.fullmatch(first.strip()):
+            box.title, box.heads = (named[1], named[2]), (box.y + 1, box.y + 1)
+        elif len(box.rows) > 1 and _NAME.fullmatch(first) and spelling(first) not in instruction_set().rows:
+            above = _NAME.fullmatch(self.lines[box.y - 1][box.x:box.until + 1]) if box.y else None
+            if not above:
+                raise Bad(box.x, box.y, box.until + 1 - box.x,
+                          f"`{first.strip()}` is no instruction, and as a block it has no instance",
+                          "write the name of the instance above the box, or instance : type in its upper side")
+            box.title, box.heads = (above[1], first.strip()), (box.y - 1, box.y + 1)
+            self._take(box.x + above.start(1), box.x + above.end(1), box.y - 1)
+        if box.title:
+            del box.rows[box.y + 1]
+        return box
 
     def _is_side(self, x: int, y: int) -> bool:
         character = self.at(x, y)
@@ -185,6 +214,8 @@ class Grid:
     def _is_operand(self, x: int, y: int) -> bool:
         """Whether an operand begins or ends in a cell; one with a sign has a digit behind it."""
         character = self.at(x, y)
+        if (x, y) in self.taken:
+            return False
         if character in "+-":
             return self.at(x + 1, y).isdigit()
         arrow = any(link.start() <= x < link.end() for link in _LINK.finditer(self.lines[y]))
@@ -213,6 +244,8 @@ class Grid:
 
     def _next_element(self, line: str, at: int, y: int) -> Drawn | None:
         for x in range(at, len(line)):
+            if named := self._named(line, x, y):
+                return named
             for is_coil, shape, known in ((False, _CONTACT, _KNOWN), (True, _COIL, _COIL_KNOWN)):
                 found = shape.match(line, x)
                 if not found or self._is_taken(x, found.end(), y) or not self._is_on_wire(x, found.end() - 1, y, is_coil):
@@ -224,6 +257,25 @@ class Grid:
                     raise Bad(x, y, found.end() - x, f"`{found[0]}` is no {what}", hint)
                 self._take(x, found.end(), y)
                 return Drawn(x, found.end() - 1, y, found[1].strip() or " ", is_coil)
+        return None
+
+    def _named(self, line: str, x: int, y: int) -> Drawn | None:
+        """The contact or coil with its operand inside that begins here, if one does."""
+        for is_coil, shape in _NAMED.items():
+            found = shape.match(line, x)
+            if not found or self._is_taken(x, found.end(), y) or not self._is_on_wire(x, found.end() - 1, y, is_coil):
+                continue
+            known = (_COIL_KNOWN if is_coil else _KNOWN).fullmatch(line[x + 1:found.end() - 1])
+            if known or any(start < found.end() and x < end for start, end in self._texts(y - 1)):
+                continue  # its operand stands above
+            if not is_coil and any(self._is_crossed(column, y) for column in (x, found.end() - 1)):
+                continue
+            self._take(x, found.end(), y)
+            return Drawn(x, found.end() - 1, y, found[1] or found[2] or " ", is_coil, (found[3],), [found.span(3)], True)
+        other = _BRACKETS.match(line, x)
+        if other and not self._is_taken(x, other.end(), y) and self._is_on_wire(x, other.end() - 1, y, False):
+            raise Bad(x, y, other.end() - x, f"`{other[0]}` is no contact",
+                      "a comparison is ┤>├ with its two operands above; an instruction or a block is a box of several rows")
         return None
 
     def _is_on_wire(self, x: int, until: int, y: int, is_coil: bool) -> bool:
@@ -249,7 +301,7 @@ class Grid:
 
     def _find_labels(self) -> None:
         """Operands above contacts and coils; then what stands below them."""
-        for element in self.elements:
+        for element in (each for each in self.elements if not each.inside):
             row = None if element.is_coil else instruction_set().rows.get("LD" + element.mark.lstrip("!@%").strip())
             wanted = len(row.operands) if row else 1
             texts = self._label(element, wanted)

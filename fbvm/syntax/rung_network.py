@@ -86,7 +86,12 @@ class Network:
         exits = [y for y in rows if (RIGHT, y) not in drawn.stubs and self.wires.is_used(border(drawn.until, y, RIGHT))]
         if not entries:
             raise Bad(drawn.x, drawn.y, 1, "no wire leads to this box", "draw ─ to its left side, in the row of its first line")
-        box = _block(drawn) if drawn.title else _instruction(drawn)
+        if drawn.title:
+            for side, used in ((LEFT, entries), (RIGHT, exits)):
+                if len(used) > 1:
+                    raise Bad(drawn.x if side == LEFT else drawn.until, used[1], 1, f"a second wire {_WAYS[side]} this block",
+                              "one wire leads through a block; at its other pins stand operands, such as a variable")
+        box = _block(drawn, entries[0], exits[0] if exits else -1) if drawn.title else _instruction(drawn)
         self.sources[id(box)] = drawn
         start, *others = (self.wires.net(border(drawn.x, y, LEFT)) for y in entries)
         if drawn.title or box.name in INLINE:
@@ -200,19 +205,25 @@ def _instruction(drawn: DrawnBox) -> Box:
     return Box(-1, words[0], tuple(words[1:]))
 
 
-def _block(drawn: DrawnBox) -> Box:
-    """A box of a function block: pins at its sides, the first with the condition."""
+_WAYS = {LEFT: "enters", RIGHT: "leaves"}
+
+
+def _block(drawn: DrawnBox, entry: int, leaving: int) -> Box:
+    """A box of a function block: pins at its sides; the condition enters in one row and leaves in one."""
     assert drawn.title
     pins: list[Pin] = []
+    wired = {LEFT: "EN", RIGHT: "ENO"}
     for y, text in drawn.rows.items():
-        left, right = _names(text, (LEFT, y) in drawn.stubs, (RIGHT, y) in drawn.stubs)
+        left, right = _names(text, (LEFT, y) in drawn.stubs or y == entry, (RIGHT, y) in drawn.stubs or y == leaving)
+        wired[LEFT] = left or "EN" if y == entry else wired[LEFT]
+        wired[RIGHT] = right or "ENO" if y == leaving else wired[RIGHT]
         for side, name in ((LEFT, left), (RIGHT, right)):
             if operand := drawn.stubs.get((side, y)):
                 if not name:
                     raise Bad(drawn.x if side == LEFT else drawn.until, y, 1, f"`{operand}` stands at no pin",
                               "write the name of the pin inside of the box, at this side")
                 pins.append(Pin(name, operand, side == RIGHT))
-    return Box(-1, drawn.title[1], (), (), True, drawn.title[0], tuple(pins), ("EN",))
+    return Box(-1, drawn.title[1], (), (), True, drawn.title[0], tuple(pins), (wired[LEFT],), wired[RIGHT])
 
 
 def _names(text: str, taking: bool, giving: bool) -> tuple[str, str]:

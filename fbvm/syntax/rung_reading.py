@@ -13,6 +13,8 @@ from fbvm.syntax.rung_network import Network
 from fbvm.syntax.rung_steps import Coded, steps
 
 _BEGINS = re.compile(r"[ \t]*(?:[│┃├┣┝┠║╟|]|\+-)")
+_BARE = re.compile(r"[ \t]*[-─]+[\[\]|┤].*[-─]\(")
+"""A row of contacts and a coil whose rail is missing."""
 _REMARK = re.compile(r"(?<=[│┃┤┫┥┨|\s])\s*(//.*)$")
 
 
@@ -38,8 +40,8 @@ class Placed:
 
 
 def is_drawn(lines: Sequence[str]) -> bool:
-    """Whether lines are a drawing: one of them begins with a rail."""
-    return any(_BEGINS.match(line) for line in lines)
+    """Whether lines are a drawing: one of them begins with a rail, or should."""
+    return any(_BEGINS.match(line) or _BARE.match(line) for line in lines)
 
 
 def remark_of(line: str) -> str:
@@ -50,6 +52,10 @@ def remark_of(line: str) -> str:
 
 def read_drawing(lines: Sequence[str], offsets: Sequence[int]) -> tuple[list[Placed], Picture]:
     """The instructions of a drawing; `offsets` are the places of its lines in the text.  Raises Bad."""
+    bare = next((row for row, line in enumerate(lines) if _BARE.match(line)), None)
+    if bare is not None:
+        raise Bad(len(lines[bare]) - len(lines[bare].lstrip()), bare, 1, "the left rail is missing",
+                  "each row of a drawing begins with │ or |")
     grid = Grid([_REMARK.sub("", line).rstrip() for line in lines])
     network = Network(grid)
     bar = network.diagram()
@@ -74,7 +80,8 @@ def _placed(coded: Sequence[Coded], network: Network, offsets: Sequence[int]) ->
             operands = _operands(one, drawn, network.grid, offsets)
         else:
             start, end = offsets[drawn.y] + drawn.x, offsets[drawn.y] + drawn.until + 1
-            operands = [(offsets[drawn.y - 1] + x, offsets[drawn.y - 1] + until) for x, until in drawn.operand_at]
+            row = offsets[drawn.y if drawn.inside else drawn.y - 1]
+            operands = [(row + x, row + until) for x, until in drawn.operand_at]
         made.append(Placed(one, start, end, operands))
     return made
 
@@ -86,9 +93,11 @@ def _operands(one: Coded, drawn: DrawnBox, grid: Grid, offsets: Sequence[int]) -
         words = [(offsets[y] + drawn.x + 1 + found.start(), offsets[y] + drawn.x + 1 + found.end())
                  for y, text in drawn.rows.items() for found in re.finditer(r"\S+", text.split(" = ")[0])]  # fmt: skip
         return words[1:]
-    title = offsets[drawn.y] + grid.lines[drawn.y].index(drawn.title[0], drawn.x)
-    at = offsets[drawn.y] + grid.lines[drawn.y].rindex(drawn.title[1], drawn.x, drawn.until)
+    named, typed = drawn.heads
+    title = offsets[named] + grid.lines[named].index(drawn.title[0], drawn.x)
+    at = offsets[typed] + grid.lines[typed].rindex(drawn.title[1], drawn.x, drawn.until)
     places = [(at, at + len(drawn.title[1])), (title, title + len(drawn.title[0]))]
+    places += [places[1]] * (len(one.operands) - len(places) - len(one.drawn.pins))  # pins that the wire enters and leaves
     for pin, ((side, y), operand) in zip(one.drawn.pins, _stubs(drawn), strict=True):
         line, length = grid.lines[y], len(operand)
         x = line.rindex(operand, 0, drawn.x) if side == LEFT else line.index(operand, drawn.until)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from fbvm.syntax.rung_diagram import CALL, COILS, EDGES, Box, Coil, Contact, Parallel, Part, Point, Series
+from fbvm.syntax.rung_diagram import CALL, COILS, EDGES, WIRE, Box, Coil, Contact, Parallel, Part, Point, Series
 
 _COILS = {mark.strip(): mnemonic for mnemonic, mark in COILS.items()} | {"P": "DIFU", "N": "DIFD"}
 """Marks of coils; P and N are those of IEC 61131-3, table 76."""
@@ -89,7 +89,11 @@ class _Coder:
             self.steps.append(Coded(prefix, box.name[len(prefix):], box.operands, box))
             return
         pins = [f"{pin.name}{'=>' if pin.output else ':='}{pin.operand}" for pin in box.pins]
-        conditions = [] if box.through else [f"{name}:=" for name in box.entries]
+        if box.through:
+            conditions = [f"{name}:={WIRE}" for name in box.entries if name.upper() != "EN"]
+            conditions += [f"{box.leaves}=>{WIRE}"] if box.leaves.upper() != "ENO" else []
+        else:
+            conditions = [f"{name}:=" for name in box.entries]
         self.steps.append(Coded("", "FBCALL" if box.through else CALL, (box.name, box.instance, *conditions, *pins), box))
 
 
