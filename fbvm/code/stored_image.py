@@ -45,9 +45,9 @@ def encode(image: Image) -> bytes:
         "initial": image.initial,
         "retained": [[*vars(row).values()] for row in image.retained],
         "sites": [[*vars(site).values()] for site in image.sites],
-        "objects": astuple(image.objects),
-        "rungs": [astuple(rung) for rung in image.rungs],
-        "charts": [astuple(chart) for chart in image.charts],
+        "objects": [*vars(image.objects).values()],
+        "rungs": [[*vars(rung).values()] for rung in image.rungs],
+        "charts": [[*vars(chart).values()] for chart in image.charts],
         "derived": [[name, types.number(kind)] for name, kind in image.types.items()],
     }
     return _dump({**document, "types": types.rows}).encode("utf-8", "surrogatepass")
@@ -105,14 +105,13 @@ class _StoredBody(Body):
 # --- plain data -----------------------------------------------------------------------------------------------------
 
 
-def _dump(item: object) -> str:
-    return json.dumps(item, separators=(",", ":"), ensure_ascii=False, default=_plain)
-
-
 def _plain(item: object) -> object:
     if isinstance(item, bytes):
         return {"bytes": item.decode("latin-1")}
     raise TypeError(f"{item!r} is no part of an image")
+
+
+_dump = json.JSONEncoder(separators=(",", ":"), ensure_ascii=False, check_circular=False, default=_plain).encode
 
 
 def _bytes(row: dict[str, Any]) -> Any:

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from types import MappingProxyType
 
 from fbvm.base.areas import BUDGET
 from fbvm.code.image import Image
 from fbvm.engine import native_texts
 from fbvm.engine.bases import fixed_bases
+from fbvm.engine.depths import however_deep
 from fbvm.engine.native_calls import call_graph, heights, instance_places
 from fbvm.engine.native_compiler import MATH
 from fbvm.engine.native_context import Point
@@ -24,7 +23,6 @@ from fbvm.engine.native_objects import objects
 from fbvm.engine.native_regions import FIRST_NUMBER, METADATA
 from fbvm.engine.native_statements import EMITTERS
 from fbvm.engine.native_writer import RARE, TRAPPED, Module, Writer
-from fbvm.engine.python import height
 from fbvm.engine.stops import STOPPED
 
 SMALL, LARGE = 40, 600
@@ -34,8 +32,8 @@ ALIGN = 64
 """Bytes at which functions begin: at others the same code takes a sixth more now and then."""
 DEEP = 8
 """Calls inside one another that may become one function."""
-FRAMES_A_LEVEL, FRAMES_TO_SPARE = 12, 300
-"""Python frames that writing takes at most for a level of nested code, and around it."""
+FRAMES_A_LEVEL = 12
+"""Python frames that writing takes at most for a level of nested code."""
 _FUNCTIONS = """\
 declare void @llvm.memmove.p0.p0.i64(ptr, ptr, i64, i1)
 declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)
@@ -88,11 +86,7 @@ def translate(image: Image, stops: bool = False, quick: bool = False) -> Transla
     the same points.
 
     Raises Unsupported for code that the compiler never makes."""
-    try:
-        return _translated(image, stops, quick)
-    except RecursionError:  # hardly any code is so deep, and to find out how deep it is takes a third of the time
-        with deep(image):
-            return _translated(image, stops, quick)
+    return however_deep(image, FRAMES_A_LEVEL, partial(_translated, image, stops, quick))
 
 
 def _translated(image: Image, stops: bool, quick: bool) -> Translation:
@@ -123,23 +117,6 @@ def _declarations() -> tuple[str, ...]:
     lines += [f"declare {kind} @llvm.abs.{kind}({kind}, i1)" for kind in _WIDTHS[1:]]
     lines += [f"declare double @fbvm_{name}({', '.join(['double'] * count)}) #2" for name, count in MATH.items()]
     return tuple(lines)
-
-
-@contextmanager
-def deep(image: Image) -> Iterator[None]:
-    """Lets the host recurse as deep as code is nested, for a while.
-
-    The limit is one for all threads, so it is left alone for code that needs no more."""
-    before = sys.getrecursionlimit()
-    needed = FRAMES_TO_SPARE + FRAMES_A_LEVEL * max((height(body.code) for body in image.bodies), default=0)
-    if needed <= before:
-        yield
-        return
-    sys.setrecursionlimit(needed)
-    try:
-        yield
-    finally:
-        sys.setrecursionlimit(before)
 
 
 def _body(module: Module, number: int, metadata: list[str]) -> str:

@@ -256,7 +256,7 @@ def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int) -> C
     name = name_of("scans", text)
     stored = native_cache.read(name)
     if stored is None:
-        stored = Stored({}, compile_text(text, 2))
+        stored = Stored({}, compile_text(text, 1))
         native_cache.write(name, stored)
     linked = Linked(stored.compiled, ["scans"])
     _LOADED.append(linked)

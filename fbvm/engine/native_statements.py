@@ -232,9 +232,8 @@ def _stop(w: Writer, code: str, site: int) -> None:
 
 
 def _observe(w: Writer, kind: str, site: int, detail: Any) -> None:
-    """A plain build has none, but those that a run can stop at."""
-    if w.module.stops:
-        observe(w, kind, site)
+    """What a run can stop at; a plain build has none."""
+    observe(w, kind, site)
 
 
 EMITTERS: dict[str, Callable[..., None]] = {

@@ -11,11 +11,10 @@ import struct
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import zip_longest
 from typing import Any, NamedTuple
 
 from fbvm.base.areas import BUDGET
-from fbvm.base.arithmetic import single, width
+from fbvm.base.arithmetic import single
 from fbvm.code.image import Image
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT, Address, Block, Node
 from fbvm.engine.native_calls import Range
@@ -35,10 +34,11 @@ RARE = "!prof !0"
 
 def ir(machine: str) -> str:
     """LLVM's name of a machine type as it is worked on."""
-    return _IR.get(machine) or f"i{width(machine)}"
+    return _IR[machine]
 
 
-_IR = {"b": "i1", "f32": "float", "f64": "double", "ref": "i64"}
+_IR = {"b": "i1", "f32": "float", "f64": "double", "ref": "i64",
+       **{f"{sign}{bits}": f"i{bits}" for sign in "iu" for bits in (8, 16, 32, 64)}}
 
 
 def stored(machine: str) -> str:
@@ -118,7 +118,7 @@ class Writer:
         self.module, self.body = module, module.image.bodies[number]
         self.base = module.bases.get(number)
         self.regions = Regions(module.instances[number])
-        self._system = "" if module.quick else SYSTEM
+        self._system, self._rare = ("", "") if module.quick else (SYSTEM, f", {RARE}")
         self.lines: list[str] = []
         self.cold: list[str] = []
         self.here = "entry"
@@ -170,14 +170,15 @@ class Writer:
 
     def unlikely(self, condition: str, yes: str, no: str) -> None:
         """A branch that hardly ever goes the first way."""
-        self.emit(f"br i1 {condition}, label %{yes}, label %{no}, {RARE}")
+        self.emit(f"br i1 {condition}, label %{yes}, label %{no}{self._rare}")
 
     def write(self, block: Block) -> None:
         """The statements of a block, up to one that leaves it."""
-        for node, following in zip_longest(block, block[1:]):
+        stops = self.module.stops
+        for position, node in enumerate(block, 1):
             if self.dead:
                 return
-            if self.module.stops and is_seen_later(node, following):
+            if node[0] == "observe" and (not stops or is_seen_later(node, block[position] if position < len(block) else None)):
                 continue
             self.next_scratch = SCRATCH
             self.statements[node[0]](self, *node[1:])
@@ -268,7 +269,7 @@ class Writer:
 
     def reload(self, address: Address, count: int) -> None:
         """Behind a store that may have met the step budget: read it anew."""
-        if self.loose(address) or not self.regions.is_apart(*self._seen_from(address), count):
+        if isinstance(address[0], tuple) or not self.regions.is_apart(*self._seen_from(address), count):
             self.emit(f"store i64 {self.system(BUDGET)}, ptr %budget")
 
     # --- traps

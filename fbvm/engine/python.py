@@ -8,9 +8,9 @@ from __future__ import annotations
 import linecache
 import sys
 from collections import deque
-from collections.abc import Callable, Generator, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import count
 from types import CodeType
 from typing import Any
@@ -18,8 +18,8 @@ from weakref import finalize
 
 from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Body, Image, ProgramRun
-from fbvm.code.operations import Block
 from fbvm.engine.bases import fixed_bases
+from fbvm.engine.depths import however_deep
 from fbvm.engine.runtime import NO_SITE, Observation, environment
 from fbvm.engine.statements import BodyWriter, function_name
 from fbvm.engine.trap import Stop, Trap, trap
@@ -56,18 +56,9 @@ def translate(image: Image, observed: bool = False, anywhere: bool = False) -> P
     known = _programs.get(key)
     if known is not None:
         return known
-    bases = {} if anywhere else fixed_bases(image)
-    constants: dict[str, Any] = {}
-    lines: list[str] = []
-    frames = 0
     name = f"<fbvm {'observed' if observed else 'plain'} {next(_NUMBERS)}>"
-    with _recursion(FRAMES_A_LEVEL * max((height(body.code) for body in image.bodies), default=0)):
-        for number in range(len(image.bodies)):
-            writer = BodyWriter(image, constants, observed, bases.get(number))
-            lines += [*writer.write(number), ""]
-            frames += 1 + len(writer.routines)
-        source = "\n".join(lines)
-        program = Program(source, compile(source, name, "exec"), constants, bases, frames)
+    program = however_deep(image, FRAMES_A_LEVEL, partial(_written, image, observed, anywhere, name))
+    source = program.source
     linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
     _programs[key] = program
     finalize(image, _forget, key, name)
@@ -79,24 +70,17 @@ def _forget(key: tuple[int, bool, bool], name: str) -> None:
     linecache.cache.pop(name, None)
 
 
-def height(code: Block) -> int:
-    """Levels of tuples in each other."""
-    height, level = 0, [code]
-    while level:
-        height += 1
-        level = [part for item in level for part in item if isinstance(part, tuple)]
-    return height
-
-
-@contextmanager
-def _recursion(frames: int) -> Iterator[None]:
-    """Lets the host recurse that much deeper for a while."""
-    before = sys.getrecursionlimit()
-    sys.setrecursionlimit(before + frames)
-    try:
-        yield
-    finally:
-        sys.setrecursionlimit(before)
+def _written(image: Image, observed: bool, anywhere: bool, name: str) -> Program:
+    bases = {} if anywhere else fixed_bases(image)
+    constants: dict[str, Any] = {}
+    lines: list[str] = []
+    frames = 0
+    for number in range(len(image.bodies)):
+        writer = BodyWriter(image, constants, observed, bases.get(number))
+        lines += [*writer.write(number), ""]
+        frames += 1 + len(writer.routines)
+    source = "\n".join(lines)
+    return Program(source, compile(source, name, "exec"), constants, bases, frames)
 
 
 class PythonEngine:
