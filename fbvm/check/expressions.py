@@ -22,8 +22,10 @@ from fbvm.base.types import (
     ULINT,
     WORD,
     AnyType,
+    ArrayType,
     Elementary,
     EnumType,
+    OpenArrayType,
     RefType,
     StringType,
     StructType,
@@ -36,7 +38,16 @@ from fbvm.check import anything, literals, qualified, unknown
 from fbvm.check.aggregates import Aggregates
 from fbvm.check.constants import convert, cut, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
-from fbvm.check.fitting import assignable, conversion_hint, fitting_hint, hidden_hint, is_untyped, lent, literal_hint
+from fbvm.check.fitting import (
+    BOUNDS_HINT,
+    assignable,
+    conversion_hint,
+    fitting_hint,
+    hidden_hint,
+    is_untyped,
+    lent,
+    literal_hint,
+)
 from fbvm.check.operators import Operators
 from fbvm.check.subscripts import Subscripts
 from fbvm.check.values import is_any
@@ -272,7 +283,8 @@ class Expressions:
                 return literals.enum_value(self, expr, whole, expr.name)  # a variable that is called like its type
             self.error("S0304", expr.of, f"this is {whole} and has no members",
                        f"what it points to has: write {self.text(expr.of)}^.{expr.name.text}"
-                       if isinstance(whole, RefType) and isinstance(whole.target, StructType) else "")
+                       if isinstance(whole, RefType) and isinstance(whole.target, StructType) else BOUNDS_HINT
+                       if isinstance(whole, ArrayType | OpenArrayType) else "")
             return None
         member = whole.member(expr.name.text)
         if member is None and whole.block and self.checker.block_of(whole).lost(expr.name.text):

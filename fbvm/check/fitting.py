@@ -154,13 +154,16 @@ def hidden_hint(expr: tree.Expr, target: Type) -> str:
     return ""
 
 
+BOUNDS_HINT = "how long an array is say LOWER_BOUND(a, 1) and UPPER_BOUND(a, 1)"
+
+
 def fitting_hint(expr: tree.Expr, kind: Type, target: Type) -> str:
     """What to write where `expr` of type `kind` stands and `target` is needed: a literal another way, else a conversion."""
     wanted = base(target)
     if isinstance(expr, tree.Literal) and isinstance(expr.value, str) and isinstance(wanted, StringType):
         return f"a {wanted.name.partition('[')[0]} literal stands in {'double' if wanted.wide else 'single'} quotes"
     if isinstance(expr, tree.Literal):
-        return literal_hint(expr.value if isinstance(expr.value, int | float) else None, base(target))
+        return literal_hint(expr.value if isinstance(expr.value, int | float | str) else None, base(target))
     return conversion_hint(kind, target)
 
 
@@ -221,7 +224,8 @@ def literal_hint(value: Value | None, kind: Type) -> str:
     if isinstance(kind, RefType):
         return "a reference is made of a variable, or NULL"
     if isinstance(kind, EnumType):
-        same = kind.shown.get(value) if isinstance(value, int) else None
+        number = kind.members.get(fold(value)) if isinstance(value, str) else value
+        same = kind.shown.get(number) if isinstance(number, int) else None
         return f"name a member, such as {kind}#{same or next(iter(kind.shown.values()))}"
     time_ms = value if isinstance(value, int) and value > 0 and not isinstance(value, bool) else 500
     for name, written in (("DURATION", f"a duration is written T#{time_ms}ms"), ("DATE", f"a literal is written {_dated(kind)}")):

@@ -20,10 +20,11 @@ VALUES = dict.fromkeys(("DEFAULT", "OTHERS", "OTHERWISE"), "the rest of a CASE s
                     "it is a type: variables are declared between VAR and END_VAR, in front of all statements")}
 """Names of values."""
 FUNCTIONS = {
+    **{name: f"write TO_{name}(x)" for name in (*ELEMENTARY, "STRING", "WSTRING", "TOD", "DT", "LTOD", "LDT")},
     "SWITCH": "a choice among values is CASE x OF 1: .. END_CASE", "POW": "write a ** b, or EXPT(a, b)",
     "POWER": "write a ** b, or EXPT(a, b)", "FABS": "write ABS", "SQR": "write x * x", "LOG10": "write LOG",
     "ROUND": "a conversion rounds: REAL_TO_DINT(x)", "FLOOR": "TRUNC(x) drops the fraction",
-    "CEIL": "TRUNC(x) drops the fraction", "INT": "write TO_INT(x)", "REAL": "write TO_REAL(x)", "FLOAT": "write TO_REAL(x)",
+    "CEIL": "TRUNC(x) drops the fraction", "FLOAT": "write TO_REAL(x)",
     "BOOL": "compare it: x <> 0", "STR": "write TO_STRING(x)", "STRLEN": "write LEN", "STRCAT": "write CONCAT",
     "STRCMP": "compare texts with =", "STRCPY": "assign it: a := b", "SUBSTR": "write MID(text, length, position)",
     "PRINT": _PRINT, "PRINTF": _PRINT, "PUTS": _PRINT, "SLEEP": _WAIT, "DELAY": _WAIT, "WAIT": _WAIT,

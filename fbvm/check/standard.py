@@ -12,6 +12,7 @@ from fbvm.base.types import (
     ArrayType,
     Elementary,
     EnumType,
+    OpenArrayType,
     RefType,
     StringType,
     StructType,
@@ -26,7 +27,7 @@ from fbvm.base.types import (
 from fbvm.check import foreign, functions, questions, references, unknown
 from fbvm.check.arguments import Arguments, callee
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
-from fbvm.check.fitting import as_number, convertible, is_untyped, same
+from fbvm.check.fitting import BOUNDS_HINT, as_number, convertible, is_untyped, same
 from fbvm.check.functions import Conversion, Signature
 from fbvm.check.literals import as_character
 from fbvm.check.values import MAKERS, is_any
@@ -286,7 +287,8 @@ class StandardCalls:
         if not good or is_block(bound):
             shown = " or ".join(_SHOWN.get(limit, limit) for limit in row.limits)
             self.error("S0405", call, f"{callee(call)} is defined for {shown}, not for {bound}",
-                       "an instance cannot be copied" if is_block(bound) else "")
+                       "an instance cannot be copied" if is_block(bound) else BOUNDS_HINT
+                       if isinstance(bound, ArrayType | OpenArrayType) else "")
             return None
         return bound
 
