@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from fbvm.syntax.lexer import Token
 
 TAB = 4
+BESIDE = "  "
+"""Between a pragma and the comment behind it."""
 _OPENING = re.compile(r"//[^\n]*|\(\*|/\*|\{")
 _MARKS = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
 
@@ -25,7 +27,7 @@ class Comment:
 
     @property
     def to_line_end(self) -> bool:
-        return self.text.startswith("//")
+        return self.text.startswith("//") or f"}}{BESIDE}//" in self.text
 
 
 class Comments:
@@ -65,6 +67,10 @@ class Comments:
         behind: list[Comment] = []
         for at, (begin, stop) in enumerate(found):
             ended = last or any(gaps[at + 1:])
+            if ahead and ahead[-1].own and ahead[-1].text[0] == "{" and not gaps[at] and self.text.startswith("//", begin):
+                remark = self._comment(begin, stop, own=True, blank=False).text
+                ahead[-1] = replace(ahead[-1], text=f"{ahead[-1].text}{BESIDE}{remark}")
+                continue
             if not any(gaps[:at + 1]) and start and ended:
                 behind.append(self._comment(begin, stop, own=False, blank=False))
             else:

@@ -101,12 +101,17 @@ class TypeLayout(StatementLayout):
         """Put the declarations of a group together."""
         whole = [flat_width((each.names, each.spec), self.comments) is not None for each in group]
         names = [flat_width(each.names, self.comments) if fits else None for each, fits in zip(group, whole, strict=True)]
-        plain = paddings([width if not each.at else None for each, width in zip(group, names, strict=True)])
-        located = paddings([width if each.at else None for each, width in zip(group, names, strict=True)])
+        kinds = [flat_width(each.spec, self.comments) if each.initial else None for each in group]
+
+        def apart(widths: Sequence[int | None]) -> list[int]:
+            """Padding of what has an address, and of what has none, each among its like."""
+            kept = [paddings([width if bool(each.at) is placed else None for each, width in zip(group, widths, strict=True)])
+                    for placed in (False, True)]
+            return [sum(pads) for pads in zip(*kept, strict=True)]
+
         address = paddings([flat_width(each.at, self.comments) if each.at and each.names and fits else None
                             for each, fits in zip(group, whole, strict=True)])
-        kind = paddings([flat_width(each.spec, self.comments) if each.initial else None for each in group])
-        for each, *pads in zip(group, map(sum, zip(plain, located, strict=True)), address, kind, strict=True):
+        for each, *pads in zip(group, apart(names), address, apart(kinds), strict=True):
             each.place(pads)
 
     # --- types ---

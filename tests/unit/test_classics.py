@@ -48,8 +48,8 @@ def states(plc: Plc) -> dict[str, list[int]]:
 
 
 @pytest.mark.slow
-def test_they_are_drawn_as_fmt_draws_them() -> None:
-    made = CliRunner().invoke(main, ["fmt", "--check", str(FOLDER), str(FOLDER.parent / "ladder.st")])
+def test_all_examples_are_written_and_drawn_as_fmt_does() -> None:
+    made = CliRunner().invoke(main, ["fmt", "--check", str(FOLDER.parent)])
     assert (made.exit_code, made.output) == (0, "")
 
 

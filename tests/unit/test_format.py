@@ -78,6 +78,8 @@ def test_declarations_stand_in_columns() -> None:
         Longer : DINT := 10; // two
         here AT D5 : INT;
         there AT CIO   1519.03 : BOOL;
+        block : A_long_name := (x := 1);
+        last AT D7 : INT := 2;
 
         x : INT;
         A_name_that_is_much_longer_than_x : INT;
@@ -87,6 +89,8 @@ def test_declarations_stand_in_columns() -> None:
             Longer : DINT := 10;  // two
             here  AT D5          : INT;
             there AT CIO 1519.03 : BOOL;
+            block : A_long_name := (x := 1);
+            last AT D7 : INT := 2;
 
             x : INT;
             A_name_that_is_much_longer_than_x : INT;
@@ -197,7 +201,8 @@ def test_comments_stay_where_they_belong() -> None:
         f(a, // first
           b  // second
         );
-        {region 'x'}
+        {region 'x'} // named
+        {endregion}
         """) == text("""
         // above
         a := 1;        // behind
@@ -213,7 +218,8 @@ def test_comments_stay_where_they_belong() -> None:
         END_IF;  // over
         f(a,     // first
           b);    // second
-        {region 'x'}
+        {region 'x'}  // named
+        {endregion}
         """)
 
 
