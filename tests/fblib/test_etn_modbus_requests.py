@@ -231,6 +231,7 @@ def test_the_counters_are_binary_and_begin_again() -> None:
     assert rig.counters() == [0, 0, 0, 0, 0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pins", ["", "Sockets := 8, Fn0F := TRUE, Full_DM := TRUE"])
 def test_nothing_but_the_words_of_the_sheet_is_used(pins: str) -> None:
     rig = Rig(pins)

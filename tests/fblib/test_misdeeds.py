@@ -199,7 +199,7 @@ RUDE: dict[str, set[str]] = {
 
 
 @TIMINGS
-@pytest.mark.parametrize("name", RUDE_PEERS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * ("flood" in name)) for name in RUDE_PEERS])
 def test_a_rude_server(name: str, timing: str) -> None:
     rig = rig_with(timing=timing, seed=len(name))
     peer = RUDE_PEERS[name](rig.server)

@@ -427,7 +427,7 @@ def test_a_reply_to_an_aborted_operation_is_passed_over_on_the_same_connection()
     assert [frame[1] for frame in rig.peer.heard] == [1, 2]
 
 
-@pytest.mark.parametrize("name", MISDEEDS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * ("flood" in name)) for name in MISDEEDS])
 def test_misdeeds_of_a_server(name: str) -> None:
     """Right data or a code that the README explains; and the next operation with a good server works."""
     misdeed = [MISDEEDS[name]]

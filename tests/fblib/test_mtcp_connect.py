@@ -210,6 +210,7 @@ def with_rival(socket: int, timing: str) -> Rig:
     return rig
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("timing", ["exact", "real"])
 def test_a_parameter_area_that_another_program_keeps_busy(timing: str) -> None:
     """220F, again and again; when the program leaves it, the block connects by itself."""
@@ -242,6 +243,7 @@ def test_a_close_of_another_socket_that_is_under_way(timing: str) -> None:
     assert rig.code("conn") == ""
 
 
+@pytest.mark.slow
 def test_a_unit_that_is_not_there() -> None:
     """2211 after ten seconds, and the connection once there is one."""
     rig = Rig()

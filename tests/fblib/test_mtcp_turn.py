@@ -145,6 +145,7 @@ def test_a_waiting_block_that_is_no_longer_executed_loses_its_place() -> None:
     assert rig.result("b") == (0, "0081")
 
 
+@pytest.mark.slow
 def test_a_silent_server_does_not_stop_the_others() -> None:
     rig = Rig(ScriptedPeer(), a=A, b=B).connect()
     rig.set("a_Cmd", True)
