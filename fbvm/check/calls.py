@@ -19,13 +19,13 @@ from fbvm.base.types import (
     fold,
     followed,
 )
-from fbvm.check import functions, qualified, references
+from fbvm.check import qualified, references
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
 from fbvm.check.fitting import assignable, holds, lent, same
 from fbvm.check.foreign import comma_hint
 from fbvm.check.generics import Generics, is_generic
-from fbvm.check.standard import StandardCalls
+from fbvm.check.standard import StandardCalls, is_known
 from fbvm.check.writes import note_count, writable
 from fbvm.syntax import ladder, tree
 
@@ -123,7 +123,7 @@ class Calls:
             return None
         if not isinstance(kind, StructType) or not kind.block:
             name = _shown(call.callee)
-            hidden = fold(name) in functions.names() or self.project.pou(name, self.expressions.source) is not None
+            hidden = is_known(fold(name)) or self.project.pou(name, self.expressions.source) is not None
             self.error("S0401", call.callee, f"{name} is {kind} and cannot be called",
                        f"the variable hides the function {fold(name)}: rename it" if hidden else
                        f"an element is written {name}[...]" if isinstance(kind, ArrayType) else "")

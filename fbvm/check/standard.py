@@ -40,6 +40,11 @@ _SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations", "ANY_STRING": "STRI
 _NUMBERS = ("ANY_NUM", "ANY_BIT")
 
 
+def is_known(name: str) -> bool:
+    """True for the folded name of what can be called without being declared: a standard function, or what looks like one."""
+    return functions.is_standard(name) or name in MAKERS or name in questions.NAMES and name not in questions.REFUSED
+
+
 class StandardCalls:
     """Calls of standard functions in one POU."""
 

@@ -15,9 +15,7 @@ import click
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source, whole_lines
 from fbvm.base.types import fold
-from fbvm.check.functions import is_standard
-from fbvm.check.questions import NAMES, REFUSED
-from fbvm.check.values import MAKERS
+from fbvm.check.standard import is_known
 from fbvm.cli import status
 from fbvm.cli.files import writing
 from fbvm.cli.sources import show
@@ -154,9 +152,4 @@ def _library_declaration(key: str) -> Declaration | None:
     return next(found, None)
 
 
-def _standard(name: str) -> bool:
-    """Whether a name in capitals is that of a standard function, or of what looks like one."""
-    return is_standard(name) or name in MAKERS or name in NAMES and name not in REFUSED
-
-
-OUTSIDE = Outside(lambda name: _library_declaration(fold(name)), _standard)
+OUTSIDE = Outside(lambda name: _library_declaration(fold(name)), is_known)
