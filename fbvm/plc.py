@@ -15,9 +15,9 @@ from fbvm.breakpoints import Breakpoints, Halt
 from fbvm.code.image import Image
 from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
-from fbvm.exchange import Attached, wake_ns
+from fbvm.exchange import Attached
 from fbvm.express import Express
-from fbvm.flags import CLOCKWORK, MOST, TENTH_MS_NS, Flags
+from fbvm.flags import CLOCKWORK, TENTH_MS_NS, Flags
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
 from fbvm.scan_times import Lateness, ScanTimes
@@ -216,7 +216,7 @@ class Plc:
     def due_ns(self) -> int:
         """When the next scan is worth while, if no network tells anything before: at once if a unit has news for the
         program, else when a timer of the program, a task's interval or a unit changes something by itself."""
-        return min(wake_ns(self.units, self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
+        return min(self._express.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
 
     def run(
         self,
@@ -253,6 +253,16 @@ class Plc:
         self.now_ns += done * cycle_ns
         return done > 0
 
+    def scan_at_once(self, most: int, clock: Callable[[], int]) -> list[int]:
+        """Scans in the time that `clock` tells, one upon the other for as long as units have news for the program; when
+        they began.  None if somebody has to be told between them, or has a part in one: then it takes `scan`."""
+        if self.watchers or self._past.maxlen or self.trap or not self._in_one_piece():
+            return []
+        times, self.trap = self._express.burst(most, self.now_ns, clock, self.budget)
+        self.scans += len(times)
+        self.now_ns = times[-1]
+        return times
+
     def _many_guarded(self, most: int) -> tuple[int, Trap | None]:
         """How many scans there were before one that stops at a breakpoint."""
         turns = self._schedule.turns()
@@ -260,7 +270,7 @@ class Plc:
         if outside or not turns or self._first or self._mode is not RUN or self.halted:
             return 0, None
         self._system[BUDGET // 8] = self.budget
-        guarded, cycle_time = self.breakpoints.guarding(self.engine), min(self.cycle_ns // TENTH_MS_NS, MOST)
+        guarded, cycle_time = self.breakpoints.guarding(self.engine), self.cycle_ns // TENTH_MS_NS
         return guarded.run_many(turns, most, self.cycle_ns, CLOCKWORK, cycle_time=cycle_time, spend=STEP_BUDGET)
 
     # --- values -------------------------------------------------------------------------------------------------------

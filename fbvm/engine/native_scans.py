@@ -53,6 +53,8 @@ ROW = 4
 WATCHED_ROW, WATCHED_BYTES = 2, 8
 """Numbers of what is watched: its offset in the memory, and the eight bytes that are expected there."""
 NO_LIMIT = 1 << 62
+MOST_CYCLE = 0xFFFF_FFFF
+"""The longest cycle time that its words can say."""
 _SCANS = Template(f"""
 define i32 @scans(ptr %p) {{
 entry:
@@ -121,6 +123,7 @@ store i64 %i, ptr %done_at
 ret i32 0
 }}
 declare i32 @llvm.umax.i32(i32, i32)
+declare i64 @llvm.umin.i64(i64, i64)
 """)
 
 
@@ -131,7 +134,8 @@ def _clockwork(row: Clockwork) -> Iterator[str]:
                     f"%kc{n} = and i16 %kb{n}, {stay}", f"store i16 %kc{n}, ptr %ka{n}")
     if row.cycle_time:
         now, longest = row.cycle_time
-        yield from ("%tc = trunc i64 %cycle to i32", f"%ta = getelementptr inbounds i8, ptr %m, i64 {now}",
+        yield from (f"%tq = call i64 @llvm.umin.i64(i64 %cycle, i64 {MOST_CYCLE})", "%tc = trunc i64 %tq to i32",
+                    f"%ta = getelementptr inbounds i8, ptr %m, i64 {now}",
                     "store i32 %tc, ptr %ta, align 2", f"%tl = getelementptr inbounds i8, ptr %m, i64 {longest}",
                     "%to = load i32, ptr %tl, align 2", "%tm = call i32 @llvm.umax.i32(i32 %tc, i32 %to)",
                     "store i32 %tm, ptr %tl, align 2")
@@ -228,6 +232,8 @@ class Series:
         """One scan; the point of its trap, or 0."""
         numbers, timed = self._numbers, self._timed
         numbers[STEP], numbers[BUDGETED], numbers[CYCLE] = step_ns, budget, cycle_time
+        if not timed:
+            return self._call(self._numbers_at)
         for row, at in timed:
             numbers[at] = self.turns[row].next_ns
         point = self._call(self._numbers_at)

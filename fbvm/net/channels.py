@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from fbvm.wire.link import Bind, Close, Closed, Connect, Event, Failed, Grant, Listen, Peer, Request, Send, SendTo
 
@@ -68,8 +68,8 @@ class ChannelLink(ABC):
         """Put the new channel into `channels`, or tell that it failed."""
 
     @abstractmethod
-    def serve(self, now_ns: int) -> None:
-        """Let the network do what is to be done until now."""
+    def events(self, now_ns: int) -> Sequence[Event]:
+        """What happened up to `now_ns`, in order, each once."""
 
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
         """Take requests in order.  Raises ValueError if a unit opens a channel that is in use."""
@@ -92,14 +92,6 @@ class ChannelLink(ABC):
                     self.told.append(Closed(channel))
                 case SendTo(channel, remote, data):
                     self._check(channel, there.send_to(remote, data, now_ns) if there else "ENOTCONN")
-
-    def events(self, now_ns: int) -> list[Event]:
-        """What happened up to `now_ns`, in order, each once."""
-        self.serve(now_ns)
-        for there in list(self.channels.values()):
-            there.fetch(now_ns)
-        told, self.told = self.told, []
-        return told
 
     @property
     def is_quiet(self) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import heapq
 import random
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 from fbvm.net.addresses import fits, impossible
@@ -16,7 +16,7 @@ from fbvm.net.faults import NO_FAULT, Fault, find
 from fbvm.net.loop_channels import Bound, Door, Line, MemoryLink
 from fbvm.net.peers import Action, Actions, Conversation, Fin, Leave, Reset, Say, Station, Wake
 from fbvm.net.stream import End
-from fbvm.wire.link import Bind, Connect, Failed, Listen, Peer, Request
+from fbvm.wire.link import Bind, Connect, Event, Failed, Listen, Peer, Request
 from fbvm.wire.tap import Happening, Tap, What
 
 CONNECT_TIMEOUT_NS = 75_000_000_000
@@ -174,7 +174,7 @@ class LoopLink(MemoryLink):
         self.network.run(now_ns)
         super().submit(requests, now_ns)
 
-    def serve(self, now_ns: int) -> None:
+    def events(self, now_ns: int) -> Sequence[Event]:
         self.scan = self._refreshes
         self._refreshes += 1
         self.network.run(now_ns)
@@ -182,6 +182,10 @@ class LoopLink(MemoryLink):
             for end in list(self._ends.values()):
                 if self.network.fault(end.local, end.remote).reset:
                     end.tear(now_ns)
+        for there in list(self.channels.values()):
+            there.fetch(now_ns)
+        told, self.told = self.told, []
+        return told
 
     @property
     def is_quiet(self) -> bool:

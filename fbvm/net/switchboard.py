@@ -150,11 +150,6 @@ class Switchboard(ABC):
 
     # For links and their channels.
 
-    def attend(self, now_ns: int) -> None:
-        """Serve, unless somebody else does."""
-        if not self.driven:
-            self.serve(now_ns)
-
     def told(self, link: ChannelLink) -> None:
         """A link was told something in answer to a request."""
         self._unheard.add(link)

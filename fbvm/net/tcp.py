@@ -12,13 +12,14 @@ import struct
 import sys
 from abc import abstractmethod
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 
 from fbvm.net.addresses import AddressMap, dotted, fits, impossible
-from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink, undeliverable
+from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, undeliverable
+from fbvm.net.host_link import HostLink
 from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, UDP, WRITE, Switchboard, Watcher, errno_name
-from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Request, Sent
+from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import DATA, What
 
 BUFFER_BYTES = 65_536
@@ -79,19 +80,12 @@ class TcpNetwork(Switchboard):
         self._reserved.clear()
 
 
-class TcpLink(ChannelLink):
+class TcpLink(HostLink):
     """One unit's place on a `TcpNetwork`."""
 
     def __init__(self, network: TcpNetwork, address: str) -> None:
-        super().__init__(address)
+        super().__init__(network, address)
         self.network = network
-
-    def serve(self, now_ns: int) -> None:
-        self.network.attend(now_ns)
-
-    def submit(self, requests: Iterable[Request], now_ns: int) -> None:
-        super().submit(requests, now_ns)
-        self.network.told(self)
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
         channel: _OnHost = _KINDS[type(request)](self, request)
@@ -128,6 +122,7 @@ class _OnHost(Channel, Watcher):
 
     def end(self) -> None:
         """Give the socket back to the host."""
+        self.link.waiting.pop(self, None)
         if self.sock:
             if self.transport == TCP:  # a datagram may still be under way, and the port stays this unit's
                 self.network.own(TCP, self.real, None)
@@ -281,6 +276,7 @@ class _Line(_OnHost):
                 self._receive(self.sock, now_ns)
             else:
                 self._readable = True
+                self.link.waiting[self] = None
         if ready & WRITE and self.sock:
             self._flush(self.sock, now_ns)
 
@@ -293,10 +289,10 @@ class _Line(_OnHost):
         if self.sock and self._readable:
             self._readable = False
             self._receive(self.sock, now_ns)
-        elif self.sock and (self._stalled or self._fin_seen):  # the selector would not tell that it broke
-            code = self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
-            if code:
-                self._broke(code, now_ns)
+        elif self.sock and (code := self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)):
+            self._broke(code, now_ns)
+        if not (self._stalled or self._fin_seen):  # of which the selector would not tell that they broke
+            self.link.waiting.pop(self, None)
 
     def send(self, data: bytes, now_ns: int) -> str:
         if not self._connected or self.sock is None:
@@ -314,11 +310,13 @@ class _Line(_OnHost):
             self.give_up(now_ns)
         elif self.sock:
             self._orphan, self._stalled = True, False
+            self.link.waiting.pop(self, None)
             with suppress(OSError):  # what the unit has not fetched is thrown away, so that FIN goes out and no RST
                 for _ in range(16):
                     if not self.sock.recv(BUFFER_BYTES):
                         break
             self._flush(self.sock, now_ns)
+            self._watch()
             if self.sock:
                 self.network.adopt(self, now_ns)
 
@@ -345,15 +343,16 @@ class _Line(_OnHost):
             self._tap(now_ns, What.FIN, False)
             self._report(PeerClosed(self.channel))
             self._finish(sock, now_ns)
+            self._watch()
         elif self._orphan:
             self.give_up(now_ns)
         elif wanted <= 0:
             self._stalled = True
+            self._watch()
         else:
             self.granted -= len(data)
             self._tap(now_ns, DATA, False, data)
             self._report(Received(self.channel, data))
-        self._watch()
 
     def _flush(self, sock: socket.socket, now_ns: int) -> None:
         try:
@@ -372,7 +371,8 @@ class _Line(_OnHost):
             self._broke(error, now_ns)
             return
         self._finish(sock, now_ns)
-        self._watch()
+        if self._outbox or self.watched & WRITE:
+            self._watch()
 
     def _finish(self, sock: socket.socket, now_ns: int) -> None:
         """Do the next step of an orphan's end."""
@@ -404,7 +404,8 @@ class _Line(_OnHost):
             self.link.told.append(event)
 
     def _tap(self, now_ns: int, what: What, out: bool, data: bytes = b"") -> None:
-        self.network.tell(now_ns, what, self.local, self.remote, out, data)
+        if self.network.tap:
+            self.network.tell(now_ns, what, self.local, self.remote, out, data)
 
 
 class _Bound(_OnHost):

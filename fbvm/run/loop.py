@@ -8,6 +8,7 @@ from __future__ import annotations
 import heapq
 import time
 from collections.abc import Callable, Iterable, Sequence
+from itertools import pairwise
 from typing import Protocol, cast
 
 from fbvm.plc import Plc
@@ -47,11 +48,15 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     They share one time: real if a network of any of them is, so that a network may have units of several PLCs."""
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
     start_ns = max((run.plc.elapsed_ns for run in runs), default=0)
-    for run in runs:
-        run.begin(start_ns + run.phase_ns if networks else start_ns)
-        if not networks:  # nothing happens between two periods of virtual time
+    clock: _Clock = _Virtual()
+    if networks:
+        clock = real = _Real(cast(list[RealNetwork], list(networks.values())), runs, start_ns)
+        for run in runs:
+            run.begin(start_ns + run.phase_ns, real.behind)
+    else:  # nothing happens between two periods of virtual time
+        for run in runs:
+            run.begin(start_ns)
             run.pace, run.alone = CYCLIC, len(runs) == 1
-    clock = _Real(cast(list[RealNetwork], list(networks.values())), runs, start_ns) if networks else _Virtual()
     queue = _Queue(runs)
     told_ns = time.monotonic_ns()
     try:
@@ -75,9 +80,12 @@ def _scan_all(queue: _Queue, now_ns: int, real: bool) -> None:
     first_ns = began_ns = time.monotonic_ns()
     for number, run in queue.take(now_ns):
         plc, scan, due_ns = run.plc, run.plc.scans, run.due_ns
-        run.scan(now_ns)
+        times = run.scan(now_ns)
         if scans := plc.scans - scan:
             ended_ns = time.monotonic_ns()
+            for time_ns, next_ns in pairwise(times):
+                plc.scan_times.note(scan, next_ns - time_ns)
+                began_ns, scan, scans = began_ns + next_ns - time_ns, scan + 1, scans - 1
             plc.scan_times.note(scan, (ended_ns - began_ns) // scans, scans)
             if real and run.pace == CYCLIC:
                 plc.lateness.note(scan, now_ns - due_ns + began_ns - first_ns)
@@ -145,7 +153,7 @@ class _Clock(Protocol):
     """The time of the loop."""
 
     real: bool
-    woken: Sequence[int]
+    woken: list[int]
     """Numbers of the runs that have news before their time."""
 
     def reach(self, due_ns: int) -> int:
@@ -159,7 +167,9 @@ class _Virtual:
     """Time that goes where the next scan is."""
 
     real = False
-    woken: Sequence[int] = ()
+
+    def __init__(self) -> None:
+        self.woken: list[int] = []
 
     def reach(self, due_ns: int) -> int:
         return due_ns
@@ -183,12 +193,21 @@ class _Real:
         self._waits = len(networks) == 1 and bool(self._numbers)
         self._zero_ns = time.monotonic_ns() - start_ns
 
+    def now(self) -> int:
+        """The time."""
+        return time.monotonic_ns() - self._zero_ns
+
+    def behind(self, behind_ns: int) -> Callable[[], int]:
+        """A clock that is behind this time by so much."""
+        monotonic_ns, zero_ns = time.monotonic_ns, self._zero_ns + behind_ns
+        return lambda: monotonic_ns() - zero_ns
+
     def reach(self, due_ns: int) -> int:
-        while (left_ns := due_ns - (now_ns := time.monotonic_ns() - self._zero_ns)) > 0:
+        while (left_ns := due_ns - (now_ns := self.now())) > 0:
             if not self._waits:
                 time.sleep(left_ns / 1e9)
             elif self._networks[0].wait(left_ns / 1e9):
-                self._serve(now_ns := time.monotonic_ns() - self._zero_ns)
+                self._serve(now_ns := self.now())
                 if self.woken:
                     return now_ns
                 time.sleep(min(left_ns, PATIENCE_NS) / 1e9)

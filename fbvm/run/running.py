@@ -4,7 +4,7 @@ Knows no clock: the loop tells the time and asks for the next one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from fbvm.goal import Goal
@@ -14,6 +14,8 @@ from fbvm.watch.paths import Place, Span
 CYCLIC, EVENT = "cyclic", "event"
 PACES = (CYCLIC, EVENT)
 """cyclic: a fixed period.  event: at once when there is something new to see, else at the earliest time that matters."""
+MOST_AT_ONCE = 16
+"""Scans of one PLC in event pace before the network and the others have their turn again."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,7 @@ class Running:
         self.alone = False
         """Nobody has to be told between two scans but who looks into this PLC, and time goes where its next scan is."""
         self._behind_ns = 0
+        self._clock: Callable[[], int] | None = None
         self._writes = sorted(writes, key=lambda write: write.at_ns)
 
     @property
@@ -63,13 +66,17 @@ class Running:
         """What is still to be written, in order of time."""
         return tuple(self._writes)
 
-    def begin(self, start_ns: int) -> None:
-        """The loop begins at this time of its own."""
+    def begin(self, start_ns: int, clock: Callable[[int], Callable[[], int]] | None = None) -> None:
+        """The loop begins at this time of its own, which goes on by itself if there is a clock: one that is behind the
+        loop's by so much is made by `clock`."""
         self._behind_ns = start_ns - self.plc.elapsed_ns
         self.due_ns = start_ns
+        self._clock = clock(self._behind_ns) if clock and self.pace == EVENT else None
 
-    def scan(self, now_ns: int) -> None:
-        """One scan at this time, and the plan for the next.  A period that was overrun is not made up for."""
+    def scan(self, now_ns: int) -> Sequence[int]:
+        """One scan at this time, or more upon it, and the plan for the next.  A period that was overrun is not made up for.
+
+        Returns when the scans began if that is known of each."""
         plc, told_ns = self.plc, max(now_ns - self._behind_ns, self.plc.now_ns)
         while self._writes and self._writes[0].at_ns <= told_ns:
             write = self._writes.pop(0)
@@ -77,11 +84,17 @@ class Running:
         if self.alone and (many := self._undisturbed()) > 1 and plc.scan_many(many):
             self.due_ns = plc.elapsed_ns + self._behind_ns
             self.reason = self._goal.reached()
-            return
-        plc.scan(told_ns)
+            return ()
+        times: Sequence[int] = ()
+        if self._clock and (many := self._undisturbed()) > 1:
+            times = plc.scan_at_once(min(many, MOST_AT_ONCE), self._clock)
+        if times:
+            now_ns = times[-1] + self._behind_ns
+        else:
+            plc.scan(told_ns)
         self.reason = self._goal.reached()
         if plc.breakpoints.halted:
-            return
+            return ()
         if self.pace == EVENT:
             self.due_ns = max(now_ns, min(now_ns + plc.cycle_ns, plc.due_ns + self._behind_ns))
         elif now_ns < self.due_ns + plc.cycle_ns:
@@ -89,6 +102,7 @@ class Running:
         else:
             plc.lateness.missed += (now_ns - self.due_ns) // plc.cycle_ns
             self.due_ns = now_ns + plc.cycle_ns
+        return times
 
     def _undisturbed(self) -> int:
         """How many scans come before the goal, or the next write."""

@@ -24,7 +24,6 @@ from fbvm.wire.link import Event, Request
 __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
 
 TIME_WAIT_NS = 60_000_000_000  # W421 6-9-3 p156
-NO_SWITCHES = bytes(2 * (at.FINS_TCP_STATUS - at.SWITCHES))
 
 
 class Etn21:
@@ -51,7 +50,7 @@ class Etn21:
         self.address = address
         self.faults = list(faults)
         """Each is used up by the first request that it fits."""
-        self._link_up, self._error_status = True, 0
+        self._service_status, self._error_status = at.LINK_UP, 0
         choices = Choices(time_wait_ns, odd_filler)
         self._made = {"unit_number": unit_number, "address": address, "timing": timing, "seed": seed,
                       "time_wait_ns": time_wait_ns, "odd_filler": odd_filler}  # fmt: skip
@@ -60,9 +59,12 @@ class Etn21:
         self._starting: tuple[int, int] | None = None
         """Cycle and time at which a restart ends; None if none is going on."""
         self._words: Words | None = None
-        self._seen = NO_SWITCHES
+        self._seen = 0
         """The request switches, as they were when the last refresh ended."""
-        self.wake_ns = self._next_ns = NEVER_NS
+        self._mask = 1 << self.layout.bit
+        """Its bit in words for all units."""
+        self.wake_ns = NEVER_NS
+        self.news = False
 
     @property
     def watched(self) -> tuple[tuple[str, int], ...]:
@@ -73,11 +75,11 @@ class Etn21:
     @property
     def link_up(self) -> bool:
         """Whether n+17 says that the cable is plugged; what the network does is the network's affair."""
-        return self._link_up
+        return self._service_status != 0
 
     @link_up.setter
     def link_up(self, up: bool) -> None:
-        self._link_up, self.wake_ns = up, 0
+        self._service_status, self.wake_ns = at.LINK_UP if up else 0, 0
 
     @property
     def error_status(self) -> int:
@@ -119,14 +121,14 @@ class Etn21:
         """Power on: the unit's own words and all switches 0, connections broken by RST."""
         words = self._words = Words(self.layout, memory)
         for word in (at.INITIALIZING, at.RESTART):
-            words.a[word] &= ~(1 << self.layout.bit)
+            words.a[word] &= ~self._mask
         self._starting = None
         return self._begin_anew(words)
 
     def _begin_anew(self, words: Words) -> list[Request]:
         self._dispatch.forget()
-        self._seen = NO_SWITCHES
-        self.wake_ns, self._next_ns = 0, NEVER_NS
+        self._seen = 0
+        self.wake_ns, self.news = 0, False
         cio, d = words.cio, words.d
         n, m = self.layout.n, self.layout.m
         for word in range(n + 1, n + at.FINS_TCP_STATUS + 1):
@@ -134,7 +136,7 @@ class Etn21:
         cio[n] &= ~at.FORCE_CLOSE
         for word in range(m + 1, m + at.MAIL_STATUS + 1):
             d[word] = 0
-        cio[n + at.SERVICE_STATUS], cio[n + at.ERROR_STATUS] = at.LINK_UP if self.link_up else 0, self.error_status
+        cio[n + at.SERVICE_STATUS], cio[n + at.ERROR_STATUS] = self._service_status, self.error_status
         return self._dispatch.reset_sockets()
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
@@ -142,27 +144,24 @@ class Etn21:
         words = self._words
         if words is None or words.memory is not memory:
             words = self._words = Words(self.layout, memory)
-        dispatch, n = self._dispatch, self.layout.n
+        dispatch, status = self._dispatch, words.status
         dispatch.cycle += 1
-        if self._starting or words.a[at.RESTART] >> self.layout.bit & 1:
+        if self._starting or words.a[at.RESTART] & self._mask:
             return self._restart(words, events, now_ns)
-        cio = words.cio
-        cio[n + at.SERVICE_STATUS] = at.LINK_UP if self._link_up else 0
-        cio[n + at.ERROR_STATUS] = self._error_status
-        switches, force = words.switches.tobytes(), cio[n] & at.FORCE_CLOSE
-        if not events and not force and switches == self._seen and now_ns < self._next_ns:
-            self.wake_ns = self._next_ns
+        status[0], status[1] = self._service_status, self._error_status
+        switches, force = words.switches[0], words.cio[self.layout.n] & at.FORCE_CLOSE
+        if not events and switches == self._seen and now_ns < self.wake_ns and not force:
+            self.news = False
             return []
-        requests = dispatch.refresh(words, events, b"" if switches == self._seen else switches, force, now_ns)
-        changed = dispatch.show()
-        self._seen = words.switches.tobytes() if changed else switches
-        self._next_ns = dispatch.wake_ns(now_ns)
-        self.wake_ns = 0 if changed else self._next_ns
+        requests = dispatch.refresh(words, events, switches, force, now_ns)
+        self.news = dispatch.show()
+        self._seen = words.switches[0]
+        self.wake_ns = dispatch.wake_ns(now_ns)
         return requests
 
     def _restart(self, words: Words, events: Sequence[Event], now_ns: int) -> list[Request]:
         """One I/O refresh of a restart, from the restart bit ON to the initializing flag OFF: requests are not seen."""
-        a, mask = words.a, 1 << self.layout.bit
+        a, mask = words.a, self._mask
         requests: list[Request] = []
         if self._starting is None:
             requests = self._begin_anew(words)

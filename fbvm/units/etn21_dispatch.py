@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import NamedTuple
 
 from fbvm.units import etn21_codes as codes
 from fbvm.units import etn21_map as at
@@ -52,13 +51,8 @@ class Choices:
     """Low byte that is stored beside an odd last byte; None keeps what is there."""
 
 
-class Found(NamedTuple):
-    """Switches of an area that belong to no request yet."""
-
-    area: Area
-    switches: tuple[Switch, ...]
-    busy: bool
-    """True if the program could see something running when it turned them ON."""
+Found = tuple[Area, tuple[Switch, ...], bool]
+"""Switches of an area that belong to no request yet; True if the program could see something running when it turned them ON."""
 
 
 class Dispatch:
@@ -76,36 +70,46 @@ class Dispatch:
     def forget(self) -> None:
         """As after power-on, but for what the network still has to close."""
         self.cycle = 0
-        self._areas = [Area(number, self._layout.parameters(number), self._layout.switches(number)) for number in at.AREAS]
+        layout = self._layout
+        shifts = {layout.switches_shift(number): number for number in at.AREAS}
+        self._areas = {shift: Area(shift, layout.parameters(number), layout.switches(number))
+                       for shift, number in shifts.items()}  # fmt: skip
+        """By where their switches stand."""
         self._services: list[Service] = []
         self._noticed: list[Service] = []
         """Those that have not been accepted yet."""
+        self._owned = 0
+        """Switches that belong to a request already seen, as a mask."""
+        self._deadline_ns = NEVER_NS
+        """No service has an earlier one."""
         self._forced: list[Service] | None = None
         self._held_ports: dict[int, int] = {}
         self._display = Display(self._layout)
-        self._touched: dict[int, Skew] = {}
+        self._touched: dict[Socket, Skew] = {}
 
     def reset_sockets(self) -> list[Request]:
         """Requests that end every connection."""
         return [request for socket in self._sockets.values() for request in socket.reset()]
 
-    def refresh(self, words: Words, events: Sequence[Event], switches: bytes, force: int, now_ns: int) -> list[Request]:
+    def refresh(self, words: Words, events: Sequence[Event], switches: int, force: int, now_ns: int) -> list[Request]:
         """One I/O refresh, phase by phase.
 
-        `switches` are n+19..n+22 if they have changed, low byte first; `force` says that a force-close is asked for."""
+        `switches` are n+19..n+22 as one number; `force` says that a force-close is asked for."""
         self._display.begin(words, self.cycle)
         start_force = force and self._forced is None
-        found = self._find(switches) if switches else ()
+        new = switches & at.ALL_SWITCHES & ~self._owned
+        found = self._find(new) if new else ()
         requests: list[Request] = []
         for event in events:
             requests += self.take(event)
         if self._services:
-            requests += self._expire(now_ns)
+            if now_ns >= self._deadline_ns:
+                requests += self._expire(now_ns)
             self._conclude_all(words.memory, now_ns)
         if self._forced is not None:
             self._conclude_force_close(self._forced)
-        for new in found:
-            self._notice(new)
+        for area, asked, busy in found:
+            self._notice(area, asked, busy)
         if self._noticed:
             requests += self._accept_all(words, now_ns)
         if start_force:
@@ -114,16 +118,15 @@ class Dispatch:
 
     # --- 1. switches that are new ------------------------------------------------------------------------------------
 
-    def _find(self, switches: bytes) -> list[Found]:
-        """New switches, a byte an area, judged before this refresh ends anything."""
+    def _find(self, new: int) -> list[Found]:
+        """New switches by area, judged before this refresh ends anything."""
         found = []
-        for area, byte in zip(self._areas, switches, strict=True):
-            new = byte & at.ALL_SWITCHES
-            if new and area.services:
-                new &= ~area.owned()
-            if new:
-                busy = bool(area.services) and any(service.code != codes.OTHER_PROCESSING for service in area.services)
-                found.append(Found(area, at.SWITCHES_IN[new], busy))
+        while new:
+            shift = (new & -new).bit_length() - 1 & ~7
+            area, asked = self._areas[shift], at.SWITCHES_IN[new >> shift & at.AREA_SWITCHES]
+            busy = bool(area.services) and any(service.code != codes.OTHER_PROCESSING for service in area.services)
+            found.append((area, asked, busy))
+            new &= ~(at.AREA_SWITCHES << shift)
         return found
 
     # --- 2. what the network and the clock say -----------------------------------------------------------------------
@@ -133,16 +136,18 @@ class Dispatch:
         socket = self._sockets.get(event.channel)
         if socket is None:
             return []
-        self._touched.setdefault(event.channel, TOGETHER)
+        self._touched.setdefault(socket, TOGETHER)
         return socket.take(event)
 
     def _expire(self, now_ns: int) -> list[Request]:
         """End services whose time has run out; an open is withdrawn from the network."""
         requests: list[Request] = []
+        self._deadline_ns = min((service.deadline_ns for service in self._services if service.deadline_ns > now_ns),
+                                default=NEVER_NS)  # fmt: skip
         for service in self._services:
             if now_ns >= service.deadline_ns and service.code is None and service.socket is not None:
                 service.code = service.deadline_code
-                self._touch(service.socket, TOGETHER)
+                self._touched.setdefault(service.socket, TOGETHER)
                 if service.switch in at.OPENS:
                     requests += service.socket.withdraw()
         return requests
@@ -161,6 +166,7 @@ class Dispatch:
                 self._services.remove(service)
                 if service.area is not None:
                     service.area.services.remove(service)
+                    self._owned &= ~service.switch_bit
 
     def _is_ready(self, service: Service, now_ns: int) -> bool:
         if self.cycle < service.earliest_cycle or now_ns < service.earliest_ns:
@@ -181,7 +187,7 @@ class Dispatch:
                 was_connected = socket.connected
                 socket.end(service)
                 socket.settled_cycle = self.cycle + (skew.open if socket.connected != was_connected else 0)
-            self._touched[socket.number] = skew
+            self._touched[socket] = skew
         if service.area is not None:
             if service.flag & TRANSFERS and socket is not None and service.parameters is not None:
                 if service.data:
@@ -197,19 +203,19 @@ class Dispatch:
 
     # --- 4. new requests ---------------------------------------------------------------------------------------------
 
-    def _notice(self, found: Found) -> None:
+    def _notice(self, area: Area, switches: tuple[Switch, ...], busy: bool) -> None:
         """Latch new switches of an area: a close always, else the lowest (assumed), and 110C for the others."""
-        close = CLOSE in found.switches
-        chosen = CLOSE if close else None if found.busy else found.switches[0]
-        for switch in found.switches:
-            service = Service(switch, found.area, self.cycle + self._timing.accept_refreshes)
+        chosen = CLOSE if CLOSE in switches else None if busy else switches[0]
+        for switch in switches:
+            service = Service(switch, area, self.cycle + self._timing.accept_refreshes)
             if switch is not chosen:
                 service.code = codes.OTHER_PROCESSING
                 service.earliest_cycle = self.cycle + 1
             else:
                 self._noticed.append(service)
-            found.area.services.append(service)
+            area.services.append(service)
             self._services.append(service)
+            self._owned |= service.switch_bit
 
     def _accept_all(self, words: Words, now_ns: int) -> list[Request]:
         """Check and start what was noticed."""
@@ -220,6 +226,7 @@ class Dispatch:
                 self._noticed.append(service)
             elif service.code is None and service.area is not None:
                 requests += self._accept(service, service.area, words, now_ns)
+                self._deadline_ns = min(self._deadline_ns, service.deadline_ns)
         return requests
 
     def _accept(self, service: Service, area: Area, words: Words, now_ns: int) -> list[Request]:
@@ -235,7 +242,7 @@ class Dispatch:
         if refusal or socket is None:
             service.code = refusal
             return []
-        self._touched.setdefault(number, TOGETHER)
+        self._touched.setdefault(socket, TOGETHER)
         if service.flag & TRANSFERS:
             return start_transfer(service, parameters, socket, words.memory, now_ns)
         if service.switch is CLOSE:
@@ -283,7 +290,7 @@ class Dispatch:
                 service.interrupts = self._interrupt(socket, now_ns)
                 self._delay(service, self._timing.delay(), now_ns)
                 requests += socket.begin_close(service)
-                self._touch(socket, TOGETHER)
+                self._touched.setdefault(socket, TOGETHER)
                 self._forced.append(service)
         self._services += self._forced
         return requests
@@ -297,13 +304,9 @@ class Dispatch:
 
     def show(self) -> bool:
         """Write what changed and is due; True if this refresh has written anything."""
-        for number, skew in self._touched.items():
-            self._display.show(self._sockets[number], skew)
+        changed = self._display.end(self._touched)
         self._touched.clear()
-        return self._display.end()
-
-    def _touch(self, socket: Socket, skew: Skew) -> None:
-        self._touched.setdefault(socket.number, skew)
+        return changed
 
     def wake_ns(self, now_ns: int) -> int:
         """Until when nothing happens by itself: 0 if the next refresh has work, `NEVER_NS` if nothing is timed."""

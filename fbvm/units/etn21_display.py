@@ -6,6 +6,7 @@ Only bits that changed are written, so what the CPU has cleared meanwhile (a cha
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fbvm.units import etn21_map as at
@@ -45,21 +46,27 @@ class Display:
         """A refresh begins, in which the unit has something to do."""
         self._words, self._cycle, self._changed = words, cycle, False
 
-    def end(self) -> bool:
-        """The refresh ends: write what was put off until now; True if any word was written in this refresh."""
+    def end(self, touched: Mapping[Socket, Skew]) -> bool:
+        """The refresh ends: report what changed of these sockets, and write what was put off until now; True if any word
+        was written in this refresh."""
+        for socket, skew in touched.items():
+            self._show(socket, skew)
         if self._later:
-            later, self._later = self._later, []
-            for change in later:
-                if change[0] > self._cycle:
-                    self._later.append(change)
-                else:
-                    _, in_d, address, stays, turns_on = change
-                    words = self._words.d if in_d else self._words.cio
-                    words[address] = words[address] & stays | turns_on
-                    self._changed = True
-            if not self._later:
-                self._last_due.clear()
+            self._write_due()
         return self._changed
+
+    def _write_due(self) -> None:
+        later, self._later = self._later, []
+        for change in later:
+            if change[0] > self._cycle:
+                self._later.append(change)
+            else:
+                _, in_d, address, stays, turns_on = change
+                words = self._words.d if in_d else self._words.cio
+                words[address] = words[address] & stays | turns_on
+                self._changed = True
+        if not self._later:
+            self._last_due.clear()
 
     @property
     def pending(self) -> bool:
@@ -68,30 +75,37 @@ class Display:
 
     def show_result(self, service: Service, area: Area, due_cycle: int) -> None:
         """Write the results of a service and its response code, and turn its switch OFF, in refresh `due_cycle`."""
-        change, first = self._change, area.first
+        first, (word, first_bit) = area.first, area.switches
+        if due_cycle > self._cycle or self._later:
+            for offset, value in service.results.items():
+                self._put_off(True, first + offset, 0, value, due_cycle)
+            self._put_off(True, first + at.RESPONSE, 0, service.code or 0, due_cycle)
+            self._put_off(False, word, ~(1 << first_bit + service.switch), 0, due_cycle)
+            return
+        d, cio = self._words.d, self._words.cio
         for offset, value in service.results.items():
-            change(True, first + offset, 0, value, due_cycle)
-        change(True, first + at.RESPONSE, 0, service.code or 0, due_cycle)
-        word, first_bit = area.switches
-        change(False, word, ~(1 << first_bit + service.switch), 0, due_cycle)
+            d[first + offset] = value
+        d[first + at.RESPONSE] = service.code or 0
+        cio[word] &= ~(1 << first_bit + service.switch)
+        self._changed = True
 
     def end_force_close(self) -> None:
         """Turn bit 2 of n OFF."""
-        self._change(False, self._layout.n, ~at.FORCE_CLOSE, 0, self._cycle)
+        self._change(False, self._layout.n, at.FORCE_CLOSE, 0, TOGETHER)
 
-    def show(self, socket: Socket, skew: Skew) -> None:
+    def _show(self, socket: Socket, skew: Skew) -> None:
         """Report what changed of a socket since it was last shown."""
         shown = self._shown.get((socket.protocol, socket.number)) or self._first(socket)
         status, received = socket.shown()
         if status != shown.status:
-            self._differences(False, shown.status_at, shown.status ^ status, status, skew)
+            self._change(False, shown.status_at, shown.status ^ status, status, skew)
             shown.status = status
         if socket.protocol == "TCP":
             if received != shown.received:
-                self._differences(True, shown.received_at, shown.received ^ received, received, skew)
+                self._change(True, shown.received_at, shown.received ^ received, received, skew)
                 shown.received = received
             if socket.state != shown.state:
-                self._differences(True, shown.state_at, shown.state ^ socket.state, socket.state, skew)
+                self._change(True, shown.state_at, shown.state ^ socket.state, socket.state, skew)
                 shown.state = socket.state
 
     def _first(self, socket: Socket) -> Shown:
@@ -100,22 +114,21 @@ class Display:
             self._layout.status(protocol, number), m + at.BYTES_RECEIVED + number, m + at.TCP_STATE + number)
         return shown
 
-    def _differences(self, in_d: bool, address: int, changed: int, value: int, skew: Skew) -> None:
-        if skew is TOGETHER:
-            self._change(in_d, address, ~changed, changed & value, self._cycle)
+    def _change(self, in_d: bool, address: int, changed: int, value: int, skew: Skew) -> None:
+        """Write bits of a word that have changed, each group of them when it is due."""
+        if skew is TOGETHER and not self._later:
+            words = self._words.d if in_d else self._words.cio
+            words[address] = words[address] & ~changed | changed & value
+            self._changed = True
             return
         flags, opened = (0, 0) if in_d else (at.FLAGS, at.OPEN)
         groups = ((flags, skew.flag), (opened, skew.open), (0xFFFF & ~flags & ~opened, skew.data))
         for mask, delay in groups:
             if changed & mask:
-                self._change(in_d, address, ~(changed & mask), changed & mask & value, self._cycle + delay)
+                self._put_off(in_d, address, ~(changed & mask), changed & mask & value, self._cycle + delay)
 
-    def _change(self, in_d: bool, address: int, stays: int, turns_on: int, due_cycle: int) -> None:
-        if due_cycle > self._cycle or self._later:
-            due_cycle = max(due_cycle, self._last_due.get((in_d, address), 0))
-            self._last_due[in_d, address] = due_cycle
-            self._later.append((due_cycle, in_d, address, stays, turns_on))
-        else:
-            words = self._words.d if in_d else self._words.cio
-            words[address] = words[address] & stays | turns_on
-            self._changed = True
+    def _put_off(self, in_d: bool, address: int, stays: int, turns_on: int, due_cycle: int) -> None:
+        """Leave a change for the end of that refresh; not before an earlier change of the same word."""
+        due_cycle = max(due_cycle, self._last_due.get((in_d, address), 0))
+        self._last_due[in_d, address] = due_cycle
+        self._later.append((due_cycle, in_d, address, stays, turns_on))

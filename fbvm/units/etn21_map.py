@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from sys import byteorder
 from typing import NamedTuple
 
 from fbvm.wire.link import Peer
@@ -64,8 +65,10 @@ class Switch(IntEnum):
 
 UDP_OPEN, PASSIVE_OPEN, ACTIVE_OPEN, SEND, RECEIVE, CLOSE = Switch  # Python 3.11 finds the member of an Enum by a call
 OPENS = frozenset({UDP_OPEN, PASSIVE_OPEN, ACTIVE_OPEN})
-ALL_SWITCHES = 0x3F
-SWITCHES_IN = tuple(tuple(switch for switch in Switch if mask >> switch & 1) for mask in range(ALL_SWITCHES + 1))
+AREA_SWITCHES = 0x3F
+ALL_SWITCHES = 0x3F3F_3F3F_3F3F_3F3F
+"""A byte an area, wherever it lies."""
+SWITCHES_IN = tuple(tuple(switch for switch in Switch if mask >> switch & 1) for mask in range(AREA_SWITCHES + 1))
 """The switches that are ON in a mask of them."""
 
 FLAG_OF = (OPENING, OPENING, OPENING, SENDING, RECEIVING, CLOSING)
@@ -112,6 +115,12 @@ class Layout:
         """CIO address of the word with the area's request switches, and the bit number of its first switch."""
         return self.n + SWITCHES + (area - 1) // 2, 0 if area % 2 else 8
 
+    def switches_shift(self, area: int) -> int:
+        """How far up the area's switches stand in n+19..n+22 as one number of 64 bits."""
+        word, first_bit = self.switches(area)
+        place = word - self.n - SWITCHES
+        return 16 * (place if byteorder == "little" else 3 - place) + first_bit
+
     def status(self, protocol: str, socket: int) -> int:
         """CIO address of a socket's status word."""
         return self.n + (TCP_STATUS if protocol == "TCP" else UDP_STATUS) + socket
@@ -133,7 +142,7 @@ class Parameters(NamedTuple):
     @classmethod
     def read(cls, d: memoryview, at: int) -> Parameters:
         """The area whose first word is D `at`."""
-        return cls._make(d[at : at + RESPONSE].tolist())
+        return cls(*d[at : at + RESPONSE])
 
     @property
     def option(self) -> int:

@@ -13,15 +13,9 @@ if TYPE_CHECKING:
 NEVER_NS = 1 << 63
 
 
-@dataclass(slots=True, eq=False)
 class Service:
     """A request that a switch has made; `code` stays None until it is decided how the service ends."""
 
-    switch: Switch
-    area: Area | None
-    """None for the closes of a force-close, which have neither switch nor response code of their own."""
-
-    accept_cycle: int
     parameters: Parameters | None = None
     """None until the request is accepted."""
 
@@ -29,31 +23,34 @@ class Service:
     """None if a check refused the request."""
 
     code: int | None = None
-    earliest_cycle: int = 0
-    earliest_ns: int = 0
-    deadline_ns: int = NEVER_NS
-    deadline_code: int = 0
-    unanswered: int = 0
+    earliest_cycle = 0
+    earliest_ns = 0
+    deadline_ns = NEVER_NS
+    deadline_code = 0
+    unanswered = 0
     """Parts of a send that the network has not answered yet."""
 
-    count: int = 0
+    count = 0
     """Bytes really sent or received, for +5."""
 
-    data: bytes = b""
-    results: dict[int, int] = field(default_factory=dict)
-    """Further result words: offset in the parameter area -> value."""
-
+    data = b""
     interrupts: tuple[Service, ...] = ()
     """The services that this close ended; their results come first, a cycle apart."""
 
-    concluded_cycle: int = NEVER_NS
+    concluded_cycle = NEVER_NS
     """Refresh that writes the response code; the switch goes OFF with it."""
 
-    flag: int = 0
-    """Its bit in the socket's status word; follows from the switch."""
-
-    def __post_init__(self) -> None:
-        self.flag = FLAG_OF[self.switch]
+    def __init__(self, switch: Switch, area: Area | None, accept_cycle: int) -> None:
+        self.switch = switch
+        self.area = area
+        """None for the closes of a force-close, which have neither switch nor response code of their own."""
+        self.accept_cycle = accept_cycle
+        self.flag = FLAG_OF[switch]
+        """Its bit in the socket's status word."""
+        self.switch_bit = 1 << area.shift + switch if area else 0
+        """Its switch in a mask of all switches."""
+        self.results: dict[int, int] = {}
+        """Further result words: offset in the parameter area -> value."""
 
     @property
     def rank(self) -> int:
@@ -67,7 +64,8 @@ class Service:
 class Area:
     """Parameter area 1..8: what runs in it and to which socket it is bound."""
 
-    number: int
+    shift: int
+    """By how much its switches stand higher in a mask of all switches than those of the first area."""
     first: int
     """D address of its first word."""
     switches: tuple[int, int]
@@ -79,9 +77,3 @@ class Area:
     result_cycle: int = -1
     """Refresh of the last response code: one word holds it, so results are a cycle apart (W343 6-2-7 p128)."""
 
-    def owned(self) -> int:
-        """The switches that belong to a request already seen, as a mask."""
-        mask = 0
-        for service in self.services:
-            mask |= 1 << service.switch
-        return mask

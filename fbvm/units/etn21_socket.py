@@ -5,7 +5,9 @@ Knows neither memory nor cycles.  States follow W421 6-6-2 p112, the reactions t
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import Enum
+from typing import Any
 
 from fbvm.units import etn21_codes as codes
 from fbvm.units import etn21_map as at
@@ -90,9 +92,7 @@ class Socket:
 
     def shown(self) -> tuple[int, int]:
         """The status word n+1..n+16, and m+1..m+8: 0 while a receive runs, at most 1,984 (W420 4-2 p88)."""
-        word = at.OPEN if self.connected else 0
-        for flag in self.services:
-            word |= flag
+        word = sum(self.services, at.OPEN if self.connected else 0)
         if not self._stream or not self.connected or word & at.RECEIVING:
             return word, 0
         return word | at.DATA_RECEIVED, min(len(self._stream), SERVICE_LIMIT)
@@ -217,7 +217,8 @@ class Socket:
         if self._unanswered_closes:
             return []
         if self.phase is OPEN:
-            self._take_while_open(event)
+            if taken := _WHILE_OPEN.get(type(event)):
+                taken(self, event)
             return self._serve_receive() if at.RECEIVING in self.services else []
         if self.phase is OPENING:
             return self._take_while_opening(event)
@@ -258,20 +259,6 @@ class Socket:
             service.results = {at.LOCAL_PORT: event.local_port}
         return [Grant(self.number, TCP_BUFFER)]
 
-    def _take_while_open(self, event: Event) -> None:
-        if isinstance(event, Received):
-            self._take_received(event)
-        elif isinstance(event, Sent):
-            self._take_sent(event)
-        elif isinstance(event, Failed):
-            self._take_failed_send(event)
-        elif isinstance(event, PeerClosed):
-            if self.state is TcpState.ESTABLISHED:
-                self._peer_closed = True
-                self.state = TcpState.CLOSE_WAIT
-        elif isinstance(event, Broken):
-            self._take_broken(event)
-
     def _take_received(self, event: Received) -> None:
         if self.protocol == "TCP":
             self._stream += event.data
@@ -291,6 +278,11 @@ class Socket:
         if service is not None and service.code is None:
             service.code = codes.code_of(event.error)
             self._send_ended = self.protocol == "TCP"
+
+    def _take_peer_closed(self, event: PeerClosed) -> None:
+        if self.state is TcpState.ESTABLISHED:
+            self._peer_closed = True
+            self.state = TcpState.CLOSE_WAIT
 
     def _take_broken(self, event: Broken) -> None:
         """The buffer is lost with the connection (assumed); who waits is told why, or else the next service is."""
@@ -327,7 +319,8 @@ class Socket:
         elif self._stream and limit:
             self._hand_over(service, bytes(self._stream[:limit]))
             del self._stream[:limit]
-            return [] if self._peer_closed else [Grant(self.number, max(0, TCP_BUFFER - len(self._stream)))]
+            left = TCP_BUFFER - len(self._stream)
+            return [] if self._peer_closed else [Grant(self.number, left if left > 0 else 0)]
         elif self._unreported:
             service.code, self._unreported = self._unreported, 0
         elif self._peer_closed or self._broken or not limit:
@@ -338,6 +331,16 @@ class Socket:
         service.data = data
         service.count = len(data)
         service.code = codes.NORMAL_END
+
+
+_WHILE_OPEN: dict[type, Callable[[Socket, Any], None]] = {
+    Received: Socket._take_received,
+    Sent: Socket._take_sent,
+    Failed: Socket._take_failed_send,
+    PeerClosed: Socket._take_peer_closed,
+    Broken: Socket._take_broken,
+}
+"""What an event does to an open socket."""
 
 
 def results_of(remote: Peer) -> dict[int, int]:

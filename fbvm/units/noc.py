@@ -65,6 +65,7 @@ class Noc:
         self._seen: tuple[bytes, bool, bool] | None = None
         """Mailbox and settings as the last refresh left them."""
         self.wake_ns = NEVER_NS
+        self.news = False
         self._port = Port(place + 1, at.PLACES * at.HEAD_WORDS, at.SLOTS, at.number_of)
 
     watched = None
@@ -103,7 +104,7 @@ class Noc:
             return []
         before = (words.tobytes(), self.link_up, self.configured)
         if not events and before == self._seen and (self._ready_ns is None or now_ns < self._ready_ns):
-            self.wake_ns = self._next_ns()
+            self.wake_ns, self.news = self._next_ns(), False
             return []
         head = self._head(words)
         if head[at.REQUEST] & at.RESTART:
@@ -119,7 +120,7 @@ class Noc:
         self._count(head, events, requests)
         self._before = head.tobytes()
         self._seen = (words.tobytes(), self.link_up, self.configured)
-        self.wake_ns = self._next_ns() if self._seen == before else 0
+        self.wake_ns, self.news = self._next_ns(), self._seen != before
         return requests
 
     def _next_ns(self) -> int:

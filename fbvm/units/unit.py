@@ -27,9 +27,11 @@ class Unit(Protocol):
     """IPv4 address of the unit, by which it is attached to a network."""
 
     wake_ns: int
-    """When another refresh is worth while, after the last one: 0 if that changed words or left work, so that nobody
-    should wait; else the time at which something happens by itself, far away if nothing does.  What the program asks
-    for, or a network tells, comes besides."""
+    """When the unit has something to do by itself: 0 in the next refresh, far away if nothing is timed.  What the program
+    asks for, or a network tells, comes besides."""
+
+    news: bool
+    """True if the last refresh changed words, so that the program should look at them soon."""
 
     @property
     def watched(self) -> Sequence[tuple[str, int]] | None:

@@ -175,7 +175,7 @@ class Link(Protocol):
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
         """Take requests in order.  Never blocks; answers come as events of this or a later call of `events`."""
 
-    def events(self, now_ns: int) -> list[Event]:
+    def events(self, now_ns: int) -> Sequence[Event]:
         """What happened up to `now_ns`, in order, each once.  Never blocks."""
 
     @property

@@ -71,7 +71,8 @@ class Box:
     watched = None
 
     def __init__(self) -> None:
-        self.wake_ns = 0
+        self.wake_ns = 1 << 63
+        self.news = False
         self.configuration: dict[str, Any] = {}
         self.settings: dict[str, Any] = {}
 
@@ -81,7 +82,7 @@ class Box:
         words[0] |= 8
         for slot in range(BOX.head_words, BOX.words, BOX.slot_words):
             words[slot + 1] = 100 + slot if words[slot] else 0
-        self.wake_ns = 0 if words.tobytes() != before else 1 << 63
+        self.news = words.tobytes() != before
         return []
 
     def reset(self, memory: AreaMemory) -> list[Request]:

@@ -47,6 +47,8 @@ class RealNetwork:
         self._attached = self._happened = False
         self._happenings_ns = [clock.now_ns + at_ms * MS for at_ms in happenings_ms]
 
+    is_quiet = False
+
     def attach(self, address: str) -> Link:
         """The first unit's link is the network itself, to which everything happens."""
         if not self._attached:
@@ -80,7 +82,7 @@ class Idle:
     """A unit that does nothing."""
 
     name, address, wake_ns = "Idle 0", "192.168.250.9", 1 << 63
-
+    news = False
     watched = None
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:

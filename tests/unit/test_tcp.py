@@ -227,6 +227,17 @@ def test_unread_data_do_not_turn_the_fin_into_a_reset(network: TcpNetwork, devic
     assert until(link, lambda events: is_reset(line)) == [Closed(1)]
 
 
+def test_a_connection_that_waited_for_a_grant_still_hears_its_peer_after_the_close(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device, grant=0)
+    line.sendall(b"never granted")
+    assert network.wait(BOUND_S)
+    assert link.events(now_ns()) == []
+    link.submit([Close(1)], now_ns())
+    assert line.recv(10) == b""
+    line.sendall(b"too late")
+    assert until(link, lambda events: is_reset(line)) == [Closed(1)]
+
+
 def test_a_peer_that_never_reads(network: TcpNetwork, device: Device) -> None:
     link, line = opened(network, device)
     line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
