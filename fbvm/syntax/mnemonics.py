@@ -82,6 +82,10 @@ class RungText:
         return len(line.step.operands) < (line.row.least if line.row.does != ".call" else 0)
 
 
+ALONE = (".end", ".jump_end", ".for", ".next", ".step", ".subroutine", ".return")
+"""What begins or ends more than a rung, and is therefore one of its own, whatever a line RUNG says."""
+
+
 class Refusal(Exception):
     """A line cannot be read; the arguments are start, end, message and hint."""
 
@@ -314,7 +318,8 @@ class _LineReader:
     def _begin(self, row: Instruction, mnemonic: Token) -> None:
         """Begin another rung if this instruction does."""
         rung = self.rungs[-1]
-        if rung.picture or rung.lines and not rung.declared and row.inputs == 0 and rung.may_end:
+        apart = rung.lines and (row.does in ALONE or rung.lines[-1].row.does in ALONE)
+        if rung.picture or rung.lines and (apart or not rung.declared) and row.inputs == 0 and rung.may_end:
             self.rungs.append(RungText(mnemonic.start))
 
 
