@@ -49,7 +49,7 @@ def ladder_svg(rungs: Sequence[Drawn]) -> str:
 
 
 def rung_svg(surface: Surface) -> str:
-    """A drawing as a part of a page, which says what `svg.rung` and its `text`, `path`, `mark`, `power`, `faint` look like."""
+    """A drawing of a rung or a chart as a part of a page, which says what `svg.rung` and its `text`, `path`, `mark`, `power`, `faint` look like."""
     places = [*surface.lines, *surface.texts]
     width = (max(x for x, _ in places) + 2) * CELL_WIDTH
     height = (max(y for _, y in places) + 1) * CELL_HEIGHT

@@ -25,7 +25,7 @@ from fbvm.record.ladder_text import ladder_surface
 from fbvm.record.power import Power
 from fbvm.record.recorder import Signal, signals_at
 from fbvm.record.sfc_seen import Called, Evolutions
-from fbvm.record.sfc_text import sfc_text
+from fbvm.record.sfc_text import sfc_surface
 from fbvm.record.trace import Moment, Trace
 from fbvm.record.trace_format import PHASES
 from fbvm.record.trace_signals import chosen_signals
@@ -127,7 +127,7 @@ class Collector:
 
     def _chart(self, called: Called) -> list[str]:
         name, kind = self._trace.bodies[called.picture.body]
-        return [f"{kind} {name}", *sfc_text(called.picture, RUNG_WIDTH, called.sighted)]
+        return [f"{kind} {name}", rung_svg(sfc_surface(called.picture, RUNG_WIDTH, called.sighted))]
 
     def _picture(self, scan: int, base: int, key: tuple[object, ...], lines: Callable[[], list[str]]) -> None:
         if key not in self.drawings and len(self.pictures) < MOST_PICTURES:

@@ -45,12 +45,7 @@ class ScanPanel {
       const picture = element("pre");
       const path = this.run.data.instances[instance], [head, ...lines] = this.run.data.pictures[number].split("\n");
       picture.append(element("b", "", head), element("span", "dim", path ? `  in ${path}\n` : "\n"));
-      if (lines.length && lines[0].startsWith("<svg")) {
-        picture.append(new DOMParser().parseFromString(lines[0], "image/svg+xml").documentElement);
-        return picture;
-      }
-      const parts = lines.join("\n").split(/([━┃┏┓┗┛┣┫┳┻╋┡┢┩┪┞┟┦┧┠┨┝┥┯┷┰┸┿╂┚┙┎┒┖╺╸╻╹●]+)/);
-      picture.append(...parts.map((part, at) => at % 2 ? element("span", "power", part) : part));
+      for (const line of lines) picture.append(new DOMParser().parseFromString(line, "image/svg+xml").documentElement);
       return picture;
     });
   }
