@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.sax.saxutils import escape
 
+from fbvm.record.sfc_text import TOKEN
 from fbvm.syntax.box_lines import DOUBLE, DOWN, LEFT, RIGHT, THICK, UP, Surface
 
 CELL_WIDTH, CELL_HEIGHT = 9, 18
@@ -14,12 +15,14 @@ APART = 2.0
 _STYLE = """
     text { font: 14px ui-monospace, "DejaVu Sans Mono", Menlo, Consolas, monospace; fill: #1f2430; white-space: pre; }
     text.head { font-weight: bold; } text.faint { fill: #6b7280; font-size: 12px; }
+    text.power { fill: #0a8f3c; }
     path { fill: none; stroke: #6b7280; stroke-width: 1.2; stroke-linecap: square; }
     path.mark { stroke: #1f2430; stroke-width: 1.8; stroke-linecap: butt; }
     path.power { stroke: #0a8f3c; stroke-width: 3.2; }
     rect { fill: #ffffff; }
     @media (prefers-color-scheme: dark) {
-        text { fill: #e5e7eb; } text.faint { fill: #9ca3af; } path { stroke: #9ca3af; } path.mark { stroke: #e5e7eb; }
+        text { fill: #e5e7eb; } text.faint { fill: #9ca3af; } text.power { fill: #34d26b; }
+        path { stroke: #9ca3af; } path.mark { stroke: #e5e7eb; }
         path.power { stroke: #34d26b; } rect { fill: #16181d; }
     }
 """
@@ -49,7 +52,8 @@ def ladder_svg(rungs: Sequence[Drawn]) -> str:
 
 
 def rung_svg(surface: Surface) -> str:
-    """A drawing of a rung or a chart as a part of a page, which says what `svg.rung` and its `text`, `path`, `mark`, `power`, `faint` look like."""
+    """A drawing of a rung or a chart as a part of a page, which says what `svg.rung` and its `text`, `path`, `mark`, `power`,
+    `faint` look like."""
     places = [*surface.lines, *surface.texts]
     width = (max(x for x, _ in places) + 2) * CELL_WIDTH
     height = (max(y for _, y in places) + 1) * CELL_HEIGHT
@@ -110,10 +114,11 @@ def _texts(surface: Surface, row: int) -> list[str]:
     run, start, kind = "", (0, 0), ""
     texts = {place: character for place, character in surface.texts.items() if place not in surface.strokes}
     for (x, y), character in sorted(texts.items(), key=lambda item: (item[0][1], item[0][0])):
-        if run and (x, y) != (start[0] + len(run), start[1]):
+        here = "power" if character == TOKEN else "faint" if (x, y) in surface.faint else ""
+        if run and ((x, y) != (start[0] + len(run), start[1]) or here != kind and "power" in (here, kind)):
             parts.append(_text(start[0], start[1] + row, run, kind))
             run = ""
-        start, kind = (start, kind) if run else ((x, y), "faint" if (x, y) in surface.faint else "")
+        start, kind = (start, kind) if run else ((x, y), here)
         run += character
     return [*parts, _text(start[0], start[1] + row, run, kind)] if run else parts
 
