@@ -96,9 +96,9 @@ class Express:
             self._exchange(series, now_ns)
         return None
 
-    def burst(self, most: int, last_ns: int, clock: Callable[[], int], budget: int) -> tuple[list[int], Trap | None]:
+    def burst(self, times: list[int], most: int, last_ns: int, clock: Callable[[], int], budget: int) -> Trap | None:
         """Scans each at the time that the clock tells, one upon the other for as long as units have news for the program;
-        their times.  The last one before them was at `last_ns`.
+        `times` takes when they began.  The last one before them was at `last_ns`.
 
         A refresh that was left out takes place now if there is something for it: waiting comes before the refresh, as in
         a PLC with a fixed cycle time (W394)."""
@@ -106,12 +106,11 @@ class Express:
         if self._passed and not is_idle(self._units, now_ns):
             self._passed -= 1
             self._exchange(self._series, now_ns)
-        times: list[int] = []
         while True:
             times.append(now_ns)
             trap = self.once(now_ns - last_ns, now_ns, budget)
             if trap or len(times) >= most or (not self._news and wake_ns(self._units, NEVER) > now_ns):
-                return times, trap
+                return trap
             last_ns, now_ns = now_ns, clock()
 
     def many(self, most: int, now_ns: int, step_ns: int, budget: int, spend: int) -> tuple[int, Trap | None]:

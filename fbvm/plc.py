@@ -255,12 +255,16 @@ class Plc:
 
     def scan_at_once(self, most: int, clock: Callable[[], int]) -> list[int]:
         """Scans in the time that `clock` tells, one upon the other for as long as units have news for the program; when
-        they began.  None if somebody has to be told between them, or has a part in one: then it takes `scan`."""
+        they began.  There is none if somebody has to be told between them, or has a part in one: then it takes `scan`."""
+        times: list[int] = []
         if self.watchers or self._past.maxlen or self.trap or not self._in_one_piece():
-            return []
-        times, self.trap = self._express.burst(most, self.now_ns, clock, self.budget)
-        self.scans += len(times)
-        self.now_ns = times[-1]
+            return times
+        try:
+            self.trap = self._express.burst(times, most, self.now_ns, clock, self.budget)
+        finally:  # Ctrl-C may come between two of them
+            if times:
+                self.scans += len(times)
+                self.now_ns = times[-1]
         return times
 
     def _many_guarded(self, most: int) -> tuple[int, Trap | None]:

@@ -165,6 +165,25 @@ def test_a_burst_ends_so_that_others_have_their_turn(clock: Clock) -> None:
     assert plc.read("D30027") == 0x2210
 
 
+def test_ctrl_c_in_a_burst_loses_no_scan(image: Image, clock: Clock) -> None:
+    plc, network = polling(image, clock)
+    assert run(plc, for_ns=20 * MS, pace="event") == "time"
+    network.serve(0)
+    scans, now_ns, looks = plc.scans, plc.now_ns, 0
+
+    def interrupted() -> int:
+        nonlocal looks
+        looks += 1
+        if looks == 3:
+            raise KeyboardInterrupt
+        return now_ns + looks
+
+    with pytest.raises(KeyboardInterrupt):
+        plc.scan_at_once(16, interrupted)
+    assert (plc.scans, plc.now_ns) == (scans + 2, now_ns + 2)
+    assert plc.read("Main.Scans") == plc.scans
+
+
 def test_a_trap_ends_a_burst(clock: Clock) -> None:
     compilation = compile_text(POLL.replace("State := 4; END_IF;", "State := 4; Sum := Sum / Scans / (4 - State); END_IF;"))
     assert compilation.image
