@@ -72,7 +72,7 @@ class BodyLowering:
 
     def _draw(self, statements: tree.Block) -> None:
         """Note what is seen of statements of Structured Text where they are drawn as rungs."""
-        own = tree.Empty | ladder.Ladder | sfc.Sfc
+        own = tree.Empty | ladder.Ladder | ladder.Rung | sfc.Sfc
         for number, statement in enumerate((one for one in statements if not isinstance(one, own)), 1):
             site, steps, said = self.site(statement), (), ""  # type: int, tuple[tuple[int, str, str, tuple[str, ...]], ...], str
             try:

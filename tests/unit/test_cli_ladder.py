@@ -38,6 +38,13 @@ def test_rungs_are_drawn_with_addresses(file: Path) -> None:
     assert "│  100.00" in result.output
 
 
+def test_rungs_of_subroutines_are_drawn_once(file: Path) -> None:
+    rungs = "LD P_On\nSBS 5\nSBN 5\nLD P_On\nMOV A262 D230\nRET\nEND"
+    file.write_text(f"PROGRAM Main\nLADDER\n{rungs}\nEND_LADDER\nEND_PROGRAM", encoding="utf-8")
+    heads = [line for line in CliRunner().invoke(main, ["ladder", str(file)]).output.splitlines() if line.startswith("RUNG")]
+    assert heads == ["RUNG 1", "RUNG 2", "RUNG 5", "RUNG 3", "RUNG 4"]
+
+
 def test_a_picture_goes_to_a_file(file: Path, tmp_path: Path) -> None:
     result = CliRunner().invoke(main, ["ladder", str(file), "--svg", str(tmp_path / "motor.svg")])
     assert (result.exit_code, result.output) == (0, "")
