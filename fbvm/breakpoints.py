@@ -17,6 +17,7 @@ from fbvm.engine.runtime import NO_SITE
 from fbvm.engine.stops import Line, Stops, Test, Watched
 from fbvm.engine.tiers import Engine, choice_of, substitutes_of
 from fbvm.engine.trap import Trap
+from fbvm.watch.changes import changed
 from fbvm.watch.conditions import Condition, parse_condition
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, show
@@ -175,8 +176,10 @@ class Breakpoints:
 
     def _reason(self, said: Breakpoint, row: Line | Watched) -> str:
         if isinstance(row, Watched) and said.kind == "change":
-            found = self._plc.find(said.where)
-            return f"{said.where} was {_shown(found, row.before)}, is {_shown(found, row.value)}"
+            whole = self._plc.find(said.where)
+            found, before, after = changed(whole, cast(Value, row.before), cast(Value, row.value))
+            name = said.where if found is whole else found.name
+            return f"{name} was {_shown(found, before)}, is {_shown(found, after)}"
         return f"{said.where} holds" if said.kind == "condition" else f"breakpoint {said}"
 
 
@@ -229,5 +232,5 @@ def _extents(found: Place | Span) -> tuple[list[tuple[int, int]], int]:
     return [(place.offset, max(1, place.type.size)) for place in places], 0
 
 
-def _shown(found: Place | Span, value: object) -> str:
-    return show(found.type, cast(Value, value)) if isinstance(found, Place) else str(value)
+def _shown(found: Place | Span, value: Value) -> str:
+    return show(found.type, value) if isinstance(found, Place) else str(value)

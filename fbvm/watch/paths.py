@@ -274,10 +274,20 @@ def _element(place: Place, text: str) -> Place:
         if not low <= index <= high:
             raise UnknownPlace(f"{place.name}[{text}]: {index} is outside {low}..{high}")
         at = at * (high - low + 1) + index - low
-    name = f"{place.name}[{', '.join(map(str, indexes))}]"
+    return element(place, kind, at)
+
+
+def element(place: Place, kind: ArrayType, number: int) -> Place:
+    """The element of an array that so many stand in front of."""
+    subscripts: list[str] = []
+    left = number
+    for low, high in reversed(kind.bounds):
+        left, behind = divmod(left, high - low + 1)
+        subscripts.insert(0, str(low + behind))
+    name = f"{place.name}[{', '.join(subscripts)}]"
     if place.bit is not None:
-        return place.inner(name, kind.element, (place.bit + at) // 8, (place.bit + at) % 8)
-    return _followed(place.inner(name, kind.element, at * kind.element.size))
+        return place.inner(name, kind.element, (place.bit + number) // 8, (place.bit + number) % 8)
+    return _followed(place.inner(name, kind.element, number * kind.element.size))
 
 
 def _part(place: Place, bit: int) -> Place:
