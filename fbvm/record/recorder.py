@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from fbvm.base.types import BOOL, Elementary, EnumType, StringType, base
+from fbvm.base.types import BOOL, Elementary, EnumType, RefType, StringType, base
 from fbvm.plc import Plc
 from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.values import Value, show
@@ -128,14 +128,16 @@ def signals_at(found: Place | Span, descriptions: Mapping[str, str], meanings: M
 
 
 def signal(place: Place, description: str = "", meanings: Mapping[int, str] | None = None) -> Signal:
-    """The signal of one place.  Raises TypeError for an array or structure."""
-    return Signal(_single(place), place.name.replace("CIO ", "CIO"), description, tuple((meanings or {}).items()))
+    """The signal of one place.  Raises TypeError for an array, a structure or a reference."""
+    if not is_charted(place):
+        advice = "name what it leads to" if isinstance(place.type, RefType) else "name its members"
+        raise TypeError(f"{place.name} is {place.type.name}; a chart shows single values, {advice}")
+    return Signal(place, place.name.replace("CIO ", "CIO"), description, tuple((meanings or {}).items()))
 
 
-def _single(place: Place) -> Place:
-    if not isinstance(base(place.type), Elementary | StringType | EnumType):
-        raise TypeError(f"{place.name} is {place.type.name}; a chart shows single values, name its members")
-    return place
+def is_charted(place: Place) -> bool:
+    """True for a value that a row can show: no array, structure or reference."""
+    return isinstance(base(place.type), Elementary | StringType | EnumType)
 
 
 def described(plc: Plc, place: Place) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from fbvm.plc import Phase
 from fbvm.record.inside import Event, Passing
-from fbvm.record.recorder import Recording, Signal, Track, signals_at
+from fbvm.record.recorder import Recording, Signal, Track, is_charted, signals_at
 from fbvm.record.selection import select, singles, tops
 from fbvm.record.trace import Moment, Trace
 from fbvm.record.traffic import Passed, Reader
@@ -16,7 +16,7 @@ from fbvm.watch.paths import Place
 def recording(trace: Trace, names: Sequence[str] = (), scans: range | None = None) -> Recording:
     """What some variables did, for charts; without names, those that were selected or all single ones that changed.
 
-    Raises UnknownPlace; TypeError for an array or a structure."""
+    Raises UnknownPlace; TypeError for an array, a structure or a reference."""
     wanted = range(max(trace.scans.start, scans.start), min(trace.scans.stop, scans.stop)) if scans else trace.scans
     made = Recording([Track(signal) for signal in chosen_signals(trace, names)], wanted.start)
     for moment in trace.moments(wanted):
@@ -62,7 +62,7 @@ def chosen_signals(trace: Trace, names: Sequence[str]) -> list[Signal]:
 
 
 def _every(trace: Trace) -> list[Signal]:
-    """All single values in the program that were selected, and what units describe."""
+    """All single values in the program that were selected, and what units describe; references are none."""
     selection = select(trace.symbols, trace.areas, trace.selected)
     chosen = selection.places if trace.selected else tuple(tops(trace.symbols))
     found: dict[Place, None] = {}
@@ -72,4 +72,4 @@ def _every(trace: Trace) -> list[Signal]:
     if not trace.selected:
         described = [trace.find(name) for name in trace.described]
         found.update(dict.fromkeys(place for place in described if isinstance(place, Place)))
-    return [signal for place in found for signal in signals_at(place, trace.described, trace.meanings)]
+    return [signal for place in found if is_charted(place) for signal in signals_at(place, trace.described, trace.meanings)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -348,3 +349,14 @@ def test_symbols_come_back() -> None:
 def test_what_are_no_symbols(data: dict[str, Any]) -> None:
     with pytest.raises(symbols.SymbolError, match="no symbols"):
         symbols.from_data(data)
+
+
+@pytest.mark.parametrize("selected", [(), ("Main.*",)])
+def test_references_are_left_out_of_a_chart_of_everything(selected: Sequence[str]) -> None:
+    plc = Plc(image("PROGRAM Main\nVAR a : INT; r : REF_TO INT; p : POINTER TO INT; f : REFERENCE TO INT;\n"
+                    "both : ARRAY[1..2] OF REF_TO INT; END_VAR\n"
+                    "a := a + 1; r := REF(a); p := ADR(a); f REF= a; both[2] := r;\nEND_PROGRAM"))
+    trace = Trace(io.BytesIO(record(plc, 3, selected=selected, before=lambda plc: None)))
+    assert [track.signal.label for track in recording(trace).tracks] == ["Main.a"]
+    with pytest.raises(TypeError, match=r"Main\.r is REF_TO INT; a chart shows single values"):
+        recording(trace, ["Main.r"])
