@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from io import StringIO
+from io import BytesIO, StringIO
 from pathlib import Path
 
 import click
@@ -26,8 +26,9 @@ Names = Sequence[str]
 
 
 def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
+    made = recorded(trace, names, scans)
     with path.open("w", encoding="utf-8", newline="") as file:
-        write_rows(recorded(trace, names, scans), file)
+        write_rows(made, file)
 
 
 def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
@@ -95,8 +96,10 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
 def _to_trace(source: Path, target: Path) -> None:
     if target.suffix.lower() != SUFFIX:
         raise click.UsageError(f"{target}: a table becomes a trace; end it with {SUFFIX}")
+    made = BytesIO()
     try:
-        with source.open(encoding="utf-8-sig", newline="") as file, target.open("wb") as out:
-            read_rows(file, out)
+        with source.open(encoding="utf-8-sig", newline="") as file:
+            read_rows(file, made)
     except (RowsError, UnicodeDecodeError) as error:
         raise click.UsageError(f"{source}: {error}") from None
+    target.write_bytes(made.getvalue())

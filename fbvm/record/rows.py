@@ -16,7 +16,8 @@ from decimal import Decimal
 from typing import Any, BinaryIO, TextIO
 
 from fbvm.base.areas import SLOTS_OFFSET, AddressError, parse_address
-from fbvm.base.types import BOOL, LINT, LREAL, TIME, EnumType, Field, StructType, Type, base, fold, string
+from fbvm.base.arithmetic import shortest
+from fbvm.base.types import BOOL, LINT, LREAL, REAL, TIME, EnumType, Field, StructType, Type, base, fold, string
 from fbvm.code.image import Image, Layout
 from fbvm.plc import Plc
 from fbvm.record.recorder import Recording, Signal
@@ -65,7 +66,9 @@ def _cell(signal: Signal, value: Value) -> str:
         return _milliseconds(value)
     if isinstance(base(signal.place.type), EnumType):
         return signal.text(value)
-    return "" if value is None else repr(value) if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return repr(shortest(value) if base(signal.place.type) is REAL else value)
+    return "" if value is None else str(value)
 
 
 def _milliseconds(time_ns: int) -> str:

@@ -123,6 +123,17 @@ def test_out_as_csv_and_in_again(fbvm: Fbvm) -> None:
     assert "Main.Pump  .#" in fbvm("chart", "back.fbtrace", "Main.Pump").output
 
 
+def test_what_cannot_be_converted_leaves_files_as_they_were(fbvm: Fbvm) -> None:
+    record(fbvm)
+    Path("table.csv").write_text("a,b\n")
+    for arguments, target in (("run.fbtrace old.csv Nothing", "old.csv"), ("run.fbtrace new.csv Nothing", "new.csv"),
+                              ("table.csv old.fbtrace", "old.fbtrace"), ("table.csv new.fbtrace", "new.fbtrace")):
+        if "old" in target:
+            Path(target).write_text("old")
+        assert fbvm("convert", *arguments.split()).exit_code == 2
+        assert [path.read_text() for path in Path().glob(target)] == ["old"] * ("old" in target), target
+
+
 def test_out_as_vcd(fbvm: Fbvm) -> None:
     pytest.importorskip("vcd")
     record(fbvm)

@@ -53,6 +53,13 @@ def test_times_below_a_millisecond_are_kept() -> None:
     assert [line.split(",")[1] for line in rows(made).splitlines()[1:]] == ["0", "1.5", "3"]
 
 
+def test_a_real_has_the_digits_that_it_needs() -> None:
+    plc = Plc(image("PROGRAM Main VAR r : REAL := 0.1; l : LREAL := 0.1; END_VAR r := r * 3.0; l := l * 3.0; END_PROGRAM"))
+    made = Recorder(plc, ["Main.r", "Main.l"])
+    plc.scan()
+    assert rows(made).splitlines()[1] == "0,0,0.3,0.30000000000000004"
+
+
 def test_what_goes_out_comes_in() -> None:
     names = [name for name in NAMES if "[" not in name]
     text = rows(recording(traced(30), names))
