@@ -11,6 +11,7 @@ from fbvm.syntax.literals import ELEMENTARY
 from fbvm.syntax.mend import Mend
 from fbvm.syntax.phrases import found
 from fbvm.syntax.prospect import advance, symbols
+from fbvm.syntax.tree import Name
 
 ARRAY = "an array is written ARRAY [0..9] OF INT"
 SECTIONS = {"INPUT": "VAR_INPUT", "OUTPUT": "VAR_OUTPUT", "IN_OUT": "VAR_IN_OUT", "INOUT": "VAR_IN_OUT", "TEMP": "VAR_TEMP",
@@ -107,6 +108,32 @@ def function_head(automaton: Automaton, token: Token, following: list[Token]) ->
         return None
     cut(automaton.states, automaton.values, anchor(automaton.states, open_[0].at))
     return Mend([*head, token], start, end, message, advice, lossless=True)
+
+
+def alias(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`x AT y : INT;`, another name for a variable in RuSTy"""
+    if automaton.before.type != "AT" or token.type != "NAME" or len(following) < 3 or following[1].type != "COLON":
+        return None
+    names = [value[-1] for value in automaton.values if isinstance(value, list) and value and isinstance(value[-1], Name)]
+    name, kind = names[-1].text if names else "x", following[2].text
+    return Mend([Token("LOCATION", "%M*", token.start, token.end)], token.start, token.end,
+                f"AT binds to an address, and {token.text} is none",
+                "write %MW10, D100 or CIO 1519.03; another name for a variable is a reference: "
+                f"{name} : REFERENCE TO {kind} REF= {token.text};", lossless=False)
+
+
+def written_type(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+    """`SIZEOF(ARRAY [0..9] OF INT)`"""
+    if token.type not in ("ARRAY", "STRUCT", "STRING", "WSTRING", "POINTER", "REF_TO") or automaton.before.type != "LPAR":
+        return None
+    if not advance(automaton.states, "NUMBER") or not advance(automaton.states, "RPAR"):
+        return None
+    first, depth = token, 1
+    while depth and token.type not in ("SEMICOLON", "$END"):
+        token = automaton.next()
+        depth += {"LPAR": 1, "RPAR": -1}.get(token.type, 0)
+    return Mend([token], first.start, first.end, "a type that is written out is no argument",
+                "give the type a name: TYPE Row : ARRAY [0..9] OF INT; END_TYPE, and then SIZEOF(Row)", lossless=False)
 
 
 def braces(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:

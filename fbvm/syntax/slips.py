@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 
 from fbvm.syntax.automaton import Automaton
-from fbvm.syntax.declaration_slips import braces, function_head, misnamed, sized_text, two_names
+from fbvm.syntax.declaration_slips import alias, braces, function_head, misnamed, sized_text, two_names, written_type
 from fbvm.syntax.foreign_forms import bare_function, bare_point, decimal_comma, doubled_quote, infix
 from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, cut, frames
 from fbvm.syntax.lexer import Token, lexis, meant
@@ -289,5 +289,5 @@ SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
     colon_behind, _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end,
     _location_behind_type, _caret, _begin, infix, decimal_comma, bare_point, doubled_quote, bare_function, _c_loop,
     _declared_in_body, _instruction_list, foreign_word, comment_signs, until, statement_as_value,
-    two_names, misnamed, sized_text, braces)
+    two_names, misnamed, sized_text, alias, written_type, braces)
 """Asked one after the other; the first that knows the mistake mends it."""
