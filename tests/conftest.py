@@ -26,6 +26,8 @@ if sys.dont_write_bytecode:
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     del os.environ["PYTHONDONTWRITEBYTECODE"]
 
+gc.set_threshold(100_000, 20, 50)  # what tests leave behind dies together: it is looked for seldom
+
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report(collector: pytest.Collector) -> Generator[None, pytest.CollectReport, pytest.CollectReport]:
@@ -43,12 +45,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_collection_finish() -> None:
-    """Thousands of tests stay where they are until the end: the host need not look through them again and again.
-
-    What tests leave behind dies together, so it is looked for seldom."""
-    gc.collect()
+    """Thousands of tests stay where they are until the end: the host need not look through them again and again."""
     gc.freeze()
-    gc.set_threshold(100_000, 20, 50)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -196,7 +196,7 @@ class Model:
         self.server.coils[:65536] = b"".join(BITS[word & 0xFF] + BITS[word >> 8] for word in self.cio[:4096])
         self.server.discrete_inputs[:] = self.server.coils[:5120]
         self.server.input_registers[:] = array("H", self.cio[:5801])
-        self.server.holding_registers[:] = array("H", rig.words("D").tolist())
+        self.server.holding_registers[:] = array("H", rig.words("D").tobytes())
 
     def answer(self, pdu: bytes) -> bytes:
         """The reply PDU."""

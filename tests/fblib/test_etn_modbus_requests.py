@@ -92,6 +92,7 @@ def test_bits_from_any_bit_on(bit: int, served: tuple[Rig, Client]) -> None:
         assert client.exchange(pdu) == model.answer(pdu)
 
 
+@pytest.mark.slow
 @each_of("full_dm", [False, True])
 @each_of(
     ("address", "quantity"),
@@ -167,6 +168,7 @@ def test_all_other_function_codes_are_refused(pins: str, codes: set[int]) -> Non
         assert model.agrees(rig)
 
 
+@pytest.mark.slow
 @each_of(
     ("address", "quantity"),
     [*limits(65536, 1968), *[(bit, 40) for bit in range(16)], *[(3, count) for count in range(1, 34)]],

@@ -6,6 +6,7 @@ import re
 import tomllib
 from pathlib import Path
 
+import pytest
 from mtcp_rig import SERVER
 from rows import each_of
 
@@ -48,6 +49,7 @@ def test_a_library_is_described(folder: Path) -> None:
     assert (folder / "README.md").is_file()
 
 
+@pytest.mark.slow
 @each_of("path", BLOCKS, ids=lambda path: path.stem)
 def test_no_block_gives_a_message(path: Path) -> None:
     """Functions are checked with the blocks that use them."""

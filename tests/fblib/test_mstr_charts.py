@@ -56,6 +56,7 @@ def test_remote_statistics_of_a_server_that_does_not_know_them() -> None:
     """
 
 
+@pytest.mark.slow
 def test_edge_and_hold_are_switches() -> None:
     assert begun(Rig(options="Edge := TRUE")).chart(8, *PINS[2:5]) == """
         Main.m1.ACTIVE   ###.....

@@ -56,6 +56,7 @@ def test_operators(kind: str) -> None:
         assert as_variables(f"a : {kind}; b : {kind}; r : {kind};", f"a {operator} b", rows) == want, operator
 
 
+@pytest.mark.slow
 @each_of("source", [*INTEGERS, *BITS])
 @each_of("target", [*INTEGERS, *BITS])
 def test_conversions(source: str, target: str) -> None:

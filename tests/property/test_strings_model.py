@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from rows import first_quick
 from test_arithmetic_model import compare
 
 CAPACITY = 12
@@ -15,7 +14,8 @@ POSITIONS = st.integers(1, CAPACITY + 3)
 PLAIN = "ab"
 
 
-@pytest.mark.parametrize("kind", first_quick(["STRING", "WSTRING"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["STRING", "WSTRING"])
 def test_functions(kind: str) -> None:
     declared = f"a, b, l, r, m, c, i, d, s, mx, mn, chosen : {kind}[{CAPACITY}]; long : {kind}[40]; n, p, size, place : INT; " \
                "lt, eq, ge : BOOL;"
