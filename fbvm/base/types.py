@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 
 
+@lru_cache(1 << 16)
 def fold(name: str) -> str:
     """A name as it is compared: case does not matter."""
     return name.upper()

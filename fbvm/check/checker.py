@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
@@ -24,6 +24,7 @@ from fbvm.check.statements import Statements, writes_eno
 from fbvm.check.values import Values
 from fbvm.syntax import tree
 
+_AS_IT_IS = nullcontext()
 Evaluate = Callable[[StandardCall, Sequence[Value], Dialect], Value | None]
 
 
@@ -141,9 +142,12 @@ class Checker:
         self.project.globals["", fold(name)] = instance
         return instance
 
-    @contextmanager
-    def scope(self, pou: Pou | None, late: bool = False) -> Iterator[None]:
+    def scope(self, pou: Pou | None, late: bool = False) -> AbstractContextManager[None]:
         """Constants of `pou` are visible while its declarations are worked out, `late` ones of its frame among them."""
+        return _AS_IT_IS if pou is self._scope and late == self._late else self._other_scope(pou, late)
+
+    @contextmanager
+    def _other_scope(self, pou: Pou | None, late: bool) -> Iterator[None]:
         before, self._scope = self._scope, pou
         was_late, self._late = self._late, late
         self.specs.types = pou.types if pou is not None else {}

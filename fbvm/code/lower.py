@@ -137,6 +137,8 @@ class BodyLowering:
     def measured(self, node: Node) -> Node:
         """The same operation, or a temporary for it if it is nested too deep."""
         heights, height = self._heights, 1
+        if id(node) in heights:
+            return node
         for part in node[2:]:
             if isinstance(part, tuple):
                 known = heights.get(id(part))

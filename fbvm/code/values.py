@@ -74,13 +74,14 @@ class ValueLowering:
 
     def _value(self, expr: tree.Expr, want: Type | None) -> Node:
         kind = self.facts.types[expr]
-        target = base(want) if want is not None else base(kind)
         known = self.facts.constants.get(expr)
         if known is not None:
+            target = base(kind if want is None else want)
             if machine(target) in FLOATS or machine(target) == "b" or machine(target) in TEXT_UNITS:
                 known = convert_constant(known, target)
             return constant(target, known)
-        return self.body.measured(self.converted(self._plain(expr), kind, target))
+        node = self._plain(expr)
+        return self.body.measured(node if want is None or want is kind else self.converted(node, kind, base(want)))
 
     def converted(self, node: Node, kind: Type, target: Type) -> Node:
         """A value of `kind` as one of `target`, to which it converts by itself."""
