@@ -39,7 +39,7 @@ class Code:
 
     @cached_property
     def translation(self) -> Translation:
-        """The image in LLVM's language, as fast code is made of it."""
+        """The image in LLVM's language."""
         return translate(self.image, self.stops)
 
     def prepare(self, level: int | None) -> None:
@@ -89,8 +89,8 @@ class Code:
         return native_cache.read(self._name(level))
 
     def _made(self, level: int) -> Stored:
-        made = self.translation if level == FAST else translate(self.image, self.stops, quick=True)
-        stored = Stored(_facts(made), compile_text(made.text, level))
+        made = self.translation
+        stored = Stored(_facts(made), compile_text(made.quick if level == QUICK else made.text, level))
         native_cache.write(self._name(level), stored)
         return stored
 

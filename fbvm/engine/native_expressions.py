@@ -21,12 +21,15 @@ Row = Callable[..., str]
 
 
 def _load(w: Writer, machine: str, address: Address) -> str:
-    return from_memory(w, machine, *_place(w, machine, address))
+    return from_memory(w, machine, *place(w, machine, address))
 
 
-def _place(w: Writer, machine: str, address: Address) -> tuple[str, int, str]:
+def place(w: Writer, machine: str, address: Address) -> tuple[str, int, str]:
     """Where a value lies, at a multiple of what, and what marks it."""
-    return w.pointer(address, SIZES[machine]), 1 if w.loose(address) else SIZES[machine], w.scope(address, SIZES[machine])
+    size = SIZES[machine]
+    if isinstance(address[0], tuple):
+        return w.pointer(address, size), 1, ""
+    return w.pointer(address, size), size, w.regions.mark(address, size)
 
 
 def _load_raw(w: Writer, machine: str, address: Address) -> str:
@@ -188,7 +191,7 @@ def _extreme(name: str) -> Row:
 
 def _not(w: Writer, machine: str, a: Node) -> str:
     if machine == "b" and a[0] == "load":
-        return from_memory(w, "b", *_place(w, "b", a[2]), test="eq")
+        return from_memory(w, "b", *place(w, "b", a[2]), test="eq")
     return w.new(f"xor {ir(machine)} {w.value(a)}, {'true' if machine == 'b' else -1}")
 
 

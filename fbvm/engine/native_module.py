@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from types import MappingProxyType
 
 from fbvm.base.areas import BUDGET
@@ -20,7 +20,7 @@ from fbvm.engine.native_expressions import VALUES
 from fbvm.engine.native_guard import GUARD, at_end
 from fbvm.engine.native_library import declaration, definitions
 from fbvm.engine.native_objects import objects
-from fbvm.engine.native_regions import FIRST_NUMBER, METADATA
+from fbvm.engine.native_regions import METADATA, Regions, resolved
 from fbvm.engine.native_statements import EMITTERS
 from fbvm.engine.native_writer import RARE, TRAPPED, Module, Writer
 from fbvm.engine.stops import STOPPED
@@ -63,7 +63,9 @@ attributes #5 = { nounwind willreturn memory(read) }
 class Translation:
     """An image as LLVM: its text, the points at which a run can end, the sizes of the context, what it calls."""
 
-    text: str
+    quick: str
+    """Its text as quick code is made of it, which does not say what accesses cannot meet."""
+    regions: tuple[Regions, ...]
     points: tuple[Point, ...]
     kept_bytes: int
     """Bytes of the context in front of its fields."""
@@ -71,6 +73,11 @@ class Translation:
     """Bytes of the context from its fields on."""
     routines: tuple[str, ...]
     """Names of what it calls of the library."""
+
+    @cached_property
+    def text(self) -> str:
+        """Its text as fast code is made of it."""
+        return resolved(self.quick, self.regions)
 
 
 class BodyWriter(Writer):
@@ -81,25 +88,23 @@ class BodyWriter(Writer):
     statements = EMITTERS
 
 
-def translate(image: Image, stops: bool = False, quick: bool = False) -> Translation:
-    """The module of an image, whose runs can be stopped at observations or not; a `quick` one is as short as can be and has
-    the same points.
+def translate(image: Image, stops: bool = False) -> Translation:
+    """The module of an image, whose runs can be stopped at observations or not.
 
     Raises Unsupported for code that the compiler never makes."""
-    return however_deep(image, FRAMES_A_LEVEL, partial(_translated, image, stops, quick))
+    return however_deep(image, FRAMES_A_LEVEL, partial(_translated, image, stops))
 
 
-def _translated(image: Image, stops: bool, quick: bool) -> Translation:
+def _translated(image: Image, stops: bool) -> Translation:
     graph = call_graph(image)
     module = Module(image, fixed_bases(image), instance_places(image, graph), heights(graph), [], {}, set(),
-                    stops, quick)
-    metadata: list[str] = []
-    bodies = [_body(module, number, metadata) for number in module.heights]
+                    stops)
+    bodies = [_body(module, number) for number in module.heights]
     tasks = [_task(module, number) for number in range(len(image.tasks))]
     routines = [declaration(name) for name in sorted(module.routines)]
     text = "\n".join([*definitions(module.constants), objects(image.objects), *bodies, *tasks, *routines, *_declarations(),
-                      ATTRIBUTES, METADATA, *metadata, *[GUARD] * stops])
-    return Translation(text, tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
+                      ATTRIBUTES, METADATA, *[GUARD] * stops])
+    return Translation(text, tuple(module.regions), tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
                        tuple(sorted(module.routines)))
 
 
@@ -119,7 +124,7 @@ def _declarations() -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _body(module: Module, number: int, metadata: list[str]) -> str:
+def _body(module: Module, number: int) -> str:
     w = BodyWriter(module, number)
     w.write(w.body.code)
     if not w.dead:
@@ -131,14 +136,10 @@ def _body(module: Module, number: int, metadata: list[str]) -> str:
     lines += w.lines + w.cold
     apart = len(lines) >= LARGE or module.heights[number] % DEEP == DEEP - 1
     inline = "#4" if apart else "#3" if not module.heights[number] and len(lines) <= SMALL else "#0"
-    text = "\n".join(lines)
-    if not module.quick:
-        text, more = w.regions.resolve(text, FIRST_NUMBER + len(metadata))
-        metadata += more
     shown = w.body.name.encode("unicode_escape").decode()
     return "\n".join([
         f"; {shown}", f"define internal fastcc i64 @b{number}(ptr noalias %m, ptr noalias %c, i64 %self, i64 %left) "
-        f"{inline} align {ALIGN} {{", "entry:", text, "}"])
+        f"{inline} align {ALIGN} {{", "entry:", *lines, "}"])
 
 
 def _task(module: Module, number: int) -> str:

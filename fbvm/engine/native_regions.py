@@ -6,6 +6,7 @@ an instance lies apart from the areas, and that no variable lies among the words
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from fbvm.base.areas import PAGE_BYTES
@@ -29,35 +30,54 @@ METADATA = """\
 """
 FIRST_NUMBER = 7
 """Of metadata that bodies add."""
-_MARK = re.compile(r" §(\d+)")
+_MARK = re.compile(r" ;(\d+)$", re.MULTILINE)
+"""At the end of the line of an access: a comment as long as nobody resolves it."""
 
 
 @dataclass
 class Regions:
-    """The accesses of one body.  `instances` is where its instances begin, in bytes of the buffer."""
+    """The accesses of one body.  `instances` is where its instances begin, in bytes of the buffer, `base` where the only one
+    does, if that is known; `next` is the number of its next mark, which go on from body to body."""
 
     instances: Range
+    base: int | None
+    next: int
+    marked: list[tuple[Address, int]] = field(default_factory=list)
     accesses: dict[Access, int] = field(default_factory=dict)
 
-    def is_apart(self, from_instance: bool, address: Address, count: int) -> bool:
+    def is_apart(self, address: Address, count: int) -> bool:
         """Whether an access cannot meet the words of the system page."""
-        low, high = reached(address, count)
-        return low + (self.instances[0] if from_instance else 0) >= PAGE_BYTES and high <= 1 << 40
+        return self._access(address, count) is not None
 
-    def mark(self, from_instance: bool, address: Address, count: int) -> str:
-        """A mark for an access, which `resolve` replaces; "" if it could meet the words of the system page."""
-        if not self.is_apart(from_instance, address, count):
-            return ""
-        low, high = reached(address, count)
-        access = (from_instance, low, high, bool(address[2]))
-        return f" §{self.accesses.setdefault(access, len(self.accesses))}"
+    def mark(self, address: Address, count: int) -> str:
+        """A mark for an access."""
+        self.marked.append((address, count))
+        self.next += 1
+        return f" ;{self.next - 1}"
 
-    def resolve(self, text: str, number: int) -> tuple[str, list[str]]:
-        """The text with what the marks stand for, and definitions whose numbers begin with `number`."""
+    def _access(self, address: Address, count: int) -> Access | None:
+        """What an access reaches; None if that could be words of the system page."""
+        low, high = reached(address, count)
+        from_instance = address[0] == "self"
+        if from_instance and self.base is not None:
+            from_instance, low, high = False, low + self.base, high + self.base
+        if low + (self.instances[0] if from_instance else 0) < PAGE_BYTES or high > 1 << 40:
+            return None
+        return from_instance, low, high, bool(address[2])
+
+    def told(self, number: int) -> tuple[list[str], list[str]]:
+        """What each mark stands for, and definitions whose numbers begin with `number`."""
+        found = [self._access(*marked) for marked in self.marked]
+        places = [None if access is None else self.accesses.setdefault(access, len(self.accesses)) for access in found]
+        marks, lines = self._marks(number)
+        return ["" if place is None else marks[place] for place in places], lines
+
+    def _marks(self, number: int) -> tuple[list[str], list[str]]:
+        """What is told of each access."""
         groups = self._groups()
         count = max(groups, default=-1) + 1
         if count < 2:
-            return _MARK.sub(", !alias.scope !3, !noalias !2", text), []
+            return [", !alias.scope !3, !noalias !2"] * len(groups), []
         apart = [[other for other in range(count) if other != group and self._apart(groups, group, other)]
                  for group in range(count)]
         lines = [f"!{number} = distinct !{{!{number}}}"]
@@ -67,8 +87,7 @@ class Regions:
             lines.append(f"!{at + 2 * group} = !{{!5, !{number + 1 + group}}}")
             others = "".join(f", !{number + 1 + other}" for other in apart[group])
             lines.append(f"!{at + 2 * group + 1} = !{{!4{others}}}")
-        marks = [f", !alias.scope !{at + 2 * group}, !noalias !{at + 2 * group + 1}" for group in groups]
-        return _MARK.sub(lambda match: marks[int(match[1])], text), lines
+        return [f", !alias.scope !{at + 2 * group}, !noalias !{at + 2 * group + 1}" for group in groups], lines
 
     def _groups(self) -> list[int]:
         """The number of each access's group: one for each run of computed places, then the constant ones apart from
@@ -109,3 +128,14 @@ class Regions:
         if one_base or not access[0]:
             return access[1], access[2]
         return access[1] + self.instances[0], access[2] + self.instances[1] - 1
+
+
+def resolved(text: str, bodies: Iterable[Regions]) -> str:
+    """A module with what the marks of its bodies stand for, in their order."""
+    marks: list[str] = []
+    metadata: list[str] = []
+    for regions in bodies:
+        told, lines = regions.told(FIRST_NUMBER + len(metadata))
+        marks += told
+        metadata += lines
+    return "\n".join([_MARK.sub(lambda match: marks[int(match[1])], text), *metadata])

@@ -7,7 +7,7 @@ from typing import Any
 
 from fbvm.base.areas import BUDGET, DUE
 from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
-from fbvm.engine.native_expressions import flag_mask
+from fbvm.engine.native_expressions import flag_mask, place
 from fbvm.engine.native_guard import observe
 from fbvm.engine.native_texts import in_bytes, keep
 from fbvm.engine.native_writer import TRAPPED, Writer, ir, signed, stored
@@ -22,16 +22,14 @@ FEW_VALUES = 8
 
 
 def _store(w: Writer, machine: str, address: Address, a: Node) -> None:
-    _put(w, machine, address, a, 1 if w.loose(address) else SIZES[machine])
+    pointer, align, scope = place(w, machine, address)
+    to_memory(w, machine, pointer, a, align, scope)
+    w.reload(address, SIZES[machine])
 
 
 def _store_raw(w: Writer, machine: str, address: Address, a: Node) -> None:
-    _put(w, machine, address, a, 1)
-
-
-def _put(w: Writer, machine: str, address: Address, a: Node, align: int) -> None:
     pointer, scope = w.pointer(address, SIZES[machine]), w.scope(address, SIZES[machine])
-    to_memory(w, machine, pointer, a, align, scope)
+    to_memory(w, machine, pointer, a, 1, scope)
     w.reload(address, SIZES[machine])
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from fbvm.base.areas import BUDGET
@@ -87,10 +87,10 @@ class Module:
     routines: set[str]
     stops: bool = False
     """Whether its runs can be stopped at observations."""
-    quick: bool = False
-    """Whether nothing but soon is wanted: then nothing is said that only helps to optimise."""
     kept_bytes: int = 0
     scratch_end: int = SCRATCH
+    regions: list[Regions] = field(default_factory=list)
+    """The accesses of each body that has been written."""
 
     def point(self, code: str, site: int, shown: tuple[Shown, ...]) -> int:
         """The number of a point at which a run can end; 0 is none."""
@@ -117,8 +117,8 @@ class Writer:
     def __init__(self, module: Module, number: int) -> None:
         self.module, self.body = module, module.image.bodies[number]
         self.base = module.bases.get(number)
-        self.regions = Regions(module.instances[number])
-        self._system, self._rare = ("", "") if module.quick else (SYSTEM, f", {RARE}")
+        self.regions = Regions(module.instances[number], self.base, module.regions[-1].next if module.regions else 0)
+        module.regions.append(self.regions)
         self.lines: list[str] = []
         self.cold: list[str] = []
         self.here = "entry"
@@ -170,7 +170,7 @@ class Writer:
 
     def unlikely(self, condition: str, yes: str, no: str) -> None:
         """A branch that hardly ever goes the first way."""
-        self.emit(f"br i1 {condition}, label %{yes}, label %{no}{self._rare}")
+        self.emit(f"br i1 {condition}, label %{yes}, label %{no}, {RARE}")
 
     def write(self, block: Block) -> None:
         """The statements of a block, up to one that leaves it."""
@@ -240,27 +240,17 @@ class Writer:
 
     def system(self, offset: int) -> str:
         """A word of the system page."""
-        return self.new(f"load i64, ptr {self._system_word(offset)}, align 8{self._system}")
+        return self.new(f"load i64, ptr {self._system_word(offset)}, align 8{SYSTEM}")
 
     def put_system(self, offset: int, value: str) -> None:
-        self.emit(f"store i64 {value}, ptr {self._system_word(offset)}, align 8{self._system}")
+        self.emit(f"store i64 {value}, ptr {self._system_word(offset)}, align 8{SYSTEM}")
 
     def _system_word(self, offset: int) -> str:
         return self.new(f"getelementptr inbounds i8, ptr %m, i64 {offset}")
 
     def scope(self, address: Address, count: int) -> str:
-        """What marks an access, so that LLVM knows what it cannot meet."""
-        if self.module.quick or self.loose(address):
-            return ""
-        from_instance, address = self._seen_from(address)
-        return self.regions.mark(from_instance, address, count)
-
-    def _seen_from(self, address: Address) -> tuple[bool, Address]:
-        """Whether an address counts from the instance, and that address, of which the place may be known."""
-        base, offset, terms = address
-        if base == "self" and self.base is not None:
-            return False, ("abs", offset + self.base, terms)
-        return base == "self", address
+        """What marks an access at the end of its line, so that LLVM can be told what it cannot meet."""
+        return "" if self.loose(address) else self.regions.mark(address, count)
 
     @staticmethod
     def loose(address: Address) -> bool:
@@ -269,7 +259,7 @@ class Writer:
 
     def reload(self, address: Address, count: int) -> None:
         """Behind a store that may have met the step budget: read it anew."""
-        if isinstance(address[0], tuple) or not self.regions.is_apart(*self._seen_from(address), count):
+        if self.loose(address) or not self.regions.is_apart(address, count):
             self.emit(f"store i64 {self.system(BUDGET)}, ptr %budget")
 
     # --- traps
@@ -329,13 +319,14 @@ class Writer:
     def pointer(self, address: Address, count: int) -> str:
         """Where an address lies in the host; its `count` bytes are used."""
         base, offset, terms = address
-        if isinstance(base, tuple):
+        start = "%m"
+        if base == "self":
+            if self.base is None:
+                self.uses_instance, start = True, "%s"
+            else:
+                offset += self.base
+        elif isinstance(base, tuple):
             return self.new(f"getelementptr i8, ptr %m, i64 {self._behind(address, count)}")
-        if base == "self" and self.base is None:
-            self.uses_instance = True
-            start = "%s"
-        else:
-            start, offset = "%m", offset + (self.base or 0 if base == "self" else 0)
         if offset:
             start = self.new(f"getelementptr inbounds i8, ptr {start}, i64 {offset}")
         for stride, term in terms:

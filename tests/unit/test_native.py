@@ -6,6 +6,7 @@ import ctypes
 import gc
 import math
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -200,13 +201,13 @@ def test_a_text_that_grows_without_bound_is_not_supported() -> None:
 
 
 @pytest.mark.parametrize("stops", [False, True])
-def test_quick_code_is_shorter_and_has_the_same_points(stops: bool) -> None:
+def test_quick_code_does_not_say_what_accesses_cannot_meet(stops: bool) -> None:
     program = image((*COUNT, store("i16", 8, ("div", "i16", ONE, load("i16", 0), 3)), ("call", 1, at(64))),
                     (*COUNT, ("charge", 1, 2)))
-    fast, quick = translate(program, stops), translate(program, stops, quick=True)
-    assert "alias" in fast.text and "alias.scope" not in quick.text.partition("attributes")[0]
-    assert (quick.points, quick.kept_bytes, quick.context_bytes, quick.routines) == (
-        fast.points, fast.kept_bytes, fast.context_bytes, fast.routines)  # fmt: skip
+    made = translate(program, stops)
+    fast, quick = (text.partition("attributes")[0] for text in (made.text, made.quick))
+    assert fast.count("alias.scope") > quick.count("alias.scope") == fast.count("alias.scope !2")
+    assert not re.search(r" ;[0-9]+$", fast, re.MULTILINE)
 
 
 def test_code_deeper_than_the_host_recurses() -> None:
