@@ -15,7 +15,8 @@ from fbvm.cli.traces import SUFFIX, opened, recorded, scans_option
 from fbvm.record.page import page
 from fbvm.record.page_data import page_data
 from fbvm.record.pcapng import Capture
-from fbvm.record.rows import RowsError, read_rows, write_rows
+from fbvm.record.rows import write_rows
+from fbvm.record.rows_reader import RowsError, read_rows
 from fbvm.record.svg import Drawing
 from fbvm.record.trace import Trace
 from fbvm.record.trace_signals import happenings, traffic

@@ -13,7 +13,8 @@ from trace_rig import image, traced
 
 from fbvm.plc import Plc
 from fbvm.record.recorder import Recorder, Recording
-from fbvm.record.rows import RowsError, read_rows, write_rows
+from fbvm.record.rows import write_rows
+from fbvm.record.rows_reader import RowsError, read_rows
 from fbvm.record.trace import Trace
 from fbvm.record.trace_signals import recording
 from fbvm.record.vcd import write_vcd
@@ -61,12 +62,27 @@ def test_a_real_has_the_digits_that_it_needs() -> None:
 
 
 def test_what_goes_out_comes_in() -> None:
-    names = [name for name in NAMES if "[" not in name]
-    text = rows(recording(traced(30), names))
+    text = rows(recording(traced(30), NAMES))
     back = as_trace(text)
-    assert rows(recording(back, names)) == text
+    assert rows(recording(back, NAMES)) == text
     assert back.at(8).read("Main.Delay.ET") == 50_000_000
     assert back.scans == range(30)
+
+
+def test_arrays_dates_and_large_numbers_go_out_and_in() -> None:
+    plc = Plc(image("""TYPE P : STRUCT n : ULINT := 16#FFFF_FFFF_FFFF_FFFF; t : ARRAY[-1..0, 2..3] OF TIME; END_STRUCT END_TYPE
+PROGRAM Main VAR d : DATE := D#2024-02-29; at_ : DT := DT#2024-02-29-12:30:00; p : ARRAY[1..3] OF P; END_VAR
+p[2].t[-1, 3] := p[2].t[-1, 3] + T#1ms; p[3].t[0, 2] := T#1us; END_PROGRAM"""))
+    names = ["Main.d", "Main.at_", "Main.p[2].n", "Main.p[2].t[-1, 3]", "Main.p[3].t[0, 2]"]
+    made = Recorder(plc, names)
+    plc.run(scans=2)
+    text = rows(made)
+    assert text == """\
+scan,time_ms,Main.d,Main.at_,Main.p[2].n,"Main.p[2].t[-1, 3] [ms]","Main.p[3].t[0, 2] [ms]"
+0,0,D#2024-02-29,DT#2024-02-29-12:30:00,18446744073709551615,1,0.001
+1,10,D#2024-02-29,DT#2024-02-29-12:30:00,18446744073709551615,2,0.001
+"""
+    assert rows(recording(as_trace(text), names)) == text
 
 
 def test_a_table_from_elsewhere_becomes_a_trace() -> None:
@@ -82,6 +98,13 @@ def test_a_table_from_elsewhere_becomes_a_trace() -> None:
     ("scan,time_ms,a b\n", "line 1: 'a b' is neither"),
     ("scan,time_ms,a,a\n", "line 1: a stands there twice"),
     ("scan,time_ms,a,a.b\n", "line 1: a is a variable and has members"),
+    ("scan,time_ms,a[1],a.b\n", "line 1: a has elements and members"),
+    ("scan,time_ms,a[1],a[1].b\n", "line 1: a is a variable and has members"),
+    ("scan,time_ms,a[1],a[2].b\n", "line 1: the elements of a differ"),
+    ('scan,time_ms,a[1],"a[1,2]"\n', "line 1: the elements of a differ"),
+    ("scan,time_ms,a[1],a[2000000000]\n", "line 1: a has 2000000000 elements, and no"),
+    ("scan,time_ms,a[1].b[1],a[90000].b[90000]\n", "line 1: a has 90000 elements, and no"),
+    ("scan,time_ms,a[]\n", "line 1: 'a\\[\\]' is neither"),
     ("scan,time_ms,a\nx,2,3\n", "line 2: invalid literal"),
     ("scan,time_ms,a\n1,x,3\n", "line 2: "),
     ("scan,time_ms,a\n1,5,3\n2,4,3\n", "line 3: time runs forward only"),
