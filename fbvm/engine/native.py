@@ -98,4 +98,4 @@ class NativeEngine:
         code, site, shown = self._code.points[number - 1]
         if code == STOPPED:
             return PAUSE
-        return trap(self.image, code, site, tuple(self._context.values(shown)))
+        return trap(self.image, code, site, tuple(self._context.values(shown)), self._context.instance(shown))

@@ -14,15 +14,18 @@ from fbvm.base.arithmetic import NAN
 from fbvm.base.memory import STRUCTS
 
 FIELDS = {"size": 0, "values": 8, "result": 32, "f32": 40, "f64": 48, "stops": 56}
-"""Where its 64-bit fields lie: size of the memory, up to three values of a trap, a second result of a routine, the
-canonical NaN of each float type (out of LLVM's sight, which holds one NaN for as good as another), the table of `stops`."""
+"""Where its 64-bit fields lie: size of the memory, up to three values of a trap, a second result of a routine or the
+instance of a trap, the canonical NaN of each float type (out of LLVM's sight, which holds one NaN for as good as another),
+the table of `stops`."""
 DIGITS = 64
 """Where a number's text is cleaned before it is read."""
 SCRATCH = 512
 """Where the scratch bytes of texts begin; statements use them in turn."""
 
 Shown = tuple[str, Any]
-"""How a trap tells one value: (machine type, None) or ("text", None) as found in the context, ("const", value)."""
+"""How a trap tells one value: (machine type, None) or ("text", None) as found in the context, ("const", value); and, last
+of all, whose code it was: (INSTANCE, offset), or None if that is found in the context."""
+INSTANCE = "instance"
 Point = tuple[str, int, tuple[Shown, ...]]
 """A point at which a run can end: code, site, values."""
 
@@ -47,6 +50,8 @@ class Context:
         """The values of a trap: a float as LREAL, an integer of 64 bits with its sign or without, bytes of a text."""
         at = self._start + FIELDS["values"]
         for kind, constant in shown:
+            if kind == INSTANCE:
+                return
             if kind == "const":
                 yield constant
             elif kind == "text":
@@ -56,3 +61,9 @@ class Context:
                 form = "f64" if kind[0] == "f" else "i64" if kind[0] == "i" else "u64"
                 yield STRUCTS[form].unpack_from(self._content, at)[0]
                 at += 8
+
+    def instance(self, shown: tuple[Shown, ...]) -> int:
+        """Where the instance begins whose body a trap has ended."""
+        given: int | None = dict(shown).get(INSTANCE)
+        at = self._start + FIELDS["result"]
+        return int(STRUCTS["i64"].unpack_from(self._content, at)[0]) if given is None else given

@@ -18,10 +18,11 @@ from fbvm.base.arithmetic import single
 from fbvm.code.image import Image
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT, Address, Block, Node
 from fbvm.engine.native_calls import Range
-from fbvm.engine.native_context import FIELDS, SCRATCH, Point, Shown
+from fbvm.engine.native_context import FIELDS, INSTANCE, SCRATCH, Point, Shown
 from fbvm.engine.native_guard import is_seen_later
 from fbvm.engine.native_regions import SYSTEM, Regions
 from fbvm.engine.ranges import is_float, span
+from fbvm.engine.trap import NO_INSTANCE
 
 NAN_BITS = {"f32": "0x7FF8000000000000", "f64": "0x7FF8000000000000"}
 """The canonical NaN as LLVM writes it; a float's digits are those of the double of that value."""
@@ -306,7 +307,17 @@ class Writer:
                 at = self.new(f"getelementptr inbounds i8, ptr %c, i64 {FIELDS['values'] + 8 * place}")
                 self.emit(f"store i64 {number}, ptr {at}")
                 place += 1
+        kinds.append((INSTANCE, self._instance()))
         self.emit(f"ret i64 {ENDED + self.module.point(code, site, tuple(kinds))}")
+
+    def _instance(self) -> int | None:
+        """Where the instance begins whose body ends here; None if that is found in the context."""
+        if self.body.kind == "FUNCTION":
+            return NO_INSTANCE
+        if self.base is None:
+            at = self.new(f"getelementptr inbounds i8, ptr %c, i64 {FIELDS['result']}")
+            self.emit(f"store i64 %self, ptr {at}")
+        return self.base
 
     def _raw(self, kind: str, operand: str) -> str:
         """The 64 bits in which a value of a trap is told."""

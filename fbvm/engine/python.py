@@ -22,7 +22,7 @@ from fbvm.engine.bases import fixed_bases
 from fbvm.engine.depths import however_deep
 from fbvm.engine.runtime import NO_SITE, Observation, environment
 from fbvm.engine.statements import BodyWriter, function_name
-from fbvm.engine.trap import Stop, Trap, trap
+from fbvm.engine.trap import NO_INSTANCE, Stop, Trap, trap
 
 _NUMBERS = count(1)
 FRAMES_TO_SPARE = 400
@@ -97,6 +97,7 @@ class PythonEngine:
             raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")
         self.image, self.memory, self.observed = image, memory, observed
         self.substitutes: dict[int, Callable[[int], None]] = {}
+        self._numbers = {function_name(number, body): number for number, body in enumerate(image.bodies)}
         self._program = translate(image, observed)
         self._bodies = self._bind(self._program)
         self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in image.tasks]
@@ -144,8 +145,18 @@ class PythonEngine:
                 if steps is not None:
                     deque(steps, 0)
         except Stop as stop:
-            return trap(self.image, stop.code, stop.site, stop.values)
+            return trap(self.image, stop.code, stop.site, stop.values, self._instance_of(stop))
         return None
+
+    def _instance_of(self, stop: Stop) -> int:
+        """Where the instance begins whose body was stopped: the innermost body among the frames of the host."""
+        found, at = NO_INSTANCE, stop.__traceback__
+        while at is not None:
+            number = self._numbers.get(at.tb_frame.f_code.co_name)
+            if number is not None:
+                found = NO_INSTANCE if self.image.bodies[number].kind == "FUNCTION" else at.tb_frame.f_locals["b1"]
+            at = at.tb_next
+        return found
 
     def observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
         """Execute a task step by step: yields every observation, returns like `run`.
@@ -162,7 +173,7 @@ class PythonEngine:
                 yield from self._bodies[run.body](run.offset)
                 yield Observation("return", NO_SITE, (run.body, run.offset))
         except Stop as stop:
-            return trap(self.image, stop.code, stop.site, stop.values)
+            return trap(self.image, stop.code, stop.site, stop.values, self._instance_of(stop))
         return None
 
 

@@ -8,15 +8,21 @@ from typing import Any
 from fbvm.base.codes import CODES
 from fbvm.code.image import Image, Site
 
+NO_INSTANCE = -1
+"""In place of the offset of an instance: a function has none."""
+
 
 @dataclass(frozen=True)
 class Trap:
-    """A program was stopped: `code` (R01..), where, the values that caused it, and a message of one line."""
+    """A program was stopped: `code` (R01..), where, the values that caused it, and a message of one line.
+
+    `instance` is where the instance begins whose body was executed, NO_INSTANCE in a function."""
 
     code: str
     site: Site
     values: tuple[Any, ...]
     message: str
+    instance: int = NO_INSTANCE
 
     def __str__(self) -> str:
         return self.message
@@ -44,7 +50,7 @@ _CONVERSION = {1: "{0} has no such form", 2: "{0!r} does not fit {1}", 3: "{0} o
 """R0105 by the number of its values: BCD, text and data type, value and limits."""
 
 
-def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = ()) -> Trap:
+def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), instance: int = NO_INSTANCE) -> Trap:
     """The trap of that code at a site's number; a row without values says the title of its code."""
     place = image.sites[site]
     values = tuple(int(value) if isinstance(value, bool) else value for value in values)
@@ -54,7 +60,7 @@ def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = ()) -> Tr
         words = _WORDS[code].format(*map(_shown, values))
     else:
         words = CODES[code].title if code in CODES else code
-    return Trap(code, place, values, f"{code} {place}: {words}")
+    return Trap(code, place, values, f"{code} {place}: {words}", instance)
 
 
 def _shown(value: Any) -> Any:

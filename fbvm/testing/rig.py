@@ -22,6 +22,7 @@ from fbvm.net.loop import LoopNetwork
 from fbvm.plc import Mode, Plc
 from fbvm.record.chart import Chart, draw
 from fbvm.record.history import History
+from fbvm.record.names import Names
 from fbvm.record.recorder import Recorder
 from fbvm.record.traffic import Passed, Reader, listen
 from fbvm.testing.pages import write_page
@@ -46,8 +47,8 @@ PATIENCE = "1m"
 class Trapped(AssertionError):
     """The program was stopped; `trap` says where and why."""
 
-    def __init__(self, trap: Trap) -> None:
-        super().__init__(trap.message)
+    def __init__(self, trap: Trap, message: str = "") -> None:
+        super().__init__(message or trap.message)
         self.trap = trap
 
 
@@ -271,7 +272,7 @@ class Rig:
         self._history.before_scan()
         trap = self.plc.scan()
         if trap:
-            raise Trapped(trap)
+            raise Trapped(trap, Names(self.plc.image.symbols, self.plc.memory.areas).trap(trap))
 
     @property
     def scans(self) -> int:

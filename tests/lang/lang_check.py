@@ -68,7 +68,7 @@ def _check_run(program: Program, plcs: dict[str, Plc]) -> None:
         if others:
             memory = reference.memory.snapshot()
             for name, plc in plcs.items():
-                assert str(plc.trap) == str(reference.trap), name
+                assert repr(plc.trap) == repr(reference.trap), name
                 assert compare(plc.memory.snapshot(), memory) == [], f"{name}: memory after scan {scan}"
         for item in _at(program.expected, scan):
             _check_value(program, reference, item)

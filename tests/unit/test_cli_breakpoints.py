@@ -9,6 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fbvm.cli.main import main
+from fbvm.engine import native
 
 PLANT = """\
 FUNCTION_BLOCK Adder
@@ -94,3 +95,36 @@ def test_json_tells_where() -> None:
 def test_what_cannot_be_is_refused(arguments: list[str], words: str) -> None:
     result = run(*arguments)
     assert result.exit_code == 2 and words in result.stderr
+
+
+DIVIDES = """FUNCTION_BLOCK Ratio
+VAR_INPUT a, b : INT; END_VAR
+VAR_OUTPUT q : INT; END_VAR
+    q := a / b;
+END_FUNCTION_BLOCK
+PROGRAM Main
+VAR rows : ARRAY [1..3] OF Ratio; alone : Ratio; i : INT; zero : INT := 9; x : INT; END_VAR
+    FOR i := 1 TO 3 DO
+        rows[i](a := 6, b := i - zero);
+    END_FOR;
+    alone(a := 1, b := 10 - zero);
+    x := 1 / (11 - zero);
+END_PROGRAM
+"""
+
+
+@pytest.mark.parametrize("engine", ["python", "native"])
+def test_a_trap_says_in_which_instance_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, engine: str) -> None:
+    if engine == "native" and not native.available():
+        pytest.skip("llvmlite is not installed")
+    monkeypatch.chdir(tmp_path)
+    Path("ratio.st").write_text(DIVIDES, encoding="utf-8")
+
+    def said(zero: int) -> str:
+        options = ["--scans", "3", "--engine", engine, "--set", f"Main.zero={zero}@10ms"]
+        return CliRunner().invoke(main, ["run", "ratio.st", *options]).stderr
+
+    where = "R0101 ratio.st:4:10 in Ratio"
+    assert said(2) == f"{where}: 6 divided by 0 (in Main.rows[2])\n"
+    assert said(10) == f"{where}: 1 divided by 0 (in Main.alone)\n"
+    assert said(11) == "R0101 ratio.st:12:10 in Main: 1 divided by 0\n"
