@@ -10,6 +10,7 @@ from fbvm.syntax.evolution import Evolution, action_flags
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.sfc import Sfc, Step, Transition
 from fbvm.syntax.sfc_elements import Part, SfcElements
+from fbvm.syntax.sfc_flags import declared
 from fbvm.syntax.sfc_rules import sound
 from fbvm.syntax.tree import Action, Block, VarSection
 
@@ -18,8 +19,9 @@ class Charts:
     """Makes statements of charts.  `sections` fill with what they declare; `actions` are those of the POU, with statements
     in place of their charts."""
 
-    def __init__(self, builder: SfcElements, actions: list[Action]) -> None:
+    def __init__(self, builder: SfcElements, actions: list[Action], sections: Sequence[VarSection]) -> None:
         self.builder = builder
+        self.flags = declared(sections)
         self.actions = actions
         self.sections: list[VarSection] = []
         self._users: dict[str, Action | None] = {}
@@ -61,6 +63,6 @@ class Charts:
             name = association.action
             if self._users.setdefault(fold(name.text), action) is not action:
                 self.builder.report("S0112", name.start, name.end, f"{name.text} is an action of another chart of this POU", "")
-        made = Evolution(self.builder, steps, transitions, self.actions, action).sfc(start, end, good)
+        made = Evolution(self.builder, steps, transitions, self.actions, action, self.flags).sfc(start, end, good)
         self.sections += made.sections
         return made

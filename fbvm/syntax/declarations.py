@@ -96,7 +96,7 @@ class Declarations(SfcElements):
         if self.charted or any(isinstance(a, Step | Transition) for a in actions):
             from fbvm.syntax.charts import Charts
 
-            charts = Charts(self, own)
+            charts = Charts(self, own, declared)
             body = charts.body(word, body, [a for a in actions if not isinstance(a, Refused)])
             own, declared = charts.actions, declared + charts.sections
         return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused), tuple(own),

@@ -19,6 +19,7 @@ from fbvm.syntax.ladder import Element
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.node import walk
 from fbvm.syntax.sfc import Association, Sfc, Step, Transition
+from fbvm.syntax.sfc_flags import steered
 from fbvm.syntax.tree import Expr, Name, NameRef, Statement, VarDecl, VarSection
 
 CONTROL = "SFC_ACTION_CONTROL"
@@ -33,14 +34,15 @@ class Evolution:
     """Writes the statements of one chart.  They are placed `at` the element that they come from."""
 
     def __init__(self, builder: Expressions, steps: Sequence[Step], transitions: Sequence[Transition],
-                 actions: Iterable[tree.Action], inside: tree.Action | None) -> None:
-        """`inside` is the action that the chart is the body of."""
+                 actions: Iterable[tree.Action], inside: tree.Action | None, flags: frozenset[str] = frozenset()) -> None:
+        """`inside` is the action that the chart is the body of; `flags` are those of CODESYS that the POU declares."""
         self.builder = builder
         self.steps = steps
         self.transitions = transitions
         self.actions = {fold(action.name.text): action for action in actions}
         self.named = {fold(step.name.text): step for step in steps}
         self.inside = inside.name.text if inside is not None else "chart"
+        self.flags = flags if inside is None else frozenset()
         self.is_called_often = inside is not None
         self.at = self.start = self.end = 0
         self.shown: dict[str, str] = {}
@@ -55,8 +57,11 @@ class Evolution:
         self.at = start
         body: tree.Block = () if not sound else (
             *self._fresh(), self._begun_or_evolved(), *map(self._commit, self.steps),
-            *self._controls(used), *self._variables(used),
+            *self._controls(used), *self.variables(used),
             *(statement for name, action in self.actions.items() if name in used for statement in self._run(action)))
+        if sound and self.flags:
+            self.at = start
+            body = steered(self, body, used)
         sections = (self._section("VAR", [_flags(step.name, STEP_FLAGS) for step in self.steps], "step"),
                     self._section("VAR", list(self.kept.values())), self._section("VAR_TEMP", list(self.temporaries.values())))
         return Sfc(start, end, tuple(self.steps), tuple(self.transitions), body, sections)
@@ -75,18 +80,23 @@ class Evolution:
         """In an action, which may be called several times in one call of its POU: nothing is entered or left yet."""
         if self.is_called_often:
             for step in self.steps:
-                yield from (self._set(self._entered(step), False), self._set(self._left(step), False))
+                yield from (self.put(self._entered(step), False), self.put(self.left(step), False))
+
+    @property
+    def begun(self) -> NameRef:
+        """Whether the initial steps were activated."""
+        return self._keep(f"${self.inside} begun", "BOOL")
 
     def _begun_or_evolved(self) -> Statement:
-        begun = self._keep(f"${self.inside} begun", "BOOL")
+        begun = self.begun
         evolved = (*map(self._time, self.steps), *self._tested())
-        first = (self._set(begun, True), *(self._set(self._entered(s), True) for s in self.steps if s.initial))
-        return self._if(begun, evolved, first)
+        first = (self.put(begun, True), *(self.put(self._entered(s), True) for s in self.steps if s.initial))
+        return self.when(begun, evolved, first)
 
     def _time(self, step: Step) -> Statement:
         self.at = step.start
         passed = self._binary("-", self._now(), self._since(step))
-        return self._if(self._flag(step.name, "X"), (self._assign(self._flag(step.name, "T"), passed),))
+        return self.when(self.flag(step.name, "X"), (self.assign(self.flag(step.name, "T"), passed),))
 
     def _tested(self) -> list[Statement]:
         """The transitions, those first that go first where several are enabled by one step."""
@@ -102,16 +112,16 @@ class Evolution:
         """Test a transition if it is enabled: if all steps before it are active, and none is left by another one."""
         self.at = transition.start
         steps = [self.named[fold(name.text)] for name in transition.sources]
-        enabled = [self._flag(step.name, "X") for step in steps]
-        enabled += [self._not(self._left(step)) for step in steps if fold(step.name.text) in taken]
+        enabled = [self.flag(step.name, "X") for step in steps]
+        enabled += [self.negated(self.left(step)) for step in steps if fold(step.name.text) in taken]
         seen = Element(self.at, transition.end, self.transitions.index(transition), transition.condition)
         first, *others = (self._entered(self.named[fold(name.text)]) for name in transition.targets)
-        begin = tree.Assign(transition.targets[0].start, transition.targets[0].end, (first,), ":=", self._truth(True))
-        fires = (begin, *(self._set(step, True) for step in (*others, *map(self._left, steps))))
+        begin = tree.Assign(transition.targets[0].start, transition.targets[0].end, (first,), ":=", self.truth(True))
+        fires = (begin, *(self.put(step, True) for step in (*others, *map(self.left, steps))))
         tested = tree.If(transition.start, transition.end, ((seen, fires),), tuple(self._waits(transition)) or None)
         if transition.body is not None and transition.name is not None:
             self._temporary(transition.name.text)
-        return self._if(self._all(enabled), (*(transition.body or ()), tested))
+        return self.when(self._all(enabled), (*(transition.body or ()), tested))
 
     def _waits(self, transition: Transition) -> Iterable[Statement]:
         """For `step.T >= duration`: when that may become true by itself."""
@@ -124,10 +134,10 @@ class Evolution:
     def _commit(self, step: Step) -> Statement:
         """Enter or leave a step; one that is left and entered at once begins anew."""
         self.at = step.start
-        active = self._flag(step.name, "X")
-        enter = (self._set(active, True), self._assign(self._flag(step.name, "T"), self._duration()),
-                 self._assign(self._since(step), self._now()))
-        branches = (self._entered(step), enter), (self._left(step), (self._set(active, False),))
+        active = self.flag(step.name, "X")
+        enter = (self.put(active, True), self.assign(self.flag(step.name, "T"), self._duration()),
+                 self.assign(self._since(step), self._now()))
+        branches = (self._entered(step), enter), (self.left(step), (self.put(active, False),))
         return tree.If(self.at, self.at, branches, None)
 
     # --- actions ----------------------------------------------------------------------------------------------------
@@ -153,12 +163,12 @@ class Evolution:
             pin = {"L": "N", "D": "N"}.get(qualifier, qualifier if coded or qualifier not in PULSES else "P")
             wanted.setdefault(pin, []).append(self._term(step, association))
             if time is not None and qualifier in ("SD", "SL"):
-                times.setdefault(f"{pin}_T", []).append((self._flag(step.name, "X"), time))
-        inputs = {pin: self._joined("OR", terms) for pin, terms in wanted.items()}
+                times.setdefault(f"{pin}_T", []).append((self.flag(step.name, "X"), time))
+        inputs = {pin: self.joined("OR", terms) for pin, terms in wanted.items()}
         for pin, choices in times.items():
             *rest, (_, value) = choices
             for active, time in reversed(rest):
-                value = self._function("SEL", active, value, time)
+                value = self.function("SEL", active, value, time)
             inputs[pin] = value
         return inputs
 
@@ -166,33 +176,42 @@ class Evolution:
         """What one association contributes."""
         qualifier, time = association.qualifier, association.time
         if qualifier in PULSES:
-            return self._left(step) if qualifier == "P0" else self._entered(step)
-        active = self._flag(step.name, "X")
+            return self.left(step) if qualifier == "P0" else self._entered(step)
+        active = self.flag(step.name, "X")
         if qualifier not in ("L", "D", "DS") or time is None:
             return active
-        return self._all([active, self._binary("<" if qualifier == "L" else ">=", self._flag(step.name, "T"), time)])
+        return self._all([active, self._binary("<" if qualifier == "L" else ">=", self.flag(step.name, "T"), time)])
 
     def _dues(self, pairs: Used) -> Iterable[Statement]:
         """When L, D and DS change by themselves."""
         for step, association in pairs:
             if association.time is not None and association.qualifier in ("L", "D", "DS"):
                 self.at = association.start
-                waits = self._binary("<", self._flag(step.name, "T"), association.time)
-                yield self._if(self._all([self._flag(step.name, "X"), waits]), (self._due(step, association.time),))
+                waits = self._binary("<", self.flag(step.name, "T"), association.time)
+                yield self.when(self._all([self.flag(step.name, "X"), waits]), (self._due(step, association.time),))
 
-    def _variables(self, used: dict[str, Used]) -> Iterable[Statement]:
+    def begin_again(self, used: Used) -> Iterable[Statement]:
+        """Let go of an action, whatever was stored of it."""
+        name = used[0][1].action
+        held = tree.Argument(self.at, self.at, ":=", Name(self.at, self.at, "R"), self.truth(True))
+        yield tree.CallStatement(self.at, self.at, tree.Call(self.at, self.at, self._control(name), (held,)))
+        yield self.put(self._member(self._control(name), "R"), False)
+        if fold(name.text) in self.actions:
+            yield from (self.put(self.flag(name, flag), False) for flag, _ in ACTION_FLAGS)
+
+    def variables(self, used: dict[str, Used]) -> Iterable[Statement]:
         for name, pairs in used.items():
             if name not in self.actions:
                 action = pairs[0][1].action
                 self.at = action.start
-                yield self._assign(NameRef(action.start, action.end, action.text), self._member(self._control(action), "Q"))
+                yield self.assign(NameRef(action.start, action.end, action.text), self._member(self._control(action), "Q"))
 
     def _run(self, action: tree.Action) -> Iterable[Statement]:
         self.at = action.start
         for flag, _ in ACTION_FLAGS:
-            yield self._assign(self._flag(action.name, flag), self._member(self._control(action.name), flag))
-        call = tree.CallStatement(self.at, self.at, tree.Call(self.at, self.at, self._name(action.name.text), ()))
-        yield self._if(self._flag(action.name, "A"), (call,))
+            yield self.assign(self.flag(action.name, flag), self._member(self._control(action.name), flag))
+        call = tree.CallStatement(self.at, self.at, tree.Call(self.at, self.at, self.name(action.name.text), ()))
+        yield self.when(self.flag(action.name, "A"), (call,))
 
     # --- variables --------------------------------------------------------------------------------------------------
 
@@ -202,12 +221,12 @@ class Evolution:
     def _keep(self, name: str, kind: str) -> NameRef:
         if name not in self.kept:
             self.kept[name] = _declared(Name(self.at, self.at, name), kind)
-        return self._name(name)
+        return self.name(name)
 
     def _temporary(self, name: str) -> NameRef:
         if name not in self.temporaries:
             self.temporaries[name] = _declared(Name(self.at, self.at, name), "BOOL")
-        return self._name(name)
+        return self.name(name)
 
     def _since(self, step: Step) -> NameRef:
         return self._keep(f"${step.name.text} since", "TIME")
@@ -215,7 +234,7 @@ class Evolution:
     def _entered(self, step: Step) -> NameRef:
         return self._temporary(f"${step.name.text} entered")
 
-    def _left(self, step: Step) -> NameRef:
+    def left(self, step: Step) -> NameRef:
         return self._temporary(f"${step.name.text} left")
 
     def _control(self, action: Name) -> NameRef:
@@ -223,56 +242,56 @@ class Evolution:
 
     # --- statements and expressions ---------------------------------------------------------------------------------
 
-    def _name(self, text: str) -> NameRef:
+    def name(self, text: str) -> NameRef:
         return NameRef(self.at, self.at, text)
 
     def _member(self, of: Expr, name: str) -> Expr:
         return tree.Member(self.at, self.at, of, Name(self.at, self.at, name))
 
-    def _flag(self, name: Name, flag: str) -> Expr:
-        return self._member(self._name(name.text), flag)
+    def flag(self, name: Name, flag: str) -> Expr:
+        return self._member(self.name(name.text), flag)
 
-    def _if(self, condition: Expr, then: Iterable[Statement], otherwise: Iterable[Statement] = ()) -> Statement:
+    def when(self, condition: Expr, then: Iterable[Statement], otherwise: Iterable[Statement] = ()) -> Statement:
         return tree.If(self.at, self.at, ((condition, tuple(then)),), tuple(otherwise) or None)
 
-    def _assign(self, target: Expr, value: Expr) -> Statement:
+    def assign(self, target: Expr, value: Expr) -> Statement:
         return tree.Assign(self.at, self.at, (target,), ":=", value)
 
-    def _set(self, target: Expr, value: bool) -> Statement:
-        return self._assign(target, self._truth(value))
+    def put(self, target: Expr, value: bool) -> Statement:
+        return self.assign(target, self.truth(value))
 
-    def _truth(self, value: bool) -> Expr:
+    def truth(self, value: bool) -> Expr:
         return tree.Literal(self.at, self.at, "bool", value, None, "TRUE" if value else "FALSE")
 
-    def _not(self, value: Expr) -> Expr:
+    def negated(self, value: Expr) -> Expr:
         return tree.Unary(self.at, self.at, "NOT", value)
 
     def _binary(self, operator: str, left: Expr, right: Expr) -> Expr:
         return tree.Binary(self.at, self.at, operator, left, right, self.at)
 
     def _all(self, parts: list[Expr]) -> Expr:
-        return self._joined("AND", parts)
+        return self.joined("AND", parts)
 
-    def _joined(self, operator: str, parts: list[Expr]) -> Expr:
+    def joined(self, operator: str, parts: list[Expr]) -> Expr:
         """A tree that is no deeper than needed: a step may have hundreds of associations."""
         if len(parts) == 1:
             return parts[0]
         half = len(parts) // 2
-        return self._binary(operator, self._joined(operator, parts[:half]), self._joined(operator, parts[half:]))
+        return self._binary(operator, self.joined(operator, parts[:half]), self.joined(operator, parts[half:]))
 
     def _duration(self) -> Expr:
         return self.builder.typed_literal(Token("TYPED_LITERAL", "T#0s", self.at, self.at))
 
-    def _function(self, name: str, *values: Expr) -> Expr:
+    def function(self, name: str, *values: Expr) -> Expr:
         arguments = tuple(tree.Argument(value.start, value.end, "", None, value) for value in values)
-        return tree.Call(self.at, self.at, self._name(name), arguments)
+        return tree.Call(self.at, self.at, self.name(name), arguments)
 
     def _now(self) -> Expr:
-        return self._function("TIME")
+        return self.function("TIME")
 
     def _due(self, step: Step, after: Expr) -> Statement:
         moment = self._binary("+", self._since(step), after)
-        return tree.CallStatement(self.at, self.at, self._function("__DUE", moment))
+        return tree.CallStatement(self.at, self.at, self.function("__DUE", moment))
 
 
 def action_flags(start: int, end: int, actions: Iterable[tree.Action]) -> VarSection:
