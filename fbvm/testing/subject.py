@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -33,6 +33,10 @@ LIBRARY = Path(__file__).parent / "library"
 """What tests in ST call."""
 _DECLARES = re.compile(r"\s*(FUNCTION|FUNCTION_BLOCK|PROGRAM)\b", re.I)
 _FIRST = re.compile(r"\w+")
+UNKNOWN = ("S0201", "S0204", "S0401")
+"""Codes of names that mean nothing."""
+MOST_FILES = 300
+"""In which such a name is looked for."""
 _images: dict[tuple[object, ...], Subject] = {}
 
 
@@ -129,12 +133,29 @@ def _compiled(sources: list[Source], program: str | None, prefix: str, name: str
     made = compile_sources(sources, program, libraries, runnable=True, dialect=dialect, no_warn=wanted.no_warn,
                            warnings_as_errors=wanted.as_errors)  # fmt: skip
     if made.image is None:
-        raise SubjectError("\n".join(message.render() for message in made.errors))
+        said = [message.render() for message in made.errors]
+        raise SubjectError("\n".join([*said, *_elsewhere(made.errors, sources, libraries)]))
     if not prefix and len(made.image.tasks) == 1 and len(made.image.tasks[0].programs) == 1:
         prefix = f"{made.image.tasks[0].programs[0].name}."
     return Subject(name or prefix.rstrip(".") or "PLC", made.image, prefix,
                    {source.name: source for source in sources}, tuple(libraries),
                    tuple(each for each in made.diagnostics if not each.source.name.startswith("<")))  # fmt: skip
+
+
+def _elsewhere(wrong: Sequence[Diagnostic], sources: Sequence[Source], libraries: Sequence[Path]) -> Iterator[str]:
+    """Where what is not known is declared after all: in a file of another name, or beside the test."""
+    names = dict.fromkeys(each.source.text[each.start:each.end] for each in wrong if each.code in UNKNOWN)
+    beside = dict.fromkeys(Path(source.name).parent for source in sources)
+    files = [*(file for folder in libraries for file in folder.rglob("*.st")),
+             *(file for folder in beside for file in folder.glob("*.st"))] if names else []  # fmt: skip
+    for name in names:
+        declared = re.compile(rf"^[ \t]*(?:FUNCTION_BLOCK|FUNCTION|TYPE)\s+{re.escape(name)}\b", re.I | re.M)
+        for file in files[:MOST_FILES]:
+            if declared.search(file.read_text(encoding="utf-8", errors="replace")):
+                shown = os.path.relpath(file) if file.is_absolute() and file.is_relative_to(Path.cwd()) else file
+                yield (f"{name} is declared in {shown}; a test finds it in a file of its own name, {name}.st, in src/ or in a "
+                       "folder of fbvm_libraries")
+                break
 
 
 def _read(path: Path) -> Source:

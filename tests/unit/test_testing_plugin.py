@@ -287,6 +287,15 @@ END_PROGRAM
 
 
 @pytest.mark.slow
+def test_a_block_in_a_file_of_another_name_is_found_for_the_message(project: pytest.Pytester) -> None:
+    (project.path / "src" / "queues.st").write_text("FUNCTION_BLOCK Fifo END_FUNCTION_BLOCK", encoding="utf-8")
+    project.makefile(".st", test_queue="PROGRAM Test_it VAR q : Fifo; END_VAR q(); ASSERT(TRUE); END_PROGRAM")
+    result = run(project)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["Fifo is declared in src/queues.st; a test finds it in a file of its own name, Fifo.st, in src/*"])
+
+
+@pytest.mark.slow
 def test_a_failed_assert_shows_line_and_values(project: pytest.Pytester) -> None:
     project.makefile(".st", test_pump="""\
 PROGRAM Test_wrong
