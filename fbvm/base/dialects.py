@@ -95,8 +95,7 @@ QUESTIONS = {
     "ties_away": ("REAL_TO_INT(2.5), REAL_TO_INT(50.5); REAL_TO_BYTE(-1.0)",
                   "2, 50: to the nearest, ties to even; bit strings have no negative ones",
                   "3, 51: to the nearest, ties away from 0; bit strings take the low bits, 16#FF"),
-    "libraries": ("blocks that begin or end another way; whether actions of charts have a final scan, and whether SFCInit, "
-                  "SFCReset, SFCPause, SFCTrans and SFCCurrentStep, where a POU declares them, steer its chart and tell of it",
+    "libraries": ("blocks that begin or end another way; final scans of actions; SFCInit, SFCReset and their like in charts",
                   "as the standard's bodies compute it", "blocks of its own"),
     "refused": ("POINTER TO, REFERENCE TO, REF_TO, WSTRING, another name for a type", "taken", "refused (S0903)"),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
@@ -13,6 +14,8 @@ from fbvm.syntax import tree
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
 
+_WITHOUT_SIGN = re.compile(r"[IQM][XBWDL]?\d+(?:\.\d+)*", re.IGNORECASE)
+
 
 def location_of(checker: Checker, declared: tree.VarDecl, kind: Type, source: Source) -> Address | None:
     """The address behind AT, checked against the type; None after a diagnostic."""
@@ -23,7 +26,7 @@ def location_of(checker: Checker, declared: tree.VarDecl, kind: Type, source: So
     try:
         address = parse_address(node.text, checker.areas)
     except AddressError as error:
-        checker.report.add("S0601", source, node, str(error))
+        checker.report.add("S0601", source, node, str(error), _meant(node.text, declared, kind))
         return None
     if address.area in ("T", "C") and base(kind) == BOOL:
         address = Address("TF" if address.area == "T" else "CNF", address.number)
@@ -31,6 +34,14 @@ def location_of(checker: Checker, declared: tree.VarDecl, kind: Type, source: So
         checker.report.add("S0604", source, node, "one location cannot serve several names")
         return None
     return address if _fits(checker, address, kind, source, node) else None
+
+
+def _meant(text: str, declared: tree.VarDecl, kind: Type) -> str:
+    """What to write where a text is no address: a `%` more, or for the name of a variable a reference."""
+    if _WITHOUT_SIGN.fullmatch(text):
+        return f"write %{text.upper()}"
+    name = declared.names[0].text if declared.names else "x"
+    return f"another name for a variable is a reference: {name} : REFERENCE TO {kind} REF= {text};" if text.isidentifier() else ""
 
 
 def _fits(checker: Checker, address: Address, kind: Type, source: Source, node: tree.Node) -> bool:
