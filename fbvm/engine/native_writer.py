@@ -349,8 +349,10 @@ class Writer:
         base, offset, terms = address
         if isinstance(base, tuple):
             return self._behind(address, count)
-        start = "%self" if base == "self" and self.base is None else str(self.base if base == "self" else 0)
-        total = self.new(f"add i64 {start}, {offset}")
+        if base == "self" and self.base is None:
+            total = self.new(f"add i64 %self, {offset}") if offset else "%self"
+        else:
+            total = str(offset + (self.base or 0 if base == "self" else 0))
         for stride, term in terms:
             total = self.new(f"add i64 {total}, {self.new(f'mul i64 {self.wide(term)}, {stride}')}")
         return total
