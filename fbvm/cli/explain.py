@@ -1,4 +1,4 @@
-"""`fbvm explain`: the page of a diagnostic, or of an instruction of ladder."""
+"""`fbvm explain`: the page of a diagnostic, of an instruction of ladder, or of a block of the libraries."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import click
 from fbvm.base import dialects
 from fbvm.base.codes import CODES
 from fbvm.base.pages import UnknownCode, page
-from fbvm.check import instructions
+from fbvm.check import block_pages, instructions
 from fbvm.syntax.instruction_set import meant, spelling
 
 
@@ -16,7 +16,8 @@ from fbvm.syntax.instruction_set import meant, spelling
 def command(code: str | None) -> None:
     """Print the page of a diagnostic: a wrong program, the reason, the mend.  Without CODE: the list of all codes.
 
-    `fbvm explain MOV` says what an instruction of ladder does, with its operands and flags.
+    `fbvm explain MOV` says what an instruction of ladder does, with its operands and flags; `fbvm explain TON` what a block
+    or function of the libraries does, with its pins.
 
     `fbvm explain dialects` says what compilers disagree about, and which answers --dialect chooses."""
     if code is None:
@@ -28,6 +29,9 @@ def command(code: str | None) -> None:
         return
     if (instruction := instructions.find(code)) is not None:
         click.echo(instructions.page(instruction))
+        return
+    if (block := block_pages.page(code)) is not None:
+        click.echo(block)
         return
     try:
         click.echo(page(code))

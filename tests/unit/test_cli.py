@@ -331,6 +331,15 @@ def test_explain_of_no_code_is_wrong_usage() -> None:
     assert "`fbvm explain` alone lists all" in fbvm("explain", "X").stderr
 
 
+def test_explain_shows_blocks_and_functions_with_their_pins() -> None:
+    shown = fbvm("explain", "ton").stdout
+    assert shown.startswith("# TON\n\nOn-delay: Q follows IN")
+    assert "    PT : TIME;\nEND_VAR\nVAR_OUTPUT\n" in shown and "Running" not in shown
+    assert "FUNCTION DAY_OF_WEEK : USINT" in fbvm("explain", "DAY_OF_WEEK").stdout
+    assert "CONTROL : ANY;" in fbvm("explain", "MBP_MSTR").stdout
+    assert fbvm("explain", "PVOID").exit_code == 2
+
+
 def test_explain_prints_the_page() -> None:
     assert "S0201" in fbvm("explain", "s0201").stdout
 
