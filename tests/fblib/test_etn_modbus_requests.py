@@ -145,11 +145,12 @@ def test_08_knows_sub_function_0_only(sub: int, served: tuple[Rig, Client]) -> N
     assert client.exchange(b"\x08" + sub.to_bytes(2, "big") + b"\0\0") == b"\x88\x01"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("pins", "codes"),
     [
-        pytest.param("", {1, 2, 3, 4, 5, 6, 8, 0x10}, marks=pytest.mark.slow),
-        pytest.param("Fn0F := TRUE", {1, 2, 3, 4, 5, 6, 8, 0x0F, 0x10}, marks=pytest.mark.slow),
+        ("", {1, 2, 3, 4, 5, 6, 8, 0x10}),
+        ("Fn0F := TRUE", {1, 2, 3, 4, 5, 6, 8, 0x0F, 0x10}),
         ("Fn0F := TRUE, Read_Only := TRUE", {1, 2, 3, 4, 8}),
     ],
 )
