@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 from fbvm.syntax.automaton import Automaton
 from fbvm.syntax.frames import ENDS, POUS, UNITS, anchor, frames
 from fbvm.syntax.lexer import Token
@@ -23,8 +21,6 @@ SKIPPED = {"LOOP": "a loop without a condition is WHILE TRUE DO .. END_WHILE; EX
 """Words whose statement cannot be read."""
 ENDED = {"LOOP": "END_LOOP", "CONST": "END_CONST", "TRY": "END_TRY", "INPUT": "END_INPUT", "OUTPUT": "END_OUTPUT"}
 """Words of these with an end of their own."""
-NETWORKS = re.compile(r"(?i)\bEND_NETWORK\b[ \t]*;?(?!(?s:.)*\bEND_NETWORK\b)")
-"""The last END_NETWORK."""
 BODIES = {ENDS[word] for word in POUS} | {"END_ACTION", "END_TRANSITION"}
 
 
@@ -66,12 +62,17 @@ def networks(automaton: Automaton, token: Token, following: list[Token]) -> Mend
         return None
     if automaton.text[automaton.text.rfind("\n", 0, word.start) + 1:word.start].strip():
         return None
-    last = NETWORKS.search(automaton.text, word.end)
-    while token.type not in UNITS and token.type not in BODIES and not (last and token.start >= last.end()):
+    behind: list[Token] | None = None
+    while token.type not in UNITS and token.type not in BODIES:
+        if token.text.upper() == "END_NETWORK":
+            behind = []
+        elif behind is not None:
+            behind.append(token)
         token = automaton.next()
-    return Mend([token], word.start, word.end, "NETWORK .. END_NETWORK is another tool's form of rungs",
+    rest = [*(behind or ()), token]
+    return Mend(rest, word.start, word.end, "NETWORK .. END_NETWORK is another tool's form of rungs",
                 "rungs stand between LADDER and END_LADDER, each behind a line RUNG, as mnemonics or drawn; "
-                "`fbvm import` reads PLCopen XML", cut=True, silent=token.start)
+                "`fbvm import` reads PLCopen XML", cut=True, silent=rest[0].start)
 
 
 def comment_signs(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
