@@ -130,7 +130,7 @@ def signals_at(found: Place | Span, descriptions: Mapping[str, str], meanings: M
 def signal(place: Place, description: str = "", meanings: Mapping[int, str] | None = None) -> Signal:
     """The signal of one place.  Raises TypeError for an array, a structure or a reference."""
     if not is_charted(place):
-        advice = "name what it leads to" if isinstance(place.type, RefType) else "name its members"
+        advice = f"name what it leads to, {place.name}^" if isinstance(place.type, RefType) else "name its members"
         raise TypeError(f"{place.name} is {place.type.name}; a chart shows single values, {advice}")
     return Signal(place, place.name.replace("CIO ", "CIO"), description, tuple((meanings or {}).items()))
 

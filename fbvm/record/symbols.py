@@ -70,7 +70,7 @@ class _Writer:
         if isinstance(kind, SubrangeType):
             return ["subrange", kind.name, kind.base.name, kind.low, kind.high]
         if isinstance(kind, RefType):
-            return ["ref", kind.name, None if kind.target is None else kind.target.name]
+            return ["ref", kind.name, None if kind.target is None else self.type(kind.target), kind.moves, kind.follows]
         return ["bytes", kind.name, kind.size, kind.align]
 
     def _structure(self, kind: StructType) -> int:
@@ -120,8 +120,8 @@ class _Reader:
         kind = ELEMENTARY[base]
         return SubrangeType(name, kind.size, kind.align, kind, low, high)
 
-    def reference(self, name: str, target: str | None) -> Type:
-        return RefType(name, 8, 8, None if target is None else Type(target, 0, 1))
+    def reference(self, name: str, target: Any, moves: bool, follows: bool) -> Type:
+        return RefType(name, 8, 8, None if target is None else self.type(target), moves, follows)
 
 
 _MAKERS: dict[str, Any] = {

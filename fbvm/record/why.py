@@ -6,16 +6,17 @@ Needs a trace of statements.  What the conditions around a statement read counts
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from fbvm.base.memory import Memory, Snapshot, compare
 from fbvm.code.image import Site
 from fbvm.plc import Phase
 from fbvm.record.inside import Event, Frame, Read, Statement, Write
-from fbvm.record.names import Names
+from fbvm.record.names import Names, is_single
 from fbvm.record.recorder import Signal
 from fbvm.watch.paths import Place
+from fbvm.watch.places import settled
 from fbvm.watch.values import Value, show_time
 
 DEEPEST = 6
@@ -50,6 +51,8 @@ class Follower(Protocol):
 class Readable(Protocol):
     """Whose values can be read."""
 
+    @property
+    def memory(self) -> Memory: ...
     def read(self, where: str | Place) -> Value: ...
 
 
@@ -175,7 +178,9 @@ class _Changes:
 
 def why(trace: Past, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
     """What gave a place its value at the end of a scan.  Raises ValueError for a scan that is not recorded."""
-    value = Signal(place, place.name).text(trace.at(scan).read(place))
+    then = trace.at(scan)
+    value = Signal(place, place.name).text(then.read(place))
+    place = _settled(trace.names, then.memory, place)
     start = trace.scans.start
     for window in (*WINDOWS, scan - start + 1):
         first = max(start, scan - window + 1)
@@ -184,6 +189,15 @@ def why(trace: Past, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
         if first == start or not _open(cause):
             break
     return cause
+
+
+def _settled(names: Names, memory: Memory, place: Place) -> Place:
+    """Where what is asked for lies; behind a reference it has the name of its owner, too."""
+    found = settled(memory, place) if place.hops else None
+    if found is None:
+        return place
+    owner = names.at(found.offset, found.bit) if is_single(found) else None
+    return replace(found, name=f"{place.name} ({owner.name})") if owner else found
 
 
 def _explain(past: _Changes, place: Place, value: str, before: int, deepest: int, known: set[object]) -> Cause:

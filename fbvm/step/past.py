@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fbvm.code.image import Site
+from fbvm.plc import Plc
 from fbvm.record.names import Names
 from fbvm.record.outline import outer_statements
 from fbvm.record.why import Follower
@@ -23,9 +24,9 @@ class Past:
     def scans(self) -> range:
         return range(self._session.here.scan + 1)
 
-    def at(self, scan: int) -> Session:
-        """The session, which stands there."""
-        return self._session
+    def at(self, scan: int) -> Plc:
+        """The PLC of the session, which stands there."""
+        return self._session.plc
 
     def follow(self, follower: Follower, scans: range | None = None) -> None:
         """Tells all that happened in some scans."""

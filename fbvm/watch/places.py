@@ -42,6 +42,12 @@ def write(memory: Memory, place: Place, value: object) -> None:
             memory.write(offset, "b", data != b"\0", bit)
 
 
+def settled(memory: Memory, place: Place) -> Place | None:
+    """Where a place lies now, without references on the way to it; None if one of them is null."""
+    at = _follow(memory, place)
+    return None if at is None else replace(place, offset=at[0], bit=at[1], hops=())
+
+
 def _follow(memory: Memory, place: Place) -> tuple[int, int | None] | None:
     """Byte offset and bit where a place lies now, references followed."""
     offset, bit = place.offset, place.bit

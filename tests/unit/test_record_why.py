@@ -155,3 +155,24 @@ def test_rungs_whose_statements_begin_at_one_place_come_to_an_end() -> None:
         while site >= 0:
             site, steps = outer[site], steps + 1
             assert steps < 10
+
+
+def test_what_lies_behind_a_reference_is_explained_where_it_lies() -> None:
+    plc = Plc(image("FUNCTION_BLOCK Adder VAR_IN_OUT total : INT; END_VAR\ntotal := total + 1;\nEND_FUNCTION_BLOCK\n"
+                    "PROGRAM Main VAR a, b : INT; r, none : REF_TO INT; f : REFERENCE TO INT; add : Adder; END_VAR\n"
+                    "f REF= b; r := REF(a);\n"
+                    "r^ := r^ + 1;\n"
+                    "add(total := b);\n"
+                    "END_PROGRAM"))
+    file = io.BytesIO()
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    plc.run(scans=3)
+    writer.close()
+    trace = Trace(io.BytesIO(file.getvalue()))
+    lines = {name: told(trace, ask(trace, name, 2, 0)) for name in ("Main.r^", "Main.f", "Main.add.total", "Main.none^")}
+    assert lines == {
+        "Main.r^": "Main.r^ (Main.a) = 3 since scan 2 (20ms), by pump.st:6 in Main",
+        "Main.f": "Main.f (Main.b) = 3 since scan 2 (20ms), by pump.st:2 in Main.add",
+        "Main.add.total": "Main.add.total (Main.b) = 3 since scan 2 (20ms), by pump.st:2 in Main.add",
+        "Main.none^": "Main.none^ = NULL since power-on",
+    }

@@ -360,3 +360,16 @@ def test_references_are_left_out_of_a_chart_of_everything(selected: Sequence[str
     assert [track.signal.label for track in recording(trace).tracks] == ["Main.a"]
     with pytest.raises(TypeError, match=r"Main\.r is REF_TO INT; a chart shows single values"):
         recording(trace, ["Main.r"])
+
+
+def test_what_references_lead_to_is_read_from_a_trace() -> None:
+    plc = Plc(image("TYPE Node : STRUCT n : INT; next : REF_TO Node; END_STRUCT END_TYPE\n"
+                    "PROGRAM Main VAR a : ARRAY[0..1] OF Node; r : REF_TO Node; p : POINTER TO INT; f : REFERENCE TO INT;"
+                    " none : REF_TO INT; END_VAR\n"
+                    "a[0].n := a[0].n + 1; a[1].n := 7; a[0].next := REF(a[1]); r := REF(a[0]); p := ADR(a[1].n); f REF= a[0].n;"
+                    "\nEND_PROGRAM"))
+    trace = Trace(io.BytesIO(record(plc, 3, before=lambda plc: None)))
+    names = ["Main.r^.n", "Main.r^.next^.n", "Main.p^", "Main.f", "Main.none^"]
+    assert [trace.at(2).read(name) for name in names] == [plc.read(name) for name in names] == [3, 7, 7, 3, None]
+    assert [track.changes for track in recording(trace, ["Main.f"]).tracks] == [[(0, 1), (1, 2), (2, 3)]]
+    assert [track.signal.label for track in recording(trace).tracks] == ["Main.a[0].n"]
