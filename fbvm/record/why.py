@@ -117,6 +117,10 @@ class _Changes:
         self._reads: dict[tuple[Frame, int], list[Fact]] = {}
         self._nameless: dict[int, tuple[Fact, ...]] = {}
         """What was read for the bytes that no name has: conditions of rungs, variables of functions."""
+        self._asked: list[Fact] = []
+        """What was read for a nameless value that nothing was written of since: an interlock asks so whether it holds."""
+        self._guards: list[Fact] = []
+        """Those facts, while the statement behind them is executed."""
         self._known: Snapshot | None = None
         self.order = 0
         trace.follow(self, scans)
@@ -138,16 +142,23 @@ class _Changes:
         self.order += 1
         if isinstance(event, Statement):
             self._reads[event.frame, event.site] = []
+            self._guards, self._asked = self._asked, []
         elif isinstance(event, Read):
             place = self._trace.names.at(event.offset, event.bit if event.bit < 8 else None)
             facts = self._reads.setdefault((event.frame, event.site), [])
             if place is None:
-                facts += self._nameless.get(event.offset, ())
+                self._asked = list(self._nameless.get(event.offset, ()))
+                facts += self._asked
             else:
                 facts.append(Fact(place, Signal(place, place.name).text(moment.read(place)), self.order))
-        elif isinstance(event, Write) and self._trace.names.at(event.offset, event.bit if event.bit < 8 else None) is None:
+        elif isinstance(event, Write):
+            self._written(moment, event)
+            self._asked = []
+
+    def _written(self, moment: Instant, event: Write) -> None:
+        if self._trace.names.at(event.offset, event.bit if event.bit < 8 else None) is None:
             self._nameless[event.offset] = tuple(_once(self._facts(event.frame, event.site)))[:MOST_FACTS]
-        elif isinstance(event, Write) and event.old != event.value and len(event.value) <= LARGEST_BYTES:
+        elif event.old != event.value and len(event.value) <= LARGEST_BYTES:
             site = self._trace.sites[event.site] if event.site >= 0 else None
             change = Change(moment.scans, moment.now_ns, self.order, site, self._trace.names.instance(event.frame.base),
                             tuple(self._facts(event.frame, event.site)))  # fmt: skip
@@ -158,7 +169,8 @@ class _Changes:
 
     def _facts(self, frame: Frame, site: int) -> Iterator[Fact]:
         """What a statement read, then what the conditions around it did."""
-        yield from self._reads.get((frame, site), ())
+        own = self._reads.get((frame, site), ())
+        yield from own or (replace(fact, guard=True) for fact in self._guards)
         while site >= 0 and (site := self._trace.outer[site]) >= 0:
             for fact in self._reads.get((frame, site), ()):
                 yield Fact(fact.place, fact.value, fact.order, True)

@@ -176,3 +176,21 @@ def test_what_lies_behind_a_reference_is_explained_where_it_lies() -> None:
         "Main.add.total": "Main.add.total (Main.b) = 3 since scan 2 (20ms), by pump.st:2 in Main.add",
         "Main.none^": "Main.none^ = NULL since power-on",
     }
+
+
+def test_an_interlock_is_why_its_outputs_are_off() -> None:
+    rungs = "LD Go\nANDNOT Stop\nIL\nLD P_On\nOUT Motor\nILC\nLD P_On\nOUT Lamp"
+    variables = "VAR Go : BOOL := TRUE; Stop, Motor, Lamp : BOOL; n : INT; END_VAR"
+    text = f"PROGRAM Main {variables} LADDER\n{rungs}\nEND_LADDER n := 5; END_PROGRAM"
+    plc, file = Plc(image(text)), io.BytesIO()
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    plc.run(scans=5)
+    plc.write("Main.Stop", True)
+    plc.run(scans=5)
+    writer.close()
+    trace = Trace(io.BytesIO(file.getvalue()))
+    assert told(trace, ask(trace, "Main.Motor", 9, 1)).splitlines()[1:] == [
+        "├ if Main.Go = TRUE since power-on",
+        "└ if Main.Stop = TRUE since scan 5 (50ms), from outside the program",
+    ]
+    assert ask(trace, "Main.n", 9, 1).causes == []
