@@ -31,6 +31,8 @@ _BRACKETS = re.compile(r"\[[^\[\]|]*\w[^\[\]|]*\]")
 _LINK = re.compile(r"[►▶>](\d+)")
 _TITLE = re.compile(r"([A-Za-z_]\w*) ?: ?([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)")
 _NAME = re.compile(r" *([A-Za-z_]\w*) *")
+_HEAD = re.compile(r" *(?:([A-Za-z_]\w*) +([A-Za-z_]\w*) +(\w+)|([A-Za-z_]\w*)) *")
+"""The first row of a block: its type, by itself or between two pins."""
 _STUB = frozenset("─━-╶╴╺╸")
 _BOX_TEXT = re.compile(r" ?[A-Za-z0-9@%!&#+]")
 _TEXT = re.compile(r"= [^\s─-╿|]+(?:, [^\s─-╿|]+)*|[^\s─-╿|]+")
@@ -169,19 +171,21 @@ class Grid:
 
     def _headed(self, box: DrawnBox) -> DrawnBox:
         """A box with its type in its first row and its instance above it is one of a block, as other tools draw it."""
-        first = box.rows[box.y + 1]
+        row, first = next((row, text) for row, text in box.rows.items() if text.strip())
         if named := _TITLE.fullmatch(first.strip()):
-            box.title, box.heads = (named[1], named[2]), (box.y + 1, box.y + 1)
-        elif len(box.rows) > 1 and _NAME.fullmatch(first) and spelling(first) not in instruction_set().rows:
+            box.title, box.heads = (named[1], named[2]), (row, row)
+            del box.rows[row]
+        elif len(box.rows) > 1 and (typed := _HEAD.fullmatch(first)) and spelling(first.split()[0]) not in instruction_set().rows:
             above = _NAME.fullmatch(self.lines[box.y - 1][box.x:box.until + 1]) if box.y else None
             if not above:
                 raise Bad(box.x, box.y, box.until + 1 - box.x,
-                          f"`{first.strip()}` is no instruction, and as a block it has no instance",
+                          f"`{first.split()[0]}` is no instruction, and as a block this box has no instance",
                           "write the name of the instance above the box, or instance : type in its upper side")
-            box.title, box.heads = (above[1], first.strip()), (box.y - 1, box.y + 1)
+            box.title, box.heads = (above[1], typed[2] or typed[4]), (box.y - 1, row)
             self._take(box.x + above.start(1), box.x + above.end(1), box.y - 1)
-        if box.title:
-            del box.rows[box.y + 1]
+            box.rows[row] = f"{typed[1]} {typed[3]}"
+            if typed[4]:
+                del box.rows[row]
         return box
 
     def _is_side(self, x: int, y: int) -> bool:
