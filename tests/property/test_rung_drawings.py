@@ -79,7 +79,8 @@ class Maker:
         if kind < 0.42:
             pins = [Pin(name, self.random.choice(OPERANDS + NAMES), name in "QE")
                     for name in self.random.sample(("IN", "PT", "Q", "E", "Register_Address"), self.random.randint(0, 4))]
-            return Box(-1, "TON", (), (), True, self.random.choice(("t", "Delay_of_the_pump")), tuple(pins), ("EN",))
+            return Box(-1, "TON", (), (), True, self.random.choice(("t", "Delay_of_the_pump")), tuple(pins),
+                       (self.random.choice(("EN", "CU")),), self.random.choice(("ENO", "QU")))
         if kind < 0.5:
             return Contact(-1, self.random.choice(COMPARED), self.some(OPERANDS, 2))
         return self.contact()
