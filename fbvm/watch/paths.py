@@ -6,6 +6,7 @@ A name beats an address, `%D200` is always an address.  Knows where things lie, 
 from __future__ import annotations
 
 import re
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -108,15 +109,32 @@ def _unknown(symbols: Mapping[str, Field], text: str, first: str, reason: str) -
         return f"there is no {text.strip()}; did you mean {meant}?"
     if not first or re.fullmatch(r"\s*(%.*|[A-Za-z]{1,3}\s*\d+(\.\d+)?|\d+(\.\d+)?|E\w\s*[_:]\s*\d+.*)", text):
         return reason
-    for field in symbols.values():
-        if isinstance(field.type, StructType) and field.type.block and field.type.member(first):
-            return f"there is no {first}; did you mean {field.name}.{text.strip()}?"
+    if holder := _holder(symbols, first):
+        return f"there is no {first}; did you mean {holder}.{text.strip()}?"
     listed = sorted(field.name for field in symbols.values() if field.space.upper() == first.upper())
     if listed:
         return f"{text.strip()}: the list has no such variable; it has {', '.join(listed[:8])}"
     programs_first = sorted(symbols.values(), key=lambda field: (not isinstance(field.type, StructType), field.name))
     known = ", ".join(field.name for field in programs_first[:8])
     return f"there is no {first}" + (f"; known here: {known}" if known else " (the program declares nothing)")
+
+
+def _holder(symbols: Mapping[str, Field], name: str) -> str:
+    """The path of an instance that has such a variable, the nearest one; each type is looked into once."""
+    known: set[int] = set()
+    waiting = deque((field.name, field.type) for field in symbols.values() if not field.reference)
+    while waiting:
+        path, kind = waiting.popleft()
+        if isinstance(kind, ArrayType):
+            path, kind = f"{path}[{', '.join(str(low) for low, _ in kind.bounds)}]", kind.element
+        if not isinstance(kind, StructType) or not kind.block or id(kind) in known:
+            continue
+        if kind.member(name):
+            return path
+        known.add(id(kind))
+        waiting += [(f"{path}.{field.name}", field.type) for field in kind.fields.values()
+                    if not field.reference and "$" not in field.name]
+    return ""
 
 
 _OTHER_NAMES = {"EM": "E", "HR": "H", "WR": "W", "AR": "A", "TIM": "T", "CNT": "C", "DR": "D", "IR": "CIO "}

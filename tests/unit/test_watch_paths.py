@@ -79,6 +79,7 @@ def test_a_range_is_its_places(text: str, names: list[str]) -> None:
 @pytest.mark.parametrize(("text", "message"), [
     ("Main.conn.EN", "Main.conn has no EN; it has ENO"),
     ("conn.ENO", "did you mean Main.conn.ENO?"),
+    ("ENO", "did you mean Main.conn.ENO?"),
     ("nothing", "there is no nothing; known here: Main, d200"),
     ("D40000", "D ends at 32767; 40000 does not exist"),
     ("Main.a[4, 0].x", "Main.a[4, 0]: 4 is outside 1..3"),
