@@ -296,6 +296,9 @@ class Operators:
         timed = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
         if expr.op == "*" and timed == [False, True]:
             hint = f"the {right} stands in front: {self.expressions.text(expr.right)} * {self.expressions.text(expr.left)}"
+        elif expr.op in "+-" and left == DATE and timed[1]:
+            date, time = self.expressions.text(expr.left), self.expressions.text(expr.right)
+            hint = f"a DATE has no time of day: write DT_TO_DATE(CONCAT_DATE_TOD({date}, TOD#0:0:0) {expr.op} {time})"
         elif any(timed) and expr.op not in ("*", "/") and UNTYPED_INT in (left, right):
             hint = "a duration is written T#500ms"
         elif expr.op in ("AND", "OR") and want == BOOL and not is_any(left, "ANY_BIT") and not is_any(right, "ANY_BIT"):

@@ -33,6 +33,8 @@ LIBRARY = Path(__file__).parent / "library"
 """What tests in ST call."""
 _DECLARES = re.compile(r"\s*(FUNCTION|FUNCTION_BLOCK|PROGRAM)\b", re.I)
 _FIRST = re.compile(r"\w+")
+_OPEN = re.compile(r"\[\s*\*|^\s*ANY(_\w+)?\s*$", re.I)
+"""Types of in-outs that take many: arrays of any length, ANY and its like."""
 UNKNOWN = ("S0201", "S0204", "S0401")
 """Codes of names that mean nothing."""
 MOST_FILES = 300
@@ -210,6 +212,9 @@ def _wrapper(pou: tree.Pou, source: Source) -> str:
     In-outs are connected to variables of the program, which the block shows under its own names."""
     name = pou.name.text
     in_outs = _variables(pou, "VAR_IN_OUT", source)
+    if open_ones := [f"{each} : {kind}" for each, kind in in_outs if _OPEN.search(kind)]:
+        raise SubjectError(f"{name} takes what has no type of its own, {', '.join(open_ones)}: test a PROGRAM that calls it "
+                           "with a variable")
     if pou.kind == "FUNCTION_BLOCK":
         declared = [(INSTANCE, name), *((f"{INSTANCE}_{each}", kind) for each, kind in in_outs)]
         call = f"{INSTANCE}({', '.join(f'{each} := {INSTANCE}_{each}' for each, _ in in_outs)})"

@@ -362,3 +362,10 @@ def test_what_a_unit_changed_is_told_apart_from_what_the_test_wrote() -> None:
     assert "Wanted is TRUE since scan 3 (30ms), written from outside the program" in said
     assert re.search(r"D30009 is 4 since scan \d \(\d0ms\), by a unit in the I/O refresh", said)
     assert "  I/O refresh" in said
+
+
+@pytest.mark.parametrize("kind", ["ARRAY [*] OF BYTE", "ARRAY[ *, *] OF INT", "ANY", "ANY_INT"])
+def test_in_outs_of_many_types_have_no_rig(kind: str) -> None:
+    text = f"FUNCTION_BLOCK Sum VAR_IN_OUT Data : {kind}; END_VAR END_FUNCTION_BLOCK"
+    with pytest.raises(SubjectError, match=re.escape(f"Sum takes what has no type of its own, Data : {kind}: test a PROGRAM")):
+        rig("Sum", text)
