@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import pytest
@@ -39,13 +40,11 @@ END_PROGRAM
 """
 
 
-def image_of(text: str) -> Image:
+@cache
+def image_of(text: str = POLL) -> Image:
     image = compile_text(text).image
     assert image is not None
     return image
-
-
-POLL_IMAGE = image_of(POLL)
 
 
 class Run:
@@ -54,7 +53,7 @@ class Run:
     def __init__(self, timing: str = "exact", seed: int = 0) -> None:
         self.file = io.StringIO()
         self.journal = Journal(self.file, {"seed": seed})
-        self.plc = Plc(POLL_IMAGE, journal=self.journal)
+        self.plc = Plc(image_of(), journal=self.journal)
         self.network, self.peer = LoopNetwork(seed), ModbusPeer()
         self.network.place(SERVER, self.peer)
         self.unit = Etn21(0, "192.168.250.1", timing=timing, seed=seed)
@@ -65,9 +64,9 @@ class Run:
         return self.file.getvalue()
 
 
-def replay_of(text: str, image: Image = POLL_IMAGE) -> Replay:
+def replay_of(text: str, image: Image | None = None) -> Replay:
     header, entries = open_journal(text.splitlines(keepends=True))
-    return Replay(header, entries, image)
+    return Replay(header, entries, image or image_of())
 
 
 def entries_of(text: str) -> list[Entry]:
@@ -75,7 +74,7 @@ def entries_of(text: str) -> list[Entry]:
     return [header, *entries]
 
 
-def same_again(plc: Plc, text: str, image: Image = POLL_IMAGE) -> Replay:
+def same_again(plc: Plc, text: str, image: Image | None = None) -> Replay:
     """Replays to the end and compares everything that a PLC is."""
     replay = replay_of(text, image)
     assert replay.run() == "end"
@@ -243,7 +242,7 @@ def test_any_engine_replays(options: dict[str, Any]) -> None:
     run = Run()
     run.plc.run(scans=300)
     header, entries = open_journal(run.text().splitlines(keepends=True))
-    replay = Replay(header, entries, POLL_IMAGE, **options)
+    replay = Replay(header, entries, image_of(), **options)
     assert replay.run() == "end"
     assert replay.differs is None
 
@@ -301,7 +300,7 @@ def test_what_the_network_told_stands_in_its_scan() -> None:
 
 
 def test_a_run_without_a_journal_is_the_same() -> None:
-    run, plain = Run(), Plc(POLL_IMAGE)
+    run, plain = Run(), Plc(image_of())
     network = LoopNetwork()
     network.place(SERVER, ModbusPeer())
     plain.attach(Etn21(0, "192.168.250.1"), network)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import pytest
@@ -302,7 +303,7 @@ def test_a_damaged_block_is_told() -> None:
 @pytest.mark.slow
 @given(st.binary(max_size=200), st.integers(0, 400))
 def test_any_bytes_give_a_trace_or_an_error(noise: bytes, at: int) -> None:
-    data = bytearray(GOOD)
+    data = bytearray(good())
     data[at : at + len(noise)] = noise
     try:
         trace = Trace(io.BytesIO(bytes(data)))
@@ -312,7 +313,9 @@ def test_any_bytes_give_a_trace_or_an_error(noise: bytes, at: int) -> None:
         assert str(error)
 
 
-GOOD = record(Plc(image()), 20, Depth.STATEMENTS)
+@cache
+def good() -> bytes:
+    return record(Plc(image()), 20, Depth.STATEMENTS)
 
 
 # --- numbers and symbols ----------------------------------------------------------------------------------------------
