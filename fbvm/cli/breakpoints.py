@@ -9,7 +9,7 @@ import click
 
 from fbvm.breakpoints import Frame, Halt
 from fbvm.plc import Plc
-from fbvm.record.names import Names
+from fbvm.watch.names import Names
 
 
 def breakpoint_options(function: Callable[..., Any]) -> Callable[..., Any]:

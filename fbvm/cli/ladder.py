@@ -18,10 +18,10 @@ from fbvm.plc import Plc
 from fbvm.record.history import looking
 from fbvm.record.ladder_svg import ladder_svg
 from fbvm.record.ladder_text import ladder_surface, ladder_text
-from fbvm.record.names import Names
 from fbvm.record.power import Power
 from fbvm.record.rung_values import Values
 from fbvm.syntax.rung_widths import Sight
+from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
 
 SVG_WIDTH = 120

@@ -18,8 +18,8 @@ from fbvm.cli import status
 from fbvm.engine.trap import Trap
 from fbvm.plc import Plc
 from fbvm.record.chart import draw
-from fbvm.record.names import Names
 from fbvm.record.recorder import Recorder
+from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, in_hexadecimal, plain_value, show, show_time
 
@@ -62,7 +62,7 @@ class Outcome:
                 click.echo(str(self.plc.lateness), err=True)
         if self.plc.trap:
             names = Names(self.plc.image.symbols, self.plc.memory.areas)
-            click.secho(names.trap(self.plc.trap), fg="red", err=True)
+            click.secho(self.plc.trap.told(names.instance), fg="red", err=True)
         elif self.reason == "max":
             passed_ns = round(self.plc.elapsed_ns / MS_NS) * MS_NS
             click.secho(f"{self.until} did not hold in {show_time(passed_ns)[2:]}", fg="yellow", err=True)

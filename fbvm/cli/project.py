@@ -14,12 +14,12 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli import status
 from fbvm.cli.outcome import EXIT_STATUS, Progress, for_scripts, shown, trap_for_scripts
 from fbvm.cli.sources import report, show
-from fbvm.record.names import Names
 from fbvm.run import run_all
 from fbvm.run.plant import Kind, Plant
 from fbvm.run.project import FILE, Project, project_file, read_project
 from fbvm.run.running import Running
 from fbvm.scan_times import Lateness, ScanTimes
+from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value, show_time
 
@@ -101,7 +101,7 @@ def _print(plant: Plant, as_json: bool, scan_time: bool) -> None:
             click.echo(line)
         for name, run in zip(kind.names, kind.runs, strict=True):
             if run.plc.trap:
-                told = Names(run.plc.image.symbols, run.plc.memory.areas).trap(run.plc.trap)
+                told = run.plc.trap.told(Names(run.plc.image.symbols, run.plc.memory.areas).instance)
                 click.secho(f"{name}: {told}", fg="red", err=True)
     if scan_time:
         for kind in plant.kinds:

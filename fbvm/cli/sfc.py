@@ -16,9 +16,9 @@ from fbvm.code.image import Image, SfcPicture
 from fbvm.plc import Plc
 from fbvm.record.history import looking
 from fbvm.record.ladder_svg import ladder_svg
-from fbvm.record.names import Names
 from fbvm.record.sfc_seen import Evolutions
 from fbvm.record.sfc_text import LEAST, sfc_surface, sfc_text
+from fbvm.watch.names import Names
 
 
 @click.command("sfc")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -26,6 +27,11 @@ class Trap:
 
     def __str__(self) -> str:
         return self.message
+
+    def told(self, path: Callable[[int], str]) -> str:
+        """The message, and in which instance if the body has several; `path` names what begins at a byte."""
+        instance = path(self.instance) if self.instance != NO_INSTANCE else ""
+        return f"{self} (in {instance})" if instance not in ("", self.site.pou) else str(self)
 
 
 class Stop(Exception):

@@ -8,11 +8,11 @@ from fbvm.base.areas import Area
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import Field
 from fbvm.record.inside import Read, Write
-from fbvm.record.names import Names
 from fbvm.record.power import Executed
 from fbvm.record.recorder import Signal
 from fbvm.record.table import Scanned
 from fbvm.syntax.rung_diagram import joined
+from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, UnknownPlace, find_place
 
 

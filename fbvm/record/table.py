@@ -17,8 +17,8 @@ from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.image import Site
 from fbvm.plc import Phase
 from fbvm.record.inside import Ended, Event, Frame, Read, Statement, Write
-from fbvm.record.names import Names
 from fbvm.record.recorder import Signal
+from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value, show_time
 

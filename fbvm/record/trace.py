@@ -21,7 +21,6 @@ from fbvm.code.image import Layout, RungPicture, SfcPicture, Site
 from fbvm.plc import Phase
 from fbvm.record import symbols
 from fbvm.record.inside import Began, Contact, Ended, Event, Frame, Passing, Read, Statement, Write
-from fbvm.record.names import Names
 from fbvm.record.trace_format import (
     BLOCK,
     CONTACT,
@@ -46,6 +45,7 @@ from fbvm.record.trace_format import (
 )
 from fbvm.record.trace_writer import FORMAT, Depth
 from fbvm.watch import places
+from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span, find
 from fbvm.watch.values import Value
 from fbvm.wire.link import Peer

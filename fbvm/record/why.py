@@ -13,8 +13,8 @@ from fbvm.base.memory import Memory, Snapshot, compare
 from fbvm.code.image import Site
 from fbvm.plc import Phase
 from fbvm.record.inside import Event, Frame, Read, Statement, Write
-from fbvm.record.names import Names, is_single
 from fbvm.record.recorder import Signal
+from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place
 from fbvm.watch.places import settled
 from fbvm.watch.values import Value, show_time

@@ -12,7 +12,6 @@ from functools import partial
 
 from fbvm.base.types import fold
 from fbvm.plc import Mode, Plc
-from fbvm.record.names import is_single
 from fbvm.record.recorder import signals_at
 from fbvm.record.table import ScanTable
 from fbvm.record.traffic import Passed
@@ -23,6 +22,7 @@ from fbvm.step.targets import Target, target
 from fbvm.step.twin import Act
 from fbvm.step.words import Words
 from fbvm.watch.conditions import ConditionError, parse_condition
+from fbvm.watch.names import is_single
 from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.places import parsed
 from fbvm.watch.values import parse_time_ns

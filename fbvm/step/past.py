@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fbvm.code.image import Site
 from fbvm.plc import Plc
-from fbvm.record.names import Names
 from fbvm.record.outline import outer_statements
 from fbvm.record.why import Follower
 from fbvm.step.session import Session
 from fbvm.step.words import Words
+from fbvm.watch.names import Names
 
 
 class Past:

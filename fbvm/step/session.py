@@ -17,13 +17,13 @@ from fbvm.engine.trap import Trap
 from fbvm.plc import Phase, Plc, State
 from fbvm.record.history import looking
 from fbvm.record.inside import Statement
-from fbvm.record.names import Names
 from fbvm.record.power import Executed
 from fbvm.record.recorder import HEXADECIMAL_AREAS, Signal
 from fbvm.record.rung_values import Values
 from fbvm.record.sfc_seen import Called
 from fbvm.step.twin import END, Act, Injector, Seen, Stop, Told, Twin, depth
 from fbvm.watch import places
+from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value
 

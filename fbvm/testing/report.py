@@ -5,11 +5,11 @@ from __future__ import annotations
 from fbvm.base.types import StructType
 from fbvm.plc import Phase, Plc
 from fbvm.record.history import History
-from fbvm.record.names import Names, is_single
 from fbvm.record.recorder import Signal
 from fbvm.record.table import ScanTable, Writer
 from fbvm.testing.reads import Reads
 from fbvm.testing.subject import Subject
+from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place
 from fbvm.watch.values import show_time
 

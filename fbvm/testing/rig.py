@@ -22,7 +22,6 @@ from fbvm.net.loop import LoopNetwork
 from fbvm.plc import Mode, Plc
 from fbvm.record.chart import Chart, draw
 from fbvm.record.history import History
-from fbvm.record.names import Names
 from fbvm.record.recorder import Recorder
 from fbvm.record.traffic import Passed, Reader, listen
 from fbvm.testing.pages import write_page
@@ -33,6 +32,7 @@ from fbvm.testing.values import Values, value_of, write
 from fbvm.units.etn21 import Etn21
 from fbvm.units.unit import Unit
 from fbvm.watch.conditions import parse_condition
+from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span, UnknownPlace, find, find_place
 from fbvm.watch.values import Value, parse_time_ns, show_time
 from fbvm.wire.tap import Happening
@@ -272,7 +272,7 @@ class Rig:
         self._history.before_scan()
         trap = self.plc.scan()
         if trap:
-            raise Trapped(trap, Names(self.plc.image.symbols, self.plc.memory.areas).trap(trap))
+            raise Trapped(trap, trap.told(Names(self.plc.image.symbols, self.plc.memory.areas).instance))
 
     @property
     def scans(self) -> int:

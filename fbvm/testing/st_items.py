@@ -18,7 +18,6 @@ from fbvm.code.image import Site
 from fbvm.plc import Phase, Plc
 from fbvm.record.history import History, looking
 from fbvm.record.inside import Began, Event, Frame, Read, Statement, Write
-from fbvm.record.names import Names, is_single
 from fbvm.record.recorder import Signal
 from fbvm.record.table import ScanTable
 from fbvm.syntax.text import read
@@ -27,6 +26,7 @@ from fbvm.testing.plugin import counted, library_folders, page_of
 from fbvm.testing.rig import Trapped
 from fbvm.testing.subject import LIBRARY, Subject, SubjectError, pous, subject
 from fbvm.testing.warned import warned_of
+from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value, show_time
 

@@ -11,9 +11,9 @@ from fbvm.code.image import Image
 from fbvm.plc import Phase, Plc
 from fbvm.record.history import History, looking
 from fbvm.record.inside import Began, Ended, Event, Inside, Read, Statement, Write
-from fbvm.record.names import Names
 from fbvm.record.recorder import Signal, signals_of
 from fbvm.record.table import ScanTable
+from fbvm.watch.names import Names
 
 TEXT = """\
 TYPE Pair : STRUCT a, b : INT; END_STRUCT END_TYPE

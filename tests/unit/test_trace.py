@@ -20,13 +20,13 @@ from fbvm.record import symbols
 from fbvm.record.chart import draw
 from fbvm.record.history import looking
 from fbvm.record.inside import Began, Ended, Event, Frame, Read, Statement, Write
-from fbvm.record.names import Names
 from fbvm.record.selection import select
 from fbvm.record.table import ScanTable
 from fbvm.record.trace import Trace
 from fbvm.record.trace_format import MAGIC, Cursor, TraceError, put, xor
 from fbvm.record.trace_signals import recording
 from fbvm.record.trace_writer import START, Depth, TraceWriter
+from fbvm.watch.names import Names
 from fbvm.watch.paths import UnknownPlace
 
 # --- values at the end of each scan -----------------------------------------------------------------------------------

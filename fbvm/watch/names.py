@@ -12,7 +12,6 @@ from dataclasses import replace
 
 from fbvm.base.areas import FLAG_AREAS, PAGE_BYTES, SLOTS_OFFSET, Address, Area
 from fbvm.base.types import ArrayType, Field, RefType, StructType, base
-from fbvm.engine.trap import NO_INSTANCE, Trap
 from fbvm.watch.paths import Place, UnknownPlace, find_place, member
 
 REFERENCE = RefType("reference", 8, 8, None)
@@ -61,11 +60,6 @@ class Names:
             found = self._instance(offset)
             self._instances[offset] = found or Place("", REFERENCE, offset)
         return self._instances[offset].name
-
-    def trap(self, trap: Trap) -> str:
-        """What stopped a program, and in which instance if its body has several."""
-        instance = self.instance(trap.instance) if trap.instance != NO_INSTANCE else ""
-        return f"{trap} (in {instance})" if instance not in ("", trap.site.pou) else str(trap)
 
     def address(self, place: Place) -> str:
         """The address at which a variable is located, "" for one in the program's own memory."""
