@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import Protocol
 
 from fbvm.base.memory import WHOLE_BYTES
@@ -24,6 +25,8 @@ from fbvm.watch.values import Value, show_time
 
 MARK = ">"
 WIDEST_CELL = 24
+MOST_READS = 32
+"""Values of which a value without a name is remembered to have been made."""
 
 
 class Scanned(Protocol):
@@ -97,6 +100,8 @@ class ScanTable:
         self._values: list[Value] | None = None
         self._statement: Statement | None = None
         self._reads: dict[Frame, dict[str, str]] = {}
+        self._nameless: dict[int, dict[str, str]] = {}
+        """What was read for the bytes that no name has, such as conditions of rungs."""
 
     def phase(self, plc: Scanned, phase: Phase) -> None:
         if phase is Phase.INPUTS or not self.bands or self.bands[-1].scan != plc.scans:
@@ -117,10 +122,13 @@ class ScanTable:
             self._reads[event.frame] = {}
         elif isinstance(event, Read):
             place = self._names.at(event.offset, event.bit if event.bit != WHOLE_BYTES else None)
-            if place is not None:
-                self._reads[event.frame][place.name] = Signal(place, place.name).text(plc.read(place))
+            read = self._reads.setdefault(event.frame, {})
+            read.update(self._nameless.get(event.offset, {}) if place is None else
+                        {place.name: Signal(place, place.name).text(plc.read(place))})
         elif isinstance(event, Ended):
             self._reads.pop(event.frame, None)
+        elif isinstance(event, Write) and self._names.at(event.offset) is None:
+            self._nameless[event.offset] = dict(islice(self._reads.get(event.frame, {}).items(), MOST_READS))
         elif isinstance(event, Write) and (concerned := self._concerned(event)):
             reads = tuple(self._reads.get(event.frame, {}).items())
             for signal in concerned:

@@ -287,6 +287,22 @@ END_PROGRAM
 
 
 @pytest.mark.slow
+def test_a_failure_names_the_contacts_of_a_rung(project: pytest.Pytester) -> None:
+    rungs = "LD Start\nOR Motor\nANDNOT Stop\nOUT Motor"
+    (project.path / "src" / "motor.st").write_text(
+        f"PROGRAM Main VAR Start, Stop, Motor : BOOL; END_VAR\nLADDER\n{rungs}\nEND_LADDER\nEND_PROGRAM", encoding="utf-8")
+    project.makepyfile("""
+        def test_it(plc):
+            main = plc("src/motor.st")
+            main.scan(Start=True, Stop=True)
+            assert main.Motor
+    """)
+    result = run(project)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["Motor is FALSE *OUT Motor  with Start = TRUE, Motor = FALSE, Stop = TRUE"])
+
+
+@pytest.mark.slow
 def test_a_block_in_a_file_of_another_name_is_found_for_the_message(project: pytest.Pytester) -> None:
     (project.path / "src" / "queues.st").write_text("FUNCTION_BLOCK Fifo END_FUNCTION_BLOCK", encoding="utf-8")
     project.makefile(".st", test_queue="PROGRAM Test_it VAR q : Fifo; END_VAR q(); ASSERT(TRUE); END_PROGRAM")
