@@ -123,8 +123,10 @@ class ScanTable:
         elif isinstance(event, Read):
             place = self._names.at(event.offset, event.bit if event.bit != WHOLE_BYTES else None)
             read = self._reads.setdefault(event.frame, {})
-            read.update(self._nameless.get(event.offset, {}) if place is None else
-                        {place.name: Signal(place, place.name).text(plc.read(place))})
+            if place is None:
+                read.update(self._nameless.get(event.offset, {}))
+            elif not place.unwritten:
+                read[place.name] = Signal(place, place.name).text(plc.read(place))
         elif isinstance(event, Ended):
             self._reads.pop(event.frame, None)
         elif isinstance(event, Write) and self._names.at(event.offset) is None:

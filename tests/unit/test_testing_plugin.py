@@ -303,6 +303,21 @@ def test_a_failure_names_the_contacts_of_a_rung(project: pytest.Pytester) -> Non
 
 
 @pytest.mark.slow
+def test_a_failure_in_a_chart_names_what_was_written(project: pytest.Pytester) -> None:
+    chart = "INITIAL_STEP A: Lamp(L, T#1s); END_STEP\nTRANSITION FROM A TO A := Go; END_TRANSITION"
+    (project.path / "src" / "lamp.st").write_text(
+        f"PROGRAM Main VAR Go, Lamp : BOOL; END_VAR\n{chart}\nEND_PROGRAM", encoding="utf-8")
+    project.makepyfile("""
+        def test_it(plc):
+            assert not plc("src/lamp.st").run(scans=3).Lamp
+    """)
+    result = run(project)
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["Lamp is TRUE since scan *, by src/lamp.st:2:*"])
+    assert "$" not in result.stdout.str()
+
+
+@pytest.mark.slow
 def test_a_block_in_a_file_of_another_name_is_found_for_the_message(project: pytest.Pytester) -> None:
     (project.path / "src" / "queues.st").write_text("FUNCTION_BLOCK Fifo END_FUNCTION_BLOCK", encoding="utf-8")
     project.makefile(".st", test_queue="PROGRAM Test_it VAR q : Fifo; END_VAR q(); ASSERT(TRUE); END_PROGRAM")
