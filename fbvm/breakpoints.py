@@ -19,6 +19,7 @@ from fbvm.engine.tiers import Engine, choice_of, substitutes_of
 from fbvm.engine.trap import Trap
 from fbvm.watch.changes import changed
 from fbvm.watch.conditions import Condition, parse_condition
+from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, show
 
@@ -179,8 +180,13 @@ class Breakpoints:
             whole = self._plc.find(said.where)
             found, before, after = changed(whole, cast(Value, row.before), cast(Value, row.value))
             name = said.where if found is whole else found.name
-            return f"{name} was {_shown(found, before)}, is {_shown(found, after)}"
+            return f"{name} was {self._shown(found, before)}, is {self._shown(found, after)}"
         return f"{said.where} holds" if said.kind == "condition" else f"breakpoint {said}"
+
+    def _shown(self, found: Place | Span, value: Value) -> str:
+        image = self._plc.image
+        names = Names.of(image, self._plc.memory.areas)
+        return show(found.type, names.told(found.type, value)) if isinstance(found, Place) else str(value)
 
 
 def find_line(image: Image, where: str) -> tuple[str, frozenset[int]]:
@@ -230,7 +236,3 @@ def _extents(found: Place | Span) -> tuple[list[tuple[int, int]], int]:
     if isinstance(found, Place) and found.bit is not None:
         return [(found.offset, 1)], 1 << found.bit
     return [(place.offset, max(1, place.type.size)) for place in places], 0
-
-
-def _shown(found: Place | Span, value: Value) -> str:
-    return show(found.type, value) if isinstance(found, Place) else str(value)

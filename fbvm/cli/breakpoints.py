@@ -50,7 +50,7 @@ def halt_lines(plc: Plc, halt: Halt, lines: Mapping[str, Mapping[int, str]]) -> 
     yield str(halt)
     if halt.site is not None and (text := lines.get(halt.site.file, {}).get(halt.site.line)):
         yield f"  {halt.site.line} | {text}"
-    names = Names(plc.image.symbols, plc.memory.areas)
+    names = Names.of(plc.image, plc.memory.areas)
     rows = [_row(number, frame, names) for number, frame in enumerate(halt.frames)]
     widths = [max(len(row[column]) for row in rows) for column in (0, 1)]
     for first, second, third in rows:

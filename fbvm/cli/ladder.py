@@ -61,7 +61,7 @@ def _draw(rung: RungPicture, width: int, sight: Sight) -> None:
 def _places(image: Image, body: int) -> Callable[[str], str]:
     """The addresses of what a POU declares AT one, and of global variables."""
     own = image.types.get(fold(image.bodies[body].name))
-    names = Names(image.symbols, image.layout.areas)
+    names = Names.of(image, image.layout.areas)
 
     def place(symbol: str) -> str:
         name = fold(symbol)
@@ -98,13 +98,13 @@ def drawing(plc: Plc, scans: str | None) -> Iterator[None]:
     if not scans:
         yield
         return
-    values = Values(plc.image.symbols, plc.memory.areas)
+    values = Values(plc.image, plc.memory.areas)
     power = Power(plc.image.rungs, scans_named(scans), values.keep)
     with looking(plc, power):
         yield
     if not power.executed:
         tell_nothing_drawn(plc, f"--ladder {scans}", "rung", bool(plc.image.rungs))
-    names = Names(plc.image.symbols, plc.memory.areas)
+    names = Names.of(plc.image, plc.memory.areas)
     before: tuple[int, int] | None = None
     for made in power.executed:
         if before != (made.scan, made.base):

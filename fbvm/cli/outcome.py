@@ -54,26 +54,26 @@ class Outcome:
             return
         if self.recorder:
             click.echo(draw(self.recorder, width=chart_width(), ruler=True, compress=True), nl=False)
+        names = Names.of(self.plc.image, self.plc.memory.areas)
         for text, place in self.places.items():
-            click.echo(f"{text} = {shown(place, self.plc.read(place))}")
+            click.echo(f"{text} = {shown(place, names.read(self.plc.read, place))}")
         if self.scan_time:
             click.echo(str(self.plc.scan_times), err=True)
             if self.plc.lateness.count:
                 click.echo(str(self.plc.lateness), err=True)
         if self.plc.trap:
-            names = Names(self.plc.image.symbols, self.plc.memory.areas)
             click.secho(self.plc.trap.told(names.instance), fg="red", err=True)
         elif self.reason == "max":
             passed_ns = round(self.plc.elapsed_ns / MS_NS) * MS_NS
             click.secho(f"{self.until} did not hold in {show_time(passed_ns)[2:]}", fg="yellow", err=True)
 
     def _as_dict(self) -> dict[str, object]:
-        plc = self.plc
+        plc, names = self.plc, Names.of(self.plc.image, self.plc.memory.areas)
         return {
             "scans": plc.scans,
             "time_ms": plc.elapsed_ns // 1_000_000 if plc.elapsed_ns % 1_000_000 == 0 else plc.elapsed_ns / 1e6,
             "stopped": self.reason,
-            "values": {text: for_scripts(place, plc.read(place)) for text, place in self.places.items()},
+            "values": {text: for_scripts(place, names.read(plc.read, place)) for text, place in self.places.items()},
             **({"break": _halt(plc.halted)} if plc.halted else {}),
             "trap": trap_for_scripts(plc.trap),
             **({"scan_time": plc.scan_times.as_dict(), "lateness": plc.lateness.as_dict()} if self.scan_time else {}),

@@ -101,7 +101,7 @@ def _print(plant: Plant, as_json: bool, scan_time: bool) -> None:
             click.echo(line)
         for name, run in zip(kind.names, kind.runs, strict=True):
             if run.plc.trap:
-                told = run.plc.trap.told(Names(run.plc.image.symbols, run.plc.memory.areas).instance)
+                told = run.plc.trap.told(Names.of(run.plc.image, run.plc.memory.areas).instance)
                 click.secho(f"{name}: {told}", fg="red", err=True)
     if scan_time:
         for kind in plant.kinds:
@@ -119,8 +119,10 @@ def _lines(kind: Kind) -> Iterator[str]:
     ends = sorted({run.reason for run in kind.runs})
     lasted = show_time(max(run.plc.elapsed_ns for run in kind.runs) // 1_000_000 * 1_000_000)[2:]
     yield f"{kind.row.name}: {many}{_scans(min(scans), max(scans))}{each} in {lasted}, ended by {', '.join(ends)}"
+    first = kind.runs[0].plc
+    names = Names.of(first.image, first.memory.areas)
     for name, place in kind.watched.items():
-        values = [run.plc.read(place) for run in kind.runs]
+        values = [names.read(run.plc.read, place) for run in kind.runs]
         if all(value == values[0] for value in values):
             yield f"  {name} = {shown(place, values[0])}"
         elif isinstance(place, Place) and all(isinstance(value, int | float) for value in values):
@@ -139,10 +141,12 @@ def _scans(least: int, most: int) -> str:
 
 def _for_scripts(plant: Plant) -> Iterator[tuple[str, object]]:
     for kind in plant.kinds:
+        first = kind.runs[0].plc
+        names = Names.of(first.image, first.memory.areas)
         for name, run in zip(kind.names, kind.runs, strict=True):
             yield name, {
                 "scans": run.plc.scans, "time_ns": run.plc.elapsed_ns, "stopped": run.reason,
-                "values": {text: for_scripts(kind.watched[text], value) for text, value in kind.values(run).items()},
+                "values": {text: for_scripts(place, names.read(run.plc.read, place)) for text, place in kind.watched.items()},
                 "trap": trap_for_scripts(run.plc.trap),
             }  # fmt: skip
 

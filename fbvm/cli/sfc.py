@@ -62,7 +62,7 @@ def drawing(plc: Plc, scans: str | None) -> Iterator[None]:
         yield
     if not seen.called:
         tell_nothing_drawn(plc, f"--sfc {scans}", "chart", bool(plc.image.charts))
-    names = Names(plc.image.symbols, plc.memory.areas)
+    names = Names.of(plc.image, plc.memory.areas)
     for called in seen.called:
         click.echo(f"scan {called.scan}, {names.instance(called.base)}")
         _print(sfc_text(called.picture, chart_width(), called.sighted))

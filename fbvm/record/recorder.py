@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
-from fbvm.base.types import BOOL, Elementary, EnumType, RefType, StringType, base
+from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, RefType, StringType, base
 from fbvm.plc import Plc
 from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.values import Value, show
@@ -130,8 +130,9 @@ def signals_at(found: Place | Span, descriptions: Mapping[str, str], meanings: M
 def signal(place: Place, description: str = "", meanings: Mapping[int, str] | None = None) -> Signal:
     """The signal of one place.  Raises TypeError for an array, a structure or a reference."""
     if not is_charted(place):
-        advice = f"name what it leads to, {place.name}^" if isinstance(place.type, RefType) else "name its members"
-        raise TypeError(f"{place.name} is {place.type.name}; a chart shows single values, {advice}")
+        whole = "elements" if isinstance(base(place.type), ArrayType) else "members"
+        advice = f"what it leads to, {place.name}^" if isinstance(place.type, RefType) else f"its {whole}"
+        raise TypeError(f"{place.name} is {place.type.name}, which is no single value; name {advice}")
     return Signal(place, place.name.replace("CIO ", "CIO"), description, tuple((meanings or {}).items()))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 
 from fbvm.base.areas import Area
 from fbvm.base.memory import WHOLE_BYTES
-from fbvm.base.types import Field
+from fbvm.code.image import Image
 from fbvm.record.inside import Read, Write
 from fbvm.record.power import Executed
 from fbvm.record.recorder import Signal
@@ -19,16 +19,17 @@ from fbvm.watch.paths import Place, UnknownPlace, find_place
 class Values:
     """Makes texts of what a rung reads and writes, and finds them again by its operands."""
 
-    def __init__(self, symbols: Mapping[str, Field], areas: Mapping[str, Area]) -> None:
-        self._symbols, self._areas = symbols, areas
-        self._names = Names(symbols, areas)
+    def __init__(self, image: Image, areas: Mapping[str, Area]) -> None:
+        self._symbols, self._areas = image.symbols, areas
+        self._names = Names.of(image, areas)
 
     def keep(self, plc: Scanned, made: Executed, event: Read | Write) -> None:
         """Note the value of what was read or written in a rung."""
         bit = event.bit if event.bit != WHOLE_BYTES else None
         place = self._names.at(event.offset, bit)
         if place is not None and len(event.value) <= 8:
-            made.values[event.site, event.offset, bit] = Signal(place, place.name).text(plc.read(place)).replace(" ", "")
+            text = Signal(place, place.name).text(self._names.read(plc.read, place))
+            made.values[event.site, event.offset, bit] = text.replace(" ", "")
 
     def of(self, made: Executed) -> Callable[[int, str], str]:
         """The values of the operands of a rung as it was executed, "" of those that nobody has seen."""

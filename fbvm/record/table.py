@@ -126,7 +126,7 @@ class ScanTable:
             if place is None:
                 read.update(self._nameless.get(event.offset, {}))
             elif not place.unwritten:
-                read[place.name] = Signal(place, place.name).text(plc.read(place))
+                read[place.name] = Signal(place, place.name).text(self._names.read(plc.read, place))
         elif isinstance(event, Ended):
             self._reads.pop(event.frame, None)
         elif isinstance(event, Write) and self._names.at(event.offset) is None:

@@ -103,6 +103,7 @@ class Trace:
     def _take(self, head: dict[str, Any]) -> None:
         try:
             self.symbols = symbols.from_data(head)
+            self._extents = [(int(start), int(end)) for start, end in head.get("objects", ())]
             boxes = tuple(Mailbox(str(name), *map(int, sizes)) for name, *sizes in head["mailboxes"])
             layout = Layout(int(head["slots"]), tuple(head["e_banks"]), boxes)
             self.areas, self.size = layout.areas, layout.size
@@ -123,7 +124,7 @@ class Trace:
                 file: {int(n): str(text) for n, text in rows.items()} for file, rows in head["lines"].items()}
         except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
             raise TraceError(f"the trace's header is damaged: {error}") from None
-        self.names = Names(self.symbols, self.areas)
+        self.names = Names(self.symbols, self.areas, self._extents)
 
     @classmethod
     def open(cls, path: Path | str) -> Trace:

@@ -150,7 +150,7 @@ class _Changes:
                 self._asked = list(self._nameless.get(event.offset, ()))
                 facts += self._asked
             else:
-                facts.append(Fact(place, Signal(place, place.name).text(moment.read(place)), self.order))
+                facts.append(Fact(place, Signal(place, place.name).text(self._trace.names.read(moment.read, place)), self.order))
         elif isinstance(event, Write):
             self._written(moment, event)
             self._asked = []
@@ -191,7 +191,7 @@ class _Changes:
 def why(trace: Past, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
     """What gave a place its value at the end of a scan.  Raises ValueError for a scan that is not recorded."""
     then = trace.at(scan)
-    value = Signal(place, place.name).text(then.read(place))
+    value = Signal(place, place.name).text(trace.names.read(then.read, place))
     place = _settled(trace.names, then.memory, place)
     start = trace.scans.start
     for window in (*WINDOWS, scan - start + 1):

@@ -59,7 +59,7 @@ class Session:
         self._acts: dict[Position, list[Act]] = {}
         self._states: dict[int, State] = {0: self._live.snapshot()}
         self._twin = Twin(self._live)
-        self.names = Names(self._live.image.symbols, self._live.memory.areas)
+        self.names = Names.of(self._live.image, self._live.memory.areas)
         self.here = Position()
         self._look(0, 0)
         self._mark = self._twin.plc.memory.fork()
@@ -300,7 +300,8 @@ class Session:
                     continue
                 seen.add(place)
                 signal = Signal(place, place.name)
-                old, new = signal.text(places.read(self._mark, place)), signal.text(self.read(place))
+                old, new = (signal.text(self.names.told(place.type, value))
+                            for value in (places.read(self._mark, place), self.read(place)))
                 if old != new:
                     yield Changed(place, old, new)
 

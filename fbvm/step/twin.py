@@ -67,7 +67,7 @@ class Twin:
         self.statement: Statement | None = None
         self.count = 0
         """Statements of the scan that are done."""
-        self.values = Values(plc.image.symbols, self.plc.memory.areas)
+        self.values = Values(plc.image, self.plc.memory.areas)
         self.power = Power(plc.image.rungs, lambda scan: True, self.values.keep)
         """What was seen in the rungs of this scan."""
         self.evolutions = Evolutions(plc.image.charts, lambda scan: True)

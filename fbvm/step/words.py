@@ -13,7 +13,7 @@ from fbvm.record.sfc_text import Sighted, sfc_text
 from fbvm.step.session import Session
 from fbvm.syntax.rung_widths import Sight
 from fbvm.watch.paths import Place, Span
-from fbvm.watch.values import show, show_time
+from fbvm.watch.values import Value, show, show_time
 
 AROUND = 2
 """Lines before and behind the one that comes next."""
@@ -111,7 +111,8 @@ class Words:
         """What the last move changed."""
         changes = list(self._session.changes())
         for change in changes[:MOST_CHANGES]:
-            yield f"  {change.place.name}: {change.old} -> {change.new}"
+            old, new = (text.removeprefix("-> ") for text in (change.old, change.new))
+            yield f"  {change.place.name}: {old} -> {new}"
         if len(changes) > MOST_CHANGES:
             yield f"  and {len(changes) - MOST_CHANGES} more"
 
@@ -134,11 +135,11 @@ class Words:
             return "\n".join(self._one(place, item) for place, item in zip(found.places, values, strict=True))
         return self._one(found, value)
 
-    def _one(self, place: Place, value: object) -> str:
-        name = place.name
+    def _one(self, place: Place, found: Value) -> str:
+        name, value = place.name, self._session.names.told(place.type, found)
         if isinstance(base(place.type), StructType) and isinstance(value, dict):
             return f"{name} = {place.type.name} {show(place.type, value)}"
-        text = f"{name} = {show(place.type, value)}"  # type: ignore[arg-type]
+        text = f"{name} = {show(place.type, value)}"
         if place.area and isinstance(value, int) and not isinstance(value, bool):
             text += f" ({show(place.type, value, hexadecimal=True)})"
         for attached in self._session.units.units:

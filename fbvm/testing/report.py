@@ -25,7 +25,7 @@ class Report:
 
     def __init__(self, plc: Plc, subject: Subject, history: History, reads: Reads) -> None:
         self._plc, self._subject, self._history, self._reads = plc, subject, history, reads
-        self.names = Names(plc.image.symbols, plc.memory.areas)
+        self.names = Names.of(plc.image, plc.memory.areas)
 
     def names_in(self, prefix: str) -> list[str]:
         """The variables of the block or program whose path, with its dot, is `prefix`."""
@@ -94,8 +94,8 @@ class Report:
                 continue
             pins = [field.name for field in block.type.fields.values() if field.kind in ("VAR_INPUT", "VAR_OUTPUT")]
             places = [place for pin in pins if isinstance(place := self._plc.find(f"{name}.{pin}"), Place) and is_single(place)]
-            said = ", ".join(f"{place.name.rpartition('.')[2]} = {Signal(place, place.name).text(self._plc.read(place))}"
-                             for place in places[:MOST_COLUMNS])  # fmt: skip
+            texts = [Signal(place, place.name).text(self.names.read(self._plc.read, place)) for place in places[:MOST_COLUMNS]]
+            said = ", ".join(f"{place.name.rpartition('.')[2]} = {text}" for place, text in zip(places, texts, strict=False))
             if said:
                 lines.append(f"{name.removeprefix(self._subject.prefix)}: {block.type.name} with {said}")
         return lines

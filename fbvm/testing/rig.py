@@ -272,7 +272,7 @@ class Rig:
         self._history.before_scan()
         trap = self.plc.scan()
         if trap:
-            raise Trapped(trap, trap.told(Names(self.plc.image.symbols, self.plc.memory.areas).instance))
+            raise Trapped(trap, trap.told(Names.of(self.plc.image, self.plc.memory.areas).instance))
 
     @property
     def scans(self) -> int:

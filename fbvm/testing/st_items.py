@@ -130,7 +130,7 @@ class Assertions:
     def __init__(self, plc: Plc, prefix: str) -> None:
         self.asserted = 0
         self._prefix = prefix
-        self.names = Names(plc.image.symbols, plc.memory.areas)
+        self.names = Names.of(plc.image, plc.memory.areas)
         self._bodies = {number for number, body in enumerate(plc.image.bodies) if fold(body.name) == "ASSERT"}
         self._reads: dict[Frame, list[Place]] = {}
         self._seen: dict[Place, None] = {}

@@ -7,22 +7,32 @@ its address.  Frames of functions have no names that outlive a call, and none he
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 from fbvm.base.areas import FLAG_AREAS, PAGE_BYTES, SLOTS_OFFSET, Address, Area
-from fbvm.base.types import ArrayType, Field, RefType, StructType, base
-from fbvm.watch.paths import Place, UnknownPlace, find_place, member
+from fbvm.base.memory import WHOLE_BYTES
+from fbvm.base.types import ArrayType, Field, RefType, StructType, Type, base, followed
+from fbvm.code.image import Image
+from fbvm.code.operations import BIT_MASK, BUFFER_OBJECT, FIRST_OBJECT, LEASED, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT
+from fbvm.watch.paths import Place, Span, UnknownPlace, find_place, member
+from fbvm.watch.values import Value, as_read
 
 REFERENCE = RefType("reference", 8, 8, None)
+_LETTERS = {2: "W", 4: "D", 8: "L"}
+"""Size prefixes of addresses of several bytes (table 16)."""
 
 
 class Names:
-    """The names of everything in the memory of one program.  Knows where things lie, not what they hold."""
+    """The names of everything in the memory of one program.  Knows where things lie, not what they hold.
 
-    def __init__(self, symbols: Mapping[str, Field], areas: Mapping[str, Area]) -> None:
-        self._symbols, self._areas = symbols, areas
-        tops = [Place(field.name, REFERENCE if field.reference else field.type, field.offset, field.bit)
+    `extents` are those of the program's objects: with them it is known that a pointer has left its variable."""
+
+    def __init__(self, symbols: Mapping[str, Field], areas: Mapping[str, Area],
+                 extents: Sequence[tuple[int, int]] = ()) -> None:  # fmt: skip
+        self._symbols, self._areas, self._extents = symbols, areas, extents
+        tops = [Place(field.name, _bound(field.type) if field.reference else field.type, field.offset, field.bit)
                 for field in symbols.values()]
         self._slots = sorted((place for place in tops if self._in_slots(place)), key=lambda place: place.offset)
         self._starts = [place.offset for place in self._slots]
@@ -31,6 +41,12 @@ class Names:
             self._located += _located_in(place)
         self._known: dict[tuple[int, int | None], Place | None] = {}
         self._instances: dict[int, Place] = {}
+        self._leads: dict[tuple[int, str], str] = {}
+
+    @classmethod
+    def of(cls, image: Image, areas: Mapping[str, Area]) -> Names:
+        """The names in the memory of a program that runs."""
+        return cls(image.symbols, areas, image.objects.extents)
 
     def _in_slots(self, place: Place) -> bool:
         return place.offset >= SLOTS_OFFSET and all(area.offset > place.offset or place.offset >= _end(area)
@@ -69,6 +85,80 @@ class Names:
                 return found.name if found else ""
         return ""
 
+    # --- references
+
+    def read(self, read: Callable[[Any], Value], where: Place | Span) -> Value:
+        """The value at a place, for people and scripts: references in it are texts that say what they lead to."""
+        return self.told(where.type, read(where)) if isinstance(where, Place) else read(where)
+
+    def told(self, kind: Type, value: Value) -> Value:
+        """The same value with `-> Main.a[3]` in place of each reference."""
+        plain = base(as_read(kind))
+        if isinstance(plain, RefType) and type(value) is int:
+            return self.lead(value, plain.target)
+        if isinstance(value, list) and isinstance(plain, ArrayType):
+            return [self.told(plain.element, item) for item in value]
+        if isinstance(value, dict) and isinstance(plain, StructType):
+            kinds = {field.name: field.type for field in plain.fields.values()}
+            return {name: self.told(kinds[name], item) for name, item in value.items()}
+        return value
+
+    def lead(self, reference: int, target: Type | None) -> str:
+        """Where a reference to `target` leads: `-> Main.a[3]`, `-> D200`; `outside of Main.a` if it has left its variable."""
+        key = reference, target.name if target else ""
+        if key not in self._leads:
+            self._leads[key] = self._lead(reference, target)
+        return self._leads[key]
+
+    def _lead(self, reference: int, target: Type | None) -> str:
+        number, offset = reference >> OBJECT_SHIFT, reference >> OFFSET_SHIFT & OFFSET_MASK
+        row = number - FIRST_OBJECT
+        if 0 <= row < len(self._extents):
+            start, end = self._extents[row]
+            if not start <= offset < end:
+                return f"outside of {self._whole(start, end)}"
+        bit = reference & BIT_MASK
+        place = self._fitting(offset, None if bit == WHOLE_BYTES else bit, target)
+        if place is None:
+            local = number == BUFFER_OBJECT or number >= LEASED
+            return "-> a local variable" if local else f"no variable (16#{reference:016X})"
+        behind = offset - place.offset
+        return f"-> {place.name}" + (f" + {behind} byte{'s' * (behind != 1)}" if behind else "")
+
+    def _whole(self, start: int, end: int) -> str:
+        """The name of a variable that has these bytes for its own; of an area its own name."""
+        for area in self._areas.values():
+            if (area.offset, _end(area)) == (start, end):
+                return area.name
+        chain = list(self._chain(start, None))
+        fitting = [place for place in chain if (place.offset, place.type.size) == (start, end - start)]
+        return (fitting or chain[-1:] or [Place("its variable", REFERENCE, start)])[0].name
+
+    def _fitting(self, offset: int, bit: int | None, target: Type | None) -> Place | None:
+        """What is meant by a reference to a byte: of what begins there the part of the target's type."""
+        chain = list(self._chain(offset, bit))
+        same = [place for place in chain
+                if place.offset == offset and target and base(place.type).name == base(target).name]
+        return next(iter(same), None) or self._addressed(offset, target) or self.at(offset, bit) or next(reversed(chain), None)
+
+    def _addressed(self, offset: int, target: Type | None) -> Place | None:
+        """The word, double word or long word of an area of bytes, %MW20, in which no variable is located."""
+        size = target.size if target else 0
+        area = next((area for area in self._areas.values() if area.offset <= offset < _end(area)), None)
+        if area is None or area.unit_bits != 8 or size not in _LETTERS or self._at_area(offset, None):
+            return None
+        number, rest = divmod(offset - area.offset, size)
+        return find_place({}, self._areas, f"%{area.name}{_LETTERS[size]}{number}") if rest == 0 else None
+
+    def _chain(self, offset: int, bit: int | None) -> Iterator[Place]:
+        """The variables to which a byte belongs, each with its parts behind it."""
+        top = self._top(offset)
+        for start in [top] if top else self._at_area(offset, bit):
+            place: Place | None = start
+            while place is not None:
+                yield place
+                place = _part(place, offset) if isinstance(base(place.type), ArrayType | StructType) else None
+
     # --- the slots of the program
 
     def _top(self, offset: int) -> Place | None:
@@ -95,10 +185,14 @@ class Names:
 
     # --- areas
 
-    def _in_area(self, offset: int, bit: int | None) -> Place | None:
+    def _at_area(self, offset: int, bit: int | None) -> list[Place]:
+        """The located variables that have a byte, the smallest first."""
         fitting = [place for place in self._located
                    if place.offset <= offset < place.offset + place.type.size and place.bit in (None, bit)]
-        for place in sorted(fitting, key=lambda place: (place.type.size, place.bit is None)):
+        return sorted(fitting, key=lambda place: (place.type.size, place.bit is None))
+
+    def _in_area(self, offset: int, bit: int | None) -> Place | None:
+        for place in self._at_area(offset, bit):
             inner: Place | None = place
             while inner is not None and isinstance(base(inner.type), ArrayType | StructType):
                 inner = _part(inner, offset)
@@ -106,6 +200,11 @@ class Names:
                 return inner
         area = next((area for area in self._areas.values() if area.offset <= offset < _end(area)), None)
         return _address(self._areas, area, offset, bit) if area else None
+
+
+def _bound(kind: Type) -> RefType:
+    """The type of what an in-out or a REFERENCE TO itself holds."""
+    return replace(REFERENCE, target=followed(kind))
 
 
 def _end(area: Area) -> int:
@@ -138,7 +237,7 @@ def _part(place: Place, offset: int) -> Place | None:
         size = 8 if field.reference else field.type.size
         if not field.absolute and place.offset + field.offset <= offset < place.offset + field.offset + size:
             inner = member(place, field.name)
-            return replace(inner, type=REFERENCE, hops=()) if inner.hops else inner
+            return replace(inner, type=_bound(field.type), hops=()) if inner.hops else inner
     return None
 
 

@@ -38,7 +38,8 @@ from fbvm.syntax import literals
 from fbvm.syntax.texts import to_text
 
 Value: TypeAlias = "bool | int | float | str | list[Value] | dict[str, Value] | None"
-"""What a place holds, as a Python value; None is a null reference."""
+"""What a place holds, as a Python value; None is a null reference, another one its 64 bits, or the text that `Names` makes of
+them."""
 
 _PIECE = re.compile(r"(\d[\d_]*(?:\.\d+)?)(ms|us|ns|d|h|m|s)_?", re.I)
 _PREFIX = re.compile(r"(?:TIME|LTIME|LT|T)#", re.I)
@@ -335,10 +336,10 @@ def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
         return "TRUE" if value else "FALSE"
     if isinstance(plain, EnumType) and isinstance(value, int):
         return f"{plain.shown.get(value, '?')} ({value})"
+    if isinstance(plain, RefType):
+        return str(value)
     if isinstance(value, str):
         return _quoted(plain, value)
-    if isinstance(plain, RefType):
-        return f"reference {value}"
     if isinstance(value, float) and plain is REAL:
         return str(shortest(value))
     if isinstance(value, int) and plain.name in ("TIME", "LTIME"):

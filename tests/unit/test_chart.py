@@ -132,7 +132,7 @@ def test_a_range_is_a_row_each(plc: Plc) -> None:
 
 
 def test_what_cannot_be_charted_is_refused(plc: Plc) -> None:
-    with pytest.raises(TypeError, match="Main is Counter; a chart shows single values"):
+    with pytest.raises(TypeError, match="Main is Counter, which is no single value; name its members"):
         Recorder(plc, ["Main"])
     with pytest.raises(UnknownPlace):
         Recorder(plc, ["Main.missing"])

@@ -179,7 +179,7 @@ def test_values_are_those_that_the_rung_read() -> None:
     """The second rung changes what the first one compared and gave to the block."""
     declared = "n : INT; d : WORD := 7; b : BOOL; t : CTU;"
     plc = Plc(image("LD> d &5\nFBCALL CTU t PV:=n\nOUT b\nLD P_On\n++ d", declared))
-    values = Values(plc.image.symbols, plc.memory.areas)
+    values = Values(plc.image, plc.memory.areas)
     power = Power(plc.image.rungs, lambda scan: scan == 0, values.keep)
     plc.write("Main.n", 3)
     with looking(plc, power):

@@ -63,7 +63,7 @@ def plc(image: Image) -> Plc:
 
 @pytest.fixture
 def names(plc: Plc) -> Names:
-    return Names(plc.image.symbols, plc.memory.areas)
+    return Names.of(plc.image, plc.memory.areas)
 
 
 class Log:

@@ -121,7 +121,7 @@ class Log:
 
 def test_a_trace_tells_what_a_listener_was_told() -> None:
     plc = Plc(image())
-    names = Names(plc.image.symbols, plc.memory.areas)
+    names = Names.of(plc.image, plc.memory.areas)
     live, told = Log(names), Log(names)
     file = io.BytesIO()
     writer = TraceWriter(plc, file, Depth.STATEMENTS)
@@ -154,7 +154,7 @@ def test_each_depth_holds_its_events(depth: Depth, kinds: set[type]) -> None:
 
 def test_the_scan_table_of_a_trace_is_that_of_the_plc() -> None:
     plc = Plc(image())
-    names = Names(plc.image.symbols, plc.memory.areas)
+    names = Names.of(plc.image, plc.memory.areas)
     trace = traced(12, Depth.STATEMENTS)
     made = recording(trace, ["Main.Start", "Main.Pump", "D200"])
     signals = [track.signal for track in made.tracks]
@@ -361,7 +361,7 @@ def test_references_are_left_out_of_a_chart_of_everything(selected: Sequence[str
                     "a := a + 1; r := REF(a); p := ADR(a); f REF= a; both[2] := r;\nEND_PROGRAM"))
     trace = Trace(io.BytesIO(record(plc, 3, selected=selected, before=lambda plc: None)))
     assert [track.signal.label for track in recording(trace).tracks] == ["Main.a"]
-    with pytest.raises(TypeError, match=r"Main\.r is REF_TO INT; a chart shows single values"):
+    with pytest.raises(TypeError, match=r"Main\.r is REF_TO INT, which is no single value; name what it leads to, Main\.r\^"):
         recording(trace, ["Main.r"])
 
 

@@ -158,7 +158,7 @@ def test_only_what_is_selected(fbvm: Fbvm) -> None:
 @pytest.mark.parametrize(("arguments", "said"), [
     ("chart pump.st", "this is no trace"),
     ("chart run.fbtrace Foo", "there is no Foo"),
-    ("chart run.fbtrace Main.Both", "name its members"),
+    ("chart run.fbtrace Main.Both", "name its elements"),
     ("chart run.fbtrace --scans 900..", "the trace has scans 0 to 59"),
     ("chart run.fbtrace --scans 9..3", "has no scan in it"),
     ("chart run.fbtrace --scans x", "is not scans such as"),
