@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from fbvm.base.areas import NEVER
 from fbvm.watch.conditions import Condition, parse_condition
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ class Goal:
         self.scans = None if scans is None else plc.scans + scans
         self.for_ns = None if for_ns is None else plc.elapsed_ns + for_ns
         self.max_ns = None if max_ns is None else plc.elapsed_ns + max_ns
+        self._end_ns = min(NEVER if at_ns is None else at_ns for at_ns in (self.for_ns, self.max_ns))
         self._until = self._condition(until)
         self._started = plc.scans
         self._halted = plc.halted
@@ -51,9 +53,10 @@ class Goal:
         plc = self._plc
         if self._until:
             return 1
-        ends = [self.scans - plc.scans] if self.scans is not None else []
-        ends += [-((plc.elapsed_ns - at_ns) // plc.cycle_ns) for at_ns in (self.for_ns, self.max_ns) if at_ns is not None]
-        return min(ends)
+        left = NEVER if self.scans is None else self.scans - plc.scans
+        if self._end_ns < NEVER:
+            left = min(left, -((plc.elapsed_ns - self._end_ns) // plc.cycle_ns))
+        return left
 
     def reached(self) -> str:
         """"trap", "until", "scans", "time", "max" or "break" if that ended the run, else ""."""
@@ -66,11 +69,7 @@ class Goal:
             return "until"
         if self.scans is not None and plc.scans >= self.scans:
             return "scans"
-        if self.for_ns is None and self.max_ns is None:
-            return ""
         elapsed_ns = plc.elapsed_ns
-        if self.for_ns is not None and elapsed_ns >= self.for_ns:
-            return "time"
-        if self.max_ns is not None and elapsed_ns >= self.max_ns:
-            return "max"
-        return ""
+        if elapsed_ns < self._end_ns:
+            return ""
+        return "time" if self.for_ns is not None and elapsed_ns >= self.for_ns else "max"

@@ -154,7 +154,7 @@ class Etn21:
             self.news = False
             return []
         requests = dispatch.refresh(words, events, switches, force, now_ns)
-        self.news = dispatch.show()
+        self.news = dispatch.changed
         self._seen = words.switches[0]
         self.wake_ns = dispatch.wake_ns(now_ns)
         return requests

@@ -86,6 +86,8 @@ class Dispatch:
         self._held_ports: dict[int, int] = {}
         self._display = Display(self._layout)
         self._touched: dict[Socket, Skew] = {}
+        self.changed = False
+        """The last refresh has written something."""
 
     def reset_sockets(self) -> list[Request]:
         """Requests that end every connection."""
@@ -114,6 +116,7 @@ class Dispatch:
             requests += self._accept_all(words, now_ns)
         if start_force:
             requests += self._force_close(now_ns)
+        self.changed = self._display.end(self._touched)
         return requests
 
     # --- 1. switches that are new ------------------------------------------------------------------------------------
@@ -301,12 +304,6 @@ class Dispatch:
             self._forced = None
 
     # --- 6. what is seen ---------------------------------------------------------------------------------------------
-
-    def show(self) -> bool:
-        """Write what changed and is due; True if this refresh has written anything."""
-        changed = self._display.end(self._touched)
-        self._touched.clear()
-        return changed
 
     def wake_ns(self, now_ns: int) -> int:
         """Until when nothing happens by itself: 0 if the next refresh has work, `NEVER_NS` if nothing is timed."""

@@ -6,7 +6,6 @@ Only bits that changed are written, so what the CPU has cleared meanwhile (a cha
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from fbvm.units import etn21_map as at
@@ -46,11 +45,12 @@ class Display:
         """A refresh begins, in which the unit has something to do."""
         self._words, self._cycle, self._changed = words, cycle, False
 
-    def end(self, touched: Mapping[Socket, Skew]) -> bool:
-        """The refresh ends: report what changed of these sockets, and write what was put off until now; True if any word
-        was written in this refresh."""
+    def end(self, touched: dict[Socket, Skew]) -> bool:
+        """The refresh ends: report what changed of these sockets, which are then done, and write what was put off until
+        now; True if any word was written in this refresh."""
         for socket, skew in touched.items():
             self._show(socket, skew)
+        touched.clear()
         if self._later:
             self._write_due()
         return self._changed

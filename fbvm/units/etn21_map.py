@@ -142,7 +142,7 @@ class Parameters(NamedTuple):
     @classmethod
     def read(cls, d: memoryview, at: int) -> Parameters:
         """The area whose first word is D `at`."""
-        return cls(*d[at : at + RESPONSE])
+        return tuple.__new__(cls, d[at : at + RESPONSE])  # half the time of a call
 
     @property
     def option(self) -> int:
