@@ -156,7 +156,7 @@ class Collector:
 
     def _text(self, number: int, moment: Moment) -> str:
         signal = self.signals[number]
-        value = moment.read(signal.place)
+        value = self._trace.names.read(moment.read, signal.place)
         return str(int(value is True)) if signal.is_bit else signal.said(value)
 
     def _touched(self, now: Snapshot) -> set[int]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 from fbvm.base.types import BOOL, ArrayType, Elementary, EnumType, RefType, StringType, base
 from fbvm.plc import Plc
+from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.values import Value, show
 
@@ -94,7 +95,7 @@ class Recorder(Recording):
 
     def __init__(self, plc: Plc, signals: Iterable[str | tuple[str, str] | Signal]) -> None:
         super().__init__([Track(signal) for given in signals for signal in signals_of(plc, given)], plc.scans)
-        self._plc = plc
+        self._plc, self._names = plc, Names.of(plc.image, plc.memory.areas)
         plc.watchers.append(self._watch)
 
     def stop(self) -> None:
@@ -106,7 +107,7 @@ class Recorder(Recording):
         scan = self.first + len(self.times_ns)
         self.times_ns.append(plc.now_ns)
         for track in self.tracks:
-            track.add(scan, plc.read(track.signal.place))
+            track.add(scan, self._names.read(plc.read, track.signal.place))
 
 
 def signals_of(plc: Plc, given: str | tuple[str, str] | Signal) -> list[Signal]:
@@ -128,16 +129,15 @@ def signals_at(found: Place | Span, descriptions: Mapping[str, str], meanings: M
 
 
 def signal(place: Place, description: str = "", meanings: Mapping[int, str] | None = None) -> Signal:
-    """The signal of one place.  Raises TypeError for an array, a structure or a reference."""
-    if not is_charted(place):
+    """The signal of one place.  Raises TypeError for an array or a structure."""
+    if not is_charted(place) and not isinstance(place.type, RefType):
         whole = "elements" if isinstance(base(place.type), ArrayType) else "members"
-        advice = f"what it leads to, {place.name}^" if isinstance(place.type, RefType) else f"its {whole}"
-        raise TypeError(f"{place.name} is {place.type.name}, which is no single value; name {advice}")
+        raise TypeError(f"{place.name} is {place.type.name}, which is no single value; name its {whole}")
     return Signal(place, place.name.replace("CIO ", "CIO"), description, tuple((meanings or {}).items()))
 
 
 def is_charted(place: Place) -> bool:
-    """True for a value that a row can show: no array, structure or reference."""
+    """True for what is shown if nobody says what: no array, no structure, and no reference, which somebody has to name."""
     return isinstance(base(place.type), Elementary | StringType | EnumType)
 
 
@@ -159,7 +159,7 @@ def default_signals(plc: Plc) -> list[Signal]:
     for symbol in plc.image.symbols.values():
         for text in [symbol.name, *(f"{symbol.name}.{name}" for name in getattr(symbol.type, "fields", ()))]:
             try:
-                signals += signals_of(plc, text)
+                signals += (found for found in signals_of(plc, text) if is_charted(found.place))
             except (TypeError, UnknownPlace):
                 continue
     return signals

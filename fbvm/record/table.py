@@ -169,7 +169,7 @@ class ScanTable:
         self._statement = None
 
     def _look(self, plc: Scanned) -> tuple[list[Value], list[bool]]:
-        values = [plc.read(signal.place) for signal in self.signals]
+        values = [self._names.read(plc.read, signal.place) for signal in self.signals]
         before = self._values
         return values, [before is not None and now != before[at] for at, now in enumerate(values)]
 

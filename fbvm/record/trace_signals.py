@@ -16,12 +16,12 @@ from fbvm.watch.paths import Place
 def recording(trace: Trace, names: Sequence[str] = (), scans: range | None = None) -> Recording:
     """What some variables did, for charts; without names, those that were selected or all single ones that changed.
 
-    Raises UnknownPlace; TypeError for an array, a structure or a reference."""
+    Raises UnknownPlace; TypeError for an array or a structure."""
     wanted = range(max(trace.scans.start, scans.start), min(trace.scans.stop, scans.stop)) if scans else trace.scans
     made = Recording([Track(signal) for signal in chosen_signals(trace, names)], wanted.start)
     for moment in trace.moments(wanted):
         for track in made.tracks:
-            track.add(moment.scans, moment.read(track.signal.place))
+            track.add(moment.scans, trace.names.read(moment.read, track.signal.place))
         made.times_ns.append(moment.now_ns)
     if not names:
         written = [track for track in made.tracks if not track.signal.place.unwritten]
@@ -62,7 +62,7 @@ def chosen_signals(trace: Trace, names: Sequence[str]) -> list[Signal]:
 
 
 def _every(trace: Trace) -> list[Signal]:
-    """All single values in the program that were selected, and what units describe; references are none."""
+    """All single values in the program that were selected, and what units describe; references only where they are named."""
     selection = select(trace.symbols, trace.areas, trace.selected)
     chosen = selection.places if trace.selected else tuple(tops(trace.symbols))
     found: dict[Place, None] = {}

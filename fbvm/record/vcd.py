@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, TextIO
 
-from fbvm.base.types import Elementary, EnumType, StringType, Type, base, families
+from fbvm.base.types import Elementary, EnumType, RefType, StringType, Type, base, families
 from fbvm.record.recorder import Recording, Signal, Track
 from fbvm.watch.values import Value
 
@@ -77,7 +77,7 @@ def _kind(signal: Signal) -> tuple[str, int | None]:
 
 
 def _is_text(kind: Type) -> bool:
-    return isinstance(kind, EnumType | StringType) or "ANY_CHAR" in families(kind)
+    return isinstance(kind, EnumType | RefType | StringType) or "ANY_CHAR" in families(kind)
 
 
 def _plain(signal: Signal, value: Value) -> Any:

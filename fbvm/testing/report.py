@@ -61,7 +61,7 @@ class Report:
 
     def _told(self, table: ScanTable, signal: Signal) -> str:
         """`Running is TRUE since scan 5 (50ms), by pump.st:12: Running := Delay.Q;  with Delay.Q = TRUE`"""
-        value = self._plc.read(signal.place)
+        value = self.names.read(self._plc.read, signal.place)
         now = f"{signal.label} is {signal.text(value)}"
         change, writer = table.last_change(signal), table.writers.get(signal)
         if change is None:

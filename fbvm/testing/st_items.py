@@ -158,5 +158,5 @@ class Assertions:
         assert frame.caller is not None
         places = self._reads.get(frame.caller, [])
         signals = [Signal(place, place.name.removeprefix(self._prefix)) for place in dict.fromkeys(places)]
-        values = [(signal, plc.read(signal.place)) for signal in signals]
+        values = [(signal, self.names.read(plc.read, signal.place)) for signal in signals]
         raise AssertFailed(plc.image.sites[frame.site], plc.scans, plc.now_ns, values)

@@ -13,7 +13,7 @@ from typing import Any
 
 from fbvm.base.areas import FLAG_AREAS, PAGE_BYTES, SLOTS_OFFSET, Address, Area
 from fbvm.base.memory import WHOLE_BYTES
-from fbvm.base.types import ArrayType, Field, RefType, StructType, Type, base, followed
+from fbvm.base.types import ArrayType, Elementary, Field, RefType, StructType, Type, base, followed
 from fbvm.code.image import Image
 from fbvm.code.operations import BIT_MASK, BUFFER_OBJECT, FIRST_OBJECT, LEASED, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT
 from fbvm.watch.paths import Place, Span, UnknownPlace, find_place, member
@@ -89,7 +89,8 @@ class Names:
 
     def read(self, read: Callable[[Any], Value], where: Place | Span) -> Value:
         """The value at a place, for people and scripts: references in it are texts that say what they lead to."""
-        return self.told(where.type, read(where)) if isinstance(where, Place) else read(where)
+        value = read(where)
+        return self.told(where.type, value) if isinstance(where, Place) and not isinstance(where.type, Elementary) else value
 
     def told(self, kind: Type, value: Value) -> Value:
         """The same value with `-> Main.a[3]` in place of each reference."""

@@ -14,8 +14,14 @@ from trace_rig import record
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_text
 from fbvm.plc import Plc
+from fbvm.record.chart import draw
+from fbvm.record.page_data import page_data
+from fbvm.record.rows import write_rows
+from fbvm.record.table import ScanTable
 from fbvm.record.trace import Trace
+from fbvm.record.trace_signals import chosen_signals, recording
 from fbvm.record.trace_writer import Depth
+from fbvm.record.vcd import write_vcd
 from fbvm.record.why import told, why
 from fbvm.step.session import Session
 from fbvm.step.words import Words
@@ -111,6 +117,35 @@ def test_why_and_stepping_say_it(trace: Trace) -> None:
     assert "  Main.element: Main.a[0] -> Main.a[1]" in list(words.changes())
     assert words.value("Main.element") == "Main.element = -> Main.a[1]"
     assert words.value("Main.two") == "Main.two = [NULL, -> Main.b.p.y]"
+
+
+def test_charts_and_rows_show_references_that_are_named(trace: Trace) -> None:
+    wanted, rows = recording(trace, ["Main.element", "Main.none"]), io.StringIO(newline="")
+    assert [track.changes for track in wanted.tracks] == [
+        [(0, "-> Main.a[0]"), (1, "-> Main.a[1]"), (2, "-> Main.a[2]")], [(0, None)],
+    ]  # fmt: skip
+    assert "= -> Main.a[0], -> Main.a[1], -> Main.a[2]" in draw(wanted)
+    assert "Main.element" not in [track.signal.label for track in recording(trace).tracks]
+    write_rows(wanted, rows)
+    assert rows.getvalue().splitlines()[2] == "1,10,-> Main.a[1],"
+
+
+def test_a_dump_shows_references_as_texts(trace: Trace) -> None:
+    pytest.importorskip("vcd")
+    dump = io.StringIO()
+    write_vcd(recording(trace, ["Main.element", "Main.none"]), dump)
+    assert {"s->_Main.a[2]", "sNULL"} <= set(dump.getvalue().split())
+
+
+def test_a_scan_table_shows_references(trace: Trace) -> None:
+    table = ScanTable(trace.sites, trace.names, chosen_signals(trace, ["Main.element"]))
+    trace.follow(table)
+    assert [row.values for row in table.bands[1].rows] == [["-> Main.a[0]"], ["-> Main.a[1]"]]
+
+
+def test_the_page_of_a_run_shows_references(trace: Trace) -> None:
+    signal, = page_data(trace, names=["Main.element"])["signals"]
+    assert [text for text in signal["changes"] if isinstance(text, str)] == ["-> Main.a[0]", "-> Main.a[1]", "-> Main.a[2]"]
 
 
 def test_a_watch_says_it() -> None:

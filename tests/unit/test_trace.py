@@ -361,8 +361,7 @@ def test_references_are_left_out_of_a_chart_of_everything(selected: Sequence[str
                     "a := a + 1; r := REF(a); p := ADR(a); f REF= a; both[2] := r;\nEND_PROGRAM"))
     trace = Trace(io.BytesIO(record(plc, 3, selected=selected, before=lambda plc: None)))
     assert [track.signal.label for track in recording(trace).tracks] == ["Main.a"]
-    with pytest.raises(TypeError, match=r"Main\.r is REF_TO INT, which is no single value; name what it leads to, Main\.r\^"):
-        recording(trace, ["Main.r"])
+    assert [track.changes for track in recording(trace, ["Main.r", "Main.p"]).tracks] == [[(0, "-> Main.a")]] * 2
 
 
 def test_what_references_lead_to_is_read_from_a_trace() -> None:
