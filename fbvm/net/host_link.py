@@ -21,7 +21,7 @@ class HostLink(ChannelLink):
     @property
     def is_quiet(self) -> bool:
         """True if there is nothing to fetch, as far as is known to whoever asks the host."""
-        return not self.told and not self.waiting and (self._network.driven or not self.channels)
+        return self.heard and (self._network.driven or not self.channels)
 
     def events(self, now_ns: int) -> Sequence[Event]:
         if not self._network.driven:
@@ -32,9 +32,11 @@ class HostLink(ChannelLink):
         told = self.told
         if told:
             self.told = []
+        self.heard = not self.waiting
         return told
 
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
         super().submit(requests, now_ns)
         if self.told:
+            self.heard = False
             self._network.told(self)

@@ -128,6 +128,7 @@ class Switchboard(ABC):
             found = self._selector.select(0)
         for key, ready in found:
             key.data.ready(ready, now_ns)
+            key.data.link.heard = False
             woken.append(key.data.link)
         self._unheard.update(woken)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):

@@ -83,7 +83,7 @@ def _scan_all(queue: _Queue, now_ns: int, real: bool) -> None:
         times = run.scan(now_ns)
         if scans := plc.scans - scan:
             ended_ns = time.monotonic_ns()
-            for time_ns, next_ns in pairwise(times):
+            for time_ns, next_ns in pairwise(times) if len(times) > 1 else ():
                 plc.scan_times.note(scan, next_ns - time_ns)
                 began_ns, scan, scans = began_ns + next_ns - time_ns, scan + 1, scans - 1
             plc.scan_times.note(scan, (ended_ns - began_ns) // scans, scans)
