@@ -14,8 +14,8 @@ instructions an exchange: more than half of them in the unit (it accepts a reque
 words shown), a tenth in the connection, the rest in burst, loop and the measuring of times; the send alone takes a fifth of the
 time, as in any client.
 
-So the blocks reach 0.8 to 0.9 of pymodbus's rate where the host lets its processors sleep between two changes of processes (one
-x86-64 machine: 6,500 to 8,300 a second beside 7,500 to 10,400), and there the time is our own processor time, with hardly any
+So the blocks reach 0.78 to 0.87 of pymodbus's rate where the host lets its processors sleep between two changes of processes (one
+x86-64 machine: 6,000 to 8,300 a second beside 7,500 to 10,400), and there the time is our own processor time, with hardly any
 waiting in it.  Where changes of processes are quick, because the machine is busy, whoever computes least wins: pymodbus does
 33,000 a second there and the blocks 10,500, a third.  More than that takes the unit itself into machine code, with its words,
 checks and services: then Python would be called twice an exchange, to send and to receive.  A server in Python, as most
