@@ -43,10 +43,26 @@ FIRST = ("SEMICOLON", "THEN", "DO", "OF", "TO", "ASSIGN", "COLON", "COMMA", "RPA
 
 SHOWN = 4
 
-MEANT = {"STEP": ("BY", "the step of a loop stands behind BY"), "DOWNTO": ("TO", "write TO, and BY -1")}
+MEANT = {
+    "STEP": ("BY", "the step of a loop stands behind BY"),
+    "DOWNTO": ("TO", "write TO, and BY -1"),
+    "IN": ("ASSIGN", "write FOR i := 0 TO 9 DO"),
+}
 """Words of other languages -> ours, and advice."""
-
-
+SLIPS = (
+    ("TO", "ASSIGN", "the variable of a loop takes its first value with `:=`"),
+    ("RANGE", "TO", "the last value of a loop stands behind TO"),
+    ("OUTPUT", "ASSIGN", "`:` stands behind a label of CASE, `:=` assigns"),
+    ("OUTPUT", "GREATER_EQUAL", "`>=` compares; `=>` takes an output of a call"),
+    ("EQUAL", "ASSIGN", "`:=` assigns and gives initial values, `=` compares"),
+    ("ASSIGN", "EQUAL", "`=` compares, `:=` assigns"),
+    ("VAR", "TYPE", "VAR sections stand in a FUNCTION, FUNCTION_BLOCK or PROGRAM; VAR_GLOBAL by itself"),
+    ("VAR", "SEMICOLON", "VAR sections stand in front of the first statement"),
+    ("NOT", "UNEQUAL", "unequal is written `<>`"),
+    ("CARET", "POWER", "a power is written 2 ** 3"),
+    ("DO", "FOR", "a loop that tests at its end is REPEAT .. UNTIL condition END_REPEAT"),
+)
+"""What stands where something else is expected, and advice; the first row that fits counts."""
 OPENING = {"THEN": ("IF", "IF"), "DO": ("FOR", "FOR or WHILE"), "OF": ("CASE", "CASE"), "BY": ("FOR", "FOR")}
 """Words in the middle of a statement -> the word that shows that one begins here, and what stands in front of them."""
 MIDDLE = {"THEN", "DO", "OF", "TO", "BY", "AND", "OR", "XOR", "MOD"}
@@ -116,32 +132,11 @@ def hint(token: Token, kinds: set[str]) -> str:
     ours, advice = MEANT.get(token.text.upper(), ("", ""))
     if ours in kinds:
         return advice
-    if token.type == "TO" and "ASSIGN" in kinds:
-        return "the variable of a loop takes its first value with `:=`"
-    if token.type == "RANGE" and "TO" in kinds:
-        return "the last value of a loop stands behind TO"
-    if token.text.upper() == "IN" and "ASSIGN" in kinds:
-        return "write FOR i := 0 TO 9 DO"
-    if token.type == "OUTPUT" and "ASSIGN" in kinds:
-        return "`:` stands behind a label of CASE, `:=` assigns"
-    if token.type == "OUTPUT" and "GREATER_EQUAL" in kinds:
-        return "`>=` compares; `=>` takes an output of a call"
-    if token.type == "EQUAL" and "ASSIGN" in kinds:
-        return "`:=` assigns and gives initial values, `=` compares"
-    if token.type == "ASSIGN" and "EQUAL" in kinds:
-        return "`=` compares, `:=` assigns"
-    if token.type == "VAR" and "TYPE" in kinds:
-        return "VAR sections stand in a FUNCTION, FUNCTION_BLOCK or PROGRAM; VAR_GLOBAL by itself"
+    for found_kind, wanted_kind, advice in SLIPS:
+        if token.type == found_kind and wanted_kind in kinds:
+            return advice
     if token.type == "ASSIGN" and "COLON" in kinds and "NUMBER" not in kinds:
         return "a declaration has a type, and then its value: `x : INT := 5;`"
-    if token.type == "VAR" and "SEMICOLON" in kinds:
-        return "VAR sections stand in front of the first statement"
-    if token.type == "NOT" and "UNEQUAL" in kinds:
-        return "unequal is written `<>`"
-    if token.type == "CARET" and "POWER" in kinds:
-        return "a power is written 2 ** 3"
-    if token.type == "DO" and "FOR" in kinds:
-        return "a loop that tests at its end is REPEAT .. UNTIL condition END_REPEAT"
     if {"FUNCTION", "TYPE"} <= kinds and (token.type == "NAME" or "FOR" in kinds or token.type in STATEMENTS):
         return "statements stand in a POU: PROGRAM Main .. END_PROGRAM"
     if token.type in ("STRUCT", "UNION") and {"FUNCTION", "TYPE"} <= kinds:
