@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fbvm.base.areas import AREAS
 from fbvm.base.memory import Memory
-from fbvm.engine.native_scans import Clockwork
+from fbvm.engine.native_scans import MOST_CYCLE, Clockwork
 
 FIRST_CYCLE = (200, 11)
 """A200.11: ON in the first cycle after a change to RUN."""
@@ -19,8 +19,6 @@ MAX_CYCLE_TIME = 262
 CYCLE_TIME = 264
 """A264 and A265, low word first: cycle time of the cycle before, 0.1 ms."""
 TENTH_MS_NS = 100_000
-MOST = 0xFFFFFFFF
-"""Longest cycle time that its words can say, in 0.1 ms."""
 FREE_COUNTERS = ((0, 10_000_000), (1, 100_000_000))
 """A0 counts 10 ms, A1 100 ms, both modulo 65536 (newer CPU units; assumed for all)."""
 
@@ -52,7 +50,7 @@ class Flags:
         a, on = self._a, self._bytes
         word, bit = FIRST_CYCLE
         a[word] = a[word] & ~(1 << bit | 1 << FIRST_TASK_CYCLE[1]) | first << bit
-        tenths = min(cycle_time_ns // TENTH_MS_NS, MOST)
+        tenths = min(cycle_time_ns // TENTH_MS_NS, MOST_CYCLE)
         longest = 0 if first else a[MAX_CYCLE_TIME] | a[MAX_CYCLE_TIME + 1] << 16
         a[CYCLE_TIME], a[CYCLE_TIME + 1] = tenths & 0xFFFF, tenths >> 16
         longest = max(tenths, longest)
