@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 from fbvm.wire.link import Event, Request
@@ -15,6 +16,38 @@ class AreaMemory(Protocol):
         """The words of an area ("CIO", "D", "W", "H", "A", "E0" ...) as a writable memoryview of format "H".
 
         Raises KeyError for an area that this PLC does not have."""
+
+
+class Processor(Protocol):
+    """A unit's own processor: runs the unit's program over a memory of its own."""
+
+    @property
+    def machine(self) -> Any:
+        """What runs it as machine code (a `NativeEngine`), or None."""
+
+    def view(self, variable: str, machine: str) -> memoryview:
+        """A global variable of the program as a writable memoryview of a machine type (u8, u16, i64 ...)."""
+
+    def offset(self, variable: str) -> int:
+        """Where the variable lies in that memory, in bytes."""
+
+    def run(self, now_ns: int) -> None:
+        """One execution of the program."""
+
+
+@dataclass(frozen=True)
+class Exchanged:
+    """Words that a unit's processor exchanges with the CPU unit in each refresh, and where it says what it wants."""
+
+    processor: Processor
+    words: tuple[tuple[str, int, str, int], ...]
+    """Area, first word, variable of the processor's program, how many words."""
+    posted: str
+    """UDINT variable: how many events of the network wait for the program, which sets it 0 when it took them."""
+    requested: str
+    """UDINT variable: how many requests the last run left for the network."""
+    wake: str
+    """64-bit variable: time in ns (of the PLC) from which on the program wants to run although nothing changed."""
 
 
 class Unit(Protocol):

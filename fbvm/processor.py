@@ -1,0 +1,96 @@
+"""The processor of a unit that has one: a program over a small memory of its own, whatever PLC the unit is in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+from fbvm.base.areas import BUDGET, DUE, NEVER, NOW
+from fbvm.base.diagnostics import Source
+from fbvm.base.memory import FORMATS, Memory
+from fbvm.code import image_cache
+from fbvm.code.compiler import compile_sources
+from fbvm.code.image import Image
+from fbvm.engine import native
+from fbvm.engine.native import NativeEngine
+from fbvm.engine.python import PythonEngine
+from fbvm.watch.paths import Place, find_place
+
+BUDGET_STATEMENTS = 2_000_000
+"""Statements that one execution of the program may take; a program of ours takes far less."""
+TASK = 0
+"""The one task of its program."""
+
+
+def processor(text: str) -> OwnProcessor:
+    """A processor with a program of its own, before its first execution; the text is compiled once.
+
+    Raises ValueError for a text that is not one PROGRAM and what it needs."""
+    return _first(text).copy()
+
+
+@cache
+def _first(text: str) -> OwnProcessor:
+    """The one that all others of the same program are copies of.  It stays, and so does its code."""
+    return OwnProcessor(_compiled(text))
+
+
+def _compiled(text: str) -> Image:
+    sources = [Source("unit.st", text)]
+    name = image_cache.name(sources, [], ())
+    known = image_cache.read(name, sources)
+    if known:
+        return known[0]
+    made = compile_sources(sources, lint=False)
+    if made.image is None or len(made.image.tasks) != 1:
+        raise ValueError("\n".join(found.render() for found in made.diagnostics) or "one PROGRAM is wanted")
+    image_cache.write(name, sources, made.image, [])
+    return made.image
+
+
+class OwnProcessor:
+    """A `fbvm.units.unit.Processor`: machine code where that can be had, else Python."""
+
+    def __init__(self, image: Image) -> None:
+        self.image = image
+        self.memory = Memory(image.layout.size, image.layout.areas)
+        for offset, data in image.initial:
+            self.memory.u8[offset : offset + len(data)] = data
+        self.machine = NativeEngine(image, self.memory) if native.available() else None
+        """What runs it as machine code, if anything does."""
+        self._engine = self.machine or PythonEngine(image, self.memory)
+        self._system = self.memory.views["i64"]
+
+    def _place(self, variable: str) -> Place:
+        place = find_place(self.image.symbols, self.memory.areas, variable)
+        if place.hops or place.bit is not None:
+            raise ValueError(f"{variable} does not lie in bytes of its own")
+        return place
+
+    def view(self, variable: str, machine: str) -> memoryview:
+        """All of a variable as values of a machine type.  Raises UnknownPlace, and TypeError for what it has no room for."""
+        place = self._place(variable)
+        part = self.memory.u8[place.offset : place.offset + place.type.size]
+        return part.cast(FORMATS[machine])  # type: ignore[call-overload,no-any-return]
+
+    def offset(self, variable: str) -> int:
+        """Where a variable lies in the processor's memory, in bytes.  Raises UnknownPlace."""
+        return self._place(variable).offset
+
+    def run(self, now_ns: int) -> None:
+        """One execution of the program.  Raises RuntimeError if it traps: it is a program of ours."""
+        system = self._system
+        system[NOW // 8], system[DUE // 8], system[BUDGET // 8] = now_ns, NEVER, BUDGET_STATEMENTS
+        trap = self._engine.run(TASK)
+        if trap:
+            raise RuntimeError(str(trap))
+
+    def copy(self) -> OwnProcessor:
+        """Another processor in the same state."""
+        other = OwnProcessor(self.image)
+        other.memory.restore(self.memory.snapshot())
+        return other
+
+    def __deepcopy__(self, memo: Mapping[int, Any]) -> OwnProcessor:
+        return self.copy()
