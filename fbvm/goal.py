@@ -30,10 +30,9 @@ class Goal:
             if bound is not None and bound < 0:
                 raise ValueError(f"{name} is {bound}; it cannot be negative")
         self._plc = plc
-        self.scans = None if scans is None else plc.scans + scans
-        self.for_ns = None if for_ns is None else plc.elapsed_ns + for_ns
-        self.max_ns = None if max_ns is None else plc.elapsed_ns + max_ns
-        self._end_ns = min(NEVER if at_ns is None else at_ns for at_ns in (self.for_ns, self.max_ns))
+        self._last_scan = NEVER if scans is None else plc.scans + scans
+        self._for_ns = NEVER if for_ns is None else plc.elapsed_ns + for_ns
+        self._end_ns = self._for_ns if max_ns is None else min(self._for_ns, plc.elapsed_ns + max_ns)
         self._until = self._condition(until)
         self._started = plc.scans
         self._halted = plc.halted
@@ -51,12 +50,7 @@ class Goal:
     def scans_left(self) -> int:
         """How many scans of a cycle each come before anybody looks at the goal again; 1 for a condition."""
         plc = self._plc
-        if self._until:
-            return 1
-        left = NEVER if self.scans is None else self.scans - plc.scans
-        if self._end_ns < NEVER:
-            left = min(left, -((plc.elapsed_ns - self._end_ns) // plc.cycle_ns))
-        return left
+        return 1 if self._until else min(self._last_scan - plc.scans, -((plc.elapsed_ns - self._end_ns) // plc.cycle_ns))
 
     def reached(self) -> str:
         """"trap", "until", "scans", "time", "max" or "break" if that ended the run, else ""."""
@@ -67,9 +61,9 @@ class Goal:
             return "trap"
         if self._until and plc.scans > self._started and self._until():
             return "until"
-        if self.scans is not None and plc.scans >= self.scans:
+        if plc.scans >= self._last_scan:
             return "scans"
         elapsed_ns = plc.elapsed_ns
         if elapsed_ns < self._end_ns:
             return ""
-        return "time" if self.for_ns is not None and elapsed_ns >= self.for_ns else "max"
+        return "time" if elapsed_ns >= self._for_ns else "max"

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
+from collections import Counter
+from functools import partial
+from operator import sub
+
 from fbvm.base.areas import NEVER
 
-DIGIT_BITS = 5
-"""Bits that a time keeps when it is sorted in: a share is true to 3 %."""
+SIZES_NS: tuple[int, ...] = (*range(32), *(digits << zeros for zeros in range(1, 60) for digits in range(16, 32)))
+"""Where each size begins: a time is sorted in by its five highest bits, so a share is true to 3 %."""
+_size = partial(bisect_right, SIZES_NS)
+RECENT = 64
+"""Scans of bursts that wait to be sorted in together, which takes a fifth of the time."""
 
 
 class Times:
@@ -13,52 +21,99 @@ class Times:
 
     def __init__(self, limit_ns: int = NEVER) -> None:
         self._limit_ns = limit_ns
-        self.count = 0
-        self.beyond = 0
-        """How many were longer than the limit."""
-        self.longest_ns = 0
-        self.longest_scan = 0
-        """Number of the longest one."""
-        self._total_ns = 0
+        self._count = self._beyond = self._total_ns = 0
+        self._longest_ns = self._longest_scan = 0
         self._sorted: dict[int, int] = {}
-        """How many there were, by a number that grows with the time: how many bits were dropped, and those left."""
+        """How many there were of each size."""
+        self._recent_ns: list[int] = []
+        """Of scans that followed one upon the other, not sorted in yet."""
+        self._recent_scan = 0
+        """Number of the first of them."""
 
-    def note(self, scan: int, time_ns: int, times: int = 1) -> None:
-        """Take one in, or so many that nobody measured one by one, from this scan on."""
-        self.count += times
-        self._total_ns += time_ns * times
-        if time_ns > self.longest_ns:
-            self.longest_ns, self.longest_scan = time_ns, scan
-        if time_ns > self._limit_ns:
-            self.beyond += times
-        dropped = time_ns.bit_length() - DIGIT_BITS
-        kind = dropped << DIGIT_BITS | time_ns >> dropped if dropped > 0 else time_ns
-        self._sorted[kind] = self._sorted.get(kind, 0) + times
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        self._settle()
+        return self._count
+
+    @property
+    def beyond(self) -> int:
+        """How many were longer than the limit."""
+        self._settle()
+        return self._beyond
+
+    @property
+    def longest_ns(self) -> int:
+        """The longest one."""
+        self._settle()
+        return self._longest_ns
+
+    @property
+    def longest_scan(self) -> int:
+        """Number of the longest one."""
+        self._settle()
+        return self._longest_scan
 
     @property
     def mean_ns(self) -> int:
         """The average."""
-        return self._total_ns // self.count if self.count else 0
+        return self._total_ns // self._count if self.count else 0
+
+    def note(self, scan: int, time_ns: int, times: int = 1) -> None:
+        """Take one in, or so many that nobody measured one by one, from this scan on."""
+        self._settle()
+        self._count += times
+        self._total_ns += time_ns * times
+        if time_ns > self._longest_ns:
+            self._longest_ns, self._longest_scan = time_ns, scan
+        if time_ns > self._limit_ns:
+            self._beyond += times
+        size = _size(time_ns)
+        self._sorted[size] = self._sorted.get(size, 0) + times
+
+    def note_burst(self, scan: int, began_ns: list[int], together_ns: int) -> None:
+        """Take in those of scans one upon the other, from this one on: when they began, and what they took together."""
+        if scan != self._recent_scan + len(self._recent_ns) or len(self._recent_ns) >= RECENT:
+            self._settle()
+            self._recent_scan = scan
+        self._recent_ns += map(sub, [*began_ns[1:], began_ns[0] + together_ns], began_ns)
+
+    def _settle(self) -> None:
+        """Sort in what waits for it."""
+        recent_ns = self._recent_ns
+        if not recent_ns:
+            return
+        self._count += len(recent_ns)
+        self._total_ns += sum(recent_ns)
+        longest_ns = max(recent_ns)
+        if longest_ns > self._longest_ns:
+            self._longest_ns, self._longest_scan = longest_ns, self._recent_scan + recent_ns.index(longest_ns)
+        if longest_ns > self._limit_ns:
+            self._beyond += sum(time_ns > self._limit_ns for time_ns in recent_ns)
+        self._sort_in(Counter(map(_size, recent_ns)))
+        recent_ns.clear()
+
+    def _sort_in(self, found: dict[int, int]) -> None:
+        for size, times in found.items():
+            self._sorted[size] = self._sorted.get(size, 0) + times
 
     def within_ns(self, share: float) -> int:
         """The time that this share of all (0.99: 99 of 100) did not exceed, to 3 %."""
         missing = share * self.count
-        for kind, times in sorted(self._sorted.items()):
+        for size, times in sorted(self._sorted.items()):
             missing -= times
             if missing <= 0:
-                dropped, digits = kind >> DIGIT_BITS, kind & (1 << DIGIT_BITS) - 1
-                return min((digits + 1 << dropped) - 1, self.longest_ns)
-        return self.longest_ns
+                return min(SIZES_NS[size] - 1, self._longest_ns)
+        return self._longest_ns
 
     def add(self, other: Times) -> None:
         """Take in all of another PLC's; the number of the longest scan is one of that PLC."""
-        self.count += other.count
-        self.beyond += other.beyond
-        self._total_ns += other._total_ns
         if other.longest_ns > self.longest_ns:
-            self.longest_ns, self.longest_scan = other.longest_ns, other.longest_scan
-        for kind, times in other._sorted.items():
-            self._sorted[kind] = self._sorted.get(kind, 0) + times
+            self._longest_ns, self._longest_scan = other._longest_ns, other._longest_scan
+        self._count += other._count
+        self._beyond += other._beyond
+        self._total_ns += other._total_ns
+        self._sort_in(other._sorted)
 
     def as_dict(self) -> dict[str, int]:
         """For scripts, in nanoseconds."""

@@ -8,9 +8,9 @@ from __future__ import annotations
 import heapq
 import time
 from collections.abc import Callable, Iterable, Sequence
-from itertools import pairwise
 from typing import Protocol, cast
 
+from fbvm.base.areas import NEVER
 from fbvm.plc import Plc
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
 from fbvm.wire.link import RealNetwork
@@ -61,10 +61,8 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     told_ns = time.monotonic_ns()
     try:
         while (due_ns := queue.next_ns()) is not None:
-            now_ns = clock.reach(due_ns)
-            for number in clock.woken:
-                queue.hasten(number, now_ns)
-            _scan_all(queue, now_ns, clock.real)
+            now_ns, woken = clock.reach(due_ns)
+            _scan_all(queue, now_ns, woken, clock.real)
             if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
                 told_ns = time.monotonic_ns()
                 progress()
@@ -75,18 +73,19 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
         clock.stop()
 
 
-def _scan_all(queue: _Queue, now_ns: int, real: bool) -> None:
-    """One scan of everybody whose time has come, with the same time for all."""
+def _scan_all(queue: _Queue, now_ns: int, woken: Sequence[int], real: bool) -> None:
+    """Scans of everybody who is woken or whose time has come, with the same time for all."""
     first_ns = began_ns = time.monotonic_ns()
-    for number, run in queue.take(now_ns):
-        plc, scan, due_ns = run.plc, run.plc.scans, run.due_ns
+    for number, run in queue.take(now_ns, woken):
+        plc, due_ns = run.plc, run.due_ns
+        scan = plc.scans
         times = run.scan(now_ns)
         if scans := plc.scans - scan:
             ended_ns = time.monotonic_ns()
-            for time_ns, next_ns in pairwise(times) if len(times) > 1 else ():
-                plc.scan_times.note(scan, next_ns - time_ns)
-                began_ns, scan, scans = began_ns + next_ns - time_ns, scan + 1, scans - 1
-            plc.scan_times.note(scan, (ended_ns - began_ns) // scans, scans)
+            if times:
+                plc.scan_times.note_burst(scan, times, ended_ns - began_ns)
+            else:
+                plc.scan_times.note(scan, (ended_ns - began_ns) // scans, scans)
             if real and run.pace == CYCLIC:
                 plc.lateness.note(scan, now_ns - due_ns + began_ns - first_ns)
             began_ns = ended_ns
@@ -94,70 +93,81 @@ def _scan_all(queue: _Queue, now_ns: int, real: bool) -> None:
 
 
 class _Queue:
-    """Who scans when."""
+    """Who scans when.
+
+    Each stands in the row of a time, which is when it is due or before: who is woken again and again, and due later each
+    time, moves on only when that row is the next."""
 
     def __init__(self, runs: Sequence[Running]) -> None:
         self._runs = runs
         self._times: list[int] = []
-        """When anybody is due, the next first; PLCs with one period share theirs."""
+        """Of the rows, the next first."""
         self._rows: dict[int, list[int]] = {}
-        """Whose times these are, by number."""
-        self._queued: list[int | None] = [None] * len(runs)
-        """When each is due; if it stands in the row of another time, too, that is out of date."""
+        """Who stands where, by number; PLCs with one period share a row."""
+        self._stands_ns = [NEVER] * len(runs)
+        """Time of the row in which each stands; where else it is found is out of date."""
         for number, run in enumerate(runs):
             self.put(number, run)
 
     def put(self, number: int, run: Running) -> None:
         """Remember when a run is due, unless it has ended."""
+        due_ns = run.due_ns
         if run.reason:
-            return
-        due_ns = self._queued[number] = run.due_ns
-        row = self._rows.get(due_ns)
-        if row is None:
-            self._rows[due_ns] = [number]
-            heapq.heappush(self._times, due_ns)
-        else:
-            row.append(number)
+            self._stands_ns[number] = NEVER
+        elif due_ns < self._stands_ns[number]:
+            self._stands_ns[number] = due_ns
+            row = self._rows.get(due_ns)
+            if row is None:
+                self._rows[due_ns] = [number]
+                heapq.heappush(self._times, due_ns)
+            else:
+                row.append(number)
 
     def next_ns(self) -> int | None:
         """When somebody is due; None if all have ended."""
-        times, queued = self._times, self._queued
-        while times:
-            due_ns = times[0]
-            for number in self._rows[due_ns]:
-                if queued[number] == due_ns:
-                    return due_ns
-            del self._rows[heapq.heappop(times)]
+        runs, stands_ns = self._runs, self._stands_ns
+        if len(runs) == 1:
+            return None if runs[0].reason else runs[0].due_ns
+        while self._times:
+            time_ns = self._times[0]
+            row = self._rows[time_ns]
+            while row:
+                number = row[-1]
+                if stands_ns[number] == time_ns:
+                    if runs[number].due_ns == time_ns:
+                        return time_ns
+                    stands_ns[number] = NEVER
+                    self.put(number, runs[number])
+                row.pop()
+            del self._rows[heapq.heappop(self._times)]
         return None
 
-    def hasten(self, number: int, now_ns: int) -> None:
-        """Let one be due already now."""
-        queued_ns = self._queued[number]
-        if queued_ns is not None and queued_ns > now_ns:
-            self._runs[number].due_ns = now_ns
-            self.put(number, self._runs[number])
-
-    def take(self, now_ns: int) -> list[tuple[int, Running]]:
-        """Takes out all that are due, with their numbers; who has scanned one puts it back."""
-        times, queued, taken = self._times, self._queued, []
+    def take(self, now_ns: int, woken: Sequence[int]) -> Iterable[tuple[int, Running]]:
+        """All that are due, or woken before that, with their numbers; who has scanned one puts it back."""
+        times, runs, stands_ns = self._times, self._runs, self._stands_ns
+        taken: dict[int, Running] = {}
         while times and times[0] <= now_ns:
-            due_ns = heapq.heappop(times)
-            for number in self._rows.pop(due_ns):
-                if queued[number] == due_ns:
-                    queued[number] = None
-                    taken.append((number, self._runs[number]))
-        return taken
+            time_ns = heapq.heappop(times)
+            for number in self._rows.pop(time_ns):
+                if stands_ns[number] == time_ns:
+                    stands_ns[number] = NEVER
+                    if runs[number].due_ns <= now_ns:
+                        taken[number] = runs[number]
+                    else:
+                        self.put(number, runs[number])
+        for number in woken:
+            if not runs[number].reason:
+                taken[number] = runs[number]
+        return taken.items()
 
 
 class _Clock(Protocol):
     """The time of the loop."""
 
     real: bool
-    woken: list[int]
-    """Numbers of the runs that have news before their time."""
 
-    def reach(self, due_ns: int) -> int:
-        """Waits until then, or until somebody is woken; the time."""
+    def reach(self, due_ns: int) -> tuple[int, Sequence[int]]:
+        """Waits until then, or until somebody is woken; the time, and the numbers of the runs that have news."""
 
     def stop(self) -> None:
         """The loop has ended."""
@@ -168,11 +178,8 @@ class _Virtual:
 
     real = False
 
-    def __init__(self) -> None:
-        self.woken: list[int] = []
-
-    def reach(self, due_ns: int) -> int:
-        return due_ns
+    def reach(self, due_ns: int) -> tuple[int, Sequence[int]]:
+        return due_ns, ()
 
     def stop(self) -> None:
         """Nothing to give back."""
@@ -184,7 +191,6 @@ class _Real:
     real = True
 
     def __init__(self, networks: Sequence[RealNetwork], runs: Sequence[Running], start_ns: int) -> None:
-        self.woken: list[int] = []
         self._networks = networks
         for network in networks:
             network.driven = True
@@ -193,34 +199,30 @@ class _Real:
         self._waits = len(networks) == 1 and bool(self._numbers)
         self._zero_ns = time.monotonic_ns() - start_ns
 
-    def now(self) -> int:
-        """The time."""
-        return time.monotonic_ns() - self._zero_ns
-
     def behind(self, behind_ns: int) -> Callable[[], int]:
         """A clock that is behind this time by so much."""
         monotonic_ns, zero_ns = time.monotonic_ns, self._zero_ns + behind_ns
         return lambda: monotonic_ns() - zero_ns
 
-    def reach(self, due_ns: int) -> int:
-        while (left_ns := due_ns - (now_ns := self.now())) > 0:
+    def reach(self, due_ns: int) -> tuple[int, Sequence[int]]:
+        zero_ns = self._zero_ns
+        while (left_ns := due_ns - (now_ns := time.monotonic_ns() - zero_ns)) > 0:
             if not self._waits:
                 time.sleep(left_ns / 1e9)
             elif self._networks[0].wait(left_ns / 1e9):
-                self._serve(now_ns := self.now())
-                if self.woken:
-                    return now_ns
+                if woken := self._serve(now_ns := time.monotonic_ns() - zero_ns):
+                    return now_ns, woken
                 time.sleep(min(left_ns, PATIENCE_NS) / 1e9)
-        self._serve(now_ns)
-        return now_ns
+        return now_ns, self._serve(now_ns)
 
-    def _serve(self, now_ns: int) -> None:
-        """Asks the networks what happened until now, and notes whom it wakes."""
-        self.woken.clear()
+    def _serve(self, now_ns: int) -> Sequence[int]:
+        """Asks the networks what happened until now; the numbers of whom it wakes."""
+        numbers, woken = self._numbers, []
         for network in self._networks:
             for link in network.serve(now_ns):
-                if (number := self._numbers.get(id(link))) is not None:
-                    self.woken.append(number)
+                if (number := numbers.get(id(link))) is not None:
+                    woken.append(number)
+        return woken
 
     def stop(self) -> None:
         for network in self._networks:

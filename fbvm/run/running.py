@@ -4,7 +4,7 @@ Knows no clock: the loop tells the time and asks for the next one."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from fbvm.goal import Goal
@@ -73,10 +73,10 @@ class Running:
         self.due_ns = start_ns
         self._clock = clock(self._behind_ns) if clock and self.pace == EVENT else None
 
-    def scan(self, now_ns: int) -> Sequence[int]:
+    def scan(self, now_ns: int) -> list[int]:
         """One scan at this time, or more upon it, and the plan for the next.  A period that was overrun is not made up for.
 
-        Returns when the scans began if that is known of each."""
+        Returns when the scans of a burst began."""
         plc, told_ns = self.plc, max(now_ns - self._behind_ns, self.plc.now_ns)
         while self._writes and self._writes[0].at_ns <= told_ns:
             write = self._writes.pop(0)
@@ -84,8 +84,8 @@ class Running:
         if self.alone and (many := self._undisturbed()) > 1 and plc.scan_many(many):
             self.due_ns = plc.elapsed_ns + self._behind_ns
             self.reason = self._goal.reached()
-            return ()
-        times: Sequence[int] = ()
+            return []
+        times: list[int] = []
         if self._clock and (many := self._undisturbed()) > 1:
             times = plc.scan_at_once(min(many, MOST_AT_ONCE), self._clock)
         if times:
@@ -94,7 +94,7 @@ class Running:
             plc.scan(told_ns)
         self.reason = self._goal.reached()
         if plc.breakpoints.halted:
-            return ()
+            return []
         if self.pace == EVENT:
             self.due_ns = max(now_ns, min(now_ns + plc.cycle_ns, plc.due_ns + self._behind_ns))
         elif now_ns < self.due_ns + plc.cycle_ns:

@@ -277,6 +277,18 @@ def test_news_wake_only_whose_they_are(clock: Clock) -> None:
         assert [at_ms for name, at_ms in scans if name == other] == [0, 10, 20]
 
 
+def test_who_is_woken_again_and_again_stays_due_a_period_later(clock: Clock) -> None:
+    scans: dict[str, list[int]] = {"with": [], "without": []}
+    network, runs = RealNetwork(clock, 3, 4, 7, 22), []
+    for name in scans:
+        plc = Plc(counter_image())
+        plc.attach(Idle(), network)
+        plc.watchers.append(lambda plc, name=name: scans[name].append(plc.now_ns // MS))  # type: ignore[misc]
+        runs.append(Running(plc, for_ns=50 * MS, pace="event"))
+    run_all(runs)
+    assert scans == {"with": [0, 3, 4, 7, 17, 22, 32, 42], "without": [0, 10, 20, 30, 40]}
+
+
 class Unread(RealNetwork):
     """A network that always has something, and only for its first unit."""
 

@@ -53,3 +53,24 @@ def test_many_plcs_are_one_measure() -> None:
     assert (all_of_them.count, all_of_them.mean_ns, all_of_them.longest_ns, all_of_them.longest_scan) == (3, 180, 500, 1)
     assert all_of_them.overruns == 1
     assert all_of_them.within_ns(0.6) == 30
+
+
+def test_a_burst_counts_as_its_scans() -> None:
+    """Whoever asks, and whenever: between bursts, and with single scans or a gap between them."""
+    one_by_one, bursts, scan = ScanTimes(1_000), ScanTimes(1_000), 3
+    for number in range(200):
+        took_ns = [90 * (number % 13) + 7 * each * (1 + 30 * (number == 77)) for each in range(number % 9 + 1)]
+        began_ns = [1_000_000 + sum(took_ns[:each]) for each in range(len(took_ns))]
+        bursts.note_burst(scan, began_ns, sum(took_ns))
+        for time_ns in took_ns:
+            one_by_one.note(scan, time_ns)
+            scan += 1
+        if number in (40, 90):
+            one_by_one.note(scan, 1_500, 2)
+            bursts.note(scan, 1_500, 2)
+            scan += 5
+        if number % 50 == 8:
+            assert bursts.as_dict() == one_by_one.as_dict()
+    assert (bursts.count, bursts.overruns, str(bursts)) == (one_by_one.count, one_by_one.overruns, str(one_by_one))
+    assert 0 < bursts.overruns < bursts.count
+    assert bursts.longest_ns > 1_500
