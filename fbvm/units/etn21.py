@@ -1,29 +1,35 @@
 """The Omron ETN21 Ethernet unit: socket services by request switches, as a CS/CJ program sees them in CIO and D words.
 
-A state machine without I/O: memory words, network events and the time go in; memory words and network requests come
-out.  FINS, mail, FTP and clock adjustment are not emulated; their words stay 0.  From W420, W421 and, for points that
-these leave open, W343.
+What the unit does is a program, `fblib/omron/etn21`, which its own processor runs once in an I/O refresh.  This module
+exchanges the words, as the backplane does, and carries what program and network tell each other.  No I/O in here.  FINS,
+mail, FTP and clock adjustment are not emulated; their words stay 0.  From W420, W421 and, for points that these leave
+open, W343.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from copy import deepcopy
 from functools import cached_property
 from typing import Any
 
+from fbvm.processor import OwnProcessor, processor
 from fbvm.units import etn21_map as at
-from fbvm.units.etn21_dispatch import Choices, Dispatch, Fault
+from fbvm.units.etn21_data import lengths
+from fbvm.units.etn21_faults import Fault, Faults
+from fbvm.units.etn21_mail import Mail
 from fbvm.units.etn21_map import Layout
 from fbvm.units.etn21_names import descriptions, meanings
-from fbvm.units.etn21_service import NEVER_NS
-from fbvm.units.etn21_timing import timing_of
 from fbvm.units.etn21_words import Words
-from fbvm.units.unit import AreaMemory
+from fbvm.units.unit import AreaMemory, Exchanged
 from fbvm.wire.link import Event, Request
 
 __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
 
 TIME_WAIT_NS = 60_000_000_000  # W421 6-9-3 p156
+PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
+NEVER_NS = 1 << 62
+TIMINGS = ("exact", "real")
 
 
 class Etn21:
@@ -45,19 +51,13 @@ class Etn21:
         odd_filler: int | None = 0x00,
         faults: Iterable[Fault] = (),
     ) -> None:
+        if timing not in TIMINGS:
+            raise ValueError(f"timing {timing!r} is neither 'exact' nor 'real'")
         self.layout = Layout.of(unit_number)
         self.name = f"ETN21 {unit_number}"
         self.address = address
-        self.faults = list(faults)
-        """Each is used up by the first request that it fits."""
-        self._service_status, self._error_status = at.LINK_UP, 0
-        choices = Choices(time_wait_ns, odd_filler)
         self._made = {"unit_number": unit_number, "address": address, "timing": timing, "seed": seed,
                       "time_wait_ns": time_wait_ns, "odd_filler": odd_filler}  # fmt: skip
-        self._timing = timing_of(timing, seed)
-        self._dispatch = Dispatch(self.layout, address, self._timing, choices, self.faults)
-        self._starting: tuple[int, int] | None = None
-        """Cycle and time at which a restart ends; None if none is going on."""
         self._words: Words | None = None
         self._seen = 0
         """The request switches, as they were when the last refresh ended."""
@@ -65,6 +65,36 @@ class Etn21:
         """Its bit in words for all units."""
         self.wake_ns = NEVER_NS
         self.news = False
+        self._connect(processor(PROGRAM), odd_filler)
+        own = self._processor
+        own.view("ETN21_Unit_Bit", "u16")[0] = self._mask
+        ip = own.view("ETN21_IP", "u16")
+        ip[0], ip[1] = at.words_of(address)
+        own.view("ETN21_Real", "u8")[0] = timing == "real"
+        own.view("ETN21_Random", "u64")[0] = _scattered(seed)
+        own.view("ETN21_Time_Wait", "i64")[0] = time_wait_ns
+        self._service_status[0] = at.LINK_UP
+        self.faults += faults
+
+    def _connect(self, own: OwnProcessor, odd_filler: int | None) -> None:
+        """The unit's processor, and where its program keeps what is exchanged with it."""
+        self._processor = own
+        self._n, self._m = own.view("ETN21_N", "u16"), own.view("ETN21_M", "u16")
+        self._initializing, self._restart = own.view("ETN21_Initializing", "u16"), own.view("ETN21_Restart", "u16")
+        self._service_status = own.view("ETN21_Service_Status", "u16")
+        self._error_status = own.view("ETN21_Error_Status", "u16")
+        self._wake, self._changed = own.view("ETN21_Wake", "i64"), own.view("ETN21_News", "u8")
+        self._mail = Mail(own, odd_filler)
+        self.faults = Faults(own)
+        """Each is used up by the first request that it fits."""
+
+    def __deepcopy__(self, known: dict[int, Any]) -> Etn21:
+        """Another unit in the same state, which shares the PLC's memory."""
+        twin = Etn21(**self._made)  # type: ignore[arg-type]
+        twin._connect(self._processor.copy(), twin._mail.odd_filler)
+        twin._mail.inboxes = deepcopy(self._mail.inboxes)
+        twin._words, twin._seen, twin.wake_ns, twin.news = self._words, self._seen, self.wake_ns, self.news
+        return twin
 
     @property
     def watched(self) -> tuple[tuple[str, int], ...]:
@@ -73,22 +103,31 @@ class Etn21:
         return ("CIO", n), ("CIO", n + at.SERVICE_STATUS), ("CIO", n + at.SWITCHES), ("A", at.RESTART)
 
     @property
+    def exchanged(self) -> Exchanged:
+        """The words of the unit, and where its program says what it wants."""
+        words = (("CIO", self.layout.n, "ETN21_N", at.CIO_WORDS), ("D", self.layout.m, "ETN21_M", at.D_WORDS),
+                 ("A", at.INITIALIZING, "ETN21_Initializing", 1), ("A", at.RESTART, "ETN21_Restart", 1))  # fmt: skip
+        return Exchanged(self._processor, words, "ETN21_Posted", "ETN21_Requested", "ETN21_Wake")
+
+    @property
     def link_up(self) -> bool:
         """Whether n+17 says that the cable is plugged; what the network does is the network's affair."""
-        return self._service_status != 0
+        return self._service_status[0] != 0
 
     @link_up.setter
     def link_up(self, up: bool) -> None:
-        self._service_status, self.wake_ns = at.LINK_UP if up else 0, 0
+        self._service_status[0] = at.LINK_UP if up else 0
+        self._wake[0] = self.wake_ns = 0
 
     @property
     def error_status(self) -> int:
         """What n+18 shows."""
-        return self._error_status
+        return int(self._error_status[0])
 
     @error_status.setter
     def error_status(self, status: int) -> None:
-        self._error_status, self.wake_ns = status, 0
+        self._error_status[0] = status
+        self._wake[0] = self.wake_ns = 0
 
     @cached_property
     def descriptions(self) -> dict[str, str]:
@@ -119,60 +158,64 @@ class Etn21:
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on: the unit's own words and all switches 0, connections broken by RST."""
-        words = self._words = Words(self.layout, memory)
-        for word in (at.INITIALIZING, at.RESTART):
-            words.a[word] &= ~self._mask
-        self._starting = None
-        return self._begin_anew(words)
+        words = self._look_at(memory)
+        self._mail.forget()
+        self._processor.view("ETN21_Reset", "u8")[0] = 1
+        self._run(words, 0)
+        return self.finish()
 
-    def _begin_anew(self, words: Words) -> list[Request]:
-        self._dispatch.forget()
-        self._seen = 0
-        self.wake_ns, self.news = 0, False
-        cio, d = words.cio, words.d
-        n, m = self.layout.n, self.layout.m
-        for word in range(n + 1, n + at.FINS_TCP_STATUS + 1):
-            cio[word] = 0
-        cio[n] &= ~at.FORCE_CLOSE
-        for word in range(m + 1, m + at.MAIL_STATUS + 1):
-            d[word] = 0
-        cio[n + at.SERVICE_STATUS], cio[n + at.ERROR_STATUS] = self._service_status, self.error_status
-        return self._dispatch.reset_sockets()
+    def _look_at(self, memory: AreaMemory) -> Words:
+        """The words of the PLC that the unit is in now."""
+        words = self._words = Words(self.layout, memory)
+        table = self._processor.view("ETN21_Lengths", "u32")
+        for code, length in lengths(memory).items():
+            table[code - at.FIRST_AREA_CODE] = length
+        return words
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
         """One I/O refresh: take the network's events and new switches, end what is ready, show what changed."""
         words = self._words
         if words is None or words.memory is not memory:
-            words = self._words = Words(self.layout, memory)
-        dispatch, status = self._dispatch, words.status
-        dispatch.cycle += 1
-        if self._starting or words.a[at.RESTART] & self._mask:
-            return self._restart(words, events, now_ns)
-        status[0], status[1] = self._service_status, self._error_status
-        switches, force = words.switches[0], words.cio[self.layout.n] & at.FORCE_CLOSE
-        if not events and switches == self._seen and now_ns < self.wake_ns and not force:
+            words = self._look_at(memory)
+        if events:
+            self._mail.post(events)
+        elif now_ns < self.wake_ns and words.switches[0] == self._seen and not self._mail.waits and not self._asked(words):
+            words.status[0], words.status[1] = self._service_status[0], self._error_status[0]
             self.news = False
             return []
-        requests = dispatch.refresh(words, events, switches, force, now_ns)
-        self.news = dispatch.changed
+        self._run(words, now_ns)
+        return self.finish()
+
+    def _asked(self, words: Words) -> bool:
+        """Does the program want a force-close, or a restart?"""
+        return bool(words.n[0] & at.FORCE_CLOSE or words.restart[0] & self._mask)
+
+    def _run(self, words: Words, now_ns: int) -> None:
+        """The program of the unit once, between the two halves of the exchange of words."""
+        self._n[:], self._m[:] = words.n, words.m
+        self._initializing[:], self._restart[:] = words.initializing, words.restart
+        self._processor.run(now_ns)
+        words.n[:], words.m[:] = self._n, self._m
+        words.initializing[:], words.restart[:] = self._initializing, self._restart
+
+    def post(self, events: Iterable[Event]) -> None:
+        """Events of the network for the next run of the program."""
+        self._mail.post(events)
+
+    def finish(self) -> list[Request]:
+        """What the program asked for in its last run; `news` and `wake_ns` are as it left them."""
+        words = self._words
+        assert words is not None
         self._seen = words.switches[0]
-        self.wake_ns = dispatch.wake_ns(now_ns)
+        self.news = self._changed[0] != 0
+        requests = self._mail.collect(words.memory) if self._mail.speaks else []
+        self.wake_ns = 0 if self._mail.waits else self._wake[0]
         return requests
 
-    def _restart(self, words: Words, events: Sequence[Event], now_ns: int) -> list[Request]:
-        """One I/O refresh of a restart, from the restart bit ON to the initializing flag OFF: requests are not seen."""
-        a, mask = words.a, self._mask
-        requests: list[Request] = []
-        if self._starting is None:
-            requests = self._begin_anew(words)
-            delay = self._timing.start_up()
-            self._starting = self._dispatch.cycle + delay.refreshes, now_ns + delay.time_ns
-            a[at.INITIALIZING] |= mask
-        elif self._dispatch.cycle >= self._starting[0] and now_ns >= self._starting[1]:
-            self._starting = None
-            a[at.INITIALIZING] &= ~mask
-            a[at.RESTART] &= ~mask
-        for event in events:
-            requests += self._dispatch.take(event)
-        self.wake_ns = self._starting[1] if self._starting and self._dispatch.cycle >= self._starting[0] else 0
-        return requests
+
+def _scattered(seed: int) -> int:
+    """A state to draw numbers from that is far from those of seeds nearby, and not 0 (splitmix64, G. Steele 2014)."""
+    mixed = (seed + 1) * 0x9E37_79B9_7F4A_7C15 & 0xFFFF_FFFF_FFFF_FFFF
+    mixed = (mixed ^ mixed >> 30) * 0xBF58_476D_1CE4_E5B9 & 0xFFFF_FFFF_FFFF_FFFF
+    mixed = (mixed ^ mixed >> 27) * 0x94D0_49BB_1331_11EB & 0xFFFF_FFFF_FFFF_FFFF
+    return mixed ^ mixed >> 31 or 1

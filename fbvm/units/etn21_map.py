@@ -7,10 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from sys import byteorder
-from typing import NamedTuple
-
-from fbvm.wire.link import Peer
 
 SOCKETS = range(1, 9)
 AREAS = range(1, 9)
@@ -23,6 +19,8 @@ SERVICE_STATUS = 17
 ERROR_STATUS = 18
 SWITCHES = 19  # n+19..n+22, two areas a word
 FINS_TCP_STATUS = 23
+CIO_WORDS = 24
+"""That the unit exchanges, from n on."""
 
 FORCE_CLOSE_BIT = 2  # of word n, W421 6-7-5 p120
 FORCE_CLOSE = 1 << FORCE_CLOSE_BIT
@@ -38,6 +36,11 @@ TCP_STATE = 8  # + socket number: m+9..m+16
 MAIL_STATUS = 17
 PARAMETERS = 18  # area k from m + 18 + 10 * (k - 1)
 PARAMETERS_LENGTH = 10
+D_WORDS = 98
+"""That the unit exchanges, from m on."""
+
+FIRST_AREA_CODE = 0x80
+"""Of the table of the areas' lengths."""
 
 # --- offsets in a parameter area, W421 6-7-4 p117 --------------------------------------------------------------------
 OPTION_AND_SOCKET, LOCAL_PORT, REMOTE_HOST, REMOTE_PORT, COUNT, DATA_ADDRESS, TIMEOUT, RESPONSE = 0, 1, 2, 4, 5, 6, 8, 9
@@ -62,18 +65,6 @@ class Switch(IntEnum):
     RECEIVE = 4
     CLOSE = 5
 
-
-UDP_OPEN, PASSIVE_OPEN, ACTIVE_OPEN, SEND, RECEIVE, CLOSE = Switch  # Python 3.11 finds the member of an Enum by a call
-OPENS = frozenset({UDP_OPEN, PASSIVE_OPEN, ACTIVE_OPEN})
-AREA_SWITCHES = 0x3F
-ALL_SWITCHES = 0x3F3F_3F3F_3F3F_3F3F
-"""A byte an area, wherever it lies."""
-SWITCHES_IN = tuple(tuple(switch for switch in Switch if mask >> switch & 1) for mask in range(AREA_SWITCHES + 1))
-"""The switches that are ON in a mask of them."""
-
-FLAG_OF = (OPENING, OPENING, OPENING, SENDING, RECEIVING, CLOSING)
-"""By switch."""
-TRANSFERS = SENDING | RECEIVING
 
 
 class TcpState(IntEnum):
@@ -115,50 +106,9 @@ class Layout:
         """CIO address of the word with the area's request switches, and the bit number of its first switch."""
         return self.n + SWITCHES + (area - 1) // 2, 0 if area % 2 else 8
 
-    def switches_shift(self, area: int) -> int:
-        """How far up the area's switches stand in n+19..n+22 as one number of 64 bits."""
-        word, first_bit = self.switches(area)
-        place = word - self.n - SWITCHES
-        return 16 * (place if byteorder == "little" else 3 - place) + first_bit
-
     def status(self, protocol: str, socket: int) -> int:
         """CIO address of a socket's status word."""
         return self.n + (TCP_STATUS if protocol == "TCP" else UDP_STATUS) + socket
-
-
-class Parameters(NamedTuple):
-    """The words of a parameter area when the unit accepts a request, and what they say."""
-
-    option_and_socket: int
-    local_port: int
-    host_high: int
-    host_low: int
-    remote_port: int
-    size_bytes: int
-    address_high: int
-    address_low: int
-    timeout: int
-
-    @classmethod
-    def read(cls, d: memoryview, at: int) -> Parameters:
-        """The area whose first word is D `at`."""
-        return tuple.__new__(cls, d[at : at + RESPONSE])  # half the time of a call
-
-    @property
-    def option(self) -> int:
-        return self.option_and_socket >> 8
-
-    @property
-    def socket(self) -> int:
-        return self.option_and_socket & 0xFF
-
-    @property
-    def remote(self) -> Peer:
-        return Peer(host_of(self.host_high, self.host_low), self.remote_port)
-
-    @property
-    def timeout_ns(self) -> int:
-        return self.timeout * 100_000_000
 
 
 def host_of(high: int, low: int) -> str:

@@ -2,25 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from fbvm.units import etn21_map as at
 from fbvm.units.unit import AreaMemory
 
 
 class Words:
-    """What a unit with this layout sees of a memory.  A copy of a unit shares it, as it shares the memory."""
+    """What a unit with this layout exchanges with a memory."""
 
-    __slots__ = ("a", "cio", "d", "memory", "status", "switches")
+    __slots__ = ("initializing", "m", "memory", "n", "restart", "status", "switches")
 
     def __init__(self, layout: at.Layout, memory: AreaMemory) -> None:
         self.memory = memory
-        self.cio, self.d, self.a = memory.words("CIO"), memory.words("D"), memory.words("A")
-        n = layout.n
-        self.status = self.cio[n + at.SERVICE_STATUS : n + at.SWITCHES]
+        cio, a, n = memory.words("CIO"), memory.words("A"), layout.n
+        self.n = cio[n : n + at.CIO_WORDS]
+        self.m = memory.words("D")[layout.m : layout.m + at.D_WORDS]
+        self.initializing, self.restart = a[at.INITIALIZING : at.INITIALIZING + 1], a[at.RESTART : at.RESTART + 1]
+        self.status = cio[n + at.SERVICE_STATUS : n + at.SWITCHES]
         """n+17 and n+18."""
-        self.switches = self.cio[n + at.SWITCHES : n + at.FINS_TCP_STATUS].cast("B").cast("Q")
+        self.switches = cio[n + at.SWITCHES : n + at.FINS_TCP_STATUS].cast("B").cast("Q")
         """n+19..n+22 as one number."""
-
-    def __deepcopy__(self, known: dict[int, Any]) -> Words:
-        return self

@@ -125,16 +125,20 @@ class Rig:
         self.run_until("Main.conn.ENO")
         return self
 
-    def command(self, *names: str, max_s: float = 60) -> None:
-        """Command blocks in the same scan and run until all have ended, one scan at least."""
+    def command(self, *names: str, max_s: float = 60) -> bool:
+        """Command blocks in the same scan and run until all have ended, one scan at least.
+
+        False if none has begun: the connection was lost in that very scan."""
         for name in names:
             self.set(f"{name}_Cmd", True)
         self.scan()
         busy = " OR ".join(f"Main.{name}.Exchange.State <> 0" for name in names)
+        began = any(self.number(f"{name}.Exchange.State") for name in names)
         self.run_until(f"NOT ({busy})", max_s)
         for name in names:
             self.set(f"{name}_Cmd", False)
         self.scan()
+        return began
 
     def chart(self, scans: int, *signals: str) -> str:
         """The signals at the end of each scan."""

@@ -6,7 +6,7 @@ import pytest
 from mtcp_rig import SERVER, Rig
 from rows import each_of
 
-from fbvm.units.etn21_dispatch import Fault
+from fbvm.units.etn21_faults import Fault
 from fbvm.units.etn21_map import Switch
 
 READ = "Fn03(Register_Address := 1000, Register_Qty := 3, RespData_DM := 200)"

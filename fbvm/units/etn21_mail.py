@@ -1,0 +1,158 @@
+"""What an ETN21's processor and the network tell each other, as rows in the processor's memory.
+
+The rows are ETN21_Event and ETN21_Request of fblib/omron/etn21/ETN21_Memory.st."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable
+from struct import Struct
+
+from fbvm.units import etn21_map as at
+from fbvm.units.etn21_codes import code_of
+from fbvm.units.etn21_data import fetch, store
+from fbvm.units.etn21_inbox import Datagrams, Stream
+from fbvm.units.unit import AreaMemory, Processor
+from fbvm.wire.link import (
+    Bind,
+    Broken,
+    Close,
+    Closed,
+    Connect,
+    Event,
+    Failed,
+    Grant,
+    Listen,
+    Opened,
+    Peer,
+    PeerClosed,
+    Received,
+    Request,
+    Send,
+    SendTo,
+    Sent,
+)
+
+TCP_PART = 1024  # sends are cut into these, W343 6-1-7 p108
+EVENT = Struct("<7H?xI")
+"""Kind, channel, error, local port, two words of host, port, whether it was taken, size."""
+TAKEN = 14
+"""Offset of the last but one."""
+REQUEST = Struct("<10HI")
+"""Kind, channel, option, local port, two words of host, port, two of data address, size, first number."""
+OPENED, FAILED, SENT, RECEIVED, PEER_CLOSED, BROKEN, CLOSED = range(1, 8)
+CONNECT, LISTEN, BIND, SEND, SEND_TO, GRANT, CLOSE, STORE = range(1, 9)
+
+
+def _opened(event: Opened) -> tuple[int, ...]:
+    return OPENED, event.channel, 0, event.local_port, *at.words_of(event.remote.host), event.remote.port, 0, 0
+
+
+def _received(event: Received) -> tuple[int, ...]:
+    high, low = at.words_of(event.remote.host) if event.remote.port else (0, 0)
+    return RECEIVED, event.channel, 0, 0, high, low, event.remote.port, 0, len(event.data)
+
+
+_ROWS: dict[type, Callable[..., tuple[int, ...]]] = {
+    Opened: _opened,
+    Failed: lambda event: (FAILED, event.channel, code_of(event.error), 0, 0, 0, 0, 0, 0),
+    Sent: lambda event: (SENT, event.channel, 0, 0, 0, 0, 0, 0, event.size),
+    Received: _received,
+    PeerClosed: lambda event: (PEER_CLOSED, event.channel, 0, 0, 0, 0, 0, 0, 0),
+    Broken: lambda event: (BROKEN, event.channel, code_of(event.error), 0, 0, 0, 0, 0, 0),
+    Closed: lambda event: (CLOSED, event.channel, 0, 0, 0, 0, 0, 0, 0),
+}
+"""An event as a row."""
+
+
+class Mail:
+    """The two tables of one processor, and what its sockets have received."""
+
+    def __init__(self, processor: Processor, odd_filler: int | None) -> None:
+        self.odd_filler = odd_filler
+        self._posted = processor.view("ETN21_Posted", "u32")
+        self._events = processor.view("ETN21_Events", "u8")
+        self._requested = processor.view("ETN21_Requested", "u32")
+        self._requests = processor.view("ETN21_Requests", "u8")
+        self._most = len(self._events) // EVENT.size
+        self._later: deque[Event] = deque()
+        """Events for which the table has no room now."""
+        self._received: list[tuple[int, Received]] = []
+        """What was received in the rows that are posted, with their offsets."""
+        self.inboxes: dict[int, Stream | Datagrams] = {}
+
+    @property
+    def waits(self) -> bool:
+        """True if there are events that the processor has not taken."""
+        return self._posted[0] > 0
+
+    @property
+    def speaks(self) -> bool:
+        """True if the last run left something to be done."""
+        return self._requested[0] > 0 or bool(self._received or self._later)
+
+    def forget(self) -> None:
+        """As after power-on."""
+        self._posted[0] = 0
+        self._later.clear()
+        self._received.clear()
+        self.inboxes.clear()
+
+    def post(self, events: Iterable[Event]) -> None:
+        """Give events to the processor; what does not fit waits for the refresh after, unknown channels are dropped."""
+        posted: int = self._posted[0]
+        for event in events:
+            if posted == self._most or self._later:
+                self._later.append(event)
+                continue
+            if event.channel not in at.SOCKETS:
+                continue
+            offset = EVENT.size * posted
+            EVENT.pack_into(self._events, offset, *_ROWS[type(event)](event))
+            if isinstance(event, Received):
+                self._received.append((offset, event))
+            posted += 1
+        self._posted[0] = posted
+
+    def collect(self, memory: AreaMemory) -> list[Request]:
+        """After a refresh: what the processor asks of the network; what it asks of the memory is done."""
+        if self._received:
+            for offset, event in self._received:
+                if self._events[offset + TAKEN]:
+                    self.inboxes[event.channel].add(event.data)
+            self._received.clear()
+        if self._later:
+            later, self._later = self._later, deque()
+            self.post(later)
+        requests: list[Request] = []
+        for number in range(self._requested[0]):
+            row = REQUEST.unpack_from(self._requests, REQUEST.size * number)
+            kind, channel, size, first = row[0], row[1], row[9], row[10]
+            if kind == SEND:
+                data = fetch(memory, row[7], row[8], size)
+                if size <= TCP_PART:
+                    requests.append(Send(channel, data))
+                else:
+                    requests += [Send(channel, data[at : at + TCP_PART]) for at in range(0, size, TCP_PART)]
+            elif kind == GRANT:
+                requests.append(Grant(channel, size))
+            elif kind == STORE:
+                store(memory, row[7], row[8], self.inboxes[channel].take(first, size), self.odd_filler)
+            else:
+                requests.append(self._rare(kind, channel, row, memory))
+        self._requested[0] = 0
+        return requests
+
+    def _rare(self, kind: int, channel: int, row: tuple[int, ...], memory: AreaMemory) -> Request:
+        """What is not asked for in each exchange."""
+        if kind == CLOSE:
+            return Close(channel, bool(row[2]))
+        remote = Peer(at.host_of(row[4], row[5]), row[6])
+        if kind == SEND_TO:
+            return SendTo(channel, remote, fetch(memory, row[7], row[8], row[9]))
+        self.inboxes[channel] = Datagrams(row[10]) if kind == BIND else Stream(row[10])
+        if kind == CONNECT:
+            return Connect(channel, remote, row[3], bool(row[2]))
+        if kind == LISTEN:
+            return Listen(channel, row[3], remote, bool(row[2]))
+        return Bind(channel, row[3])
