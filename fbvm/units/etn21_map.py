@@ -16,14 +16,12 @@ UNIT_NUMBERS = range(16)
 UDP_STATUS = 0  # + socket number: n+1..n+8
 TCP_STATUS = 8  # + socket number: n+9..n+16
 SERVICE_STATUS = 17
-ERROR_STATUS = 18
 SWITCHES = 19  # n+19..n+22, two areas a word
 FINS_TCP_STATUS = 23
 CIO_WORDS = 24
 """That the unit exchanges, from n on."""
 
-FORCE_CLOSE_BIT = 2  # of word n, W421 6-7-5 p120
-FORCE_CLOSE = 1 << FORCE_CLOSE_BIT
+FORCE_CLOSE = 1 << 2  # of word n, W421 6-7-5 p120
 LINK_UP = 1 << 14  # of n+17; the bit's number is assumed
 
 # --- A words of the CPU unit, bit N for the CPU bus unit with number N, [K] ---------------------------------------------
@@ -33,7 +31,6 @@ RESTART = 501
 # --- offsets from m (D), W420 4-2 p88 --------------------------------------------------------------------------------
 BYTES_RECEIVED = 0  # + socket number: m+1..m+8
 TCP_STATE = 8  # + socket number: m+9..m+16
-MAIL_STATUS = 17
 PARAMETERS = 18  # area k from m + 18 + 10 * (k - 1)
 PARAMETERS_LENGTH = 10
 D_WORDS = 98
@@ -45,14 +42,7 @@ FIRST_AREA_CODE = 0x80
 # --- offsets in a parameter area, W421 6-7-4 p117 --------------------------------------------------------------------
 OPTION_AND_SOCKET, LOCAL_PORT, REMOTE_HOST, REMOTE_PORT, COUNT, DATA_ADDRESS, TIMEOUT, RESPONSE = 0, 1, 2, 4, 5, 6, 8, 9
 
-KEEP_ALIVE = 1 << 0  # of the option byte, W421 6-7-4 p117
-LINGER = 1 << 1  # of the option byte, W420 7-3-14 p178
-
-# --- bits of a socket status word, W420 4-1 p80-82 -------------------------------------------------------------------
-OPENING, RECEIVING, SENDING, CLOSING = 1 << 0, 1 << 1, 1 << 2, 1 << 3
-DATA_RECEIVED = 1 << 13
-OPEN = 1 << 15
-FLAGS = OPENING | RECEIVING | SENDING | CLOSING
+OPEN = 1 << 15  # of a socket's status word, W420 4-1 p80-82
 
 
 class Switch(IntEnum):

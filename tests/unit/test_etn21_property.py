@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from common_unit_tests import answer, events
 from etn21_rig import CIO, D, Rig
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fbvm.units.etn21 import Etn21, Fault
@@ -73,6 +73,39 @@ def test_any_order_of_switches_and_events(
     assert [rig.cio[n + 19 + word] for word in range(4)] == [0] * 4
     assert rig.cio[n] & 4 == 0
     assert [rig.cio[n + word] & 0xF for word in range(1, 17)] == [0] * 16
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.lists(cycles, max_size=25), timings)
+def test_the_unit_does_the_same_without_machine_code(
+    monkeypatch: pytest.MonkeyPatch,
+    script: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, bool, int]],
+    timing: str,
+) -> None:
+    rigs = [Rig(Etn21(timing=timing, faults=[Fault(0x2211, Switch.SEND)]))]
+    with monkeypatch.context() as patched:
+        patched.setattr("fbvm.engine.native.available", lambda: False)
+        rigs.append(Rig(Etn21(timing=timing, faults=[Fault(0x2211, Switch.SEND)])))
+    assert rigs[1].unit.exchanged.processor.machine is None
+    for program, told, _, force, cycle_ms in script:
+        asked = [turn(rig, program, told, force, cycle_ms) for rig in rigs]
+        assert asked[0] == asked[1]
+        assert rigs[0].memory.snapshot() == rigs[1].memory.snapshot()
+        assert (rigs[0].unit.wake_ns, rigs[0].unit.news) == (rigs[1].unit.wake_ns, rigs[1].unit.news)
+
+
+def turn(
+    rig: Rig, program: list[tuple[int, Switch, dict[str, object]]], told: list[Event], force: bool, cycle_ms: int
+) -> list[Request]:
+    """One cycle: what the program does, then a refresh in which the network tells something."""
+    for area, switch, values in program:
+        rig.parameters(area, **values)  # type: ignore[arg-type]
+        rig.turn_on(switch, area)
+    if force:
+        rig.cio[n] |= 1 << 2
+    rig.cycle_ns = cycle_ms * 1_000_000
+    return rig.scan(*told)
 
 
 def settle(rig: Rig, asked: list[Request]) -> None:
