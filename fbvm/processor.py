@@ -8,7 +8,7 @@ from typing import Any
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW
 from fbvm.base.diagnostics import Source
-from fbvm.base.memory import FORMATS, Memory
+from fbvm.base.memory import STRUCTS, Memory
 from fbvm.code import image_cache
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
@@ -27,13 +27,13 @@ def processor(text: str) -> OwnProcessor:
     """A processor with a program of its own, before its first execution; the text is compiled once.
 
     Raises ValueError for a text that is not one PROGRAM and what it needs."""
-    return _first(text).copy()
+    return _first(text).another()
 
 
 @cache
 def _first(text: str) -> OwnProcessor:
-    """The one that all others of the same program are copies of.  It stays, and so does its code."""
-    return OwnProcessor(_compiled(text))
+    """The one of a program that stays, and with it the code for all others."""
+    return OwnProcessor(_compiled(text), {})
 
 
 def _compiled(text: str) -> Image:
@@ -52,8 +52,10 @@ def _compiled(text: str) -> Image:
 class OwnProcessor:
     """A `fbvm.units.unit.Processor`: machine code where that can be had, else Python."""
 
-    def __init__(self, image: Image) -> None:
+    def __init__(self, image: Image, places: dict[str, Place]) -> None:
         self.image = image
+        self._places = places
+        """Where variables lie, as far as somebody has asked; the same for all with this image."""
         self.memory = Memory(image.layout.size, image.layout.areas)
         for offset, data in image.initial:
             self.memory.u8[offset : offset + len(data)] = data
@@ -63,16 +65,20 @@ class OwnProcessor:
         self._system = self.memory.views["i64"]
 
     def _place(self, variable: str) -> Place:
-        place = find_place(self.image.symbols, self.memory.areas, variable)
-        if place.hops or place.bit is not None:
-            raise ValueError(f"{variable} does not lie in bytes of its own")
+        place = self._places.get(variable)
+        if place is None:
+            place = find_place(self.image.symbols, self.memory.areas, variable)
+            if place.hops or place.bit is not None:
+                raise ValueError(f"{variable} does not lie in bytes of its own")
+            self._places[variable] = place
         return place
 
     def view(self, variable: str, machine: str) -> memoryview:
         """All of a variable as values of a machine type.  Raises UnknownPlace, and TypeError for what it has no room for."""
-        place = self._place(variable)
-        part = self.memory.u8[place.offset : place.offset + place.type.size]
-        return part.cast(FORMATS[machine])  # type: ignore[call-overload,no-any-return]
+        place, size = self._place(variable), STRUCTS[machine].size
+        if place.offset % size or place.type.size % size:
+            raise TypeError(f"{variable} is no row of {machine}")
+        return self.memory.views[machine][place.offset // size : (place.offset + place.type.size) // size]
 
     def offset(self, variable: str) -> int:
         """Where a variable lies in the processor's memory, in bytes.  Raises UnknownPlace."""
@@ -86,9 +92,13 @@ class OwnProcessor:
         if trap:
             raise RuntimeError(str(trap))
 
+    def another(self) -> OwnProcessor:
+        """Another processor with the same program, before its first execution."""
+        return OwnProcessor(self.image, self._places)
+
     def copy(self) -> OwnProcessor:
         """Another processor in the same state."""
-        other = OwnProcessor(self.image)
+        other = self.another()
         other.memory.restore(self.memory.snapshot())
         return other
 

@@ -16,6 +16,7 @@ from fbvm.engine.native_compiler import Linked, compile_text
 BLOCK = 32
 """Entries that are loaded together."""
 SLOT_BYTES = 24
+_FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int32)
 _ENTRY = """
 define i32 @e{0}() {{
 %f = load ptr, ptr getelementptr (i8, ptr @slots, i64 {1})
@@ -32,7 +33,7 @@ class Entry:
     def __init__(self, block: _Block, number: int) -> None:
         self._block, self._number = block, number
         self._slot = (ctypes.c_void_p * 3).from_address(block.slots + SLOT_BYTES * number)
-        self.call: Callable[[], int] = ctypes.PYFUNCTYPE(ctypes.c_int32)(block.linked.address(f"e{number}"))
+        self.call: Callable[[], int] = _FUNCTION(block.linked.address(f"e{number}"))
 
     def bind(self, memory: int, context: int) -> None:
         """Say over which memory and context the entry works."""

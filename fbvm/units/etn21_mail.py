@@ -4,7 +4,6 @@ The rows are ETN21_Event and ETN21_Request of fblib/omron/etn21/ETN21_Memory.st.
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable
 from struct import Struct
 
@@ -75,7 +74,7 @@ class Mail:
         self._requested = processor.view("ETN21_Requested", "u32")
         self._requests = processor.view("ETN21_Requests", "u8")
         self._most = len(self._events) // EVENT.size
-        self._later: deque[Event] = deque()
+        self._later: list[Event] = []
         """Events for which the table has no room now."""
         self._received: list[tuple[int, Received]] = []
         """What was received in the rows that are posted, with their offsets."""
@@ -122,7 +121,7 @@ class Mail:
                     self.inboxes[event.channel].add(event.data)
             self._received.clear()
         if self._later:
-            later, self._later = self._later, deque()
+            later, self._later = self._later, []
             self.post(later)
         requests: list[Request] = []
         for number in range(self._requested[0]):
