@@ -57,9 +57,6 @@ class Channel:
 class ChannelLink(ABC):
     """One unit's place on a network; its children know how channels are opened."""
 
-    heard = False
-    """Everything has been fetched, and nothing can have happened since, as far as somebody keeps an eye on that."""
-
     def __init__(self, address: str) -> None:
         self.address = address
         self.told: list[Event] = []

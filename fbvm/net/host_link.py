@@ -12,31 +12,30 @@ from fbvm.wire.link import Event, Request
 class HostLink(ChannelLink):
     """Looks only at connections for which the host has something."""
 
+    is_quiet = False
+    """Everything has been fetched, and nothing can have happened since, as far as is known to whoever asks the host."""
+
     def __init__(self, network: Switchboard, address: str) -> None:
         super().__init__(address)
         self._network = network
         self.waiting: dict[Channel, None] = {}
         """Those that may have something to fetch, in order."""
 
-    @property
-    def is_quiet(self) -> bool:
-        """True if there is nothing to fetch, as far as is known to whoever asks the host."""
-        return self.heard and (self._network.driven or not self.channels)
-
     def events(self, now_ns: int) -> Sequence[Event]:
-        if not self._network.driven:
+        driven = self._network.driven
+        if not driven:
             self._network.serve(now_ns)
+        elif self.is_quiet:
+            return ()
         if self.waiting:
             for there in list(self.waiting):
                 there.fetch(now_ns)
-        told = self.told
-        if told:
-            self.told = []
-        self.heard = not self.waiting
+        told, self.told = self.told, []
+        self.is_quiet = not self.waiting and (driven or not self.channels)
         return told
 
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
         super().submit(requests, now_ns)
-        if self.told:
-            self.heard = False
-            self._network.told(self)
+        if self.told or not self._network.driven:
+            self.is_quiet = False
+            self._network.unheard.add(self)

@@ -11,12 +11,14 @@ import selectors
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from fbvm.net.addresses import AddressMap
-from fbvm.net.channels import ChannelLink
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import Happening, Tap, What
+
+if TYPE_CHECKING:
+    from fbvm.net.host_link import HostLink
 
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 TCP, UDP = "tcp", "udp"
@@ -53,7 +55,7 @@ class HasFileno(Protocol):
 class Watcher(ABC):
     """Somebody who is told when the host is ready, and who can let go of what the host lent."""
 
-    link: ChannelLink
+    link: HostLink
     """Whose it is."""
     watched = 0
     """What of the host it waits for at the moment."""
@@ -87,7 +89,7 @@ class Switchboard(ABC):
     def __init__(self, address_map: AddressMap) -> None:
         self.tap: Tap | None = None
         self.map = address_map
-        self.links: dict[str, ChannelLink] = {}
+        self.links: dict[str, HostLink] = {}
         self._selector = selectors.DefaultSelector()
         self._number = _number(self._selector)
         self._watched = 0
@@ -96,20 +98,34 @@ class Switchboard(ABC):
         """What the host was ready for when somebody waited."""
         self._own: dict[tuple[str, Peer], Peer] = {}
         self._orphans: deque[tuple[int, Orphan]] = deque()
-        self._unheard: set[ChannelLink] = set()
+        self.unheard: set[HostLink] = set()
         """Links that may have something to tell, besides what the host is ready for."""
         self.closed = False
-        self.driven = False
-        """True while somebody else calls `serve` whenever time goes on, for all links at once."""
+        self._driven = False
 
     @abstractmethod
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
         """Where on the host a unit's own endpoint is."""
 
+    @property
+    def driven(self) -> bool:
+        """True while somebody else calls `serve` whenever time goes on, for all links at once."""
+        return self._driven
+
+    @driven.setter
+    def driven(self, driven: bool) -> None:
+        self._driven = driven
+        for link in self.links.values():
+            link.is_quiet = False
+
     def wait(self, timeout_s: float) -> bool:
         """Sleep until a connection wants attention or the time is over; True if there is something to fetch."""
-        if self.closed or (self._unheard and self._is_unheard()):
+        if self.closed:
             return True
+        for link in self.unheard:
+            if link.told:
+                return True
+        self.unheard.clear()
         timeout_s = max(timeout_s, 0.0)
         coarse_s = timeout_s if self._number is None else timeout_s // COARSE_S * COARSE_S
         if coarse_s or self._number is None:
@@ -118,19 +134,22 @@ class Switchboard(ABC):
             return bool(self._found)
         return bool(select.select([self._number], [], [], timeout_s - coarse_s)[0])
 
-    def serve(self, now_ns: int) -> list[ChannelLink]:
+    def serve(self, now_ns: int) -> list[HostLink]:
         """Do everything that the host is ready for; whose connections that was."""
         if self.closed:
             return []
-        woken: list[ChannelLink] = []
+        woken: list[HostLink] = []
         found, self._found = self._found, []
         if not found and self._watched:
             found = self._selector.select(0)
         for key, ready in found:
-            key.data.ready(ready, now_ns)
-            key.data.link.heard = False
-            woken.append(key.data.link)
-        self._unheard.update(woken)
+            watcher: Watcher = key.data
+            watcher.ready(ready, now_ns)
+            link = watcher.link
+            link.is_quiet = False
+            if link.told:
+                self.unheard.add(link)
+            woken.append(link)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):
             self._orphans.popleft()[1].give_up(now_ns)
         return woken
@@ -150,14 +169,6 @@ class Switchboard(ABC):
         self.closed = True
 
     # For links and their channels.
-
-    def told(self, link: ChannelLink) -> None:
-        """A link was told something in answer to a request."""
-        self._unheard.add(link)
-
-    def _is_unheard(self) -> bool:
-        self._unheard = {link for link in self._unheard if link.told}
-        return bool(self._unheard)
 
     def watch(self, sock: HasFileno, wanted: int, channel: Watcher) -> None:
         """Be told when the host is ready for what is wanted: READ, WRITE, both or nothing."""

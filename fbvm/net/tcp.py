@@ -207,7 +207,7 @@ class _Line(_OnHost):
 
     As an `_orphan` it has been closed by its unit: it sends what it has, then FIN, and waits for the peer's."""
 
-    _connected = _orphan = _readable = _stalled = _fin_sent = _fin_seen = False
+    _connected = _orphan = _stalled = _fin_sent = _fin_seen = False
     _taken = 0
 
     def __init__(self, link: TcpLink, request: Connect) -> None:
@@ -275,23 +275,23 @@ class _Line(_OnHost):
             if self._orphan:
                 self._receive(self.sock, now_ns)
             else:
-                self._readable = True
                 self.link.waiting[self] = None
         if ready & WRITE and self.sock:
             self._flush(self.sock, now_ns)
 
     def grant(self, size_bytes: int) -> None:
-        self.granted, self._stalled = size_bytes, False
-        self._watch()
+        self.granted = size_bytes
+        if self._stalled:
+            self._stalled = False
+            self._watch()
 
     def fetch(self, now_ns: int) -> None:
         """Read only now: until its unit asks, another unit's turn must not use up a grant that may yet be changed."""
-        if self.sock and self._readable:
-            self._readable = False
+        if self.sock and not self._stalled and not self._fin_seen:
             self._receive(self.sock, now_ns)
         elif self.sock and (code := self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)):
             self._broke(code, now_ns)
-        if not (self._stalled or self._fin_seen):  # of which the selector would not tell that they broke
+        if not self._stalled and not self._fin_seen:  # of which the selector would not tell that they broke
             self.link.waiting.pop(self, None)
 
     def send(self, data: bytes, now_ns: int) -> str:
@@ -352,7 +352,7 @@ class _Line(_OnHost):
         else:
             self.granted -= len(data)
             self._tap(now_ns, DATA, False, data)
-            self._report(Received(self.channel, data))
+            self.link.told.append(Received(self.channel, data))
 
     def _flush(self, sock: socket.socket, now_ns: int) -> None:
         try:
@@ -363,8 +363,8 @@ class _Line(_OnHost):
                     self._tap(now_ns, DATA, True, rest[:size])
                 self._taken += size
                 if size == len(rest):
-                    self._report(Sent(self.channel, len(self._outbox.popleft())))
                     self._taken = 0
+                    self._report(Sent(self.channel, len(self._outbox.popleft())))
         except BlockingIOError:
             pass
         except OSError as error:

@@ -15,6 +15,8 @@ from fbvm.plc import Plc
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
 from fbvm.wire.link import RealNetwork
 
+Numbers = dict[int, None]
+"""Runs by their numbers, each once, in the order of their turns."""
 PROGRESS_NS = 100_000_000
 """How often progress is told, at most."""
 PATIENCE_NS = 1_000_000
@@ -73,10 +75,13 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
         clock.stop()
 
 
-def _scan_all(queue: _Queue, now_ns: int, woken: Sequence[int], real: bool) -> None:
+def _scan_all(queue: _Queue, now_ns: int, woken: Numbers, real: bool) -> None:
     """Scans of everybody who is woken or whose time has come, with the same time for all."""
     first_ns = began_ns = time.monotonic_ns()
-    for number, run in queue.take(now_ns, woken):
+    for number in queue.take(now_ns, woken):
+        run = queue.runs[number]
+        if run.reason:  # it has ended, and is woken nevertheless
+            continue
         plc, due_ns = run.plc, run.due_ns
         scan = plc.scans
         times = run.scan(now_ns)
@@ -99,7 +104,7 @@ class _Queue:
     time, moves on only when that row is the next."""
 
     def __init__(self, runs: Sequence[Running]) -> None:
-        self._runs = runs
+        self.runs = runs
         self._times: list[int] = []
         """Of the rows, the next first."""
         self._rows: dict[int, list[int]] = {}
@@ -125,7 +130,7 @@ class _Queue:
 
     def next_ns(self) -> int | None:
         """When somebody is due; None if all have ended."""
-        runs, stands_ns = self._runs, self._stands_ns
+        runs, stands_ns = self.runs, self._stands_ns
         if len(runs) == 1:
             return None if runs[0].reason else runs[0].due_ns
         while self._times:
@@ -142,23 +147,20 @@ class _Queue:
             del self._rows[heapq.heappop(self._times)]
         return None
 
-    def take(self, now_ns: int, woken: Sequence[int]) -> Iterable[tuple[int, Running]]:
-        """All that are due, or woken before that, with their numbers; who has scanned one puts it back."""
-        times, runs, stands_ns = self._times, self._runs, self._stands_ns
-        taken: dict[int, Running] = {}
+    def take(self, now_ns: int, woken: Numbers) -> Numbers:
+        """Those that are woken, and all that are due; who has scanned one puts it back."""
+        times = self._times
         while times and times[0] <= now_ns:
             time_ns = heapq.heappop(times)
             for number in self._rows.pop(time_ns):
-                if stands_ns[number] == time_ns:
-                    stands_ns[number] = NEVER
-                    if runs[number].due_ns <= now_ns:
-                        taken[number] = runs[number]
+                if self._stands_ns[number] == time_ns:
+                    self._stands_ns[number] = NEVER
+                    run = self.runs[number]
+                    if run.due_ns <= now_ns:
+                        woken[number] = None
                     else:
-                        self.put(number, runs[number])
-        for number in woken:
-            if not runs[number].reason:
-                taken[number] = runs[number]
-        return taken.items()
+                        self.put(number, run)
+        return woken
 
 
 class _Clock(Protocol):
@@ -166,8 +168,8 @@ class _Clock(Protocol):
 
     real: bool
 
-    def reach(self, due_ns: int) -> tuple[int, Sequence[int]]:
-        """Waits until then, or until somebody is woken; the time, and the numbers of the runs that have news."""
+    def reach(self, due_ns: int) -> tuple[int, Numbers]:
+        """Waits until then, or until somebody is woken; the time, and the runs that have news."""
 
     def stop(self) -> None:
         """The loop has ended."""
@@ -178,8 +180,8 @@ class _Virtual:
 
     real = False
 
-    def reach(self, due_ns: int) -> tuple[int, Sequence[int]]:
-        return due_ns, ()
+    def reach(self, due_ns: int) -> tuple[int, Numbers]:
+        return due_ns, {}
 
     def stop(self) -> None:
         """Nothing to give back."""
@@ -194,7 +196,7 @@ class _Real:
         self._networks = networks
         for network in networks:
             network.driven = True
-        self._numbers = {id(unit.link): number for number, run in enumerate(runs) if run.pace == EVENT
+        self._numbers = {unit.link: number for number, run in enumerate(runs) if run.pace == EVENT
                          for unit in run.plc.units}  # fmt: skip
         self._waits = len(networks) == 1 and bool(self._numbers)
         self._zero_ns = time.monotonic_ns() - start_ns
@@ -204,7 +206,7 @@ class _Real:
         monotonic_ns, zero_ns = time.monotonic_ns, self._zero_ns + behind_ns
         return lambda: monotonic_ns() - zero_ns
 
-    def reach(self, due_ns: int) -> tuple[int, Sequence[int]]:
+    def reach(self, due_ns: int) -> tuple[int, Numbers]:
         zero_ns = self._zero_ns
         while (left_ns := due_ns - (now_ns := time.monotonic_ns() - zero_ns)) > 0:
             if not self._waits:
@@ -215,13 +217,13 @@ class _Real:
                 time.sleep(min(left_ns, PATIENCE_NS) / 1e9)
         return now_ns, self._serve(now_ns)
 
-    def _serve(self, now_ns: int) -> Sequence[int]:
-        """Asks the networks what happened until now; the numbers of whom it wakes."""
-        numbers, woken = self._numbers, []
+    def _serve(self, now_ns: int) -> Numbers:
+        """Asks the networks what happened until now; whom it wakes."""
+        numbers, woken = self._numbers, Numbers()
         for network in self._networks:
             for link in network.serve(now_ns):
-                if (number := numbers.get(id(link))) is not None:
-                    woken.append(number)
+                if link in numbers:
+                    woken[numbers[link]] = None
         return woken
 
     def stop(self) -> None:

@@ -533,6 +533,23 @@ def test_who_drives_a_network_asks_the_host_once_for_all(network: TcpNetwork, de
     assert network.serve(now_ns()) == []
 
 
+def test_a_link_is_quiet_only_while_somebody_keeps_an_eye_on_the_host(network: TcpNetwork, device: Device) -> None:
+    link, line = opened(network, device)
+    assert (link.events(now_ns()), link.is_quiet) == ([], False)
+    network.driven = True
+    assert (link.events(now_ns()), link.is_quiet) == ([], True)
+    link.submit([Grant(1, 50)], now_ns())
+    assert (link.is_quiet, list(link.events(now_ns()))) == (True, [])
+    link.submit([Send(1, b"x")], now_ns())
+    assert (link.is_quiet, list(link.events(now_ns())), link.is_quiet) == (False, [Sent(1, 1)], True)
+    network.driven = False
+    line.sendall(b"y")
+    assert not link.is_quiet
+    assert until_last(link, Received) == [Received(1, b"y")]
+    link.submit([Close(1)], now_ns())
+    assert (link.is_quiet, list(link.events(now_ns())), link.is_quiet) == (False, [Closed(1)], True)
+
+
 def test_wrong_use(network: TcpNetwork, device: Device) -> None:
     link, _ = opened(network, device)
     with pytest.raises(ValueError, match="channel 1"):
