@@ -1,11 +1,12 @@
-"""The units of a PLC on its backplane, and what they say together."""
+"""The units of a PLC on its backplane, and the I/O refresh in which they exchange their words."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from fbvm.base.areas import Area
+from fbvm.base.memory import Memory
+from fbvm.net.journal import Journal
 from fbvm.units.unit import Unit
 from fbvm.wire.link import Link, Network
 
@@ -19,33 +20,70 @@ class Attached:
     network: Network
 
 
-def wake_ns(units: Sequence[Attached], latest_ns: int) -> int:
-    """When a unit changes something by itself, `latest_ns` if none does before."""
-    for attached in units:
-        if (unit_ns := attached.unit.wake_ns) < latest_ns:
-            latest_ns = unit_ns
-    return latest_ns
+class Exchange:
+    """I/O refreshes of the units of one PLC; some may be left out, and are counted."""
 
+    def __init__(self, units: Sequence[Attached], memory: Memory) -> None:
+        self.units, self.memory = units, memory
+        self.passed = 0
+        """How many refreshes were left out since the last one."""
+        self.news = False
+        """The units changed words in the last refresh, and no scan has come upon it."""
 
-def watched(units: Sequence[Attached], areas: Mapping[str, Area]) -> list[int] | None:
-    """Offsets of what the units look at in each refresh; None if one does not say so."""
-    found: list[int] = []
-    for attached in units:
-        if attached.unit.watched is None:
-            return None
-        found += [areas[area].offset + 2 * word for area, word in attached.unit.watched]
-    return found
+    def refresh(self, now_ns: int, journal: Journal | None = None, seen: Callable[[int], None] | None = None) -> bool:
+        """Each unit exchanges its words once, the networks take what the units ask for.
 
+        `seen` is told the number of each unit that has been refreshed.  True if nobody has anything left to do."""
+        if self.passed:
+            self.pass_by()
+        memory, news, at_rest = self.memory, False, True
+        for number, attached in enumerate(self.units):
+            unit, link = attached.unit, attached.link
+            events = link.events(now_ns)
+            if journal:
+                journal.told(number, events)
+            requests = unit.refresh(memory, events, now_ns)
+            if requests:
+                link.submit(requests, now_ns)
+            if seen:
+                seen(number)
+            if unit.news:
+                news = True
+            if unit.wake_ns <= now_ns or not link.is_quiet:
+                at_rest = False
+        self.news = news
+        return at_rest
 
-def is_idle(units: Sequence[Attached], now_ns: int) -> bool:
-    """True if a refresh changes nothing unless what the units watch has changed, as far as they say what that is."""
-    for attached in units:  # noqa: SIM110 - a generator would cost as much as the rest of it
-        if attached.unit.wake_ns <= now_ns or not attached.link.is_quiet:
-            return False
-    return True
+    def pass_by(self) -> None:
+        """Tell the links of refreshes that were left out."""
+        for attached in self.units:
+            attached.link.pass_by(self.passed)
+        self.passed = 0
 
+    def is_idle(self, now_ns: int) -> bool:
+        """True if a refresh changes nothing unless what the units watch has changed, as far as they say what that is."""
+        for attached in self.units:  # noqa: SIM110 - a generator would cost as much as the rest of it
+            if attached.unit.wake_ns <= now_ns or not attached.link.is_quiet:
+                return False
+        return True
 
-def pass_by(units: Sequence[Attached], refreshes: int) -> None:
-    """So many refreshes have taken place in which nobody had anything to do."""
-    for attached in units:
-        attached.link.pass_by(refreshes)
+    def wake_ns(self, latest_ns: int) -> int:
+        """When the units want another scan: at once if the program has not seen yet what they changed."""
+        return 0 if self.news else self.unit_ns(latest_ns)
+
+    def unit_ns(self, latest_ns: int) -> int:
+        """When a unit changes something by itself, `latest_ns` if none does before."""
+        for attached in self.units:
+            if (unit_ns := attached.unit.wake_ns) < latest_ns:
+                latest_ns = unit_ns
+        return latest_ns
+
+    def offset(self, area: str, word: int) -> int:
+        """Where a word of an area lies in the memory."""
+        return self.memory.areas[area].offset + 2 * word
+
+    @property
+    def watched(self) -> list[list[int]] | None:
+        """Offsets of what each unit looks at in each refresh; None if one does not say so."""
+        groups = [attached.unit.watched for attached in self.units]
+        return None if None in groups else [[self.offset(*place) for place in group or ()] for group in groups]

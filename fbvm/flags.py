@@ -93,7 +93,7 @@ def _clockwork() -> Clockwork:
     assert FIRST_TASK_CYCLE[0] == word
     return Clockwork(
         cleared=((a + 2 * word, 0xFFFF & ~(1 << bit | 1 << FIRST_TASK_CYCLE[1])),),
-        cycle_time=(a + 2 * CYCLE_TIME, a + 2 * MAX_CYCLE_TIME),
+        cycle_time=(a + 2 * CYCLE_TIME, a + 2 * MAX_CYCLE_TIME, TENTH_MS_NS),
         counters=tuple((a + 2 * at, unit_ns) for at, unit_ns in FREE_COUNTERS),
         pulses=tuple((at, keep, tuple(periods)) for at, keep, periods in _ROWS),
     )  # fmt: skip

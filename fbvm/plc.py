@@ -15,9 +15,9 @@ from fbvm.breakpoints import Breakpoints, Halt
 from fbvm.code.image import Image
 from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
-from fbvm.exchange import Attached
-from fbvm.express import Express
-from fbvm.flags import CLOCKWORK, TENTH_MS_NS, Flags
+from fbvm.exchange import Attached, Exchange
+from fbvm.express import Express, Way
+from fbvm.flags import CLOCKWORK, Flags
 from fbvm.goal import Goal
 from fbvm.net.journal import Journal
 from fbvm.scan_times import Lateness, ScanTimes
@@ -88,7 +88,8 @@ class Plc:
         self._due: deque[int] = deque()
         self.breakpoints = Breakpoints(self)
         self._schedule = Schedule(image.tasks, lambda path: self.read(path) is True)
-        self._express = Express(self.units, self.memory, self._schedule)
+        self._exchange = Exchange(self.units, self.memory)
+        self._express = Express(self._exchange, self._schedule)
         self._write_initial()
         self._journal = journal
         if journal:
@@ -106,9 +107,9 @@ class Plc:
             raise Stopped(self.trap)
         if not self.breakpoints.halted:
             now_ns = self._time(now_ns)
-            if self._in_one_piece():
-                before_ns, self.now_ns = self.now_ns, now_ns
-                self.trap = self._express.once(now_ns - before_ns, now_ns, self.budget)
+            if way := self._way():
+                self.now_ns = now_ns
+                self.trap = way.once(now_ns, self.budget)
                 self.scans += 1
                 self._tell()
                 return self.trap
@@ -124,16 +125,15 @@ class Plc:
         self._end()
         return self.trap
 
-    def _in_one_piece(self) -> bool:
-        """Can machine code do the next scan up to its refresh?  Not if somebody has a part in it."""
+    def _way(self) -> Way | None:
+        """How machine code does the next scan in one piece.  It cannot if somebody has a part in it."""
         machine = self.engine.machine
         if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
-            return False
-        return not self.breakpoints.armed and self._express.ready(machine)
+            return None
+        return None if self.breakpoints.armed else self._express.way(machine)
 
     def _begin(self, now_ns: int) -> None:
         """A scan up to its program."""
-        self._express.idle = False
         if self._journal:
             self._journal.before(self.scans, now_ns, self.budget, self.forces)
         self._oversee(now_ns)
@@ -216,7 +216,7 @@ class Plc:
     def due_ns(self) -> int:
         """When the next scan is worth while, if no network tells anything before: at once if a unit has news for the
         program, else when a timer of the program, a task's interval or a unit changes something by itself."""
-        return min(self._express.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
+        return min(self._exchange.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
 
     def run(
         self,
@@ -245,8 +245,8 @@ class Plc:
         cycle_ns = self.cycle_ns
         if self.breakpoints.armed:
             done, self.trap = self._many_guarded(most)
-        elif self._in_one_piece() and self._express.idle and all(attached.network.virtual_time for attached in self.units):
-            done, self.trap = self._express.many(most, self.now_ns, cycle_ns, self.budget, STEP_BUDGET)
+        elif all(attached.network.virtual_time for attached in self.units) and (way := self._way()):
+            done, self.trap = way.many(most, self.now_ns, cycle_ns, self.budget, STEP_BUDGET)
         else:
             return False
         self.scans += done
@@ -257,10 +257,10 @@ class Plc:
         """Scans in the time that `clock` tells, one upon the other for as long as units have news for the program; when
         they began.  There is none if somebody has to be told between them, or has a part in one: then it takes `scan`."""
         times: list[int] = []
-        if self.watchers or self._past.maxlen or self.trap or not self._in_one_piece():
+        if self.watchers or self._past.maxlen or self.trap or not (way := self._way()):
             return times
         try:
-            self.trap = self._express.burst(times, most, self.now_ns, clock, self.budget)
+            self.trap = way.burst(times, most, clock, self.budget)
         finally:  # Ctrl-C may come between two of them
             if times:
                 self.scans += len(times)
@@ -274,8 +274,8 @@ class Plc:
         if outside or not turns or self._first or self._mode is not RUN or self.halted:
             return 0, None
         self._system[BUDGET // 8] = self.budget
-        guarded, cycle_time = self.breakpoints.guarding(self.engine), self.cycle_ns // TENTH_MS_NS
-        return guarded.run_many(turns, most, self.cycle_ns, CLOCKWORK, cycle_time=cycle_time, spend=STEP_BUDGET)
+        guarded = self.breakpoints.guarding(self.engine)
+        return guarded.run_many(turns, most, self.cycle_ns, CLOCKWORK, spend=STEP_BUDGET)
 
     # --- values -------------------------------------------------------------------------------------------------------
 

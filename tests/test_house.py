@@ -21,7 +21,7 @@ LONGEST_FILE, LONGEST_FUNCTION = 450, 60
 FLOORS = {
     "base": 0, "syntax": 1, "check": 2, "plcopen": 2, "code": 3, "engine": 4,
     "wire": 1, "units": 5, "net": 2,
-    "watch": 4, "breakpoints": 5, "exchange": 5, "express": 5, "flags": 5, "goal": 5, "schedule": 5, "state": 5,
+    "watch": 4, "breakpoints": 5, "companions": 5, "exchange": 5, "express": 5, "flags": 5, "goal": 5, "schedule": 5, "state": 5,
     "processor": 5, "scan_times": 5, "plc": 5,
     "record": 6, "run": 6, "step": 6, "testing": 7, "cli": 7, "": 7, "__main__": 7,
 }  # fmt: skip

@@ -72,18 +72,18 @@ class Guarded:
             return trap
         return self._observe(task_index)
 
-    def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork, *, cycle_time: int,
+    def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork, *,
                  spend: int) -> tuple[int, Trap | None]:  # fmt: skip
         """What `NativeEngine.run_many` does, up to the scan that would stop; its caller does that one alone."""
         if self._native is None:
             return 0, None
         seen, times = self._keep(), [turn.next_ns for turn in turns]
-        done, trap = self._native.run_many(turns, n, step_ns, clockwork, cycle_time=cycle_time, spend=spend)
+        done, trap = self._native.run_many(turns, n, step_ns, clockwork, spend=spend)
         if not self._undone(trap, seen):
             return done, trap
         for turn, next_ns in zip(turns, times, strict=True):
             turn.next_ns = next_ns
-        return self._native.run_many(turns, done - 1, step_ns, clockwork, cycle_time=cycle_time, spend=spend)
+        return self._native.run_many(turns, done - 1, step_ns, clockwork, spend=spend)
 
     def _keep(self) -> State:
         """Keep the memory as it is, and what was seen of it last."""

@@ -9,11 +9,12 @@ import ctypes
 from collections.abc import Sequence
 from weakref import finalize
 
-from fbvm.base.areas import BUDGET
+from fbvm.base.areas import BUDGET, NOW
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
 from fbvm.engine import native_compiler
 from fbvm.engine.native_code import Code, code_of
+from fbvm.engine.native_companions import Companion
 from fbvm.engine.native_context import Context
 from fbvm.engine.native_entries import Entry, entry
 from fbvm.engine.native_scans import NO_LIMIT, NOTHING, Clockwork, Series, Turn
@@ -75,13 +76,22 @@ class NativeEngine:
         point = self._calls[task_index]()
         return self.trap_at(point) if point else None
 
-    def series(self, turns: Sequence[Turn], clockwork: Clockwork = NOTHING, watched: Sequence[int] = ()) -> Series:
-        """Scans with the tasks in this order, which write the clockwork and end when what is watched changes."""
-        return Series(self.memory, self._memory_at, self._context.at, self._entries, turns, clockwork, watched)
+    def series(self, turns: Sequence[Turn], clockwork: Clockwork = NOTHING, watched: Sequence[Sequence[int]] = (),
+               companions: Sequence[Companion] = ()) -> Series:  # fmt: skip
+        """Scans with the tasks in this order, which write the clockwork and end when what is watched changes or a
+        companion runs."""
+        return Series(self.memory, self._memory_at, self._context.at, self._entries, turns, clockwork, watched, companions)
+
+    def companion(self, copies: Sequence[tuple[int, int, int]], watched: Sequence[int], posted: int, requested: int,
+                  wake: int) -> Companion:  # fmt: skip
+        """This program, its first task, as a companion of another; see `Companion` for the offsets."""
+        return Companion(self._entries[0].function_at, self._memory_at, self._context.at, self.trap_at, tuple(copies),
+                         tuple(watched), posted, requested, wake)  # fmt: skip
 
     def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork = NOTHING, *,
-                 cycle_time: int = 0, spend: int = NO_LIMIT) -> tuple[int, Trap | None]:  # fmt: skip
-        """Up to n scans of a `Series` with the budget that there is now; how many there were, and the trap of the last."""
+                 spend: int = NO_LIMIT) -> tuple[int, Trap | None]:  # fmt: skip
+        """Up to n scans of a `Series`, each a step later than the one before, with the budget that there is now; how many
+        there were, and the trap of the last."""
         if not turns or n <= 0:
             return 0, None
         shape = tuple((turn.task, turn.interval_ns) for turn in turns), clockwork
@@ -89,8 +99,8 @@ class NativeEngine:
         if series is None:
             series = self._series[shape] = self.series(turns, clockwork)
         series.turns = turns
-        budget: int = self.memory.views["i64"][BUDGET // 8]
-        done, point = series.run(n, step_ns, budget, cycle_time, spend)
+        system = self.memory.views["i64"]
+        done, point = series.run(n, system[NOW // 8] + step_ns, step_ns, system[BUDGET // 8], spend)
         return done, self.trap_at(point) if point else None
 
     def trap_at(self, number: int) -> Trap:

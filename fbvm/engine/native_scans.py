@@ -1,7 +1,7 @@
 """Scans inside machine code: what a scan does up to its refresh, for as long as nobody outside has to be told.
 
-The function that does them is made for a shape: which of the tasks have an interval, and which words tell the program
-about time.  It has no calls but those of the tasks."""
+The function that does them is made for a shape: which of the tasks have an interval, which words tell the program about
+time, what is watched.  It has no calls but those of the tasks and of companions."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import count
 from string import Template
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
 from fbvm.base.memory import Memory
 from fbvm.engine import native_cache
 from fbvm.engine.native_cache import Stored, name_of
+from fbvm.engine.native_companions import Companion, Shape, Told
+from fbvm.engine.native_companions import text as companions_text
 from fbvm.engine.native_compiler import Linked, compile_text
 from fbvm.engine.native_entries import Entry
 
@@ -35,8 +38,8 @@ class Clockwork:
 
     cleared: tuple[tuple[int, int], ...] = ()
     """Words of 16 bits and the bits of them that stay."""
-    cycle_time: tuple[int, int] | None = None
-    """Where 32 bits with the cycle time lie, and where those with the longest one."""
+    cycle_time: tuple[int, int, int] | None = None
+    """Where 32 bits with the cycle time lie, where those with the longest one, and their unit in nanoseconds."""
     counters: tuple[tuple[int, int], ...] = ()
     """Words of 16 bits that count, and what they count, in nanoseconds."""
     pulses: tuple[tuple[int, int, tuple[tuple[int, int, int], ...]], ...] = ()
@@ -44,10 +47,14 @@ class Clockwork:
 
 
 NOTHING = Clockwork()
-MEMORY, CONTEXT, LEFT, STEP, BUDGETED, SPEND, DONE, CYCLE, CHANGED, ROWS = range(10)
-"""Parameters, 64 bits each, and then the rows of turns and of what is watched: the addresses of memory and context, how
-many scans, by how far time goes on, statements that a scan may execute and all of them together, how many scans there
-were, the cycle time, whether something that is watched has changed."""
+MEMORY, CONTEXT, LEFT, FIRST, STEP, BUDGETED, SPEND, DONE, CHANGED, UNFINISHED, AGAIN, FAULTY, POINT, ROWS = range(14)
+"""Parameters, 64 bits each, and then the rows of turns, of what is watched and of companions: the addresses of memory and
+context, how many scans, the time of the first one and by how far it goes on, statements that a scan may execute and all
+of them together, how many scans there were, whether something that is watched has changed or which companions ran, and
+what else these tell."""
+TOLD = Told(ran=CHANGED, unfinished=UNFINISHED, again=AGAIN, faulty=FAULTY, point=POINT)
+ASKED = -1
+"""In place of a trap's point: companions have requests, or one of them has a trap of its own."""
 ROW = 4
 """Numbers of a turn: where the address of its function lies, interval, next time, whether it is due."""
 WATCHED_ROW, WATCHED_BYTES = 2, 8
@@ -66,22 +73,23 @@ entry:
 %budget_at = getelementptr inbounds i8, ptr %m, i64 {BUDGET}
 %count_at = getelementptr inbounds i8, ptr %m, i64 {SCANS}
 %n_at = getelementptr inbounds i8, ptr %p, i64 {8 * LEFT}
+%first_at = getelementptr inbounds i8, ptr %p, i64 {8 * FIRST}
 %step_at = getelementptr inbounds i8, ptr %p, i64 {8 * STEP}
 %amount_at = getelementptr inbounds i8, ptr %p, i64 {8 * BUDGETED}
 %spend_at = getelementptr inbounds i8, ptr %p, i64 {8 * SPEND}
 %done_at = getelementptr inbounds i8, ptr %p, i64 {8 * DONE}
-%cycle_at = getelementptr inbounds i8, ptr %p, i64 {8 * CYCLE}
 %changed_at = getelementptr inbounds i8, ptr %p, i64 {8 * CHANGED}
 store i64 0, ptr %changed_at
 %n = load i64, ptr %n_at
+%first = load i64, ptr %first_at
 %step = load i64, ptr %step_at
 %amount = load i64, ptr %amount_at
 %spend = load i64, ptr %spend_at
-%cycle = load i64, ptr %cycle_at
 $rows
 br label %test
 test:
 %i = phi i64 [ 0, %entry ], [ %i1, %good ]
+%now = phi i64 [ %first, %entry ], [ %next, %good ]
 %spent = phi i64 [ 0, %entry ], [ %spent1, %good ]
 %more = icmp slt i64 %i, %n
 %rest = icmp slt i64 %spent, %spend
@@ -89,7 +97,6 @@ test:
 br i1 %go, label %scan, label %end
 scan:
 %before = load i64, ptr %now_at
-%now = add i64 %before, %step
 store i64 %now, ptr %now_at
 store i64 {NEVER}, ptr %due_at
 store i64 %amount, ptr %budget_at
@@ -104,12 +111,12 @@ good:
 %s1 = add i64 %s, 1
 store i64 %s1, ptr %count_at
 %i1 = add i64 %i, 1
+%next = add i64 %now, %step
 $watched
 br i1 %changed, label %stop, label %test
 stop:
 store i64 %i1, ptr %done_at
-store i64 1, ptr %changed_at
-ret i32 0
+$changed
 trap:
 %point = phi i32 $points
 %s2 = load i64, ptr %count_at
@@ -122,6 +129,7 @@ end:
 store i64 %i, ptr %done_at
 ret i32 0
 }}
+$companions
 declare i32 @llvm.umax.i32(i32, i32)
 declare i64 @llvm.umin.i64(i64, i64)
 """)
@@ -133,8 +141,9 @@ def _clockwork(row: Clockwork) -> Iterator[str]:
         yield from (f"%ka{n} = getelementptr inbounds i8, ptr %m, i64 {offset}", f"%kb{n} = load i16, ptr %ka{n}",
                     f"%kc{n} = and i16 %kb{n}, {stay}", f"store i16 %kc{n}, ptr %ka{n}")
     if row.cycle_time:
-        now, longest = row.cycle_time
-        yield from (f"%tq = call i64 @llvm.umin.i64(i64 %cycle, i64 {MOST_CYCLE})", "%tc = trunc i64 %tq to i32",
+        now, longest, unit_ns = row.cycle_time
+        yield from ("%tb = sub i64 %now, %before", f"%tu = udiv i64 %tb, {unit_ns}",
+                    f"%tq = call i64 @llvm.umin.i64(i64 %tu, i64 {MOST_CYCLE})", "%tc = trunc i64 %tq to i32",
                     f"%ta = getelementptr inbounds i8, ptr %m, i64 {now}",
                     "store i32 %tc, ptr %ta, align 2", f"%tl = getelementptr inbounds i8, ptr %m, i64 {longest}",
                     "%to = load i32, ptr %tl, align 2", "%tm = call i32 @llvm.umax.i32(i32 %tc, i32 %to)",
@@ -172,6 +181,23 @@ def _watched(first: int, count: int) -> Iterator[str]:
     yield f"%changed = or i1 %j{count}, 0"
 
 
+_CHANGED = """store i64 1, ptr %changed_at
+ret i32 0"""
+_REFRESHED = """%ran = call i32 @companions(ptr %p, i64 %now)
+%changed = icmp ne i32 %ran, 0"""
+_RAN = """%answer = ashr i32 %ran, 31
+ret i32 %answer"""
+_REFRESH = f"""
+define i32 @refresh(ptr %p) {{
+%now_at = getelementptr inbounds i8, ptr %p, i64 {8 * FIRST}
+%now = load i64, ptr %now_at
+%ran = call i32 @companions(ptr %p, i64 %now)
+%answer = ashr i32 %ran, 31
+ret i32 %answer
+}}
+"""
+
+
 def _turns(intervals: Sequence[bool]) -> Iterator[str]:
     """Which are due is found before the first one runs."""
     for n in (n for n, has in enumerate(intervals) if has):
@@ -193,80 +219,105 @@ def _turns(intervals: Sequence[bool]) -> Iterator[str]:
 class Series:
     """Scans of one PLC: its memory and context by their addresses, its tasks by their entries, in the order of `turns`.
 
-    In each scan time advances by a step, nothing is due, the budget is full, the clockwork is written with the cycle
-    time in its unit; then the tasks that are due take their turns, and the number of scans grows.  `watched` are offsets
-    of eight bytes each: a scan after which they are not as `expect` saw them last is the last one."""
+    In each scan there is a time, nothing is due, the budget is full, the clockwork is written; then the tasks that are
+    due take their turns, and the number of scans grows.  `watched` are offsets of eight bytes each, by who watches them: a
+    scan after which they are not as `expect` saw them last is the last one.  In place of it there may be `companions`: then
+    each scan ends with a refresh, and the one in whose refresh one of them ran is the last one."""
 
     def __init__(self, memory: Memory, memory_at: int, context_at: int, tasks: Sequence[Entry], turns: Sequence[Turn],
-                 clockwork: Clockwork, watched: Sequence[int] = ()) -> None:  # fmt: skip
+                 clockwork: Clockwork, watched: Sequence[Sequence[int]] = (),
+                 companions: Sequence[Companion] = ()) -> None:  # fmt: skip
         rows: list[tuple[int, ...]] = [
             (tasks[turn.task].function_at, turn.interval_ns, turn.next_ns, 0) for turn in turns]  # fmt: skip
-        rows += [(offset, 0) for offset in watched]
+        offsets = [offset for group in watched for offset in group]
+        rows += [(offset, 0) for offset in offsets]
         self._tasks = tasks  # which stay while machine code calls them
         self.turns = turns
         """These move on, or others of the same tasks."""
         self._timed = [(row, ROWS + ROW * row + 2) for row, turn in enumerate(turns) if turn.interval_ns]
         """Which turns have an interval, and where their next time is."""
-        numbers = {MEMORY: memory_at, CONTEXT: context_at, LEFT: 1, SPEND: NO_LIMIT}
-        self._numbers = array("q", [numbers.get(number, 0) for number in range(ROWS)])
-        self._numbers.extend(number for row in rows for number in row)
-        first = ROWS + ROW * len(turns)
-        self._watched = [(memory.u8[offset : offset + WATCHED_BYTES].cast("q"), first + WATCHED_ROW * number + 1)
-                         for number, offset in enumerate(watched)]  # fmt: skip
-        """What is watched, and where what is expected of it is."""
-        shape = tuple(turn.interval_ns > 0 for turn in turns), clockwork, len(watched)
-        self._numbers_at = self._numbers.buffer_info()[0]
-        self._call = _scans(*shape)
+        given = {MEMORY: memory_at, CONTEXT: context_at, LEFT: 1, SPEND: NO_LIMIT}
+        self.numbers = numbers = array("q", [given.get(number, 0) for number in range(ROWS)])
+        """The parameters, for who calls `call` himself."""
+        numbers.extend(number for row in rows for number in row)
+        at = count(ROWS + ROW * len(turns) + 1, WATCHED_ROW)
+        self._expected = [[(memory.u8[offset : offset + WATCHED_BYTES].cast("q"), next(at)) for offset in group]
+                          for group in watched]  # fmt: skip
+        """What is watched, and where what is expected of it is, by who watches it: of each companion, if there are any."""
+        self.companions = companions
+        for companion in companions:
+            self._expected.append([(view, len(numbers) + at) for view, at in companion.expected(memory)])
+            numbers.extend(companion.row(memory_at))
+        shape = tuple(turn.interval_ns > 0 for turn in turns), clockwork, len(offsets)
+        self.numbers_at = numbers.buffer_info()[0]
+        self.call, self.call_refresh = _scans(*shape, tuple(companion.shape for companion in companions))
+        """Machine code of scans, and of one refresh: they take the address of the parameters."""
 
     @property
     def changed(self) -> bool:
-        """True if after the last scan something that is watched was not as expected."""
-        return self._numbers[CHANGED] != 0
+        """True if after the last scan something that is watched was not as expected, or a companion ran."""
+        return self.numbers[CHANGED] != 0
 
-    def expect(self) -> None:
-        """From now on what is watched shall be as it is."""
-        for view, at in self._watched:
-            self._numbers[at] = view[0]
+    def expect(self, number: int) -> None:
+        """From now on what this one watches shall be as it is."""
+        for view, at in self._expected[number]:
+            self.numbers[at] = view[0]
 
-    def once(self, step_ns: int, budget: int, cycle_time: int) -> int:
-        """One scan; the point of its trap, or 0."""
-        numbers, timed = self._numbers, self._timed
-        numbers[STEP], numbers[BUDGETED], numbers[CYCLE] = step_ns, budget, cycle_time
-        if not timed:
-            return self._call(self._numbers_at)
-        for row, at in timed:
-            numbers[at] = self.turns[row].next_ns
-        point = self._call(self._numbers_at)
-        for row, at in timed:
-            self.turns[row].next_ns = numbers[at]
+    def load_turns(self) -> None:
+        """Take over when the tasks run next."""
+        for row, at in self._timed:
+            self.numbers[at] = self.turns[row].next_ns
+
+    def store_turns(self) -> None:
+        """Give back when the tasks run next."""
+        for row, at in self._timed:
+            self.turns[row].next_ns = self.numbers[at]
+
+    def once(self, now_ns: int, budget: int) -> int:
+        """One scan; the point of its trap, 0, or ASKED."""
+        numbers = self.numbers
+        numbers[FIRST], numbers[BUDGETED] = now_ns, budget
+        if not self._timed:
+            return self.call(self.numbers_at)
+        self.load_turns()
+        point = self.call(self.numbers_at)
+        self.store_turns()
         return point
 
-    def run(self, n: int, step_ns: int, budget: int, cycle_time: int, spend: int) -> tuple[int, int]:
-        """Up to n scans; how many there were, and the point of the last one's trap, or 0.
+    def run(self, n: int, now_ns: int, step_ns: int, budget: int, spend: int) -> tuple[int, int]:
+        """Up to n scans, a step of time between them; how many there were, and what `once` says of the last.
 
         No other begins when all together have executed `spend` statements."""
-        numbers = self._numbers
-        numbers[LEFT], numbers[SPEND] = n, spend
-        point = self.once(step_ns, budget, cycle_time)
+        numbers = self.numbers
+        numbers[LEFT], numbers[STEP], numbers[SPEND] = n, step_ns, spend
+        point = self.once(now_ns, budget)
         numbers[LEFT], numbers[SPEND] = 1, NO_LIMIT
         return numbers[DONE], point
 
 
+Call = Callable[[int], int]
+
+
 @cache
-def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int) -> Callable[[int], int]:
-    """The function for a shape: it takes the address of the parameters and returns the point of a trap or 0."""
+def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int, shapes: tuple[Shape, ...]) -> tuple[Call, Call]:
+    """The functions for a shape: scans, and a refresh, which is never called where there are no companions."""
     points = ", ".join(f"[ %r{n}, %run{n} ]" for n in range(len(intervals)))
+    first = ROWS + ROW * len(intervals)
+    compared = _REFRESHED if shapes else "\n".join(_watched(first, watched))
     text = _SCANS.substitute(rows="\n".join(_rows(len(intervals))), clockwork="\n".join(_clockwork(clockwork)),
-                             turns="\n".join(_turns(intervals)), points=points,
-                             watched="\n".join(_watched(ROWS + ROW * len(intervals), watched)))  # fmt: skip
+                             turns="\n".join(_turns(intervals)), points=points, watched=compared,
+                             changed=_RAN if shapes else _CHANGED,
+                             companions=companions_text(shapes, first, TOLD) + _REFRESH if shapes else "")  # fmt: skip
     name = name_of("scans", text)
     stored = native_cache.read(name)
     if stored is None:
         stored = Stored({}, compile_text(text, 1))
         native_cache.write(name, stored)
-    linked = Linked(stored.compiled, ["scans"])
+    names = ["scans", "refresh"] if shapes else ["scans"]
+    linked = Linked(stored.compiled, names)
     _LOADED.append(linked)
-    return ctypes.PYFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)(linked.address("scans"))
+    of_address = ctypes.PYFUNCTYPE(ctypes.c_int32, ctypes.c_void_p)
+    return of_address(linked.address(names[0])), of_address(linked.address(names[-1]))
 
 
 _LOADED: list[Linked] = []

@@ -47,6 +47,8 @@ class Tianxing:
 
     watched = None
     """Its mailbox is looked at in each refresh."""
+    exchanged = None
+    """It has no processor of its own."""
 
     @property
     def configuration(self) -> dict[str, Any]:

@@ -72,6 +72,10 @@ class Unit(Protocol):
         them, the network has nothing to tell and `wake_ns` has not come.  None if each refresh has to take place."""
 
     @property
+    def exchanged(self) -> Exchanged | None:
+        """How the words of a unit with a processor of its own (a `ProcessorUnit`) are exchanged; None for any other."""
+
+    @property
     def configuration(self) -> dict[str, Any]:
         """The arguments with which the unit's class makes the same unit; plain data, as a journal keeps it."""
 
@@ -90,3 +94,15 @@ class Unit(Protocol):
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on or unit restart: words to their initial state; returns what closes connections left open."""
+
+
+class ProcessorUnit(Unit, Protocol):
+    """A unit of which a processor of its own does all that a refresh does, but for what a network has to know.
+
+    Its `refresh` posts the events, copies the words in, runs, copies them out, finishes.  The machine may do it so, too."""
+
+    def post(self, events: Sequence[Event]) -> None:
+        """Events of the network for the next run of its program, behind those that wait already."""
+
+    def finish(self) -> list[Request]:
+        """After the program ran elsewhere than in `refresh`: take over `news` and `wake_ns`; what the network has to do."""

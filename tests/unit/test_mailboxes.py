@@ -68,7 +68,7 @@ class Box:
 
     name, address = "box", "192.168.250.9"
 
-    watched = None
+    watched = exchanged = None
 
     def __init__(self) -> None:
         self.wake_ns = 1 << 63

@@ -82,6 +82,7 @@ def test_plcs_with_one_image_share_its_code() -> None:
 
 @pytest.mark.slow
 def test_an_entry_is_used_again() -> None:
+    gc.collect()  # what other tests have left gives back its entries now
     program = image(COUNT)
     e: NativeEngine | None = NativeEngine(program, power_on(program), 0)
     assert e is not None

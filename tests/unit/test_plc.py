@@ -322,7 +322,7 @@ class _Echo:
 
     name, address, wake_ns = "Echo 0", "192.168.250.2", 1 << 63
     news = False
-    watched = None
+    watched = exchanged = None
 
     def __init__(self) -> None:
         self.resets = 0

@@ -83,7 +83,7 @@ class Idle:
 
     name, address, wake_ns = "Idle 0", "192.168.250.9", 1 << 63
     news = False
-    watched = None
+    watched = exchanged = None
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
         return []

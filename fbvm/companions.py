@@ -1,0 +1,187 @@
+"""Units whose own processors run as machine code, inside the scans of their PLC.
+
+What is left for Python is what their networks have to know, and what these tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import cast
+
+from fbvm.engine.native import NativeEngine
+from fbvm.engine.native_companions import NEWS, Companion
+from fbvm.engine.native_scans import AGAIN, BUDGETED, CHANGED, FAULTY, FIRST, POINT, UNFINISHED, Turn
+from fbvm.engine.trap import Trap
+from fbvm.exchange import Exchange
+from fbvm.flags import CLOCKWORK
+from fbvm.net.journal import Journal
+from fbvm.units.unit import ProcessorUnit, Unit
+
+
+def companions(exchange: Exchange) -> list[Companion]:
+    """The units as companions of the PLC's program; none if one of them cannot be, or if one's words on a network of
+    virtual time could reach another in the same refresh."""
+    virtual = [id(attached.network) for attached in exchange.units if attached.network.virtual_time]
+    found = [_companion(attached.unit, exchange) for attached in exchange.units] if len({*virtual}) == len(virtual) else []
+    return [] if None in found else [companion for companion in found if companion]
+
+
+def _companion(unit: Unit, exchange: Exchange) -> Companion | None:
+    exchanged = unit.exchanged
+    if exchanged is None or unit.watched is None:
+        return None
+    own = exchanged.processor
+    machine: NativeEngine | None = own.machine
+    if machine is None:
+        return None
+    copies = [(exchange.offset(area, word), own.offset(variable), 2 * count) for area, word, variable, count in exchanged.words]
+    watched = [exchange.offset(area, word) for area, word in unit.watched]
+    return machine.companion(copies, watched, *map(own.offset, (exchanged.posted, exchanged.requested, exchanged.wake)))
+
+
+class Accompanied:
+    """Machine code of whole scans, with their I/O refreshes.  One in which no unit has anything to do is left out."""
+
+    def __init__(self, exchange: Exchange, machine: NativeEngine, turns: list[Turn], found: Sequence[Companion]) -> None:
+        self._exchange, self._machine = exchange, machine
+        self._series = machine.series(turns, CLOCKWORK, companions=found)
+        self._rows = [(1 << number, cast(ProcessorUnit, attached.unit), attached.link)
+                      for number, attached in enumerate(exchange.units)]  # fmt: skip
+        self._counts = any(attached.network.virtual_time for attached in exchange.units)
+        """There are links that want to know of each refresh."""
+        self.is_open = False
+        """What the units watch is expected to be as their last refresh left it."""
+
+    def refresh(self, now_ns: int, journal: Journal | None = None) -> None:
+        """An I/O refresh of a scan that goes another way."""
+        self._exchange.refresh(now_ns, journal, self._series.expect)
+        self.is_open = True
+
+    def once(self, now_ns: int, budget: int) -> Trap | None:
+        """One scan."""
+        if loud := self._is_loud():
+            self._hear(now_ns)
+        point = self._series.once(now_ns, budget)
+        if point > 0:
+            return self._machine.trap_at(point)
+        self._count(loud)
+        self._end(now_ns)
+        return None
+
+    def burst(self, times: list[int], most: int, clock: Callable[[], int], budget: int) -> Trap | None:
+        """Scans each at the time that the clock tells, one upon the other for as long as units have news for the program;
+        `times` takes when they began.
+
+        A refresh that was left out takes place now if there is something for it: waiting comes before the refresh, as in
+        a PLC with a fixed cycle time (W394)."""
+        series, exchange, counts = self._series, self._exchange, self._counts
+        numbers, call, at = series.numbers, series.call, series.numbers_at
+        numbers[BUDGETED] = budget
+        now_ns, loud, heard = clock(), self._is_loud(), False
+        if exchange.passed:
+            loud = self._refresh_before(now_ns, loud)
+        series.load_turns()
+        try:
+            while True:
+                times.append(now_ns)
+                if loud:
+                    loud, heard = self._hear(now_ns), True
+                numbers[FIRST] = now_ns
+                point = call(at)
+                if point > 0:
+                    return self._machine.trap_at(point)
+                if counts:
+                    self._count(heard)
+                if point:
+                    loud = self._finish(now_ns) or loud
+                if not numbers[AGAIN] or len(times) >= most:
+                    return None
+                now_ns, heard = clock(), False
+        finally:  # Ctrl-C may come between two of them
+            series.store_turns()
+            if not counts:
+                self._count(heard)
+            self._end(now_ns)
+
+    def many(self, most: int, now_ns: int, step_ns: int, budget: int, spend: int) -> tuple[int, Trap | None]:
+        """Scans that follow the one at `now_ns`, each a step later, until a unit has something to do; how many there were.
+
+        No other begins when all together have executed `spend` statements."""
+        series, exchange = self._series, self._exchange
+        if self._is_loud():
+            return 0, None
+        done, point = series.run(most, now_ns + step_ns, step_ns, budget, spend)
+        exchange.passed += done - 1
+        if point > 0:
+            return done, self._machine.trap_at(point)
+        self._count(False)
+        self._end(now_ns + done * step_ns)
+        return done, None
+
+    def _refresh_before(self, now_ns: int, loud: bool) -> bool:
+        """The refresh that the last scan did without, if there is something for it now; whether links have more to tell."""
+        series, exchange = self._series, self._exchange
+        if loud:
+            exchange.passed -= 1
+            loud = self._hear(now_ns)
+        series.numbers[FIRST] = now_ns
+        series.call_refresh(series.numbers_at)
+        if series.numbers[CHANGED]:
+            exchange.pass_by()
+            loud = self._finish(now_ns) or loud
+        return loud
+
+    def _is_loud(self) -> bool:
+        """True if a link has something to tell."""
+        for _, _, link in self._rows:  # noqa: SIM110 - a generator would cost as much as the rest of it
+            if not link.is_quiet:
+                return True
+        return False
+
+    def _hear(self, now_ns: int) -> bool:
+        """Fetch what links have to tell, for the next refresh; whether they have more before they are asked for anything."""
+        if self._exchange.passed:
+            self._exchange.pass_by()
+        loud = False
+        for _, unit, link in self._rows:
+            if link.is_quiet:
+                link.pass_by(1)
+                continue
+            events = link.events(now_ns)
+            if events:
+                unit.post(events)
+            if not link.is_quiet:
+                loud = True
+        return loud
+
+    def _count(self, heard: bool) -> None:
+        """A refresh is over; links that were heard for it know of it."""
+        exchange = self._exchange
+        if not heard:
+            exchange.passed += 1
+            if self._series.numbers[CHANGED]:
+                exchange.pass_by()
+
+    def _end(self, now_ns: int) -> None:
+        """The last of some scans is over."""
+        numbers = self._series.numbers
+        if numbers[UNFINISHED]:
+            self._finish(now_ns)
+        self._exchange.news = numbers[AGAIN] & NEWS != 0
+
+    def _finish(self, now_ns: int) -> bool:
+        """Have done what the processors ask for that ran; whether that made links have something to tell.
+
+        Raises RuntimeError if the program of one has trapped, which is a fault of ours."""
+        numbers, loud = self._series.numbers, False
+        if numbers[FAULTY]:
+            number = numbers[FAULTY].bit_length() - 1
+            raise RuntimeError(str(self._series.companions[number].trap_at(numbers[POINT])))
+        ran, numbers[UNFINISHED] = numbers[UNFINISHED], 0
+        for bit, unit, link in self._rows:
+            if ran & bit:
+                requests = unit.finish()
+                if requests:
+                    link.submit(requests, now_ns)
+                    if not link.is_quiet:
+                        loud = True
+        return loud

@@ -1,0 +1,251 @@
+"""Companions: programs over memories of their own that machine code runs inside the scans of a PLC, where the I/O refresh is.
+
+A companion runs when something that it watches in the PLC's memory is not as its last run left it, when something is
+posted for it, or when its time has come.  Then words go into its memory, it is executed once, and they come back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from string import Template
+
+from fbvm.base.areas import BUDGET, DUE, NEVER, NOW
+from fbvm.base.memory import Memory
+from fbvm.engine.trap import Trap
+
+STATEMENTS = 2_000_000
+"""How many it may execute in a run."""
+Shape = tuple[tuple[int, ...], int]
+"""Bytes of each copy, and how many groups are watched: what its machine code is made for."""
+
+
+@dataclass(frozen=True)
+class Companion:
+    """Where the program of a companion is and what it is to see.  Offsets are in bytes."""
+
+    function_at: int
+    """Where the address of what it executes lies, at any time."""
+    memory_at: int
+    context_at: int
+    trap_at: Callable[[int], Trap]
+    """What a point of its code says."""
+    copies: tuple[tuple[int, int, int], ...]
+    """Offset in the PLC's memory, offset in its own, how many bytes."""
+    watched: tuple[int, ...]
+    """Offsets in the PLC's memory of eight bytes each."""
+    posted: int
+    """Offset in its memory of 32 bits that are not 0 if something waits for it."""
+    requested: int
+    """Offset in its memory of 32 bits with the number of requests that its last run left."""
+    wake: int
+    """Offset in its memory of 64 bits without sign: the time from which on it is to run."""
+
+    @property
+    def shape(self) -> Shape:
+        """What its machine code depends on."""
+        return tuple(size for _, _, size in self.copies), len(self.watched)
+
+    def row(self, memory_at: int) -> Iterator[int]:
+        """Its parameters: addresses, and for what is watched what is expected there."""
+        own = self.memory_at
+        yield from (self.function_at, own, self.context_at, own + self.posted, own + self.requested, own + self.wake)
+        for offset, its_offset, _ in self.copies:
+            yield from (memory_at + offset, own + its_offset)
+        for offset in self.watched:
+            yield from (memory_at + offset, 0)
+
+    def expected(self, memory: Memory) -> list[tuple[memoryview, int]]:
+        """What is watched, and which number of the row says what is expected there."""
+        first = HEAD + 2 * len(self.copies) + 1
+        return [(memory.u8[offset : offset + 8].cast("q"), first + 2 * number) for number, offset in enumerate(self.watched)]
+
+
+FUNCTION, MEMORY, CONTEXT, POSTED, REQUESTED, WAKE, HEAD = range(7)
+"""Numbers of a companion's row, before those of copies and of what is watched: two for each."""
+NEWS, AT_ONCE = 1, 2
+"""Why there should be another scan soon: words have changed that the program may look at, a companion has more to do."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """Where among the parameters machine code says what happened; numbers of 64 bits."""
+
+    ran: int
+    """Which companions ran in the last refresh, a bit each."""
+    unfinished: int
+    """Which ones have run since somebody else has set this 0."""
+    again: int
+    """NEWS, AT_ONCE, both or neither, after the last refresh."""
+    faulty: int
+    """The bit of a companion whose run has ended in a trap, 0 if none has."""
+    point: int
+    """The point of that trap."""
+
+
+_COMPANION = Template(f"""
+define internal i32 @companion$number(ptr %p, ptr %w, i64 %now, i64 %bit) {{
+entry:
+$fields
+$watched
+%posted = load i32, ptr %posted_at
+%told = icmp ne i32 %posted, 0
+%wake = load i64, ptr %wake_at
+%due = icmp uge i64 %now, %wake
+%moved = or i1 %changed, %told
+%wanted = or i1 %moved, %due
+br i1 %wanted, label %run, label %rest
+rest:
+ret i32 0
+run:
+$into
+%now_at = getelementptr inbounds i8, ptr %m, i64 {NOW}
+%due_at = getelementptr inbounds i8, ptr %m, i64 {DUE}
+%budget_at = getelementptr inbounds i8, ptr %m, i64 {BUDGET}
+store i64 %now, ptr %now_at
+store i64 {NEVER}, ptr %due_at
+store i64 {STATEMENTS}, ptr %budget_at
+%f = load ptr, ptr %function_at
+%point = call i32 %f(ptr %m, ptr %c)
+%ran = load i64, ptr %ran_at
+%ran1 = or i64 %ran, %bit
+store i64 %ran1, ptr %ran_at
+%sound = icmp eq i32 %point, 0
+br i1 %sound, label %out, label %trap
+out:
+$outof
+$expected
+%next = load i64, ptr %wake_at
+%late = icmp uge i64 %now, %next
+%at_once = select i1 %late, i64 {AT_ONCE}, i64 0
+%news = icmp ne i64 %x$copies, 0
+%again = select i1 %news, i64 {NEWS}, i64 0
+%again1 = or i64 %again, %at_once
+%again2 = load i64, ptr %again_at
+%again3 = or i64 %again1, %again2
+store i64 %again3, ptr %again_at
+%requested = load i32, ptr %requested_at
+%asks = icmp ne i32 %requested, 0
+%answer = select i1 %asks, i32 -1, i32 1
+ret i32 %answer
+trap:
+%number = zext i32 %point to i64
+store i64 %bit, ptr %faulty_at
+store i64 %number, ptr %point_at
+ret i32 -1
+}}
+""")
+_COMPANIONS = Template("""
+define internal i32 @companions(ptr %p, i64 %now) {
+$told
+store i64 0, ptr %ran_at
+store i64 0, ptr %again_at
+$calls
+%ran = load i64, ptr %ran_at
+%before = load i64, ptr %unfinished_at
+%all = or i64 %before, %ran
+store i64 %all, ptr %unfinished_at
+ret i32 %any$count
+}
+""")
+
+
+def text(shapes: Sequence[Shape], first: int, told: Told) -> str:
+    """The function @companions, for parameters in which their rows begin with number `first`: a refresh at a time.
+
+    It returns 0 if none ran, 1 if one did, -1 if somebody has to look at once: there are requests, or a trap."""
+    kinds = list(dict.fromkeys(shapes))
+    functions = [_COMPANION.substitute(
+        number=number, fields=_lines(_fields(told)), watched=_lines(_watched(HEAD + 2 * len(copies), groups)),
+        into=_lines(_into(copies)), outof=_lines(_out_of(copies)), expected=_lines(_expected(groups)), copies=len(copies),
+    ) for number, (copies, groups) in enumerate(kinds)]  # fmt: skip
+    calls = ["%any0 = add i32 0, 0"]
+    for number, shape in enumerate(shapes):
+        calls += [_address(f"w{number}", "p", first),
+                  f"%a{number} = call i32 @companion{kinds.index(shape)}(ptr %p, ptr %w{number}, i64 %now, i64 {1 << number})",
+                  f"%any{number + 1} = or i32 %any{number}, %a{number}"]  # fmt: skip
+        first += size(shape)
+    return "".join(functions) + _COMPANIONS.substitute(told=_lines(_told(told)), calls=_lines(calls), count=len(shapes))
+
+
+def size(shape: Shape) -> int:
+    """Numbers of a row."""
+    return HEAD + 2 * (len(shape[0]) + shape[1])
+
+
+def _lines(lines: Iterable[str]) -> str:
+    return "\n".join(lines)
+
+
+def _address(name: str, base: str, number: int) -> str:
+    """The address of a number."""
+    return f"%{name} = getelementptr inbounds i8, ptr %{base}, i64 {8 * number}"
+
+
+def _loaded(name: str, number: int, kind: str = "ptr") -> Iterator[str]:
+    """A number of the row."""
+    yield from (_address(f"{name}_in", "w", number), f"%{name} = load {kind}, ptr %{name}_in")
+
+
+def _told(told: Told) -> Iterator[str]:
+    for name, number in vars(told).items():
+        yield _address(f"{name}_at", "p", number)
+
+
+def _fields(told: Told) -> Iterator[str]:
+    """The names that a companion's function uses."""
+    yield from _told(told)
+    for number, name in enumerate(("function_at", "m", "c", "posted_at", "requested_at", "wake_at")):
+        yield from _loaded(name, number)
+
+
+def _watched(first: int, groups: int) -> Iterator[str]:
+    """Whether anything that is watched is not what is expected."""
+    yield "%v0 = add i1 0, 0"
+    for n in range(groups):
+        yield from _loaded(f"vp{n}", first + 2 * n)
+        yield from _loaded(f"ve{n}", first + 2 * n + 1, "i64")
+        yield from (f"%vm{n} = load i64, ptr %vp{n}, align 1", f"%vx{n} = icmp ne i64 %vm{n}, %ve{n}",
+                    f"%v{n + 1} = or i1 %v{n}, %vx{n}")  # fmt: skip
+    yield f"%changed = or i1 %v{groups}, 0"
+
+
+def _expected(groups: int) -> Iterator[str]:
+    """What is watched is expected to stay as it is."""
+    for n in range(groups):
+        yield from (f"%en{n} = load i64, ptr %vp{n}, align 1", f"store i64 %en{n}, ptr %ve{n}_in")
+
+
+def _pieces(bytes_: int) -> Iterator[tuple[int, int]]:
+    """Where the pieces of so many bytes begin, and how many bits they have."""
+    at = 0
+    for wide in (8, 4, 2, 1):
+        while bytes_ - at >= wide:
+            yield at, 8 * wide
+            at += wide
+
+
+def _into(copies: Sequence[int]) -> Iterator[str]:
+    """The PLC's words go into the companion's memory."""
+    for n, bytes_ in enumerate(copies):
+        yield from _loaded(f"o{n}", HEAD + 2 * n)
+        yield from _loaded(f"i{n}", HEAD + 2 * n + 1)
+        for at, bits in _pieces(bytes_):
+            yield from (f"%op{n}.{at} = getelementptr inbounds i8, ptr %o{n}, i64 {at}",
+                        f"%ip{n}.{at} = getelementptr inbounds i8, ptr %i{n}, i64 {at}",
+                        f"%ov{n}.{at} = load i{bits}, ptr %op{n}.{at}, align 1",
+                        f"store i{bits} %ov{n}.{at}, ptr %ip{n}.{at}, align 1")  # fmt: skip
+
+
+def _out_of(copies: Sequence[int]) -> Iterator[str]:
+    """They come back; whatever has changed is a bit of %x and the number of copies."""
+    yield "%x0 = add i64 0, 0"
+    for n, bytes_ in enumerate(copies):
+        last = f"%x{n}"
+        for at, bits in _pieces(bytes_):
+            name = f"{n}.{at}"
+            yield from (f"%in{name} = load i{bits}, ptr %ip{name}, align 1", f"%on{name} = load i{bits}, ptr %op{name}, align 1",
+                        f"store i{bits} %in{name}, ptr %op{name}, align 1", f"%d{name} = xor i{bits} %in{name}, %on{name}",
+                        f"%dw{name} = " + (f"zext i{bits} %d{name} to i64" if bits < 64 else f"or i64 %d{name}, 0"),
+                        f"%do{name} = or i64 {last}, %dw{name}")  # fmt: skip
+            last = f"%do{name}"
+        yield f"%x{n + 1} = or i64 {last}, 0"

@@ -1,0 +1,290 @@
+"""Units whose processors run inside the scans of machine code: to the bit, and to the scan, what refreshes from outside do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rows import first_quick
+from toy_unit import Echoing, Toy
+
+from fbvm import Plc, compile_text
+from fbvm.code.image import Image
+from fbvm.companions import Accompanied
+from fbvm.engine import native
+from fbvm.express import Alone, Way
+from fbvm.plc import Mode
+
+if not native.available():
+    pytest.skip("llvmlite is not installed", allow_module_level=True)
+
+MS = 1_000_000
+MAIN = """
+PROGRAM Main
+VAR
+  n, hash : UDINT; every : UDINT := {every}; i : INT; trap : UDINT := {trap};
+  words AT %CIO1500 : ARRAY[0..7] OF WORD; tables AT %D20000 : ARRAY[0..13] OF WORD; shared AT %W5 : WORD;
+END_VAR
+  n := n + 1;
+  FOR i := 0 TO 7 DO hash := hash * 31 + WORD_TO_UDINT(words[i]); END_FOR;
+  hash := hash * 31 + WORD_TO_UDINT(tables[1]) + WORD_TO_UDINT(tables[8]) + WORD_TO_UDINT(shared);
+  IF n MOD every = 0 AND NOT words[0].0 THEN tables[0] := UDINT_TO_WORD(n); words[0].0 := TRUE; END_IF;
+  IF n MOD (every + 3) = 1 AND NOT words[4].0 THEN tables[7] := UDINT_TO_WORD(hash); words[4].0 := TRUE; END_IF;
+  IF n = trap THEN n := n / (n - trap); END_IF;
+END_PROGRAM
+PROGRAM Slow
+VAR n : UDINT; shared AT %W5 : WORD; END_VAR
+  n := n + 1;
+  IF n MOD 4 = 0 THEN shared.9 := NOT shared.9; END_IF;
+END_PROGRAM
+CONFIGURATION C
+  TASK Often({interval}PRIORITY := 2);
+  TASK Seldom(INTERVAL := T#25ms, PRIORITY := 1);
+  PROGRAM Main WITH Often : Main;
+  {slow}
+END_CONFIGURATION
+"""
+
+
+@cache
+def image(every: int = 5, interval: str = "", trap: int = 0, slow: bool = True) -> Image:
+    text = MAIN.replace("{every}", str(every)).replace("{trap}", str(trap)).replace("{interval}", interval)
+    compilation = compile_text(text.replace("{slow}", "PROGRAM Slow WITH Seldom : Slow;" if slow else ""))
+    assert compilation.image, [diagnostic.render() for diagnostic in compilation.diagnostics]
+    return compilation.image
+
+
+class Steps:
+    """A clock: each look takes some microseconds, never the same; it stops the one who looks too often."""
+
+    def __init__(self) -> None:
+        self.now_ns, self.looks, self.stop = 0, 0, 0
+
+    def __call__(self) -> int:
+        self.looks += 1
+        if self.looks == self.stop:
+            raise KeyboardInterrupt
+        self.now_ns += 1000 * (3 + self.looks % 5)
+        return self.now_ns
+
+
+class Rig:
+    """A PLC with toys, and all that can be known of them."""
+
+    def __init__(self, code: Image, delays_ns: tuple[int, ...] = (0,), latency_ns: int = 0, *, engine: str = "native",
+                 is_inside: bool = True, is_watched: bool = False, virtual_time: bool = True) -> None:  # fmt: skip
+        self.plc, self.clock = Plc(code, MS, engine=engine), Steps()
+        self.toys = [Toy(number, delay_ns, is_inside) for number, delay_ns in enumerate(delays_ns)]
+        self.networks = [Echoing(latency_ns, virtual_time) for _ in delays_ns]
+        for toy, network in zip(self.toys, self.networks, strict=True):
+            self.plc.attach(toy, network)
+        if is_watched:
+            self.plc.phases.append(lambda plc, phase: None)
+
+    @property
+    def state(self) -> tuple[Any, ...]:
+        plc = self.plc
+        own = [(bytes(toy.own.memory.u8), toy.wake_ns) for toy in self.toys]
+        logs = [(network.log, [link.refreshes for link in network.links]) for network in self.networks]
+        return bytes(plc.memory.u8), plc.now_ns, plc.scans, str(plc.trap), plc.trap or plc.due_ns, own, logs
+
+
+def four(code: Image, *operands: Any) -> list[Rig]:
+    """The same four times: inside machine code, beside it, looked into, in Python."""
+    return [Rig(code, *operands), Rig(code, *operands, is_inside=False), Rig(code, *operands, is_watched=True),
+            Rig(code, *operands, engine="python")]  # fmt: skip
+
+
+def way(rig: Rig) -> Way | None:
+    return rig.plc._way()
+
+
+def agree(rigs: list[Rig], do: Callable[[Plc], object]) -> None:
+    for rig in rigs:
+        do(rig.plc)
+        for attached in rig.plc.units:  # what was left out is told at the latest by the next refresh
+            attached.link.pass_by(rig.plc._exchange.passed)
+        rig.plc._exchange.passed = 0
+    for rig in rigs[1:]:
+        assert rig.state == rigs[0].state
+
+
+SHAPES = [
+    ((), (0,), 0), ((5, "INTERVAL := T#7ms, "), (3 * MS, 0), 0), ((1,), (0, 0), 2_500_000),
+    ((9, "INTERVAL := T#2ms, "), (MS, 90), 0),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("program", "delays_ns", "latency_ns"), first_quick(SHAPES))
+def test_scan_by_scan(program: tuple[Any, ...], delays_ns: tuple[int, ...], latency_ns: int) -> None:
+    rigs = four(image(*program), delays_ns, latency_ns)
+    for _ in range(120):
+        agree(rigs, Plc.scan)
+    assert isinstance(way(rigs[0]), Accompanied) and isinstance(way(rigs[1]), Alone)
+    assert rigs[0].plc.read("D20001") > 2 and rigs[0].networks[0].log
+    assert rigs[0].toys[0].refreshes < rigs[1].toys[0].refreshes
+
+
+@pytest.mark.parametrize(("program", "delays_ns", "latency_ns"), first_quick(SHAPES, 2))
+def test_many_at_once(program: tuple[Any, ...], delays_ns: tuple[int, ...], latency_ns: int) -> None:
+    rigs = four(image(*program), delays_ns, latency_ns)
+    for scans in (1, 2, 7, 30, 500, 3, 200):
+        agree(rigs, lambda plc, scans=scans: plc.run(scans=scans))  # type: ignore[misc]
+    assert rigs[0].plc.scans == 743 and rigs[0].plc.read("D20001") > 20
+
+
+def test_a_trap_of_the_program_ends_a_run_and_a_restart_begins_anew() -> None:
+    rigs = four(image(every=5, trap=47), (MS,))
+    agree(rigs, lambda plc: plc.run(scans=100))
+    assert rigs[0].plc.trap and rigs[0].plc.scans == 47
+    agree(rigs, Plc.warm_start)
+    agree(rigs, lambda plc: plc.run(scans=40))
+    assert rigs[0].plc.scans == 87 and not rigs[0].plc.trap
+
+
+def test_a_trap_of_a_units_program_is_a_fault_of_ours() -> None:
+    for rig in four(image(every=50), (0, 0)):
+        rig.plc.run(scans=10)
+        rig.plc.write("CIO1504.1", True)
+        with pytest.raises(RuntimeError, match=r"R0101 unit\.st:\d+:\d+ in Toy: \d divided by 0"):
+            rig.plc.run(scans=3)
+
+
+def test_what_is_written_from_outside_is_seen() -> None:
+    rigs = four(image(every=1000, slow=False), (0, 2 * MS))
+    agree(rigs, lambda plc: plc.run(scans=20))
+    runs = rigs[0].plc.read("CIO1502")
+
+    def ask(plc: Plc) -> None:
+        plc.write("D20000", 0x1234)
+        plc.write("CIO1500.0", True)
+        plc.run(scans=4)
+
+    agree(rigs, ask)
+    assert (rigs[0].plc.read("CIO1503"), rigs[0].plc.read("CIO1502")) == (0x34 ^ 0xFF, runs + 2)  # type: ignore[operator]
+    agree(rigs, lambda plc: plc.write("W7", 1))
+    agree(rigs, Plc.scan)
+    assert rigs[0].plc.read("CIO1502") == runs + 3  # type: ignore[operator]
+
+
+def test_its_time_comes_in_the_middle_of_many_scans() -> None:
+    rigs = four(image(every=10_000, slow=False), (700 * MS,))
+    agree(rigs, lambda plc: plc.run(scans=20))
+    for rig in rigs:
+        rig.plc.write("CIO1500.0", True)
+    agree(rigs, lambda plc: plc.run(until="NOT CIO1500.0"))
+    assert rigs[0].plc.scans == 20 + 702
+    assert rigs[0].toys[0].refreshes < 5
+
+
+def test_scans_in_one_piece_and_others_take_turns() -> None:
+    rigs = four(image(), (MS, 0))
+    for number in range(12):
+        agree(rigs, lambda plc: plc.run(scans=11))
+        if number % 3 == 0:
+            agree(rigs, lambda plc: plc.force("W9", 5))
+        if number % 3 == 1:
+            agree(rigs, Plc.unforce)
+        if number == 6:
+            agree(rigs, lambda plc: setattr(plc, "mode", Mode.PROGRAM))
+            agree(rigs, lambda plc: plc.run(scans=3))
+            agree(rigs, lambda plc: setattr(plc, "mode", Mode.RUN))
+        if number == 8:
+            agree(rigs, lambda plc: plc.units.append(plc.units.pop(0)))
+    assert isinstance(way(rigs[0]), Accompanied)
+
+
+@pytest.mark.slow
+@settings(max_examples=60, deadline=None)
+@given(st.data())
+def test_any_order_of_happenings(data: st.DataObject) -> None:
+    every, interval = data.draw(st.integers(1, 9)), data.draw(st.sampled_from(["", "INTERVAL := T#7ms, "]))
+    delays_ns = tuple(data.draw(st.lists(st.sampled_from([0, 1, MS, 10 * MS]), min_size=1, max_size=4)))
+    rigs = four(image(every, interval), delays_ns, data.draw(st.sampled_from([0, 0, 300_000, 5 * MS])))
+    for _ in range(data.draw(st.integers(1, 12))):
+        scans, word = data.draw(st.integers(1, 60)), data.draw(st.integers(0, 15))
+        value = data.draw(st.integers(0, 0xFFFF)) & ~2
+        agree(rigs, lambda plc, scans=scans: plc.run(scans=scans))  # type: ignore[misc]
+        agree(rigs, lambda plc, word=word, value=value: plc.write(f"CIO{1500 + word}", value))  # type: ignore[misc]
+
+
+# --- when they cannot -------------------------------------------------------------------------------------------------
+
+
+def test_units_of_different_kinds_are_refreshed_from_outside() -> None:
+    rig = Rig(image(), (0,))
+    rig.plc.attach(Toy(1, is_inside=False), Echoing())
+    rig.plc.run(scans=5)
+    assert isinstance(way(rig), Alone)
+
+
+@pytest.mark.parametrize("virtual_time", [True, False])
+def test_what_one_unit_says_reaches_another_on_the_same_network_of_virtual_time_at_once(virtual_time: bool) -> None:
+    rig = Rig(image(), (0,), virtual_time=virtual_time)
+    rig.plc.attach(Toy(1), rig.networks[0])
+    for scan in range(5):
+        rig.plc.scan(scan * MS)
+    assert isinstance(way(rig), Alone if virtual_time else Accompanied)
+
+
+def test_a_processor_without_machine_code_is_run_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig, other = Rig(image(), (0,)), Rig(image(), (0,))
+    with monkeypatch.context() as patch:
+        patch.setattr(native, "available", lambda: False)
+        other.toys[0].own = other.toys[0].own.copy()
+        other.toys[0].connect()
+    for scans in (1, 5, 300):
+        agree([rig, other], lambda plc, scans=scans: plc.run(scans=scans))  # type: ignore[misc]
+    assert isinstance(way(other), Alone) and isinstance(way(rig), Accompanied)
+
+
+# --- bursts -----------------------------------------------------------------------------------------------------------
+
+
+def bursts(rig: Rig, count: int, most: int, pause_ns: int, stop: int = 0) -> list[list[int]]:
+    """Bursts as in event pace: upon what a network has, and at the latest when a millisecond is over."""
+    clock, found = rig.clock, []
+    rig.plc.scan(clock())
+    rig.plc.scan(clock())
+    clock.stop = stop
+    for _ in range(count):
+        clock.now_ns += pause_ns
+        for network in rig.networks:
+            network.serve(clock.now_ns)
+        try:
+            found.append(rig.plc.scan_at_once(most, clock))
+        except KeyboardInterrupt:
+            found.append([])
+        if rig.plc.trap:
+            break
+    return found
+
+
+CASES = [((0,), 0, 16), ((MS,), 300_000, 16), ((0, 50_000), 10_000, 3), ((0,), 0, 1), ((7000, 0, MS), 0, 16)]
+
+
+@pytest.mark.parametrize("program", first_quick([(2,), ((3, "INTERVAL := T#1ms, "),), ((2, "", 150),)]))
+@pytest.mark.parametrize(("delays_ns", "latency_ns", "most"), first_quick(CASES))
+@pytest.mark.parametrize("virtual_time", [False, True])
+def test_bursts(program: tuple[Any, ...], delays_ns: tuple[int, ...], latency_ns: int, most: int, virtual_time: bool) -> None:
+    inside, beside = (Rig(image(*program), delays_ns, latency_ns, is_inside=is_inside, virtual_time=virtual_time)
+                      for is_inside in (True, False))  # fmt: skip
+    for pause_ns in (200_000, 1000, 20_000):
+        assert bursts(inside, 60, most, pause_ns) == bursts(beside, 60, most, pause_ns)
+        for rig in (inside, beside):
+            rig.plc._exchange.pass_by()
+        assert inside.state == beside.state
+        if inside.plc.trap:
+            break
+    assert inside.plc.read("D20001") > 3 and inside.toys[0].refreshes <= 6  # type: ignore[operator]
+
+
+def test_ctrl_c_in_a_burst_loses_nothing() -> None:
+    for stop in range(3, 40):
+        inside, beside = (Rig(image(2), (0,), is_inside=is_inside, virtual_time=False) for is_inside in (True, False))
+        assert bursts(inside, 30, 16, 1000, stop) == bursts(beside, 30, 16, 1000, stop)
+        assert inside.state == beside.state
