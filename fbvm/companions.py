@@ -141,6 +141,8 @@ class Accompanied:
         """Fetch what links have to tell, for the next refresh; whether they have more before they are asked for anything."""
         if self._exchange.passed:
             self._exchange.pass_by()
+        if self._series.numbers[UNFINISHED]:
+            self._finish(now_ns)
         loud = False
         for _, unit, link in self._rows:
             if link.is_quiet:

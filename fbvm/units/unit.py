@@ -102,7 +102,9 @@ class ProcessorUnit(Unit, Protocol):
     Its `refresh` posts the events, copies the words in, runs, copies them out, finishes.  The machine may do it so, too."""
 
     def post(self, events: Sequence[Event]) -> None:
-        """Events of the network for the next run of its program, behind those that wait already."""
+        """Events of the network for the next run of its program, behind those that wait already.  If it has run, `finish`
+        comes before."""
 
     def finish(self) -> list[Request]:
-        """After the program ran elsewhere than in `refresh`: take over `news` and `wake_ns`; what the network has to do."""
+        """After the program ran elsewhere than in `refresh`, at once if it left requests, else at the latest before
+        something is posted: take over `news` and `wake_ns`; what the network has to do."""
