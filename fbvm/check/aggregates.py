@@ -45,6 +45,7 @@ class Aggregates:
         values = list(self._values(want, expr, (0,)))
         content = bytearray(self.expressions.checker.specs.fresh(want))
         parts = [part for part in (self._part(value, content) for value in values) if part is not None]
+        self.expressions.project.asked.again = False  # it makes the frame larger
         self.facts.aggregates[expr] = Aggregate(self._place(expr, want), bytes(content), tuple(parts))
         return want
 

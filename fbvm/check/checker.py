@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
@@ -10,6 +10,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import RefType, StructType, Type, fold
 from fbvm.check import beginnings, references
+from fbvm.check.asked import Asked, is_lasting, key_of
 from fbvm.check.calls import Calls
 from fbvm.check.configurations import Configurations
 from fbvm.check.expressions import Expressions
@@ -57,6 +58,12 @@ class Checker:
         """POUs with checked bodies; their `number` is the position here."""
         self.progress: Callable[[int, int], None] = lambda done, known: None
         """Told how many POUs have been checked, and of how many."""
+        self.keeps = False
+        """True if what is known of bodies of libraries is kept for other programs."""
+        self.known: Mapping[tree.Pou, Asked] = {}
+        """Bodies of libraries that need no check: what theirs would ask for."""
+        self.asked: dict[Pou, Asked] = {}
+        """Of those that were checked, what that asked for, if a check of the same body in another program asks the same."""
         self._scope: Pou | None = None
         self._late = False
         self._blocks: dict[int, Pou] = {}
@@ -99,6 +106,7 @@ class Checker:
 
     def use_area(self, name: str) -> None:
         """Note that a program names an area, which matters for those that a PLC has only then."""
+        self.project.asked.note("area", name)
         if name in self.project.libraries.mailboxes:
             self.mailboxes[name] = self.project.libraries.mailboxes[name]
         elif name in E_NAMES:
@@ -109,6 +117,7 @@ class Checker:
 
     def interface(self, pou: Pou, source: Source, node: tree.Node) -> bool:
         """Make the variables and layout of a POU known; False if it holds itself."""
+        self.project.asked.note("interface", *reversed(key_of(pou)))
         if pou.resolved:
             return True
         if pou.busy:
@@ -116,6 +125,7 @@ class Checker:
                             "an instance can hold instances of other blocks only")
             return False
         pou.busy = True
+        asked, self.project.asked = self.project.asked, Asked()
         with self.scope(pou):
             self.interfaces.resolve(pou)
         pou.busy = False
@@ -124,11 +134,14 @@ class Checker:
         if pou.type is not None:
             self._blocks[id(pou.type)] = pou
         if pou.source.library:
+            self.project.asked = Asked()
             self._body(pou)
+        self.project.asked = asked
         return True
 
     def program(self, pou: Pou, node: tree.Node) -> Variable | None:
         """The one instance of a program that is called or looked into by its name; None if a CONFIGURATION has several."""
+        self.project.asked.again = False
         named = [run.name.text for run in (self.resource.programs if self.resource is not None else ())
                  if fold(run.type_name.text) == fold(pou.name)]
         if len(named) > 1 or not self.interface(pou, pou.source, node) or pou.type is None:
@@ -168,6 +181,7 @@ class Checker:
 
     def _start(self, init: tree.Expr, kind: RefType, source: Source) -> bytes:
         """The bytes of a reference that is made before anything runs; its place is looked for when all names are known."""
+        self.project.asked.again = False
         return references.noted(self.project.facts, Start(references.named(init), init, kind, source, self._scope, self._late))
 
     def _infer(self, expr: tree.Expr, source: Source) -> Type | None:
@@ -194,9 +208,22 @@ class Checker:
         pou.number = len(self.bodies)
         self.bodies.append(pou)
         pou.writes_eno = writes_eno(pou)
-        Statements(self, pou).block(pou.tree.body)
+        if (known := self.known.get(pou.tree)) is not None:
+            known.repeat(pou, self)
+        elif self.keeps and is_lasting(pou):
+            self._asking(pou)
+        else:
+            Statements(self, pou).block(pou.tree.body)
         for action in pou.actions.values():
             self._body(action)
+
+    def _asking(self, pou: Pou) -> None:
+        """Check the body of a library's POU, and note what that asks for."""
+        said, asked = len(self.report.diagnostics), self.project.asked
+        Statements(self, pou).block(pou.tree.body)
+        asked.end(pou, self.project)
+        if asked.again and said == len(self.report.diagnostics):
+            self.asked[pou] = asked
 
     def _complain_of_recursion(self) -> None:
         """POUs never call themselves, directly or through others (7.2)."""

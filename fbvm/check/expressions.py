@@ -209,8 +209,9 @@ class Expressions:
         variable = self.variable(expr.text)
         if variable is not None:
             return self._variable(expr, variable)
-        members = self.project.enum_members.get(fold(expr.text), [])
-        near = [m for m in members if m[2] == self.source.library]
+        own = self.source.library
+        members = [m for m in self.project.enum_members.get(fold(expr.text), ()) if m[2] or not own]
+        near = [m for m in members if m[2] == own]
         wanted = [m for m in members if m[0] == want] or near or members
         if len({kind.name for kind, _, _ in wanted}) == 1:
             self.facts.constants[expr] = wanted[0][1]

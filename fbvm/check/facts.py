@@ -97,6 +97,8 @@ class Pou:
     """Bytes at the start of a function's frame that the caller writes."""
     frame_offset: int = 0
     number: int = -1
+    as_written: bool = True
+    """False if its tree is another one than that of its source, made for one call or one program."""
     resolved: bool = False
     calls: dict[Pou, Node] = field(default_factory=dict)
     writes_eno: bool = False

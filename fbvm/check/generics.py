@@ -97,7 +97,7 @@ class Generics:
             return None
         key = pou, tuple(sorted((name, kind.name) for name, kind in types.items()))
         if key not in self.made:
-            made = Pou(pou.name, pou.kind, pou.source, copied(pou.tree), types=types)
+            made = Pou(pou.name, pou.kind, pou.source, copied(pou.tree), types=types, as_written=False)
             self.made[key] = made
             if not self.calls.checker.interface(made, pou.source, call):
                 return None

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
+from fbvm.check.asked import Asked
 from fbvm.check.facts import Variable, is_open, list_name
 from fbvm.syntax import tree
 
@@ -45,6 +46,8 @@ class Globals:
     def enroll(self) -> None:
         """Know the names of everything that was read since the last time; who asks for one has it declared."""
         new = self.project.sections
+        if not new:
+            return
         self.project.sections = []
         turns = [Turn(declared, section, source) for section, source in new for declared in section.variables]
         for section, source in new:
@@ -52,6 +55,7 @@ class Globals:
         for turn in turns:
             for key in self._keys(turn):
                 self._waiting.setdefault(key, turn)
+                self.project.waiting.add(key[1])
         self._turns += turns
 
     def declare(self) -> None:
@@ -94,7 +98,8 @@ class Globals:
         turn.taken = True
         keys = self._keys(turn)
         self._busy.update(keys)
-        resolved = self.checker.interfaces.typed(turn.declared, turn.source, None)
+        with self.project.asking(Asked()):
+            resolved = self.checker.interfaces.typed(turn.declared, turn.source, None)
         self._busy.difference_update(keys)
         if resolved is None:
             self._damaged.update(keys)

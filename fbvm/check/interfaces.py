@@ -78,7 +78,7 @@ class Interfaces:
         for name in sorted(self.project.tasked(pou.name)) if pou.kind == "PROGRAM" else ():
             self._tasked(name, pou)
         if begun := self._begun[mark:]:
-            pou.tree = beginnings.with_assignments(pou, begun)
+            pou.tree, pou.as_written = beginnings.with_assignments(pou, begun), False
             del self._begun[mark:]
         if pou.tree.result is not None:
             self._result(pou, pou.tree.result)

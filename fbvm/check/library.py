@@ -55,6 +55,8 @@ class Library:
     """Areas that programs may only read, and this library writes."""
     by_dialect: bool = False
     """True for blocks in place of others, which only a dialect brings in."""
+    shipped: bool = False
+    """True for one that comes with fbvm, which stays as it is."""
     loaded: set[str] = field(default_factory=set)
 
 
@@ -120,7 +122,13 @@ def _flag(table: dict[str, object], key: str, described: Path) -> bool:
 @cache
 def _shipped() -> tuple[Library, ...]:
     """The libraries that come with fbvm, which stay as they are while it runs."""
-    return tuple(_libraries_below(data_folder("fblib")))
+    return tuple(replace(library, shipped=True) for library in _libraries_below(data_folder("fblib")))
+
+
+@cache
+def _shipped_files() -> frozenset[str]:
+    """The folded names of their files."""
+    return frozenset(name for library in _shipped() for name in library.files)
 
 
 def _pins(table: dict[str, object], described: Path) -> dict[str, dict[str, str]]:
@@ -168,12 +176,17 @@ class Libraries:
             for library in sorted(below, key=lambda library: library.name not in preferred):
                 if not library.by_dialect or library.name in preferred:
                     self._libraries.setdefault(library.name, library)
+        self._files = {name for below in shelves[:len(own)] for library in below for name in library.files}
         self.mailboxes: dict[str, Mailbox] = {}
         """What the libraries' units bring, by area."""
         for library in self._libraries.values():
             if library.mailbox and self.mailboxes.setdefault(library.mailbox.name, library.mailbox) != library.mailbox:
                 described = library.folder / "library.toml"
                 raise LibraryError(described, f"{library.mailbox.name} is another library's mailbox, too")
+
+    def has_file(self, name: str) -> bool:
+        """True if a library may have a file for a folded name."""
+        return name in _shipped_files() or name in self._files
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -213,18 +226,31 @@ class Libraries:
         if path.name in library.loaded:
             return None
         library.loaded.add(path.name)
-        found = read(path, f"{library.name}/{path.name}", library.name)
-        if not isinstance(found, Source):
-            report.diagnostics.append(found)
+        known = (_shipped_file if library.shipped else _file)(library.name, path)
+        if isinstance(known, Diagnostic):
+            report.diagnostics.append(known)
             return None
-        source, text, diagnostics = _parsed(found.name, found.text, found.library)
+        source, text, diagnostics = known
         report.diagnostics.extend(diagnostics)
         return source, text
 
 
+Parsed = tuple[Source, tree.SourceText, tuple[Diagnostic, ...]]
+"""A file of a library, its tree and what is wrong with it."""
+
+
+def _file(library: str, path: Path) -> Parsed | Diagnostic:
+    found = read(path, f"{library}/{path.name}", library)
+    return _parsed(found.name, found.text, found.library) if isinstance(found, Source) else found
+
+
+_shipped_file = cache(_file)
+"""The trees of what comes with fbvm are kept: trees are values, and tests compile them often."""
+
+
 @lru_cache(maxsize=512)
-def _parsed(name: str, text: str, library: str) -> tuple[Source, tree.SourceText, tuple[Diagnostic, ...]]:
-    """The tree of a library's file, kept as long as the text stays: trees are values, and tests compile them often."""
+def _parsed(name: str, text: str, library: str) -> Parsed:
+    """The tree of a library's file, kept as long as the text stays."""
     source = Source(name, text, library)
     parsed, diagnostics = parse(source)
     return source, parsed, tuple(diagnostics)

@@ -7,13 +7,15 @@ from __future__ import annotations
 import difflib
 import re
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import STANDARD, Dialect
 from fbvm.base.types import EnumType, RefType, Type, fold
+from fbvm.check.asked import Asked
 from fbvm.check.facts import Facts, Pou, Report, Variable, list_name
 from fbvm.check.library import Libraries
 from fbvm.check.names import refuse_reserved
@@ -59,6 +61,8 @@ class Project:
         self.globals: dict[tuple[str, str], Variable] = {}
         self.sections: list[tuple[tree.VarSection, Source]] = []
         """VAR_GLOBAL sections that still have to be declared."""
+        self.waiting: set[str] = set()
+        """Folded names of global variables that were read, and may still have to be declared."""
         self.lists: set[str] = set()
         """Folded names of the files that declare global variables outside of a CONFIGURATION."""
         self.qualified_only: set[tree.VarSection] = set()
@@ -70,11 +74,15 @@ class Project:
         """VAR_ACCESS and VAR_CONFIG sections."""
         self.late_global: Callable[[tuple[str, str]], None] = lambda key: None
         """Declares a global variable whose turn has not come yet (set by the checker)."""
+        self.asked = Asked()
+        """What is asked for by the body that is being checked."""
         self._loaded: set[str] = set()
         self._refused: set[tuple[str, str]] = set()
         """Library and folded name of what was declared and refused: an INTERFACE, a structure that EXTENDS another."""
-        self._absent: set[tuple[bool, str, str]] = set()
-        """Names of types (True) and POUs that were looked for and are nowhere, and the library that asked."""
+        self._owners: dict[str, tuple[str, ...]] = {}
+        self._found_pous: dict[str, dict[str, Pou | None]] = {}
+        self._found_types: dict[str, dict[str, TypeEntry | None]] = {}
+        """What was looked for, by folded name, and what each library that asked for it sees."""
         self._compared = 0
         self.meanings: dict[tuple[str, Type, Type], tuple[Type, Type]] = {}
         """For operators between elementary types that are no constants: the type in which they work, and that of the result."""
@@ -94,7 +102,6 @@ class Project:
 
     def collect(self, text: tree.SourceText, source: Source) -> None:
         """Take the declarations of one text; complain about names declared twice."""
-        self._absent.clear()
         last: Pou | None = None
         for declaration in text.declarations:
             if isinstance(declaration, tree.Refused):
@@ -116,6 +123,7 @@ class Project:
             elif isinstance(declaration, tree.TypeDecl):
                 key = (source.library, fold(declaration.name.text))
                 if not self._twice(key, declaration.name, source, "type"):
+                    self._found_types.pop(key[1], None)
                     self.types[key] = TypeEntry(declaration, source, pack_mode(text, declaration))
             elif isinstance(declaration, tree.GlobalVars):
                 self.sections.append((declaration.section, source))
@@ -145,6 +153,7 @@ class Project:
         for refused in declaration.refused:
             self.report.refuse(source, refused)
         if not self._twice(key, declaration.name, source, "POU"):
+            self._found_pous.pop(key[1], None)
             self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
             pou.other_names = self.libraries.other_pins(source.library, pou.name)
             pou.inherits = any(refused.what == "EXTENDS" for refused in declaration.refused)
@@ -166,11 +175,20 @@ class Project:
 
     # --- look-up ----------------------------------------------------------------------------------------------------
 
-    def owners(self, source: Source) -> Iterable[str]:
+    @contextmanager
+    def asking(self, asked: Asked) -> Iterator[Asked]:
+        """Whoever asks for something meanwhile is not the body that is being checked."""
+        before, self.asked = self.asked, asked
+        yield asked
+        self.asked = before
+
+    def owners(self, source: Source) -> tuple[str, ...]:
         """Whose names `source` sees, nearest first; a library never sees the user's own."""
-        yield source.library
-        yield from (name for name in self.libraries.names
-                    if name != source.library and not (source.library and self.libraries.is_by_dialect(name)))
+        own = source.library
+        if own not in self._owners:
+            others = [name for name in self.libraries.names if name != own]
+            self._owners[own] = own, *(name for name in others if not (own and self.libraries.is_by_dialect(name)))
+        return self._owners[own]
 
     def _load(self, name: str, owner: str) -> None:
         for source, text in self.libraries.load(name, owner, self.report):
@@ -180,21 +198,30 @@ class Project:
 
     def pou(self, name: str, source: Source) -> Pou | None:
         """The POU of that name as seen from `source`."""
-        return self._find(self.pous, name, source, types=False)
+        return self._find(self.pous, self._found_pous, name, source, "POU")
 
     def type_entry(self, name: str, source: Source) -> TypeEntry | None:
-        return self._find(self.types, name, source, types=True)
+        return self._find(self.types, self._found_types, name, source, "type")
 
-    def _find(self, table: dict[tuple[str, str], T], name: str, source: Source, types: bool) -> T | None:
+    def _find(self, table: dict[tuple[str, str], T], known: dict[str, dict[str, T | None]], name: str, source: Source,
+              what: str) -> T | None:
         folded = fold(name)
-        if (types, source.library, folded) in self._absent:
-            return None
+        found = known.setdefault(folded, {})
+        if source.library not in found:
+            found[source.library] = self._look(table, folded, source)
+        answer = found[source.library]
+        if answer is not None or self.libraries.has_file(folded):
+            self.asked.note(what, folded)
+        return answer
+
+    def _look(self, table: dict[tuple[str, str], T], folded: str, source: Source) -> T | None:
+        """What a name means for `source`, in the file of that name if it was not read before."""
+        in_file = self.libraries.has_file(folded)
         for owner in self.owners(source):
-            if owner and (owner, folded) not in table:
+            if in_file and owner and (owner, folded) not in table:
                 self._load(folded, owner)
             if (owner, folded) in table:
                 return table[owner, folded]
-        self._absent.add((types, source.library, folded))
         return None
 
     def is_refused(self, name: str, source: Source) -> bool:
@@ -204,10 +231,12 @@ class Project:
     def global_variable(self, name: str, source: Source) -> Variable | None:
         folded = fold(name)
         for owner in self.owners(source):
-            if (owner, folded) not in self.globals:
-                self.late_global((owner, folded))
-            if (owner, folded) in self.globals:
-                return self.globals[owner, folded]
+            key = owner, folded
+            if key not in self.globals and (self.sections or folded in self.waiting):
+                self.late_global(key)
+            if key in self.globals:
+                self.asked.note("global", folded)
+                return self.globals[key]
         return None
 
     def is_space(self, name: str) -> bool:

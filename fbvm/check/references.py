@@ -51,6 +51,7 @@ def refer(expressions: Expressions, expr: tree.Expr, lasting: bool) -> Type | No
     if variable is not None:
         variable.written = True
     expressions.facts.holders[expr] = _holder(expressions, expr)
+    expressions.project.asked.again = False
     return kind
 
 
@@ -94,6 +95,7 @@ def to_parameter(expressions: Expressions, expr: tree.Member) -> Type:
     """`x.pValue` of an ANY: a pointer to what was passed."""
     facts = expressions.facts
     facts.holders[expr] = _held(expressions, expr.of, facts.variables[expr.of])
+    expressions.project.asked.again = False
     return pointer(BYTE)
 
 

@@ -30,6 +30,7 @@ from fbvm.base.types import (
     string,
 )
 from fbvm.check import foreign
+from fbvm.check.asked import Asked
 from fbvm.check.constants import default
 from fbvm.check.facts import Pou, is_block, is_open
 from fbvm.check.names import refuse_reserved
@@ -186,13 +187,14 @@ class Specs:
         """A declared type as seen from `source`; its mistakes are reported at the first call."""
         entry = self.project.type_entry(name, source)
         assert entry is not None
+        self.project.asked.note("declared", name)
         if entry.busy:
             self.report.add("S0207", entry.source, entry.tree.name,
                             f"{entry.tree.name.text} contains itself", "a type cannot hold a value of its own type")
             return None
         if not entry.known:
             entry.busy = True
-            with self.scope(None):
+            with self.scope(None), self.project.asking(Asked()):
                 entry.resolved = self._type(entry)
             entry.busy = False
             entry.known = True

@@ -6,17 +6,16 @@ import gc
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from fbvm.base.areas import Area
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.dialects import dialect as named_dialect
 from fbvm.base.repeats import gathered
-from fbvm.base.types import Field, StructType, Type, fold
+from fbvm.base.types import Type, fold
 from fbvm.check.checker import Checker
-from fbvm.check.facts import Pou, Report, Start, TaskFact
+from fbvm.check.facts import Pou, Report, TaskFact
 from fbvm.check.library import Libraries, LibraryError
 from fbvm.check.lint import lint as look_for_slips
 from fbvm.check.project import Project
@@ -24,11 +23,11 @@ from fbvm.check.silence import Silence, Wanted
 from fbvm.code import image_cache
 from fbvm.code.damage import Damage
 from fbvm.code.evaluation import evaluate
-from fbvm.code.image import Image, Objects, ProgramRun, RungPicture, SfcPicture, Site, TaskRow
+from fbvm.code.image import Image, ProgramRun, TaskRow
 from fbvm.code.initial_references import InitialReferences
-from fbvm.code.layout import Placed, place
-from fbvm.code.lower import BodyLowering
-from fbvm.code.operations import FIRST_OBJECT
+from fbvm.code.layout import place
+from fbvm.code.object_code import Shelf, shelf_of
+from fbvm.code.program import Program
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
@@ -57,50 +56,6 @@ class Compilation:
     @property
     def errors(self) -> list[Diagnostic]:
         return errors(self.diagnostics)
-
-
-class Program:
-    """What the lowering of all bodies shares: areas, sites, located members."""
-
-    def __init__(self, placed: Placed, drawn: bool = False) -> None:
-        self.drawn = drawn
-        self.areas: dict[str, Area] = placed.layout.areas
-        self.sites: list[Site] = []
-        self.rungs: list[RungPicture] = []
-        self.charts: list[SfcPicture] = []
-        self.held: InitialReferences
-        self.late_starts: dict[Pou, list[tuple[int, Start]]] = {}
-        """References in frames that bodies make when they start, by POU, and where in the buffer they lie."""
-        self.leases_at, self.held_bits = placed.objects.leases_at, placed.objects.held_bits
-        self._objects = placed.objects
-        self._area_objects: dict[str, tuple[int, int]] = {}
-        self._numbers: dict[tuple[str, str, int], int] = {}
-
-    def site(self, pou: Pou, node: tree.Node) -> int:
-        """The number of a place in the source."""
-        key = pou.source.name, pou.name, node.start
-        number = self._numbers.get(key)
-        if number is None:
-            number = self._numbers[key] = len(self.sites)
-            line, column = pou.source.place(node.start)
-            self.sites.append(Site(pou.source.name, pou.name, line, column))
-        return number
-
-    def area_object(self, area: str) -> int:
-        """The number of the object that a whole area is."""
-        row = self.areas[area]
-        self._area_objects.setdefault(area, (row.offset, row.offset + row.size_bytes))
-        return FIRST_OBJECT + len(self._objects.extents) + list(self._area_objects).index(area)
-
-    @property
-    def objects(self) -> Objects:
-        """What pointers may be moved in, areas that were asked for included."""
-        return replace(self._objects, extents=(*self._objects.extents, *self._area_objects.values()))
-
-    def located(self, member: Field, whole: Type) -> Field:
-        """A located member of a block with its final place."""
-        assert isinstance(whole, StructType)
-        return whole.fields[fold(member.name)]
 
 
 def compile_files(paths: Sequence[Path | str], program: str | None = None, libraries: Sequence[Path | str] = (),
@@ -171,6 +126,9 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         unread = len(report.diagnostics)
         checker = Checker(project, evaluate)
         checker.progress = partial(progress, "checked")
+        checker.keeps = not libraries and not project.settings
+        shelf = shelf_of(spoken) if checker.keeps else Shelf()
+        checker.known = shelf.asked
         checker.check(program, resource)
         if runnable and not errors(report.diagnostics):
             _demand_program(checker, program, sources, report)
@@ -178,7 +136,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
             look_for_slips(checker, program)
         found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not damage.explains(d)]
         diagnostics = gathered(sorted(silence.heard(found, wanted), key=Diagnostic.order))
-        image = None if errors(diagnostics) else _image(checker, progress, drawn)
+        image = None if errors(diagnostics) else _image(checker, shelf, progress, drawn)
         project.let_go()
     return Compilation(image, diagnostics)
 
@@ -225,13 +183,12 @@ def _deep(sources: Sequence[Source]) -> Iterator[None]:
             gc.enable()
 
 
-def _image(checker: Checker, progress: Progress, drawn: bool) -> Image:
+def _image(checker: Checker, shelf: Shelf, progress: Progress, drawn: bool) -> Image:
     placed = place(checker)
     program = Program(placed, drawn)
     program.held = held = InitialReferences(program, checker, placed)
     held.in_frames()
-    bodies = tuple(BodyLowering(program, checker, pou).body()
-                   for pou in _told(checker.bodies, partial(progress, "compiled")))
+    bodies = tuple(shelf.body(program, checker, pou) for pou in _told(checker.bodies, partial(progress, "compiled")))
     tasks = sorted((_task(task) for task in checker.tasks), key=lambda row: row.priority)
     types: dict[str, Type] = {fold(p.type.name): p.type for p in checker.bodies if p.type is not None}
     for (_, name), entry in checker.project.types.items():

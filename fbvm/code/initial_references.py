@@ -21,7 +21,7 @@ from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_SHIFT, Addr
 from fbvm.code.shapes import is_expression
 
 if TYPE_CHECKING:
-    from fbvm.code.compiler import Program
+    from fbvm.code.program import Program
 
 Instances = Mapping[Pou, int]
 """Where the instances around a value begin."""

@@ -26,7 +26,7 @@ from fbvm.syntax import ladder, sfc, tree
 from fbvm.syntax.pragmas import hides_inside
 
 if TYPE_CHECKING:
-    from fbvm.code.compiler import Program
+    from fbvm.code.program import Program
 
 
 class BodyLowering:
@@ -89,7 +89,8 @@ class BodyLowering:
         start = self.pou.frame_inputs if self.pou.is_function else 0
         fresh = self.pou.frame_initial[start:]
         if fresh:
-            self.out.append(("fill", ("abs", self.pou.frame_offset + start, ()), fresh))
+            base, offset = self.program.frame(self.pou)
+            self.out.append(("fill", (base, offset + start, ()), fresh))
         for offset, made in self.program.late_starts.get(self.pou, ()):
             slot = Place(("abs", offset, ()), made.kind)
             self.out.append(self.places.store(slot, self.pointers.to(made.place), self.entry_site))

@@ -15,9 +15,11 @@ from fbvm.base.types import (
     LINT,
     AnyType,
     ArrayType,
+    Field,
     OpenArrayType,
     RefType,
     StringType,
+    StructType,
     SubrangeType,
     Type,
     base,
@@ -93,9 +95,9 @@ class Places:
             return self.variable(variable, expr)
         if isinstance(expr, tree.Direct):
             address = self.facts.directs[expr]
-            offset = self.body.program.areas[address.area].offset + address.byte_offset()
+            start, offset = self.body.program.area(address.area)
             is_bit = address.bit is not None or address.area in FLAG_AREAS
-            return Place(("abs", offset, ()), kind, address.bit_in_byte() if is_bit else None)
+            return Place((start, offset + address.byte_offset(), ()), kind, address.bit_in_byte() if is_bit else None)
         if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
             return self._of_any(expr, kind)
         if expr in self.facts.bits:
@@ -103,8 +105,8 @@ class Places:
         if isinstance(expr, tree.Member):
             member = self.facts.fields[expr]
             if member.absolute:
-                of = self.body.program.located(member, self.facts.types[expr.of])
-                return Place(("abs", of.offset, ()), kind, of.bit)
+                slot = self.slot(self._located(member, self.facts.types[expr.of]))
+                return Place(slot.address, kind, slot.bit)
             slot = self.of(expr.of).moved(member.offset, kind, member.bit)
             return self.behind(slot, self.body.site(expr)) if member.reference else slot
         if isinstance(expr, tree.Part):
@@ -148,11 +150,14 @@ class Places:
     def _slot(self, variable: Variable) -> Place:
         if variable.place == "self":
             return Place(("self", variable.offset, ()), variable.type)
-        offset = variable.offset
-        if variable.place == "frame":
-            assert variable.owner is not None
-            offset += variable.owner.frame_offset
-        return Place(("abs", offset, ()), variable.type, variable_bit(variable))
+        return Place((*self.body.program.origin(variable), ()), variable.type, variable_bit(variable))
+
+    def _located(self, member: Field, whole: Type) -> Variable:
+        """A member of a block that lies in no instance."""
+        assert isinstance(whole, StructType)
+        block = self.body.checker.block_of(whole)
+        known = block.variables[fold(member.name)]
+        return known if known.name == member.name else next(v for v in block.order if v.name == member.name)
 
     def _part(self, expr: tree.Part, kind: Type) -> Place:
         whole = self.of(expr.of)

@@ -35,7 +35,7 @@ class CallLowering:
             self._guarded(call, called, None)
             return
         instance = self.body.places.of(called.instance) if called.instance is not None else Place(("self", 0, ()), BOOL)
-        self.body.out.append(("call", called.pou.number, instance.address))
+        self.body.out.append(("call", self.body.program.number(called.pou), instance.address))
 
     def value(self, call: tree.Call, called: PouCall) -> Node:
         """A call of a function for its result."""
@@ -118,7 +118,7 @@ class CallLowering:
 
     def _execute(self, called: PouCall, address: Address | None) -> None:
         """Run the body, unless a task of its own does."""
-        run: Node = ("call", called.pou.number, address)
+        run: Node = ("call", self.body.program.number(called.pou), address)
         if called.tasked is None:
             self.body.out.append(run)
             return
