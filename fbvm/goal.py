@@ -46,11 +46,10 @@ class Goal:
         condition: Condition = parse_condition(until, self._plc.find)
         return lambda: condition.holds(self._plc.read)
 
-    @property
-    def scans_left(self) -> int:
-        """How many scans of a cycle each come before anybody looks at the goal again; 1 for a condition."""
+    def scans_left(self, step_ns: int) -> int:
+        """How many scans, each so much later than the one before, come before the goal; 1 for a condition."""
         plc = self._plc
-        return 1 if self._until else min(self._last_scan - plc.scans, -((plc.elapsed_ns - self._end_ns) // plc.cycle_ns))
+        return 1 if self._until else min(self._last_scan - plc.scans, -((plc.elapsed_ns - self._end_ns) // step_ns))
 
     def reached(self) -> str:
         """"trap", "until", "scans", "time", "max" or "break" if that ended the run, else ""."""

@@ -22,20 +22,20 @@ class HostLink(ChannelLink):
         """Those that may have something to fetch, in order."""
 
     def events(self, now_ns: int) -> Sequence[Event]:
-        driven = self._network.driven
-        if not driven:
-            self._network.serve(now_ns)
-        elif self.is_quiet:
+        if self.is_quiet:
             return ()
+        network = self._network
+        if not network.driven:
+            network.serve(now_ns)
         if self.waiting:
             for there in list(self.waiting):
                 there.fetch(now_ns)
         told, self.told = self.told, []
-        self.is_quiet = not self.waiting and (driven or not self.channels)
+        self.is_quiet = not self.waiting and (network.driven or not network.watched)
         return told
 
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
         super().submit(requests, now_ns)
-        if self.told or not self._network.driven:
+        if self.told:
             self.is_quiet = False
             self._network.unheard.add(self)

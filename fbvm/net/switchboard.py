@@ -92,7 +92,7 @@ class Switchboard(ABC):
         self.links: dict[str, HostLink] = {}
         self._selector = selectors.DefaultSelector()
         self._number = _number(self._selector)
-        self._watched = 0
+        self.watched = 0
         """How many sockets the selector has."""
         self._found: list[tuple[selectors.SelectorKey, int]] = []
         """What the host was ready for when somebody waited."""
@@ -140,7 +140,7 @@ class Switchboard(ABC):
             return []
         woken: list[HostLink] = []
         found, self._found = self._found, []
-        if not found and self._watched:
+        if not found and self.watched:
             found = self._selector.select(0)
         for key, ready in found:
             watcher: Watcher = key.data
@@ -176,12 +176,12 @@ class Switchboard(ABC):
             return
         if not wanted:
             self._selector.unregister(sock)
-            self._watched -= 1
+            self.watched -= 1
         elif channel.watched:
             self._selector.modify(sock, wanted, channel)
         else:
             self._selector.register(sock, wanted, channel)
-            self._watched += 1
+            self.watched += 1
         channel.watched = wanted
 
     def adopt(self, orphan: Orphan, now_ns: int) -> None:

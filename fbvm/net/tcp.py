@@ -88,8 +88,8 @@ class TcpLink(HostLink):
         self.network = network
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
-        channel: _OnHost = _KINDS[type(request)](self, request)
-        self.channels[request.channel] = channel
+        channel = self.channels[request.channel] = _KINDS[type(request)](self, request)
+        self.is_quiet = False
         try:
             if self.network.closed:
                 raise OSError(errno.ENETDOWN, "closed")
@@ -291,7 +291,7 @@ class _Line(_OnHost):
             self._receive(self.sock, now_ns)
         elif self.sock and (code := self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)):
             self._broke(code, now_ns)
-        if not self._stalled and not self._fin_seen:  # of which the selector would not tell that they broke
+        if not self._stalled and not self._fin_seen:  # else the selector does not tell that it breaks
             self.link.waiting.pop(self, None)
 
     def send(self, data: bytes, now_ns: int) -> str:
@@ -359,7 +359,7 @@ class _Line(_OnHost):
             while self._outbox:
                 rest = self._outbox[0][self._taken :] if self._taken else self._outbox[0]
                 size = sock.send(rest) if rest else 0
-                if size:
+                if size and self.network.tap:
                     self._tap(now_ns, DATA, True, rest[:size])
                 self._taken += size
                 if size == len(rest):

@@ -59,7 +59,7 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
         for run in runs:
             run.begin(start_ns)
             run.pace, run.alone = CYCLIC, len(runs) == 1
-    queue = _Queue(runs)
+    queue = _Alone(runs) if len(runs) == 1 else _Queue(runs)
     told_ns = time.monotonic_ns()
     try:
         while (due_ns := queue.next_ns()) is not None:
@@ -75,7 +75,7 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
         clock.stop()
 
 
-def _scan_all(queue: _Queue, now_ns: int, woken: Numbers, real: bool) -> None:
+def _scan_all(queue: _Queue | _Alone, now_ns: int, woken: Numbers, real: bool) -> None:
     """Scans of everybody who is woken or whose time has come, with the same time for all."""
     first_ns = began_ns = time.monotonic_ns()
     for number in queue.take(now_ns, woken):
@@ -131,8 +131,6 @@ class _Queue:
     def next_ns(self) -> int | None:
         """When somebody is due; None if all have ended."""
         runs, stands_ns = self.runs, self._stands_ns
-        if len(runs) == 1:
-            return None if runs[0].reason else runs[0].due_ns
         while self._times:
             time_ns = self._times[0]
             row = self._rows[time_ns]
@@ -161,6 +159,23 @@ class _Queue:
                     else:
                         self.put(number, run)
         return woken
+
+
+class _Alone:
+    """Who is alone needs no queue."""
+
+    def __init__(self, runs: Sequence[Running]) -> None:
+        self.runs = runs
+
+    def put(self, number: int, run: Running) -> None:
+        """It says itself when it is due."""
+
+    def next_ns(self) -> int | None:
+        run = self.runs[0]
+        return None if run.reason else run.due_ns
+
+    def take(self, now_ns: int, woken: Numbers) -> Numbers:
+        return {0: None}
 
 
 class _Clock(Protocol):

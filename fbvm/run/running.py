@@ -16,6 +16,8 @@ PACES = (CYCLIC, EVENT)
 """cyclic: a fixed period.  event: at once when there is something new to see, else at the earliest time that matters."""
 MOST_AT_ONCE = 16
 """Scans of one PLC in event pace before the network and the others have their turn again."""
+AT_ONCE_NS = 1
+"""How much later than the one before it such a scan begins, at least: time ends a run between two bursts, not in one."""
 
 
 @dataclass(frozen=True)
@@ -77,24 +79,23 @@ class Running:
         """One scan at this time, or more upon it, and the plan for the next.  A period that was overrun is not made up for.
 
         Returns when the scans of a burst began."""
-        plc, told_ns = self.plc, max(now_ns - self._behind_ns, self.plc.now_ns)
-        while self._writes and self._writes[0].at_ns <= told_ns:
-            write = self._writes.pop(0)
-            plc.write(write.where, write.value)
-        if self.alone and (many := self._undisturbed()) > 1 and plc.scan_many(many):
-            self.due_ns = plc.elapsed_ns + self._behind_ns
-            self.reason = self._goal.reached()
-            return []
+        plc = self.plc
         times: list[int] = []
-        if self._clock and (many := self._undisturbed()) > 1:
+        if self._writes:
+            self._write(max(now_ns - self._behind_ns, plc.now_ns))
+        if self._clock and (many := self._undisturbed(plc.cycle_ns if self._writes else AT_ONCE_NS)) > 1:
             times = plc.scan_at_once(min(many, MOST_AT_ONCE), self._clock)
         if times:
             now_ns = times[-1] + self._behind_ns
+        elif self.alone and (many := self._undisturbed(plc.cycle_ns)) > 1 and plc.scan_many(many):
+            self.due_ns = plc.elapsed_ns + self._behind_ns
+            self.reason = self._goal.reached()
+            return times
         else:
-            plc.scan(told_ns)
+            plc.scan(max(now_ns - self._behind_ns, plc.now_ns))
         self.reason = self._goal.reached()
         if plc.breakpoints.halted:
-            return []
+            return times
         if self.pace == EVENT:
             self.due_ns = max(now_ns, min(now_ns + plc.cycle_ns, plc.due_ns + self._behind_ns))
         elif now_ns < self.due_ns + plc.cycle_ns:
@@ -104,10 +105,13 @@ class Running:
             self.due_ns = now_ns + plc.cycle_ns
         return times
 
-    def _undisturbed(self) -> int:
-        """How many scans come before the goal, or the next write."""
-        left = self._goal.scans_left
-        if not self._writes:
-            return left
-        plc = self.plc
-        return min(left, -((plc.elapsed_ns - self._writes[0].at_ns) // plc.cycle_ns))
+    def _write(self, told_ns: int) -> None:
+        """Writes what is to be written until then."""
+        while self._writes and self._writes[0].at_ns <= told_ns:
+            write = self._writes.pop(0)
+            self.plc.write(write.where, write.value)
+
+    def _undisturbed(self, step_ns: int) -> int:
+        """How many scans, each so much later than the one before, come before the goal or the next write."""
+        left = self._goal.scans_left(step_ns)
+        return min(left, -((self.plc.elapsed_ns - self._writes[0].at_ns) // step_ns)) if self._writes else left

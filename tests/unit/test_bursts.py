@@ -4,7 +4,7 @@ The network answers when somebody waits for it; the clock is a stand-in that nev
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 
 import pytest
@@ -164,6 +164,24 @@ def test_a_burst_ends_so_that_others_have_their_turn(clock: Clock) -> None:
     assert run(plc, for_ns=40 * MS, pace="event") == "time"
     assert max(later - earlier for earlier, later in pairwise(served)) == MOST_AT_ONCE
     assert plc.read("D30027") == 0x2210
+
+
+def test_time_ends_a_run_between_two_bursts(image: Image, clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last cycle, which counts as gone when it begins, is made of bursts like those before it."""
+    plc, _ = polling(image, clock)
+    plc.cycle_ns = 1000 * MS
+    bursts: list[int] = []
+    at_once = plc.scan_at_once
+
+    def counted(most: int, clock: Callable[[], int]) -> list[int]:
+        times = at_once(most, clock)
+        bursts.append(len(times))
+        return times
+
+    monkeypatch.setattr(plc, "scan_at_once", counted)
+    assert run(plc, for_ns=1010 * MS, pace="event") == "time"
+    assert bursts[-1] == bursts[-2] == 5
+    assert 10 * MS <= plc.now_ns < 11 * MS
 
 
 def test_ctrl_c_in_a_burst_loses_no_scan(image: Image, clock: Clock) -> None:

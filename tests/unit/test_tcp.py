@@ -547,7 +547,10 @@ def test_a_link_is_quiet_only_while_somebody_keeps_an_eye_on_the_host(network: T
     assert not link.is_quiet
     assert until_last(link, Received) == [Received(1, b"y")]
     link.submit([Close(1)], now_ns())
-    assert (link.is_quiet, list(link.events(now_ns())), link.is_quiet) == (False, [Closed(1)], True)
+    assert (list(link.events(now_ns())), link.is_quiet) == ([Closed(1)], False)
+    line.close()
+    until(link, lambda events: link.is_quiet)  # the old connection has ended on both sides
+    assert link.events(now_ns()) == ()
 
 
 def test_wrong_use(network: TcpNetwork, device: Device) -> None:
