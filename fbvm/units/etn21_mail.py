@@ -48,7 +48,7 @@ def _opened(event: Opened) -> tuple[int, ...]:
 
 
 def _received(event: Received) -> tuple[int, ...]:
-    high, low = at.words_of(event.remote.host) if event.remote.port else (0, 0)
+    high, low = at.words_of(event.remote.host)
     return RECEIVED, event.channel, 0, 0, high, low, event.remote.port, 0, len(event.data)
 
 

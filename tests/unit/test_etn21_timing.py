@@ -90,6 +90,22 @@ def test_real_services_take_3_to_7_refreshes_and_5_to_21_ms_assumed() -> None:
 
 
 @each_of("seed", SEEDS)
+def test_a_real_service_takes_as_long_whether_the_network_answers_in_the_first_refresh_or_in_the_fifth_assumed(seed: int) -> None:
+    ends = []
+    for refreshes in (1, 5):
+        rig = Rig(Etn21(timing="real", seed=seed), cycle_ms=1)
+        rig.parameters()
+        rig.scan(Switch.ACTIVE_OPEN)
+        for _ in range(refreshes):
+            rig.scan()
+        rig.scan(Opened(1, 49152, SERVER))
+        while rig.is_on(Switch.ACTIVE_OPEN):
+            rig.scan()
+        ends.append(rig.now_ns)
+    assert ends[0] == ends[1]
+
+
+@each_of("seed", SEEDS)
 def test_real_words_agree_in_the_end(seed: int) -> None:
     watched = Watched(seed)
     rig = watched.rig

@@ -343,6 +343,15 @@ def test_udp_receive_takes_one_datagram_and_drops_the_rest_of_it() -> None:
     assert [rig.result(offset) for offset in (3, 4, 5)] == [0xFA0A, 4001, 2]
 
 
+def test_udp_receive_tells_the_host_of_a_sender_without_port() -> None:
+    """A datagram may have port 0 as its source (RFC 768)."""
+    rig = bound()
+    rig.scan(Received(1, b"ab", Peer("192.168.250.9", 0)))
+    rig.parameters(count=4)
+    assert rig.ask(Switch.RECEIVE) == "0000"
+    assert [rig.result(offset) for offset in (2, 3, 4, 5)] == [0xC0A8, 0xFA09, 0, 2]
+
+
 def test_udp_datagrams_past_the_buffer_are_lost() -> None:
     rig = bound()
     rig.scan(*[Received(1, bytes(1400), STATION)] * 7)
