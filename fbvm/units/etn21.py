@@ -28,7 +28,6 @@ __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
 
 TIME_WAIT_NS = 60_000_000_000  # W421 6-9-3 p156
 PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
-NEVER_NS = 1 << 62
 TIMINGS = ("exact", "real")
 
 
@@ -59,12 +58,8 @@ class Etn21:
         self._made = {"unit_number": unit_number, "address": address, "timing": timing, "seed": seed,
                       "time_wait_ns": time_wait_ns, "odd_filler": odd_filler}  # fmt: skip
         self._words: Words | None = None
-        self._seen = 0
-        """The request switches, as they were when the last refresh ended."""
         self._mask = 1 << self.layout.bit
         """Its bit in words for all units."""
-        self.wake_ns = NEVER_NS
-        self.news = False
         self._connect(processor(PROGRAM), odd_filler)
         own = self._processor
         own.view("ETN21_Unit_Bit", "u16")[0] = self._mask
@@ -83,6 +78,8 @@ class Etn21:
         self._initializing, self._restart = own.view("ETN21_Initializing", "u16"), own.view("ETN21_Restart", "u16")
         self._service_status = own.view("ETN21_Service_Status", "u16")
         self._error_status = own.view("ETN21_Error_Status", "u16")
+        self._seen = self._n[at.SWITCHES : at.FINS_TCP_STATUS].cast("B").cast("Q")
+        """The request switches as one number, as they were when the last refresh ended."""
         self._wake, self._changed = own.view("ETN21_Wake", "i64"), own.view("ETN21_News", "u8")
         self._mail = Mail(own, odd_filler)
         self.faults = Faults(own)
@@ -93,7 +90,7 @@ class Etn21:
         twin = Etn21(**self._made)  # type: ignore[arg-type]
         twin._connect(self._processor.copy(), twin._mail.odd_filler)
         twin._mail.inboxes = deepcopy(self._mail.inboxes)
-        twin._words, twin._seen, twin.wake_ns, twin.news = self._words, self._seen, self.wake_ns, self.news
+        twin._words = self._words
         return twin
 
     @property
@@ -107,7 +104,17 @@ class Etn21:
         """The words of the unit, and where its program says what it wants."""
         words = (("CIO", self.layout.n, "ETN21_N", at.CIO_WORDS), ("D", self.layout.m, "ETN21_M", at.D_WORDS),
                  ("A", at.INITIALIZING, "ETN21_Initializing", 1), ("A", at.RESTART, "ETN21_Restart", 1))  # fmt: skip
-        return Exchanged(self._processor, words, "ETN21_Posted", "ETN21_Requested", "ETN21_Wake")
+        return Exchanged(self._processor, words, "ETN21_Posted", "ETN21_Urgent", "ETN21_Wake")
+
+    @property
+    def wake_ns(self) -> int:
+        """When the unit has something to do by itself."""
+        return 0 if self._mail.waits else int(self._wake[0])
+
+    @property
+    def news(self) -> bool:
+        """True if the last refresh changed words."""
+        return bool(self._changed[0])
 
     @property
     def link_up(self) -> bool:
@@ -117,7 +124,7 @@ class Etn21:
     @link_up.setter
     def link_up(self, up: bool) -> None:
         self._service_status[0] = at.LINK_UP if up else 0
-        self._wake[0] = self.wake_ns = 0
+        self._wake[0] = 0
 
     @property
     def error_status(self) -> int:
@@ -127,7 +134,7 @@ class Etn21:
     @error_status.setter
     def error_status(self, status: int) -> None:
         self._error_status[0] = status
-        self._wake[0] = self.wake_ns = 0
+        self._wake[0] = 0
 
     @cached_property
     def descriptions(self) -> dict[str, str]:
@@ -179,9 +186,9 @@ class Etn21:
             words = self._look_at(memory)
         if events:
             self._mail.post(events)
-        elif now_ns < self.wake_ns and words.switches[0] == self._seen and not self._mail.waits and not self._asked(words):
+        elif now_ns < self.wake_ns and words.switches[0] == self._seen[0] and not self._asked(words):
             words.status[0], words.status[1] = self._service_status[0], self._error_status[0]
-            self.news = False
+            self._changed[0] = 0
             return []
         self._run(words, now_ns)
         return self.finish()
@@ -203,14 +210,9 @@ class Etn21:
         self._mail.post(events)
 
     def finish(self) -> list[Request]:
-        """What the program asked for in its last run; `news` and `wake_ns` are as it left them."""
-        words = self._words
-        assert words is not None
-        self._seen = words.switches[0]
-        self.news = self._changed[0] != 0
-        requests = self._mail.collect(words.memory) if self._mail.speaks else []
-        self.wake_ns = 0 if self._mail.waits else self._wake[0]
-        return requests
+        """What the program asked for since the last time, as far as it is the network's affair; the rest is done."""
+        assert self._words is not None
+        return self._mail.collect(self._words.memory)
 
 
 def _scattered(seed: int) -> int:

@@ -72,6 +72,7 @@ class Mail:
         self._posted = processor.view("ETN21_Posted", "u32")
         self._events = processor.view("ETN21_Events", "u8")
         self._requested = processor.view("ETN21_Requested", "u32")
+        self._urgent = processor.view("ETN21_Urgent", "u32")
         self._requests = processor.view("ETN21_Requests", "u8")
         self._most = len(self._events) // EVENT.size
         self._later: list[Event] = []
@@ -85,14 +86,9 @@ class Mail:
         """True if there are events that the processor has not taken."""
         return self._posted[0] > 0
 
-    @property
-    def speaks(self) -> bool:
-        """True if the last run left something to be done."""
-        return self._requested[0] > 0 or bool(self._received or self._later)
-
     def forget(self) -> None:
         """As after power-on."""
-        self._posted[0] = 0
+        self._posted[0] = self._requested[0] = self._urgent[0] = 0
         self._later.clear()
         self._received.clear()
         self.inboxes.clear()
@@ -124,22 +120,19 @@ class Mail:
             later, self._later = self._later, []
             self.post(later)
         requests: list[Request] = []
-        for number in range(self._requested[0]):
-            row = REQUEST.unpack_from(self._requests, REQUEST.size * number)
-            kind, channel, size, first = row[0], row[1], row[9], row[10]
-            if kind == SEND:
-                data = fetch(memory, row[7], row[8], size)
-                if size <= TCP_PART:
-                    requests.append(Send(channel, data))
-                else:
+        if count := self._requested[0]:
+            self._requested[0] = self._urgent[0] = 0
+            for row in REQUEST.iter_unpack(self._requests[: REQUEST.size * count]):
+                kind, channel, _, _, _, _, _, high, low, size, first = row
+                if kind == GRANT:
+                    requests.append(Grant(channel, size))
+                elif kind == STORE:
+                    store(memory, high, low, self.inboxes[channel].take(first, size), self.odd_filler)
+                elif kind == SEND:
+                    data = fetch(memory, high, low, size)
                     requests += [Send(channel, data[at : at + TCP_PART]) for at in range(0, size, TCP_PART)]
-            elif kind == GRANT:
-                requests.append(Grant(channel, size))
-            elif kind == STORE:
-                store(memory, row[7], row[8], self.inboxes[channel].take(first, size), self.odd_filler)
-            else:
-                requests.append(self._rare(kind, channel, row, memory))
-        self._requested[0] = 0
+                else:
+                    requests.append(self._rare(kind, channel, row, memory))
         return requests
 
     def _rare(self, kind: int, channel: int, row: tuple[int, ...], memory: AreaMemory) -> Request:

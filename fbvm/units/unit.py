@@ -45,7 +45,7 @@ class Exchanged:
     posted: str
     """UDINT variable: how many events of the network wait for the program, which sets it 0 when it took them."""
     requested: str
-    """UDINT variable: how many requests the last run left for the network."""
+    """UDINT variable: how many requests that cannot wait for the end of a burst it has left."""
     wake: str
     """64-bit variable: time in ns (of the PLC) from which on the program wants to run although nothing changed."""
 
@@ -59,12 +59,14 @@ class Unit(Protocol):
     address: str
     """IPv4 address of the unit, by which it is attached to a network."""
 
-    wake_ns: int
-    """When the unit has something to do by itself: 0 in the next refresh, far away if nothing is timed.  What the program
-    asks for, or a network tells, comes besides."""
+    @property
+    def wake_ns(self) -> int:
+        """When the unit has something to do by itself: 0 in the next refresh, far away if nothing is timed.  What the
+        program asks for, or a network tells, comes besides."""
 
-    news: bool
-    """True if the last refresh changed words, so that the program should look at them soon."""
+    @property
+    def news(self) -> bool:
+        """True if the last refresh changed words, so that the program should look at them soon."""
 
     @property
     def watched(self) -> Sequence[tuple[str, int]] | None:
