@@ -5,6 +5,7 @@ What is left for Python is what their networks have to know, and what these tell
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import chain, islice
 from typing import cast
 
 from fbvm.engine.native import NativeEngine
@@ -44,6 +45,8 @@ class Accompanied:
     def __init__(self, exchange: Exchange, machine: NativeEngine, turns: list[Turn], found: Sequence[Companion]) -> None:
         self._exchange, self._machine = exchange, machine
         self._series = machine.series(turns, CLOCKWORK, companions=found)
+        self._numbers, self._numbers_at = self._series.numbers, self._series.numbers_at
+        self._is_timed = any(turn.interval_ns for turn in turns)
         self._rows = [(1 << number, cast(ProcessorUnit, attached.unit), attached.link)
                       for number, attached in enumerate(exchange.units)]  # fmt: skip
         self._counts = any(attached.network.virtual_time for attached in exchange.units)
@@ -73,34 +76,36 @@ class Accompanied:
 
         A refresh that was left out takes place now if there is something for it: waiting comes before the refresh, as in
         a PLC with a fixed cycle time (W394)."""
-        series, exchange, counts = self._series, self._exchange, self._counts
-        numbers, call, at = series.numbers, series.call, series.numbers_at
+        numbers, call, at, counts = self._numbers, self._series.call, self._numbers_at, self._counts
         numbers[BUDGETED] = budget
-        now_ns, loud, heard = clock(), self._is_loud(), False
-        if exchange.passed:
-            loud = self._refresh_before(now_ns, loud)
-        series.load_turns()
+        first_ns, loud, heard = clock(), self._is_loud(), False
+        if self._exchange.passed:
+            loud = self._refresh_before(first_ns, loud)
+        if self._is_timed:
+            self._series.load_turns()
         try:
-            while True:
+            for now_ns in islice(chain((first_ns,), iter(clock, None)), most):
                 times.append(now_ns)
+                heard = loud
                 if loud:
-                    loud, heard = self._hear(now_ns), True
+                    loud = self._hear(now_ns)
                 numbers[FIRST] = now_ns
                 point = call(at)
-                if point > 0:
-                    return self._machine.trap_at(point)
-                if counts:
+                if counts and point <= 0:
                     self._count(heard)
                 if point:
+                    if point > 0:
+                        return self._machine.trap_at(point)
                     loud = self._finish(now_ns) or loud
-                if not numbers[AGAIN] or len(times) >= most:
-                    return None
-                now_ns, heard = clock(), False
+                if not numbers[AGAIN]:
+                    break
         finally:  # Ctrl-C may come between two of them
-            series.store_turns()
+            if self._is_timed:
+                self._series.store_turns()
             if not counts:
                 self._count(heard)
             self._end(now_ns)
+        return None
 
     def many(self, most: int, now_ns: int, step_ns: int, budget: int, spend: int) -> tuple[int, Trap | None]:
         """Scans that follow the one at `now_ns`, each a step later, until a unit has something to do; how many there were.
@@ -119,14 +124,14 @@ class Accompanied:
 
     def _refresh_before(self, now_ns: int, loud: bool) -> bool:
         """The refresh that the last scan did without, if there is something for it now; whether links have more to tell."""
-        series, exchange = self._series, self._exchange
+        numbers = self._numbers
         if loud:
-            exchange.passed -= 1
+            self._exchange.passed -= 1
             loud = self._hear(now_ns)
-        series.numbers[FIRST] = now_ns
-        series.call_refresh(series.numbers_at)
-        if series.numbers[CHANGED]:
-            exchange.pass_by()
+        numbers[FIRST] = now_ns
+        self._series.call_refresh(self._numbers_at)
+        if numbers[CHANGED]:
+            self._exchange.pass_by()
             loud = self._finish(now_ns) or loud
         return loud
 
@@ -141,7 +146,7 @@ class Accompanied:
         """Fetch what links have to tell, for the next refresh; whether they have more before they are asked for anything."""
         if self._exchange.passed:
             self._exchange.pass_by()
-        if self._series.numbers[UNFINISHED]:
+        if self._numbers[UNFINISHED]:
             self._finish(now_ns)
         loud = False
         for _, unit, link in self._rows:
@@ -160,12 +165,12 @@ class Accompanied:
         exchange = self._exchange
         if not heard:
             exchange.passed += 1
-            if self._series.numbers[CHANGED]:
+            if self._numbers[CHANGED]:
                 exchange.pass_by()
 
     def _end(self, now_ns: int) -> None:
         """The last of some scans is over."""
-        numbers = self._series.numbers
+        numbers = self._numbers
         if numbers[UNFINISHED]:
             self._finish(now_ns)
         self._exchange.news = numbers[AGAIN] & NEWS != 0
@@ -174,7 +179,7 @@ class Accompanied:
         """Have done what the processors ask for that ran; whether that made links have something to tell.
 
         Raises RuntimeError if the program of one has trapped, which is a fault of ours."""
-        numbers, loud = self._series.numbers, False
+        numbers, loud = self._numbers, False
         if numbers[FAULTY]:
             number = numbers[FAULTY].bit_length() - 1
             raise RuntimeError(str(self._series.companions[number].trap_at(numbers[POINT])))
