@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 
 SOCKETS = range(1, 9)
 AREAS = range(1, 9)
@@ -106,6 +107,7 @@ def host_of(high: int, low: int) -> str:
     return f"{high >> 8}.{high & 0xFF}.{low >> 8}.{low & 0xFF}"
 
 
+@lru_cache(1024)
 def words_of(host: str) -> tuple[int, int]:
     """The two words of a dotted address."""
     a, b, c, d = (int(part) for part in host.split("."))
