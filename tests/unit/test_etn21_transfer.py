@@ -182,14 +182,29 @@ def test_the_counter_shows_1984_at_most() -> None:
     assert rig.waiting() == 4096 - 2 * 1984
 
 
-def test_taking_bytes_grants_the_room_that_they_leave() -> None:
+def test_taking_bytes_grants_the_room_that_they_leave_by_segments() -> None:
+    """RFC 1122 4.2.3.3: the window does not open by less than a segment, 1,024 bytes."""
     rig = opened()
     assert rig.scan(Received(1, bytes(4096))) == []
     rig.parameters(count=100)
-    assert rig.scan(Switch.RECEIVE) == [Grant(1, 100)]
+    assert rig.scan(Switch.RECEIVE) == []
+    rig.scan()
+    rig.parameters(count=924)
+    assert rig.scan(Switch.RECEIVE) == [Grant(1, 1024)]
     rig.scan()
     rig.parameters(count=1984)
-    assert rig.scan(Switch.RECEIVE) == [Grant(1, 2084)]
+    assert rig.scan(Switch.RECEIVE) == [Grant(1, 3008)]
+
+
+def test_short_messages_are_granted_room_for_now_and_then() -> None:
+    rig = opened()
+    rig.parameters(count=100)
+    granted = []
+    for _ in range(22):
+        rig.scan(Received(1, bytes(100)))
+        granted += rig.scan(Switch.RECEIVE)
+        rig.scan()
+    assert granted == [Grant(1, 4096)] * 2
 
 
 def test_a_receive_times_out_and_the_socket_stays_open() -> None:
