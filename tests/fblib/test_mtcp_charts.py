@@ -43,34 +43,34 @@ def test_exact(block: str) -> None:
 @each_of("block", BLOCKS)
 def test_real(block: str) -> None:
     """Switches and flags are out of step: the reply waits before the Sending flag has fallen."""
-    rig = Rig(rd=block, timing="real", seed=5).connect()
+    rig = Rig(rd=block, timing="real", seed=2).connect()
     rig.scan(10)
     rig.set("rd_Cmd", True)
     assert (
         rig.chart(22, *EXCHANGE)
         == """
         Main.rd_Cmd          ######################
-        Main.rd.Rcv_Counter  0               |1
+        Main.rd.Rcv_Counter  0                 |1
         Main.rd.Error        ......................
-        CIO1519.03           ######................   Send Request Switch
-        CIO1509.02           .######...............   TCP Sending Flag
-        CIO1519.04           ........#######.......   Receive Request Switch
-        CIO1509.01           .........######.......   TCP Receiving Flag
-        CIO1509.13           ..#######.............   TCP Data Received Flag
+        CIO1519.03           #########.............   Send Request Switch
+        CIO1509.02           .#########............   TCP Sending Flag
+        CIO1519.04           ...........######.....   Receive Request Switch
+        CIO1509.01           ............#####.....   TCP Receiving Flag
+        CIO1509.13           ..##########..........   TCP Data Received Flag
     """
     )
 
 
 def test_connect_real() -> None:
-    rig = Rig(timing="real", seed=5)
+    rig = Rig(timing="real", seed=2)
     assert (
         rig.chart(22, *CONNECTION)
         == """
         Main.Connect              ######################
         Main.conn.ENO             ...............#######
         Main.conn.Waiting_Server  ###############.......
-        CIO1519.02                .......#####..........   TCP Active Open Request Switch
-        CIO1519.05                ######................   Close Request Switch
+        CIO1519.02                ........######........   TCP Active Open Request Switch
+        CIO1519.05                #######...............   Close Request Switch
         CIO1509.15                ..............########   TCP Open Flag
     """
     )
@@ -82,7 +82,7 @@ def test_connect_real() -> None:
         Main.conn.ENO             ..............
         Main.conn.Waiting_Server  ..............
         CIO1519.02                ..............   TCP Active Open Request Switch
-        CIO1519.05                .######.......   Close Request Switch
-        CIO1509.15                #########.....   TCP Open Flag
+        CIO1519.05                .#########....   Close Request Switch
+        CIO1509.15                #############.   TCP Open Flag
     """
     )
