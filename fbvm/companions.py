@@ -129,9 +129,10 @@ class Accompanied:
             self._exchange.passed -= 1
             loud = self._hear(now_ns)
         numbers[FIRST] = now_ns
-        self._series.call_refresh(self._numbers_at)
+        asked = self._series.call_refresh(self._numbers_at)
         if numbers[CHANGED]:
             self._exchange.pass_by()
+        if asked:
             loud = self._finish(now_ns) or loud
         return loud
 
