@@ -9,7 +9,6 @@ open, W343.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from copy import deepcopy
 from functools import cached_property
 from typing import Any
 
@@ -20,7 +19,7 @@ from fbvm.units.etn21_faults import Fault, Faults
 from fbvm.units.etn21_mail import Mail
 from fbvm.units.etn21_map import Layout
 from fbvm.units.etn21_names import descriptions, meanings
-from fbvm.units.etn21_words import Words
+from fbvm.units.etn21_words import Words, numbers
 from fbvm.units.unit import AreaMemory, Exchanged
 from fbvm.wire.link import Event, Request
 
@@ -78,8 +77,8 @@ class Etn21:
         self._initializing, self._restart = own.view("ETN21_Initializing", "u16"), own.view("ETN21_Restart", "u16")
         self._service_status = own.view("ETN21_Service_Status", "u16")
         self._error_status = own.view("ETN21_Error_Status", "u16")
-        self._seen = self._n[at.SWITCHES : at.FINS_TCP_STATUS].cast("B").cast("Q")
-        """The request switches as one number, as they were when the last refresh ended."""
+        self._seen, self._reported = numbers(self._n)
+        """As they were when the last refresh ended."""
         self._wake, self._changed = own.view("ETN21_Wake", "i64"), own.view("ETN21_News", "u8")
         self._mail = Mail(own, odd_filler)
         self.faults = Faults(own)
@@ -89,7 +88,7 @@ class Etn21:
         """Another unit in the same state, which shares the PLC's memory."""
         twin = Etn21(**self._made)  # type: ignore[arg-type]
         twin._connect(self._processor.copy(), twin._mail.odd_filler)
-        twin._mail.inboxes = deepcopy(self._mail.inboxes)
+        twin._mail.take_over(self._mail)
         twin._words = self._words
         return twin
 
@@ -175,8 +174,9 @@ class Etn21:
         """The words of the PLC that the unit is in now."""
         words = self._words = Words(self.layout, memory)
         table = self._processor.view("ETN21_Lengths", "u32")
-        for code, length in lengths(memory).items():
-            table[code - at.FIRST_AREA_CODE] = length
+        known = lengths(memory)
+        for number in range(len(table)):
+            table[number] = known.get(at.FIRST_AREA_CODE + number, 0)
         return words
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
@@ -186,8 +186,8 @@ class Etn21:
             words = self._look_at(memory)
         if events:
             self._mail.post(events)
-        elif now_ns < self.wake_ns and words.switches[0] == self._seen[0] and not self._asked(words):
-            words.status[0], words.status[1] = self._service_status[0], self._error_status[0]
+        elif (now_ns < self.wake_ns and words.switches[0] == self._seen[0] and words.status[0] == self._reported[0]
+              and not self._asked(words)):  # fmt: skip
             self._changed[0] = 0
             return []
         self._run(words, now_ns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, MutableSequence
 from dataclasses import dataclass
 from typing import Any, overload
@@ -27,7 +28,9 @@ class Fault:
 
 
 class Faults(MutableSequence[Fault]):
-    """Those that wait for a request, in order.  Raises ValueError for more than there is room for (255)."""
+    """Those that wait for a request, in order.
+
+    Raises ValueError for more than there is room for (255), and for a code that is no word."""
 
     def __init__(self, processor: Processor) -> None:
         self._count = processor.view("ETN21_Fault_Count", "u16")
@@ -43,10 +46,14 @@ class Faults(MutableSequence[Fault]):
         most = len(self._rows) // ROW
         if len(faults) > most:
             raise ValueError(f"an ETN21 has room for {most} faults; {len(faults)} were given")
-        for number, fault in enumerate(faults):
-            self._rows[ROW * number] = fault.code
-            self._rows[ROW * number + 1] = ANY_SWITCH if fault.switch is None else fault.switch
-            self._rows[ROW * number + 2] = ANY_SOCKET if fault.socket is None else fault.socket
+        rows = array("H")
+        for fault in faults:
+            if not 0 <= fault.code <= 0xFFFF:
+                raise ValueError(f"response code {fault.code} is not in 0..65535")
+            rows.append(fault.code)
+            rows.append(ANY_SWITCH if fault.switch is None else fault.switch)
+            rows.append(ANY_SOCKET if fault.socket is None else fault.socket)
+        self._rows[: len(rows)] = memoryview(rows)
         self._count[0] = len(faults)
 
     def __len__(self) -> int:

@@ -1,6 +1,6 @@
-"""What an ETN21 has received and its program has not fetched, one inbox a socket.
+"""The bytes that one socket of an ETN21 has received and its program has not fetched.
 
-The unit's processor counts only; it says by number which bytes, or which datagram, go to PLC memory."""
+The unit's processor counts only; it says by number which bytes go to PLC memory.  Datagrams lie one behind the other."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ COUNTER = 0xFFFF_FFFF
 """Numbers begin again after this."""
 
 
-class Stream:
-    """Bytes of a connection, of which the first has this number."""
+class Inbox:
+    """Bytes by number: the first one since power-on has number 0."""
 
-    def __init__(self, first: int) -> None:
-        self._first = first
+    def __init__(self) -> None:
+        self._first = 0
+        """Number of the first that is here."""
         self._bytes = bytearray()
 
     def add(self, data: bytes) -> None:
@@ -20,7 +21,7 @@ class Stream:
         self._bytes += data
 
     def take(self, first: int, size_bytes: int) -> bytes:
-        """Those from a number on; they and all before them are forgotten."""
+        """So many from a number on; they and all before them are forgotten."""
         begin = first - self._first & COUNTER
         end = begin + size_bytes
         data = bytes(self._bytes[begin:end])
@@ -28,22 +29,6 @@ class Stream:
         self._first = self._first + end & COUNTER
         return data
 
-
-class Datagrams:
-    """Datagrams, of which the first has this number."""
-
-    def __init__(self, first: int) -> None:
-        self._first = first
-        self._datagrams: list[bytes] = []
-
-    def add(self, data: bytes) -> None:
-        """Another has come."""
-        self._datagrams.append(data)
-
-    def take(self, first: int, size_bytes: int) -> bytes:
-        """The beginning of the one with this number; it and all before it are forgotten."""
-        place = first - self._first & COUNTER
-        data = self._datagrams[place][:size_bytes]
-        del self._datagrams[: place + 1]
-        self._first = first + 1 & COUNTER
-        return data
+    def forget(self) -> None:
+        """Nobody wants what is here."""
+        self.take(self._first, len(self._bytes))

@@ -5,12 +5,13 @@ The rows are ETN21_Event and ETN21_Request of fblib/omron/etn21/ETN21_Memory.st.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from copy import deepcopy
 from struct import Struct
 
 from fbvm.units import etn21_map as at
 from fbvm.units.etn21_codes import code_of
 from fbvm.units.etn21_data import fetch, store
-from fbvm.units.etn21_inbox import Datagrams, Stream
+from fbvm.units.etn21_inbox import Inbox
 from fbvm.units.unit import AreaMemory, Processor
 from fbvm.wire.link import (
     Bind,
@@ -79,7 +80,8 @@ class Mail:
         """Events for which the table has no room now."""
         self._received: list[tuple[int, Received]] = []
         """What was received in the rows that are posted, with their offsets."""
-        self.inboxes: dict[int, Stream | Datagrams] = {}
+        self._inboxes: dict[int, Inbox] = {}
+        """Of the sockets that were opened at any time."""
 
     @property
     def waits(self) -> bool:
@@ -91,13 +93,23 @@ class Mail:
         self._posted[0] = self._requested[0] = self._urgent[0] = 0
         self._later.clear()
         self._received.clear()
-        self.inboxes.clear()
+        for inbox in self._inboxes.values():
+            inbox.forget()
+
+    def take_over(self, other: Mail) -> None:
+        """Go on where this one is; the tables are those of a copy of its processor."""
+        self._later, self._received = [*other._later], [*other._received]
+        self._inboxes = deepcopy(other._inboxes)
 
     def post(self, events: Iterable[Event]) -> None:
         """Give events to the processor; what does not fit waits for the refresh after, unknown channels are dropped."""
         posted: int = self._posted[0]
+        if not posted and self._received:
+            self._keep()
+        if self._later:
+            events, self._later = [*self._later, *events], []
         for event in events:
-            if posted == self._most or self._later:
+            if posted == self._most:
                 self._later.append(event)
                 continue
             if event.channel not in at.SOCKETS:
@@ -112,13 +124,9 @@ class Mail:
     def collect(self, memory: AreaMemory) -> list[Request]:
         """After a refresh: what the processor asks of the network; what it asks of the memory is done."""
         if self._received:
-            for offset, event in self._received:
-                if self._events[offset + TAKEN]:
-                    self.inboxes[event.channel].add(event.data)
-            self._received.clear()
+            self._keep()
         if self._later:
-            later, self._later = self._later, []
-            self.post(later)
+            self.post(())
         requests: list[Request] = []
         if count := self._requested[0]:
             self._requested[0] = self._urgent[0] = 0
@@ -127,13 +135,20 @@ class Mail:
                 if kind == GRANT:
                     requests.append(Grant(channel, size))
                 elif kind == STORE:
-                    store(memory, high, low, self.inboxes[channel].take(first, size), self.odd_filler)
+                    store(memory, high, low, self._inboxes[channel].take(first, size), self.odd_filler)
                 elif kind == SEND:
                     data = fetch(memory, high, low, size)
                     requests += [Send(channel, data[at : at + TCP_PART]) for at in range(0, size, TCP_PART)]
                 else:
                     requests.append(self._rare(kind, channel, row, memory))
         return requests
+
+    def _keep(self) -> None:
+        """What the processor has taken of what was received."""
+        for offset, event in self._received:
+            if self._events[offset + TAKEN]:
+                self._inboxes[event.channel].add(event.data)
+        self._received.clear()
 
     def _rare(self, kind: int, channel: int, row: tuple[int, ...], memory: AreaMemory) -> Request:
         """What is not asked for in each exchange."""
@@ -142,7 +157,7 @@ class Mail:
         remote = Peer(at.host_of(row[4], row[5]), row[6])
         if kind == SEND_TO:
             return SendTo(channel, remote, fetch(memory, row[7], row[8], row[9]))
-        self.inboxes[channel] = Datagrams(row[10]) if kind == BIND else Stream(row[10])
+        self._inboxes.setdefault(channel, Inbox()).take(row[10], 0)
         if kind == CONNECT:
             return Connect(channel, remote, row[3], bool(row[2]))
         if kind == LISTEN:

@@ -6,6 +6,13 @@ from fbvm.units import etn21_map as at
 from fbvm.units.unit import AreaMemory
 
 
+def numbers(n: memoryview) -> tuple[memoryview, memoryview]:
+    """Of the words from n on: the request switches n+19..n+22 as one number, and n+17..n+20, which begin with what the unit
+    reports of itself."""
+    switches, status = n[at.SWITCHES : at.SWITCHES + 4], n[at.SERVICE_STATUS : at.SERVICE_STATUS + 4]
+    return switches.cast("B").cast("Q"), status.cast("B").cast("Q")
+
+
 class Words:
     """What a unit with this layout exchanges with a memory."""
 
@@ -17,7 +24,4 @@ class Words:
         self.n = cio[n : n + at.CIO_WORDS]
         self.m = memory.words("D")[layout.m : layout.m + at.D_WORDS]
         self.initializing, self.restart = a[at.INITIALIZING : at.INITIALIZING + 1], a[at.RESTART : at.RESTART + 1]
-        self.status = cio[n + at.SERVICE_STATUS : n + at.SWITCHES]
-        """n+17 and n+18."""
-        self.switches = cio[n + at.SWITCHES : n + at.FINS_TCP_STATUS].cast("B").cast("Q")
-        """n+19..n+22 as one number."""
+        self.switches, self.status = numbers(self.n)

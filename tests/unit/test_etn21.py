@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
+
 import pytest
 from common_unit_tests import CommonUnitTests, FakeMemory
-from etn21_rig import SERVER, Rig
+from etn21_rig import E2, SERVER, Rig
 from rows import each_of
 
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21 import Etn21, Fault
 from fbvm.units.etn21_map import LINK_UP, Layout, Switch
 from fbvm.units.unit import Unit
-from fbvm.wire.link import Close, Closed, Connect, Opened
+from fbvm.wire.link import Close, Closed, Connect, Grant, Opened, Received, Sent
 
 
 def writable(unit_number: int) -> set[tuple[str, int]]:
@@ -192,6 +194,21 @@ def test_a_restart_takes_1_to_3_s_assumed() -> None:
     assert a[501] == 0
 
 
+def test_until_a_restart_is_over_its_status_words_stay_whatever_the_program_does() -> None:
+    rig = Rig(Etn21(timing="real"))
+    rig.memory.words("A")[501] |= 1
+    for _ in range(10):
+        rig.scan()
+    rig.memory.words("A")[501] = 0
+    rig.unit.link_up = False
+    for _ in range(10):
+        rig.scan()
+        assert (rig.cio[1517], rig.memory.words("A")[302]) == (LINK_UP, 1)
+    rig.wait(3)
+    rig.scan()
+    assert (rig.cio[1517], rig.memory.words("A")[302]) == (0, 0)
+
+
 def test_the_restart_bit_of_another_unit_is_none_of_its_business() -> None:
     rig = Rig()
     rig.open()
@@ -199,3 +216,54 @@ def test_the_restart_bit_of_another_unit_is_none_of_its_business() -> None:
     assert rig.scan() == []
     assert rig.is_open()
     assert rig.memory.words("A")[501] == 0xFFFE
+
+
+def test_what_comes_at_once_after_a_restart_is_kept_even_if_the_network_answers_before_it_is_asked() -> None:
+    rig = Rig()
+    rig.open()
+    rig.unit.reset(rig.memory)
+    rig.parameters(count=4)
+    assert rig.scan(Switch.ACTIVE_OPEN) == []
+    asked = rig.scan(Closed(1), Opened(1, 49152, SERVER), Received(1, b"abcd"))
+    assert asked == [Connect(1, SERVER), Grant(1, 4096)]
+    rig.parameters(count=4)
+    assert rig.ask(Switch.RECEIVE) == "0000"
+    assert rig.d[1000:1002].tolist() == [0x6162, 0x6364]
+
+
+@pytest.mark.parametrize("events", [1, 64, 65, 300])
+def test_a_copy_has_what_the_unit_has_received_and_not_taken_yet(events: int) -> None:
+    rig = Rig()
+    rig.open()
+    rig.scan(*[Received(1, bytes((number % 256,))) for number in range(events)])
+    rig.unit = deepcopy(rig.unit)
+    for _ in range(6):
+        rig.scan()
+    rig.parameters(count=1984)
+    assert rig.ask(Switch.RECEIVE) == "0000"
+    words = rig.d[1000 : 1000 + (events + 1) // 2].tolist()
+    assert b"".join(word.to_bytes(2, "big") for word in words)[:events] == bytes(number % 256 for number in range(events))
+
+
+def test_a_unit_that_comes_to_another_plc_knows_its_banks() -> None:
+    rig = Rig()
+    rig.open()
+    rig.parameters(count=2, address=(E2, 0, 0))
+    assert rig.ask(Switch.SEND, Sent(1, 2)) == "0000"
+    smaller = FakeMemory()
+    del smaller._areas["E2"]
+    for area in ("CIO", "D"):
+        smaller.words(area)[:] = rig.memory.words(area)
+    rig.memory, rig.cio, rig.d = smaller, smaller.words("CIO"), smaller.words("D")
+    rig.parameters(count=2, address=(E2, 0, 0))
+    assert rig.ask(Switch.SEND, Sent(1, 2)) == "1101"
+
+
+def test_faults_that_are_refused_leave_the_others_as_they_were() -> None:
+    unit = Etn21(faults=[Fault(0x2211), Fault(0x0302, Switch.SEND, 1)])
+    before = [*unit.faults]
+    with pytest.raises(ValueError, match=r"response code 65536 is not in 0\.\.65535"):
+        unit.faults[:] = [Fault(1), Fault(0x10000)]
+    with pytest.raises(ValueError, match="room for 255 faults; 256 were given"):
+        unit.faults[1:1] = [Fault(1)] * 254
+    assert unit.faults == before
