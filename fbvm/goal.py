@@ -46,10 +46,16 @@ class Goal:
         condition: Condition = parse_condition(until, self._plc.find)
         return lambda: condition.holds(self._plc.read)
 
-    def scans_left(self, step_ns: int) -> int:
-        """How many scans, each so much later than the one before, come before the goal; 1 for a condition."""
+    @property
+    def scans_left(self) -> int:
+        """How many scans come before the goal, whatever time they take; 1 for a condition."""
+        return 1 if self._until else self._last_scan - self._plc.scans
+
+    @property
+    def cycles_left(self) -> int:
+        """How many scans of a cycle each come before the goal; 1 for a condition."""
         plc = self._plc
-        return 1 if self._until else min(self._last_scan - plc.scans, -((plc.elapsed_ns - self._end_ns) // step_ns))
+        return min(self.scans_left, -((plc.elapsed_ns - self._end_ns) // plc.cycle_ns))
 
     def reached(self) -> str:
         """"trap", "until", "scans", "time", "max" or "break" if that ended the run, else ""."""

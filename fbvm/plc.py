@@ -233,7 +233,7 @@ class Plc:
         that stands at a breakpoint; the next run goes on there."""
         goal = Goal(self, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
         while not (reason := goal.reached()):
-            if (left := goal.scans_left(self.cycle_ns)) < 2 or not self.scan_many(left):
+            if (left := goal.cycles_left) < 2 or not self.scan_many(left):
                 self.scan()
         return reason
 

@@ -92,6 +92,11 @@ class ChannelLink(ABC):
                     self.told.append(Closed(channel))
                 case SendTo(channel, remote, data):
                     self._check(channel, there.send_to(remote, data, now_ns) if there else "ENOTCONN")
+        if self.told:
+            self.stir()
+
+    def stir(self) -> None:  # noqa: B027
+        """There is something to tell: nothing to do where nobody sleeps meanwhile."""
 
     @property
     def is_quiet(self) -> bool:

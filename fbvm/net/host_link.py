@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from fbvm.net.channels import Channel, ChannelLink
 from fbvm.net.switchboard import Switchboard
-from fbvm.wire.link import Event, Request
+from fbvm.wire.link import Event
 
 
 class HostLink(ChannelLink):
@@ -34,8 +34,6 @@ class HostLink(ChannelLink):
         self.is_quiet = not self.waiting and (network.driven or not network.watched)
         return told
 
-    def submit(self, requests: Iterable[Request], now_ns: int) -> None:
-        super().submit(requests, now_ns)
-        if self.told:
-            self.is_quiet = False
-            self._network.unheard.add(self)
+    def stir(self) -> None:
+        self.is_quiet = False
+        self._network.unheard.add(self)

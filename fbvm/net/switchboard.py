@@ -148,7 +148,7 @@ class Switchboard(ABC):
             link = watcher.link
             link.is_quiet = False
             if link.told:
-                self.unheard.add(link)
+                link.stir()
             woken.append(link)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):
             self._orphans.popleft()[1].give_up(now_ns)

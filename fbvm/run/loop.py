@@ -85,15 +85,14 @@ def _scan_all(queue: _Queue | _Alone, now_ns: int, woken: Numbers, real: bool) -
         plc, due_ns = run.plc, run.due_ns
         scan = plc.scans
         times = run.scan(now_ns)
-        if scans := plc.scans - scan:
-            ended_ns = time.monotonic_ns()
-            if times:
-                plc.scan_times.note_burst(scan, times, ended_ns - began_ns)
-            else:
-                plc.scan_times.note(scan, (ended_ns - began_ns) // scans, scans)
+        ended_ns = time.monotonic_ns()
+        if times:
+            plc.scan_times.note_burst(scan, times, ended_ns - began_ns)
+        elif scans := plc.scans - scan:
+            plc.scan_times.note(scan, (ended_ns - began_ns) // scans, scans)
             if real and run.pace == CYCLIC:
                 plc.lateness.note(scan, now_ns - due_ns + began_ns - first_ns)
-            began_ns = ended_ns
+        began_ns = ended_ns
         queue.put(number, run)
 
 
@@ -234,7 +233,8 @@ class _Real:
 
     def _serve(self, now_ns: int) -> Numbers:
         """Asks the networks what happened until now; whom it wakes."""
-        numbers, woken = self._numbers, Numbers()
+        numbers = self._numbers
+        woken: Numbers = {}
         for network in self._networks:
             for link in network.serve(now_ns):
                 if link in numbers:

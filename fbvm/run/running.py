@@ -16,8 +16,6 @@ PACES = (CYCLIC, EVENT)
 """cyclic: a fixed period.  event: at once when there is something new to see, else at the earliest time that matters."""
 MOST_AT_ONCE = 16
 """Scans of one PLC in event pace before the network and the others have their turn again."""
-AT_ONCE_NS = 1
-"""How much later than the one before it such a scan begins, at least: time ends a run between two bursts, not in one."""
 
 
 @dataclass(frozen=True)
@@ -83,11 +81,11 @@ class Running:
         times: list[int] = []
         if self._writes:
             self._write(max(now_ns - self._behind_ns, plc.now_ns))
-        if self._clock and (many := self._undisturbed(plc.cycle_ns if self._writes else AT_ONCE_NS)) > 1:
+        if self._clock and (many := self._cycles_left if self._writes else self._goal.scans_left) > 1:
             times = plc.scan_at_once(min(many, MOST_AT_ONCE), self._clock)
         if times:
             now_ns = times[-1] + self._behind_ns
-        elif self.alone and (many := self._undisturbed(plc.cycle_ns)) > 1 and plc.scan_many(many):
+        elif self.alone and (many := self._cycles_left) > 1 and plc.scan_many(many):
             self.due_ns = plc.elapsed_ns + self._behind_ns
             self.reason = self._goal.reached()
             return times
@@ -111,7 +109,8 @@ class Running:
             write = self._writes.pop(0)
             self.plc.write(write.where, write.value)
 
-    def _undisturbed(self, step_ns: int) -> int:
-        """How many scans, each so much later than the one before, come before the goal or the next write."""
-        left = self._goal.scans_left(step_ns)
-        return min(left, -((self.plc.elapsed_ns - self._writes[0].at_ns) // step_ns)) if self._writes else left
+    @property
+    def _cycles_left(self) -> int:
+        """How many scans of a cycle each come before the goal, or the next write."""
+        left, plc = self._goal.cycles_left, self.plc
+        return min(left, -((plc.elapsed_ns - self._writes[0].at_ns) // plc.cycle_ns)) if self._writes else left
