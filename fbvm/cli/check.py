@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,12 +13,9 @@ import click
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.check.silence import Wanted
 from fbvm.cli import status
-from fbvm.cli.patience import patience
-from fbvm.cli.project import check_options, project_named
+from fbvm.cli.beside import check_options, project_named
 from fbvm.cli.sources import chosen, report, source_options
-from fbvm.code.compiler import compile_files
-from fbvm.run.plant import Plant
-from fbvm.run.project import Project, read_project
+from fbvm.code.compiler import LONG, compile_files
 
 BESIDE_PROJECTS = {"no_warn": "--no-warn", "warnings_as_errors": "--warnings-as-errors", "as_json": "--json"}
 """What may be said beside a project."""
@@ -41,7 +40,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         wanted = Wanted.of(codes, warnings_as_errors)
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--no-warn") from None
-    with patience(f"checking {', '.join(path.name for path in files)}") as progress:
+    with _patience(files) as progress:
         if project := project_named(files):
             check_options(click.get_current_context(), BESIDE_PROJECTS)
             diagnostics = _of_project(project, wanted)
@@ -55,8 +54,20 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         sys.exit(status.PROGRAM_ERRORS)
 
 
+def _patience(files: tuple[Path, ...]) -> AbstractContextManager[Callable[[str, int, int], None]]:
+    """Who says on a terminal how far a long check is; for a short one nothing is loaded."""
+    if not sys.stderr.isatty() or all(path.is_file() for path in files) and sum(path.stat().st_size for path in files) < LONG:
+        return nullcontext(lambda what, done, known: None)
+    from fbvm.cli.patience import patience
+
+    return patience(f"checking {', '.join(path.name for path in files)}")
+
+
 def _of_project(file: Path, wanted: Wanted) -> list[Diagnostic]:
     """What is wrong with a project: its file, and the programs of its PLCs, each thing once."""
+    from fbvm.run.plant import Plant
+    from fbvm.run.project import Project, read_project
+
     project = read_project(file)
     if not isinstance(project, Project):
         return project

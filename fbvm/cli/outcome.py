@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import shutil
+import sys
 from dataclasses import dataclass
 from types import TracebackType
+from typing import TYPE_CHECKING
 
 import click
-from rich.console import Console
-from rich.live import Live
-from rich.progress_bar import ProgressBar
-from rich.table import Table
 
 from fbvm.breakpoints import Halt
 from fbvm.cli import status
@@ -22,6 +20,9 @@ from fbvm.record.recorder import Recorder
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, in_hexadecimal, plain_value, show, show_time
+
+if TYPE_CHECKING:
+    from rich.live import Live
 
 MS_NS = 1_000_000
 PIPE_WIDTH = 100
@@ -124,13 +125,11 @@ class Progress:
     """A line on the terminal while a run lasts; nothing in a pipe, and nothing without a PLC."""
 
     def __init__(self, plc: Plc | None, scans: int | None, for_ns: int | None) -> None:
-        console = Console(stderr=True)
-        self._live = Live(console=console, auto_refresh=False, transient=True) if plc and console.is_terminal else None
+        self._shows = plc is not None and sys.stderr.isatty()
+        self._live: Live | None = None
         self._scans, self._for_ns = scans, for_ns
 
     def __enter__(self) -> Progress:
-        if self._live:
-            self._live.start()
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
@@ -138,9 +137,17 @@ class Progress:
             self._live.stop()
 
     def update(self, plc: Plc) -> None:
-        """Shows how far the run is."""
-        if not self._live:
+        """Shows how far the run is, from the first time on that somebody tells it; what ends before needs no line."""
+        if not self._shows:
             return
+        from rich.console import Console
+        from rich.live import Live
+        from rich.progress_bar import ProgressBar
+        from rich.table import Table
+
+        if self._live is None:
+            self._live = Live(console=Console(stderr=True), auto_refresh=False, transient=True)
+            self._live.start()
         total, done = (self._scans, plc.scans) if self._scans else (self._for_ns, plc.elapsed_ns)
         row = Table.grid(padding=(0, 1))
         row.add_row(ProgressBar(total=total, completed=done, width=40, pulse=total is None),

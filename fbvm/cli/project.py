@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import click
@@ -12,11 +12,12 @@ from click.core import ParameterSource
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli import status
+from fbvm.cli.beside import check_options
 from fbvm.cli.outcome import EXIT_STATUS, Progress, for_scripts, shown, trap_for_scripts
 from fbvm.cli.sources import report, show
 from fbvm.run import run_all
 from fbvm.run.plant import Kind, Plant
-from fbvm.run.project import FILE, Project, project_file, read_project
+from fbvm.run.project import Project, read_project
 from fbvm.run.running import Running
 from fbvm.scan_times import Lateness, ScanTimes
 from fbvm.watch.names import Names
@@ -25,17 +26,6 @@ from fbvm.watch.values import Value, show_time
 
 OPTIONS = {"net": "--net", "for_ns": "--for", "scans": "--scans", "scan_time": "--scan-time", "as_json": "--json"}
 """What may be said beside a project; everything else is in its file."""
-
-
-def project_named(files: tuple[Path, ...]) -> Path | None:
-    """The project file that the arguments of `fbvm run` mean: a .toml file, a folder that has one, or nothing at all,
-    which is the folder where one is.  None if they are sources."""
-    if len(files) > 1 or (files and not files[0].is_dir() and files[0].suffix != ".toml"):
-        return None
-    where = files[0] if files else Path()
-    if (found := project_file(where)) is None:
-        raise click.UsageError(f"there is no {FILE} in {where.resolve()}; give a FILE, or a folder with a project")
-    return found
 
 
 def run_project(file: Path, context: click.Context) -> int:
@@ -67,17 +57,6 @@ def run_project(file: Path, context: click.Context) -> int:
     real = not plant.network.virtual_time and not as_json and sys.stderr.isatty()
     _print(plant, as_json, context.params["scan_time"] or real)
     return max(EXIT_STATUS.get(run.reason, status.GOOD) for run in plant.runs)
-
-
-def check_options(context: click.Context, allowed: Mapping[str, str]) -> None:
-    """Refuse what may not be said beside a project; `allowed` are the names of parameters and of their options."""
-    given = {name for name in context.params if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
-    given |= {option for option in ("resource", "dialect") if context.meta.get(f"fbvm.{option}") is not None}
-    wrong = [parameter.opts[0] for parameter in context.command.params
-             if parameter.name in given - set(allowed) - {"files"}]
-    if wrong:
-        raise click.UsageError(f"{', '.join(wrong)}: what a project does stands in its file; beside it there are "
-                               f"{', '.join(allowed.values())}")  # fmt: skip
 
 
 def _refuse(diagnostics: list[Diagnostic], as_json: bool) -> int:

@@ -11,13 +11,14 @@ import click
 
 from fbvm.cli import sfc, status
 from fbvm.cli.banks import banks_in, with_banks
+from fbvm.cli.beside import project_named
 from fbvm.cli.breakpoints import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.files import writing
 from fbvm.cli.journals import start_journal
 from fbvm.cli.ladder import drawing
 from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, show_option, time_ns
 from fbvm.cli.outcome import Outcome, Progress
-from fbvm.cli.project import project_named, run_project
+from fbvm.cli.project import run_project
 from fbvm.cli.sources import compiled, source_options
 from fbvm.cli.traces import paging, statement_lines, tracing
 from fbvm.code.image import Image

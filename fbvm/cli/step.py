@@ -9,8 +9,8 @@ import click
 
 from fbvm.cli import status
 from fbvm.cli.bench import Bench, ProjectBench
+from fbvm.cli.beside import project_named
 from fbvm.cli.options import Mapping, Setting, mapping, setting, time_ns
-from fbvm.cli.project import project_named
 from fbvm.cli.prompt import prompted
 from fbvm.cli.run import CYCLE_NS
 from fbvm.cli.sources import compiled, source_options

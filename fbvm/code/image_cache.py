@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from fbvm.base.cache import Cache, modules_hash, name_of
+from fbvm.base.cache import Cache, name_of, state_of
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.code.image import Image
@@ -66,10 +66,9 @@ def _diagnostic(row: list[Any], sources: Sequence[Source]) -> Diagnostic:
 
 @cache
 def _own() -> str:
-    """A hash of the modules that make images, of the grammar and of the libraries that come along."""
+    """What stands for the modules that make images, the grammar and the libraries that come along."""
     package = Path(__file__).parents[1]
-    modules = [path for room in ROOMS for path in sorted((package / room).glob("*.py"))]
-    return modules_hash(*modules, *sorted(data_folder("grammar").glob("*"))) + _library(data_folder("fblib"))
+    return state_of(*(package / room for room in ROOMS), data_folder("grammar"), data_folder("fblib"))
 
 
 def _library(folder: Path) -> str:

@@ -23,10 +23,8 @@ class Stored:
 
 
 def name_of(*parts: str) -> str:
-    """The name for what depends on these texts, on this package's native modules, on LLVM and on the processor."""
-    folder = Path(__file__).parent
-    modules = (*sorted(folder.glob("native*.py")), folder / "ranges.py", folder / "bases.py")
-    return cache.name_of((*parts, *host(), cache.modules_hash(*modules)))
+    """The name for what depends on these texts, on this package's engines, on LLVM and on the processor."""
+    return cache.name_of((*parts, *host(), cache.state_of(Path(__file__).parent)))
 
 
 def read(name: str) -> Stored | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -96,6 +97,18 @@ def test_another_version_counts(anew: list[int], monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(image_cache, "_own", lambda: "another")
     compiled()
     assert len(anew) == 2
+
+
+def test_the_state_of_files_is_where_they_are_how_large_and_when_they_were_written(tmp_path: Path) -> None:
+    states = []
+    for name, text, at_ns in (("One.st", "a", 5), ("One.st", "a", 5), ("One.st", "ab", 5), ("One.st", "ab", 6),
+                              ("b/Two.st", "", 6), ("README.md", "for people", 6)):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+        os.utime(tmp_path / name, ns=(at_ns, at_ns))
+        cache.state_of.cache_clear()
+        states.append(cache.state_of(tmp_path))
+    assert [states.index(state) for state in states] == [0, 0, 2, 3, 4, 4]
 
 
 def test_errors_are_not_kept(anew: list[int], folder: Path) -> None:

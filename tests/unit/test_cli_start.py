@@ -1,0 +1,37 @@
+"""What the command line loads before it does anything: nothing that a verb does not need, since that is most of its time."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+LOADED = """
+import sys
+from fbvm.cli.main import main
+try:
+    main(sys.argv[1:], standalone_mode=False)
+finally:
+    print(*({"rich", "lark", "llvmlite", "fbvm.engine", "fbvm.plc", "fbvm.run", "fbvm.net"} & set(sys.modules)))
+"""
+
+
+USED = {"fbvm.engine", "fbvm.plc", "fbvm.run", "fbvm.net", "llvmlite"}
+"""What a run needs; its units have processors of their own, whose programs are machine code."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("words", "needed"), [
+    (["check", "main.st"], set()), (["fmt", "--check", "main.st"], set()), (["explain", "S0201"], set()),
+    (["list", "main.st"], {"fbvm.engine"}), (["run", "main.st", "--scans", "3", "--engine", "python"], USED),
+])  # fmt: skip
+def test_a_verb_loads_what_it_needs(
+        words: list[str], needed: set[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = "PROGRAM Main\nVAR\n    d : TON;\nEND_VAR\n    d(IN := TRUE, PT := T#1s);\nEND_PROGRAM\n"
+    (tmp_path / "main.st").write_text(text, encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
+    ran = [subprocess.run([sys.executable, "-c", LOADED, *words], cwd=tmp_path, capture_output=True, text=True) for _ in range(2)]
+    assert [one.returncode for one in ran] == [0, 0], ran[0].stderr
+    assert set(ran[1].stdout.splitlines()[-1].split()) == needed
