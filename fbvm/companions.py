@@ -15,7 +15,7 @@ from fbvm.engine.trap import Trap
 from fbvm.exchange import Exchange
 from fbvm.flags import CLOCKWORK
 from fbvm.net.journal import Journal
-from fbvm.units.unit import ProcessorUnit, Unit
+from fbvm.units.unit import Exchanged, ProcessorUnit, Unit
 
 
 def companions(exchange: Exchange) -> list[Companion]:
@@ -36,7 +36,21 @@ def _companion(unit: Unit, exchange: Exchange) -> Companion | None:
         return None
     copies = [(exchange.offset(area, word), own.offset(variable), 2 * count) for area, word, variable, count in exchanged.words]
     watched = [exchange.offset(area, word) for area, word in unit.watched]
-    return machine.companion(copies, watched, *map(own.offset, (exchanged.posted, exchanged.requested, exchanged.wake)))
+    posted, requested, wake = map(own.offset, (exchanged.posted, exchanged.requested, exchanged.wake))
+    return machine.companion(copies, watched, posted, requested, wake, _moves(exchanged, exchange))
+
+
+def _moves(exchanged: Exchanged, exchange: Exchange) -> tuple[int, int, int]:
+    """Where a processor says what is to be moved; it learns where the areas are."""
+    moves, own = exchanged.moves, exchanged.processor
+    if moves is None:
+        return 0, 0, 0
+    variable, areas = moves.targets
+    targets = own.view(variable, "u32")
+    for index, area in areas.items():
+        if area in exchange.memory.areas:
+            targets[index] = exchange.offset(area, 0)
+    return own.offset(moves.count), own.offset(moves.rows), moves.ring_bytes
 
 
 class Accompanied:

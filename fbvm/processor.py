@@ -23,17 +23,18 @@ TASK = 0
 """The one task of its program."""
 
 
-def processor(text: str) -> OwnProcessor:
+def processor(text: str, beside_bytes: int = 0) -> OwnProcessor:
     """A processor with a program of its own, before its first execution; the text is compiled once.
 
-    Raises ValueError for a text that is not one PROGRAM and what it needs."""
-    return _first(text).another()
+    Beside what the program uses, its memory has so many bytes (whole pages) for what others keep there.  Raises
+    ValueError for a text that is not one PROGRAM and what it needs."""
+    return _first(text, beside_bytes).another()
 
 
 @cache
-def _first(text: str) -> OwnProcessor:
+def _first(text: str, beside_bytes: int) -> OwnProcessor:
     """The one of a program that stays, and with it the code for all others."""
-    return OwnProcessor(_compiled(text), {})
+    return OwnProcessor(_compiled(text), beside_bytes, {})
 
 
 def _compiled(text: str) -> Image:
@@ -52,11 +53,13 @@ def _compiled(text: str) -> Image:
 class OwnProcessor:
     """A `fbvm.units.unit.Processor`: machine code where that can be had, else Python."""
 
-    def __init__(self, image: Image, places: dict[str, Place]) -> None:
+    def __init__(self, image: Image, beside_bytes: int, places: dict[str, Place]) -> None:
         self.image = image
         self._places = places
         """Where variables lie, as far as somebody has asked; the same for all with this image."""
-        self.memory = Memory(image.layout.size, image.layout.areas)
+        self.beside_at = image.layout.size
+        self.memory = Memory(self.beside_at + beside_bytes, image.layout.areas)
+        self.beside = self.memory.u8[self.beside_at :]
         for offset, data in image.initial:
             self.memory.u8[offset : offset + len(data)] = data
         self.machine = NativeEngine(image, self.memory) if native.available() else None
@@ -94,7 +97,7 @@ class OwnProcessor:
 
     def another(self) -> OwnProcessor:
         """Another processor with the same program, before its first execution."""
-        return OwnProcessor(self.image, self._places)
+        return OwnProcessor(self.image, len(self.beside), self._places)
 
     def copy(self) -> OwnProcessor:
         """Another processor in the same state."""

@@ -15,8 +15,10 @@ from fbvm.engine.trap import Trap
 
 STATEMENTS = 2_000_000
 """How many it may execute in a run."""
-Shape = tuple[tuple[int, ...], int]
-"""Bytes of each copy, and how many groups are watched: what its machine code is made for."""
+Shape = tuple[tuple[int, ...], int, int]
+"""Bytes of each copy, how many groups are watched, bytes of a ring or 0: what its machine code is made for."""
+MOVE_BYTES = 20
+"""Of a row of what is to be moved (`fbvm.units.unit.Moves`)."""
 
 
 @dataclass(frozen=True)
@@ -39,16 +41,19 @@ class Companion:
     """Offset in its memory of 32 bits with the number of requests that its last run left."""
     wake: int
     """Offset in its memory of 64 bits without sign: the time from which on it is to run."""
+    moves: tuple[int, int, int] = (0, 0, 0)
+    """Offsets in its memory of how many blocks are to be moved, and of their rows; bytes of a ring, 0 if it moves nothing."""
 
     @property
     def shape(self) -> Shape:
         """What its machine code depends on."""
-        return tuple(size for _, _, size in self.copies), len(self.watched)
+        return tuple(size for _, _, size in self.copies), len(self.watched), self.moves[2]
 
     def row(self, memory_at: int) -> Iterator[int]:
         """Its parameters: addresses, and for what is watched what is expected there."""
         own = self.memory_at
         yield from (self.function_at, own, self.context_at, own + self.posted, own + self.requested, own + self.wake)
+        yield from (own + self.moves[0], own + self.moves[1])
         for offset, its_offset, _ in self.copies:
             yield from (memory_at + offset, own + its_offset)
         for offset in self.watched:
@@ -60,7 +65,7 @@ class Companion:
         return [(memory.u8[offset : offset + 8].cast("q"), first + 2 * number) for number, offset in enumerate(self.watched)]
 
 
-FUNCTION, MEMORY, CONTEXT, POSTED, REQUESTED, WAKE, HEAD = range(7)
+FUNCTION, MEMORY, CONTEXT, POSTED, REQUESTED, WAKE, MOVED, MOVES, HEAD = range(9)
 """Numbers of a companion's row, before those of copies and of what is watched: two for each."""
 NEWS, AT_ONCE = 1, 2
 """Why there should be another scan soon: words have changed that the program may look at, a companion has more to do."""
@@ -69,6 +74,9 @@ NEWS, AT_ONCE = 1, 2
 @dataclass(frozen=True)
 class Told:
     """Where among the parameters machine code says what happened; numbers of 64 bits."""
+
+    memory: int
+    """The address of the PLC's memory."""
 
     ran: int
     """Which companions ran in the last refresh, a bit each."""
@@ -114,6 +122,7 @@ br i1 %sound, label %out, label %trap
 out:
 $outof
 $expected
+$moves
 %next = load i64, ptr %wake_at
 %late = icmp uge i64 %now, %next
 %at_once = select i1 %late, i64 {AT_ONCE}, i64 0
@@ -134,6 +143,68 @@ store i64 %number, ptr %point_at
 ret i32 -1
 }}
 """)
+_MOVES = Template(f"""
+%plc_in = load ptr, ptr %memory_at
+%count = load i32, ptr %moved_at
+store i32 0, ptr %moved_at
+br label %row
+row:
+%k = phi i32 [ 0, %out ], [ %k1, %passed ]
+%row_in = phi ptr [ %moves_at, %out ], [ %row_next, %passed ]
+%more = icmp ult i32 %k, %count
+br i1 %more, label %move, label %quiet
+move:
+%target_in = load i32, ptr %row_in
+%target_by = zext i32 %target_in to i64
+%target = getelementptr inbounds i8, ptr %plc_in, i64 %target_by
+%ring_at = getelementptr inbounds i8, ptr %row_in, i64 4
+%ring_in = load i32, ptr %ring_at
+%ring_by = zext i32 %ring_in to i64
+%ring = getelementptr inbounds i8, ptr %m, i64 %ring_by
+%place_at = getelementptr inbounds i8, ptr %row_in, i64 8
+%place = load i32, ptr %place_at
+%size_at = getelementptr inbounds i8, ptr %row_in, i64 12
+%size_in = load i16, ptr %size_at
+%size = zext i16 %size_in to i32
+%filler_at = getelementptr inbounds i8, ptr %row_in, i64 14
+%filler = load i16, ptr %filler_at
+br label %byte
+byte:
+%j = phi i32 [ 0, %move ], [ %j1, %store ]
+%inside = icmp ult i32 %j, %size
+br i1 %inside, label %store, label %last
+store:
+%from = add i32 %place, %j
+%in_ring = and i32 %from, $mask
+%from_by = zext i32 %in_ring to i64
+%from_at = getelementptr inbounds i8, ptr %ring, i64 %from_by
+%value = load i8, ptr %from_at
+%turned = xor i32 %j, 1
+%to_by = zext i32 %turned to i64
+%to_at = getelementptr inbounds i8, ptr %target, i64 %to_by
+store i8 %value, ptr %to_at
+%j1 = add i32 %j, 1
+br label %byte
+last:
+%odd = and i32 %size, 1
+%is_odd = icmp ne i32 %odd, 0
+%fills = icmp ult i16 %filler, 256
+%both = and i1 %is_odd, %fills
+br i1 %both, label %fill, label %passed
+fill:
+%low = xor i32 %size, 1
+%low_by = zext i32 %low to i64
+%low_at = getelementptr inbounds i8, ptr %target, i64 %low_by
+%low_value = trunc i16 %filler to i8
+store i8 %low_value, ptr %low_at
+br label %passed
+passed:
+%k1 = add i32 %k, 1
+%row_next = getelementptr inbounds i8, ptr %row_in, i64 {MOVE_BYTES}
+br label %row
+quiet:
+""")
+"""Blocks of bytes go into the PLC's memory, the high byte of a word first."""
 _COMPANIONS = Template("""
 define internal i32 @companions(ptr %p, i64 %now) {
 $told
@@ -157,7 +228,8 @@ def text(shapes: Sequence[Shape], first: int, told: Told) -> str:
     functions = [_COMPANION.substitute(
         number=number, fields=_lines(_fields(told)), watched=_lines(_watched(HEAD + 2 * len(copies), groups)),
         into=_lines(_into(copies)), outof=_lines(_out_of(copies)), expected=_lines(_expected(groups)), copies=len(copies),
-    ) for number, (copies, groups) in enumerate(kinds)]  # fmt: skip
+        moves=_MOVES.substitute(mask=ring - 1) if ring else "",
+    ) for number, (copies, groups, ring) in enumerate(kinds)]  # fmt: skip
     calls = ["%any0 = add i32 0, 0"]
     for number, shape in enumerate(shapes):
         calls += [_address(f"w{number}", "p", first),
@@ -194,7 +266,8 @@ def _told(told: Told) -> Iterator[str]:
 def _fields(told: Told) -> Iterator[str]:
     """The names that a companion's function uses."""
     yield from _told(told)
-    for number, name in enumerate(("function_at", "m", "c", "posted_at", "requested_at", "wake_at")):
+    for number, name in enumerate((
+            "function_at", "m", "c", "posted_at", "requested_at", "wake_at", "moved_at", "moves_at")):
         yield from _loaded(name, number)
 
 

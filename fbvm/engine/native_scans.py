@@ -52,7 +52,7 @@ MEMORY, CONTEXT, LEFT, FIRST, STEP, BUDGETED, SPEND, DONE, CHANGED, UNFINISHED, 
 context, how many scans, the time of the first one and by how far it goes on, statements that a scan may execute and all
 of them together, how many scans there were, whether something that is watched has changed or which companions ran, and
 what else these tell."""
-TOLD = Told(ran=CHANGED, unfinished=UNFINISHED, again=AGAIN, faulty=FAULTY, point=POINT)
+TOLD = Told(memory=MEMORY, ran=CHANGED, unfinished=UNFINISHED, again=AGAIN, faulty=FAULTY, point=POINT)
 ASKED = -1
 """In place of a trap's point: companions have requests, or one of them has a trap of its own."""
 ROW = 4

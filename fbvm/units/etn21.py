@@ -14,13 +14,13 @@ from typing import Any
 
 from fbvm.processor import OwnProcessor, processor
 from fbvm.units import etn21_map as at
-from fbvm.units.etn21_data import lengths
+from fbvm.units.etn21_data import AREA_OF_CODE, lengths
 from fbvm.units.etn21_faults import Fault, Faults
-from fbvm.units.etn21_mail import Mail
+from fbvm.units.etn21_mail import RING_BYTES, Mail
 from fbvm.units.etn21_map import Layout
 from fbvm.units.etn21_names import descriptions, meanings
 from fbvm.units.etn21_words import Words, numbers
-from fbvm.units.unit import AreaMemory, Exchanged
+from fbvm.units.unit import AreaMemory, Exchanged, Moves
 from fbvm.wire.link import Event, Request
 
 __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
@@ -28,6 +28,8 @@ __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
 TIME_WAIT_NS = 60_000_000_000  # W421 6-9-3 p156
 PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
 TIMINGS = ("exact", "real")
+MOVES = Moves("ETN21_Moved", "ETN21_Moves", RING_BYTES, (
+    "ETN21_Targets", {code - at.FIRST_AREA_CODE: area for code, (area, _) in AREA_OF_CODE.items()}))  # fmt: skip
 
 
 class Etn21:
@@ -59,7 +61,7 @@ class Etn21:
         self._words: Words | None = None
         self._mask = 1 << self.layout.bit
         """Its bit in words for all units."""
-        self._connect(processor(PROGRAM), odd_filler)
+        self._connect(processor(PROGRAM, RING_BYTES * len(at.SOCKETS)), odd_filler)
         own = self._processor
         own.view("ETN21_Unit_Bit", "u16")[0] = self._mask
         ip = own.view("ETN21_IP", "u16")
@@ -80,6 +82,7 @@ class Etn21:
         self._seen, self._reported = numbers(self._n)
         """As they were when the last refresh ended."""
         self._wake, self._changed = own.view("ETN21_Wake", "i64"), own.view("ETN21_News", "u8")
+        self._odd_filler = odd_filler
         self._mail = Mail(own, odd_filler)
         self.faults = Faults(own)
         """Each is used up by the first request that it fits."""
@@ -87,7 +90,7 @@ class Etn21:
     def __deepcopy__(self, known: dict[int, Any]) -> Etn21:
         """Another unit in the same state, which shares the PLC's memory."""
         twin = Etn21(**self._made)  # type: ignore[arg-type]
-        twin._connect(self._processor.copy(), twin._mail.odd_filler)
+        twin._connect(self._processor.copy(), twin._odd_filler)
         twin._mail.take_over(self._mail)
         twin._words = self._words
         return twin
@@ -103,7 +106,7 @@ class Etn21:
         """The words of the unit, and where its program says what it wants."""
         words = (("CIO", self.layout.n, "ETN21_N", at.CIO_WORDS), ("D", self.layout.m, "ETN21_M", at.D_WORDS),
                  ("A", at.INITIALIZING, "ETN21_Initializing", 1), ("A", at.RESTART, "ETN21_Restart", 1))  # fmt: skip
-        return Exchanged(self._processor, words, "ETN21_Posted", "ETN21_Urgent", "ETN21_Wake")
+        return Exchanged(self._processor, words, "ETN21_Posted", "ETN21_Urgent", "ETN21_Wake", MOVES)
 
     @property
     def wake_ns(self) -> int:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -25,6 +25,14 @@ class Processor(Protocol):
     def machine(self) -> Any:
         """What runs it as machine code (a `NativeEngine`), or None."""
 
+    @property
+    def beside(self) -> memoryview:
+        """Bytes of its memory that its program does not use."""
+
+    @property
+    def beside_at(self) -> int:
+        """Where these begin, in bytes."""
+
     def view(self, variable: str, machine: str) -> memoryview:
         """A global variable of the program as a writable memoryview of a machine type (u8, u16, i64 ...)."""
 
@@ -33,6 +41,22 @@ class Processor(Protocol):
 
     def run(self, now_ns: int) -> None:
         """One execution of the program."""
+
+
+@dataclass(frozen=True)
+class Moves:
+    """Blocks of bytes that a processor leaves to be moved into the CPU unit's memory, the high byte of a word first."""
+
+    count: str
+    """UDINT variable: how many there are; whoever has moved them sets it 0."""
+    rows: str
+    """Variable with a row for each, in 32 bits: offset of the first word in the CPU unit's memory, offset of a ring in the
+    processor's, place of the first byte in it; in 16 bits: how many bytes, the low byte beside an odd last one (above 255:
+    what is there stays), and two words that only the unit knows."""
+    ring_bytes: int
+    """Places in a ring begin again after so many, a power of two."""
+    targets: tuple[str, Mapping[int, str]]
+    """Variable that wants to know the offsets of areas in the CPU unit's memory, and which it wants by index."""
 
 
 @dataclass(frozen=True)
@@ -48,6 +72,7 @@ class Exchanged:
     """UDINT variable: how many requests that cannot wait for the end of a burst it has left."""
     wake: str
     """64-bit variable: time in ns (of the PLC) from which on the program wants to run although nothing changed."""
+    moves: Moves | None = None
 
 
 class Unit(Protocol):
