@@ -5,6 +5,7 @@ The host's clock is a stand-in that never waits.
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Sequence
 
 import pytest
@@ -287,6 +288,20 @@ def test_who_is_woken_again_and_again_stays_due_a_period_later(clock: Clock) -> 
         runs.append(Running(plc, for_ns=50 * MS, pace="event"))
     run_all(runs)
     assert scans == {"with": [0, 3, 4, 7, 17, 22, 32, 42], "without": [0, 10, 20, 30, 40]}
+
+
+def test_waking_does_not_fill_the_queue(clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+    pushed: list[int] = []
+    push = heapq.heappush
+    monkeypatch.setattr(heapq, "heappush", lambda heap, item: (pushed.append(item), push(heap, item)))
+    network, runs = RealNetwork(clock, *range(1, 300)), []
+    for _ in range(2):
+        plc = Plc(counter_image(), 10_000 * MS)
+        plc.attach(Idle(), network)
+        runs.append(Running(plc, for_ns=10_200 * MS, pace="event"))
+    run_all(runs)
+    assert [run.plc.scans for run in runs] == [201, 2]
+    assert len(pushed) < 10
 
 
 class Unread(RealNetwork):
