@@ -4,13 +4,26 @@ What is left for Python is what their networks have to know, and what these tell
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from itertools import chain, islice
+from collections.abc import Sequence
 from typing import cast
 
+from fbvm.engine.clock import Clock
 from fbvm.engine.native import NativeEngine
 from fbvm.engine.native_companions import NEWS, Companion
-from fbvm.engine.native_scans import AGAIN, BUDGETED, CHANGED, FAULTY, FIRST, POINT, UNFINISHED, Turn
+from fbvm.engine.native_scan_code import (
+    AGAIN,
+    BUDGETED,
+    CHANGED,
+    DEFERRED,
+    ENDS,
+    FAULTY,
+    FIRST,
+    HEARD,
+    POINT,
+    TIMES,
+    UNFINISHED,
+)  # fmt: skip
+from fbvm.engine.native_scans import Turn
 from fbvm.engine.trap import Trap
 from fbvm.exchange import Exchange
 from fbvm.flags import CLOCKWORK
@@ -75,50 +88,65 @@ class Accompanied:
 
     def once(self, now_ns: int, budget: int) -> Trap | None:
         """One scan."""
-        if loud := self._is_loud():
+        self._numbers[HEARD] = loud = self._is_loud()
+        if loud:
             self._hear(now_ns)
         point = self._series.once(now_ns, budget)
         if point > 0:
             return self._machine.trap_at(point)
-        self._count(loud)
+        self._count()
         self._end(now_ns)
         return None
 
-    def burst(self, times: list[int], most: int, clock: Callable[[], int], budget: int) -> Trap | None:
+    def burst(self, times: list[int], most: int, clock: Clock, budget: int) -> Trap | None:
         """Scans each at the time that the clock tells, one upon the other for as long as units have news for the program;
         `times` takes when they began.
 
         A refresh that was left out takes place now if there is something for it: waiting comes before the refresh, as in
         a PLC with a fixed cycle time (W394)."""
-        numbers, call, at, counts = self._numbers, self._series.call, self._numbers_at, self._counts
-        numbers[BUDGETED] = budget
-        first_ns, loud, heard = clock(), self._is_loud(), False
-        if self._exchange.passed:
-            loud = self._refresh_before(first_ns, loud)
+        series, numbers, exchange = self._series, self._numbers, self._exchange
+        if clock is not series.clock or most > len(series.times):
+            series.follow(clock, most)
+        counts, now_ns, loud = self._counts, clock.now(), self._is_loud()
+        is_stepped = counts or not clock.function_at
+        begin = at = numbers[TIMES] = series.times_at
+        end = begin + 8 * most
+        numbers[BUDGETED], numbers[DEFERRED] = budget, exchange.passed
+        if loud and exchange.passed:
+            exchange.passed -= 1
         if self._is_timed:
-            self._series.load_turns()
+            series.load_turns()
         try:
-            for now_ns in islice(chain((first_ns,), iter(clock, None)), most):
-                times.append(now_ns)
-                heard = loud
+            while True:
+                numbers[FIRST], numbers[HEARD], numbers[ENDS] = now_ns, loud, end
                 if loud:
                     loud = self._hear(now_ns)
-                numbers[FIRST] = now_ns
-                point = call(at)
-                if counts and point <= 0:
-                    self._count(heard)
+                if loud or is_stepped:
+                    numbers[ENDS] = at if numbers[DEFERRED] else at + 8
+                point = series.call_burst(self._numbers_at)
+                if point > 0:
+                    return self._machine.trap_at(point)
+                is_scan, at = at != numbers[TIMES], numbers[TIMES]
+                if is_scan:
+                    now_ns = numbers[FIRST]
+                    if counts:
+                        self._count()
+                elif numbers[CHANGED]:
+                    exchange.pass_by()
                 if point:
-                    if point > 0:
-                        return self._machine.trap_at(point)
                     loud = self._finish(now_ns) or loud
-                if not numbers[AGAIN]:
-                    break
-        finally:  # Ctrl-C may come between two of them
+                if is_scan:
+                    if at == end or not numbers[AGAIN]:
+                        break
+                    now_ns = clock.now()
+        finally:  # Ctrl-C may come between two calls
             if self._is_timed:
-                self._series.store_turns()
-            if not counts:
-                self._count(heard)
-            self._end(now_ns)
+                series.store_turns()
+            if done := (numbers[TIMES] - begin) // 8:
+                times += series.times[:done]
+                if not counts:
+                    self._count()
+                self._end(numbers[FIRST])
         return None
 
     def many(self, most: int, now_ns: int, step_ns: int, budget: int, spend: int) -> tuple[int, Trap | None]:
@@ -132,23 +160,10 @@ class Accompanied:
         exchange.passed += done - 1
         if point > 0:
             return done, self._machine.trap_at(point)
-        self._count(False)
+        self._numbers[HEARD] = False
+        self._count()
         self._end(now_ns + done * step_ns)
         return done, None
-
-    def _refresh_before(self, now_ns: int, loud: bool) -> bool:
-        """The refresh that the last scan did without, if there is something for it now; whether links have more to tell."""
-        numbers = self._numbers
-        if loud:
-            self._exchange.passed -= 1
-            loud = self._hear(now_ns)
-        numbers[FIRST] = now_ns
-        asked = self._series.call_refresh(self._numbers_at)
-        if numbers[CHANGED]:
-            self._exchange.pass_by()
-        if asked:
-            loud = self._finish(now_ns) or loud
-        return loud
 
     def _is_loud(self) -> bool:
         """True if a link has something to tell."""
@@ -175,12 +190,12 @@ class Accompanied:
                 loud = True
         return loud
 
-    def _count(self, heard: bool) -> None:
+    def _count(self) -> None:
         """A refresh is over; links that were heard for it know of it."""
-        exchange = self._exchange
-        if not heard:
+        numbers, exchange = self._numbers, self._exchange
+        if not numbers[HEARD]:
             exchange.passed += 1
-            if self._numbers[CHANGED]:
+            if numbers[CHANGED]:
                 exchange.pass_by()
 
     def _end(self, now_ns: int) -> None:

@@ -5,10 +5,9 @@ For scans in which nobody else has a part: no breakpoints, forces, phases, journ
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from fbvm.base.areas import NEVER
 from fbvm.companions import Accompanied, companions
+from fbvm.engine.clock import Clock
 from fbvm.engine.native import NativeEngine
 from fbvm.engine.native_scans import Turn
 from fbvm.engine.trap import Trap
@@ -92,13 +91,13 @@ class Alone:
             self.refresh(now_ns)
         return None
 
-    def burst(self, times: list[int], most: int, clock: Callable[[], int], budget: int) -> Trap | None:
+    def burst(self, times: list[int], most: int, clock: Clock, budget: int) -> Trap | None:
         """Scans each at the time that the clock tells, one upon the other for as long as units have news for the program;
         `times` takes when they began.
 
         A refresh that was left out takes place now if there is something for it: waiting comes before the refresh, as in
         a PLC with a fixed cycle time (W394)."""
-        exchange, now_ns = self._exchange, clock()
+        exchange, now_ns = self._exchange, clock.now()
         if exchange.passed and not exchange.is_idle(now_ns):
             exchange.passed -= 1
             self.refresh(now_ns)
@@ -107,7 +106,7 @@ class Alone:
             trap = self.once(now_ns, budget)
             if trap or len(times) >= most or exchange.wake_ns(NEVER) > now_ns:
                 return trap
-            now_ns = clock()
+            now_ns = clock.now()
 
     def many(self, most: int, now_ns: int, step_ns: int, budget: int, spend: int) -> tuple[int, Trap | None]:
         """Scans that follow the one at `now_ns`, each a step later, while the units are idle; how many there were.

@@ -13,6 +13,7 @@ from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
 from fbvm.base.memory import Memory, Snapshot
 from fbvm.breakpoints import Breakpoints, Halt
 from fbvm.code.image import Image
+from fbvm.engine.clock import Clock
 from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
 from fbvm.exchange import Attached, Exchange
@@ -242,18 +243,17 @@ class Plc:
         nothing to do; False if there was none."""
         if self.watchers or self._past.maxlen:
             return False
-        cycle_ns = self.cycle_ns
         if self.breakpoints.armed:
             done, self.trap = self._many_guarded(most)
         elif all(attached.network.virtual_time for attached in self.units) and (way := self._way()):
-            done, self.trap = way.many(most, self.now_ns, cycle_ns, self.budget, STEP_BUDGET)
+            done, self.trap = way.many(most, self.now_ns, self.cycle_ns, self.budget, STEP_BUDGET)
         else:
             return False
         self.scans += done
-        self.now_ns += done * cycle_ns
+        self.now_ns += done * self.cycle_ns
         return done > 0
 
-    def scan_at_once(self, most: int, clock: Callable[[], int]) -> list[int]:
+    def scan_at_once(self, most: int, clock: Clock) -> list[int]:
         """Scans in the time that `clock` tells, one upon the other for as long as units have news for the program; when
         they began.  There is none if somebody has to be told between them, or has a part in one: then it takes `scan`."""
         times: list[int] = []

@@ -15,7 +15,8 @@ from fbvm.base.memory import Memory
 from fbvm.code.image import Image
 from fbvm.engine import native
 from fbvm.engine.native_code import code_of
-from fbvm.engine.native_scans import Clockwork, Turn
+from fbvm.engine.native_scan_code import Clockwork
+from fbvm.engine.native_scans import Turn
 from fbvm.engine.python import PythonEngine
 from fbvm.engine.runtime import NO_SITE, Observation
 from fbvm.engine.stops import STOPPED, State, Stops

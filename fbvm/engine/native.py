@@ -17,7 +17,8 @@ from fbvm.engine.native_code import Code, code_of
 from fbvm.engine.native_companions import Companion
 from fbvm.engine.native_context import Context
 from fbvm.engine.native_entries import Entry, entry
-from fbvm.engine.native_scans import NO_LIMIT, NOTHING, Clockwork, Series, Turn
+from fbvm.engine.native_scan_code import NOTHING, Clockwork
+from fbvm.engine.native_scans import NO_LIMIT, Series, Turn
 from fbvm.engine.native_writer import Unsupported
 from fbvm.engine.stops import PAUSE, STOPPED, Stops
 from fbvm.engine.trap import Trap, trap

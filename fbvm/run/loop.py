@@ -11,7 +11,9 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol, cast
 
 from fbvm.base.areas import NEVER
+from fbvm.engine.clock import Clock
 from fbvm.plc import Plc
+from fbvm.run.host_clock import function_at
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
 from fbvm.wire.link import RealNetwork
 
@@ -215,10 +217,11 @@ class _Real:
         self._waits = len(networks) == 1 and bool(self._numbers)
         self._zero_ns = time.monotonic_ns() - start_ns
 
-    def behind(self, behind_ns: int) -> Callable[[], int]:
+    def behind(self, behind_ns: int) -> Clock:
         """A clock that is behind this time by so much."""
         monotonic_ns, zero_ns = time.monotonic_ns, self._zero_ns + behind_ns
-        return lambda: monotonic_ns() - zero_ns
+        function = function_at(time.get_clock_info("monotonic").implementation)
+        return Clock(lambda: monotonic_ns() - zero_ns, function, time.CLOCK_MONOTONIC if function else 0, zero_ns)
 
     def reach(self, due_ns: int) -> tuple[int, Numbers]:
         zero_ns = self._zero_ns

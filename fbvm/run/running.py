@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from fbvm.engine.clock import Clock
 from fbvm.goal import Goal
 from fbvm.plc import Plc
 from fbvm.watch.paths import Place, Span
@@ -58,7 +59,7 @@ class Running:
         self.alone = False
         """Nobody has to be told between two scans but who looks into this PLC, and time goes where its next scan is."""
         self._behind_ns = 0
-        self._clock: Callable[[], int] | None = None
+        self._clock: Clock | None = None
         self._writes = sorted(writes, key=lambda write: write.at_ns)
 
     @property
@@ -66,7 +67,7 @@ class Running:
         """What is still to be written, in order of time."""
         return tuple(self._writes)
 
-    def begin(self, start_ns: int, clock: Callable[[int], Callable[[], int]] | None = None) -> None:
+    def begin(self, start_ns: int, clock: Callable[[int], Clock] | None = None) -> None:
         """The loop begins at this time of its own, which goes on by itself if there is a clock: one that is behind the
         loop's by so much is made by `clock`."""
         self._behind_ns = start_ns - self.plc.elapsed_ns

@@ -4,7 +4,7 @@ The network answers when somebody waits for it; the clock is a stand-in that nev
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 import pytest
@@ -13,6 +13,7 @@ from test_run_loop import Clock
 from fbvm import Etn21, Plc, compile_text
 from fbvm.code.image import Image
 from fbvm.engine import native
+from fbvm.engine.clock import Clock as PlcClock
 from fbvm.run import loop as run_loop
 from fbvm.run import run
 from fbvm.run.running import MOST_AT_ONCE
@@ -136,11 +137,11 @@ def test_an_answer_is_fetched_before_the_program_that_it_wakes(image: Image, clo
     plc, network = polling(image, clock)
     assert run(plc, for_ns=20 * MS, pace="event") == "time"
     network.serve(0)
-    plc.scan_at_once(16, lambda: plc.now_ns + 1000)
+    plc.scan_at_once(16, PlcClock(lambda: plc.now_ns + 1000))
     for _ in range(20):
         exchanges, looks = plc.read("Main.Exchanges"), network.looks
         network.serve(0)
-        assert len(plc.scan_at_once(16, lambda: plc.now_ns + 1000)) == 5
+        assert len(plc.scan_at_once(16, PlcClock(lambda: plc.now_ns + 1000))) == 5
         assert plc.read("Main.Exchanges") == exchanges + 1  # type: ignore[operator]
         assert network.looks == looks + 2
 
@@ -173,7 +174,7 @@ def test_time_ends_a_run_between_two_bursts(image: Image, clock: Clock, monkeypa
     bursts: list[int] = []
     at_once = plc.scan_at_once
 
-    def counted(most: int, clock: Callable[[], int]) -> list[int]:
+    def counted(most: int, clock: PlcClock) -> list[int]:
         times = at_once(most, clock)
         bursts.append(len(times))
         return times
@@ -198,7 +199,7 @@ def test_ctrl_c_in_a_burst_loses_no_scan(image: Image, clock: Clock) -> None:
         return now_ns + looks
 
     with pytest.raises(KeyboardInterrupt):
-        plc.scan_at_once(16, interrupted)
+        plc.scan_at_once(16, PlcClock(interrupted))
     assert (plc.scans, plc.now_ns) == (scans + 2, now_ns + 2)
     assert plc.read("Main.Scans") == plc.scans
 

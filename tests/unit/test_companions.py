@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import ctypes
+from collections.abc import Callable, Iterator
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from hypothesis import given, settings
@@ -13,9 +14,11 @@ from rows import first_quick
 from toy_unit import Echoing, Toy
 
 from fbvm import Plc, compile_text
+from fbvm.base.areas import NOW
 from fbvm.code.image import Image
 from fbvm.companions import Accompanied
 from fbvm.engine import native
+from fbvm.engine.clock import Clock
 from fbvm.express import Alone, Way
 from fbvm.plc import Mode
 
@@ -23,6 +26,8 @@ if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
 MS = 1_000_000
+ZERO_NS, NUMBER = 3_600_123_456_789, 7
+FUNCTION = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_int, ctypes.POINTER(ctypes.c_int64))
 MAIN = """
 PROGRAM Main
 VAR
@@ -71,13 +76,23 @@ class Steps:
         self.now_ns += 1000 * (3 + self.looks % 5)
         return self.now_ns
 
+    def tell(self, number: int, where: Any) -> int:
+        """The same as `clock_gettime` tells it, of clock 7 and a while later."""
+        assert number == NUMBER
+        where[0], where[1] = divmod(self() + ZERO_NS, 1_000_000_000)
+        return 0
+
 
 class Rig:
     """A PLC with toys, and all that can be known of them."""
 
     def __init__(self, code: Image, delays_ns: tuple[int, ...] = (0,), latency_ns: int = 0, *, engine: str = "native",
-                 is_inside: bool = True, is_watched: bool = False, virtual_time: bool = True) -> None:  # fmt: skip
+                 is_inside: bool = True, is_watched: bool = False, virtual_time: bool = True,
+                 is_told: bool = True) -> None:  # fmt: skip
         self.plc, self.clock = Plc(code, MS, engine=engine), Steps()
+        self.function = FUNCTION(self.clock.tell)
+        at = 0 if is_told else ctypes.cast(self.function, ctypes.c_void_p).value or 0
+        self.time = Clock(self.clock, at, NUMBER, ZERO_NS)
         self.toys = [Toy(number, delay_ns, is_inside) for number, delay_ns in enumerate(delays_ns)]
         self.networks = [Echoing(latency_ns, virtual_time) for _ in delays_ns]
         for toy, network in zip(self.toys, self.networks, strict=True):
@@ -256,7 +271,7 @@ def bursts(rig: Rig, count: int, most: int, pause_ns: int, stop: int = 0) -> lis
         for network in rig.networks:
             network.serve(clock.now_ns)
         try:
-            found.append(rig.plc.scan_at_once(most, clock))
+            found.append(rig.plc.scan_at_once(most, rig.time))
         except KeyboardInterrupt:
             found.append([])
         if rig.plc.trap:
@@ -271,16 +286,30 @@ CASES = [((0,), 0, 16), ((MS,), 300_000, 16), ((0, 50_000), 10_000, 3), ((0,), 0
 @pytest.mark.parametrize(("delays_ns", "latency_ns", "most"), first_quick(CASES))
 @pytest.mark.parametrize("virtual_time", [False, True])
 def test_bursts(program: tuple[Any, ...], delays_ns: tuple[int, ...], latency_ns: int, most: int, virtual_time: bool) -> None:
-    inside, beside = (Rig(image(*program), delays_ns, latency_ns, is_inside=is_inside, virtual_time=virtual_time)
-                      for is_inside in (True, False))  # fmt: skip
+    """Machine code reads the clock itself, or is told the time; or the units are beside it."""
+    rigs = [Rig(image(*program), delays_ns, latency_ns, is_inside=is_inside, virtual_time=virtual_time, is_told=is_told)
+            for is_inside, is_told in ((True, False), (True, True), (False, True))]  # fmt: skip
     for pause_ns in (200_000, 1000, 20_000):
-        assert bursts(inside, 60, most, pause_ns) == bursts(beside, 60, most, pause_ns)
-        for rig in (inside, beside):
-            rig.plc._exchange.pass_by()
-        assert inside.state == beside.state
-        if inside.plc.trap:
+        times = [bursts(rig, 60, most, pause_ns) for rig in rigs]
+        assert times[0] == times[1] == times[2]
+        agree(rigs, lambda plc: None)
+        if rigs[0].plc.trap:
             break
-    assert inside.plc.read("D20001") > 3 and inside.toys[0].refreshes <= 6  # type: ignore[operator]
+    assert rigs[0].plc.read("D20001") > 3 and max(rig.toys[0].refreshes for rig in rigs[:2]) <= 6  # type: ignore[operator]
+
+
+def test_machine_code_that_reads_the_clock_comes_back_less_often() -> None:
+    calls = []
+    for is_told in (True, False):
+        rig, points = Rig(image(2), (0,), virtual_time=False, is_told=is_told), list[int]()
+        bursts(rig, 1, 16, 1000)
+        series = cast(Accompanied, way(rig))._series
+        call, scans, looks = series.call_burst, rig.plc.scans, rig.clock.looks
+        series.call_burst = lambda at, call=call, points=points: points.append(call(at)) or points[-1]  # type: ignore[misc]
+        bursts(rig, 40, 16, 1000)
+        assert rig.plc.scans - scans == rig.clock.looks - looks > 60
+        calls.append(len(points))
+    assert calls[1] < calls[0] * 2 // 3
 
 
 def test_ctrl_c_in_a_burst_loses_nothing() -> None:
@@ -288,3 +317,19 @@ def test_ctrl_c_in_a_burst_loses_nothing() -> None:
         inside, beside = (Rig(image(2), (0,), is_inside=is_inside, virtual_time=False) for is_inside in (True, False))
         assert bursts(inside, 30, 16, 1000, stop) == bursts(beside, 30, 16, 1000, stop)
         assert inside.state == beside.state
+
+
+def test_ctrl_c_between_two_calls_of_machine_code_loses_nothing() -> None:
+    for stop in range(1, 12):
+        rig, looks = Rig(image(2), (0,), virtual_time=False, is_told=False), iter(range(1, 1000))
+        bursts(rig, 5, 16, 1000)
+
+        def now(rig: Rig = rig, looks: Iterator[int] = looks, stop: int = stop) -> int:
+            if next(looks) == stop:
+                raise KeyboardInterrupt
+            return rig.clock()
+
+        rig.time = Clock(now, rig.time.function_at, NUMBER, ZERO_NS)
+        times = bursts(rig, 12, 16, 1000)
+        assert [] in times and rig.plc.scans == rig.plc.read("Main.n")
+        assert rig.plc.now_ns == rig.plc.memory.views["i64"][NOW // 8]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Sequence
+from types import SimpleNamespace
 
 import pytest
 from images import counter_image, task
@@ -26,6 +27,9 @@ class Clock:
     def __init__(self) -> None:
         self.now_ns = 1_000_000_000_000
         self.slept_ns: list[int] = []
+
+    def get_clock_info(self, name: str) -> SimpleNamespace:
+        return SimpleNamespace(implementation="a stand-in")
 
     def monotonic_ns(self) -> int:
         self.now_ns += 1000

@@ -1,0 +1,274 @@
+"""Text of the machine code of scans: what a scan does up to its refresh, several at known times, a burst upon a clock.
+
+It is made for a shape: which of the tasks have an interval, which words tell the program about time, what is watched,
+which companions there are.  It has no calls but those of the tasks, of companions and of the clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from string import Template
+
+from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
+from fbvm.engine.native_companions import Shape, Told
+from fbvm.engine.native_companions import text as companions_text
+
+
+@dataclass(frozen=True)
+class Clockwork:
+    """What a scan writes at its start from its time alone; offsets in bytes of the buffer."""
+
+    cleared: tuple[tuple[int, int], ...] = ()
+    """Words of 16 bits and the bits of them that stay."""
+    cycle_time: tuple[int, int, int] | None = None
+    """Where 32 bits with the cycle time lie, where those with the longest one, and their unit in nanoseconds."""
+    counters: tuple[tuple[int, int], ...] = ()
+    """Words of 16 bits that count, and what they count, in nanoseconds."""
+    pulses: tuple[tuple[int, int, tuple[tuple[int, int, int], ...]], ...] = ()
+    """Bytes, the bits of them that stay, and the others: mask, period, and from when in it they are ON."""
+
+
+NOTHING = Clockwork()
+(MEMORY, CONTEXT, LEFT, FIRST, STEP, BUDGETED, SPEND, DONE, CHANGED, UNFINISHED, AGAIN, FAULTY, POINT,
+ DEFERRED, HEARD, TIMES, ENDS, CLOCK, NUMBER, ZERO, ROWS) = range(21)  # fmt: skip
+"""Parameters, 64 bits each, and then the rows of turns, of what is watched and of companions: the addresses of memory and
+context, how many scans, the time of the first one and by how far it goes on, statements that a scan may execute and all
+of them together, how many scans there were, whether something that is watched has changed or which companions ran, and
+what else these tell.
+
+Of a burst only: whether it begins with a refresh; whether somebody was heard for the last refresh, which is so if there
+was but one; where the time of the next scan goes and where there is no more room; the clock, as `Clock` describes it.
+FIRST becomes the time of its last scan."""
+TOLD = Told(memory=MEMORY, ran=CHANGED, unfinished=UNFINISHED, again=AGAIN, faulty=FAULTY, point=POINT)
+ASKED = -1
+"""In place of a trap's point: companions have requests, or one of them has a trap of its own."""
+ROW = 4
+"""Numbers of a turn: where the address of its function lies, interval, next time, whether it is due."""
+WATCHED_ROW, WATCHED_BYTES = 2, 8
+"""Numbers of what is watched: its offset in the memory, and the eight bytes that are expected there."""
+MOST_CYCLE = 0xFFFF_FFFF
+"""The longest cycle time that its words can say."""
+SECOND_NS = 1_000_000_000
+_PARAMETERS = {"memory": MEMORY, "context": CONTEXT, "left": LEFT, "first": FIRST, "step": STEP, "budgeted": BUDGETED,
+               "spend": SPEND, "done": DONE, "changed": CHANGED, "again": AGAIN, "deferred": DEFERRED, "heard": HEARD,
+               "times": TIMES, "ends": ENDS, "clock": CLOCK, "number": NUMBER, "zero": ZERO}  # fmt: skip
+"""The names that functions use."""
+_SCAN = f"""scan:
+%before = load i64, ptr %now_at
+store i64 %now, ptr %now_at
+store i64 {NEVER}, ptr %due_at
+store i64 %amount, ptr %budget_at
+$clockwork
+$turns
+br label %good
+good:
+%s = load i64, ptr %count_at
+%s1 = add i64 %s, 1
+store i64 %s1, ptr %count_at"""
+_TRAP = """trap:
+%point = phi i32 $points
+%s2 = load i64, ptr %count_at
+%s3 = add i64 %s2, 1
+store i64 %s3, ptr %count_at"""
+_SCANS = Template(f"""
+define i32 @scans(ptr %p) {{
+entry:
+$addresses
+$rows
+store i64 0, ptr %changed_at
+%n = load i64, ptr %left_at
+%first = load i64, ptr %first_at
+%step = load i64, ptr %step_at
+%spend = load i64, ptr %spend_at
+br label %test
+test:
+%i = phi i64 [ 0, %entry ], [ %i1, %good ]
+%now = phi i64 [ %first, %entry ], [ %next, %good ]
+%spent = phi i64 [ 0, %entry ], [ %spent1, %good ]
+%more = icmp slt i64 %i, %n
+%rest = icmp slt i64 %spent, %spend
+%go = and i1 %more, %rest
+br i1 %go, label %scan, label %end
+{_SCAN}
+%left = load i64, ptr %budget_at
+%used = sub i64 %amount, %left
+%spent1 = add i64 %spent, %used
+%i1 = add i64 %i, 1
+%next = add i64 %now, %step
+$watched
+br i1 %changed, label %stop, label %test
+stop:
+store i64 %i1, ptr %done_at
+$changed
+{_TRAP}
+%i2 = add i64 %i, 1
+store i64 %i2, ptr %done_at
+ret i32 %point
+end:
+store i64 %i, ptr %done_at
+ret i32 0
+}}
+$burst
+declare i32 @llvm.umax.i32(i32, i32)
+declare i64 @llvm.umin.i64(i64, i64)
+""")
+_BURST = Template(f"""
+define i32 @burst(ptr %p) {{
+entry:
+$addresses
+$rows
+%clock = load ptr, ptr %clock_at
+%number = load i32, ptr %number_at
+%zero = load i64, ptr %zero_at
+%spec = alloca [2 x i64]
+%second_at = getelementptr inbounds i8, ptr %spec, i64 8
+%ends = load i64, ptr %ends_at
+%first = load i64, ptr %first_at
+%deferred = load i64, ptr %deferred_at
+%late = icmp ne i64 %deferred, 0
+br i1 %late, label %refresh, label %test
+refresh:
+store i64 0, ptr %deferred_at
+store i64 0, ptr %heard_at
+%early = call i32 @companions(ptr %p, i64 %first)
+%asks = icmp slt i32 %early, 0
+br i1 %asks, label %asked, label %test
+test:
+%at0 = load i64, ptr %times_at
+%room = icmp ult i64 %at0, %ends
+br i1 %room, label %begin, label %over
+begin:
+%now = phi i64 [ %first, %test ], [ %next, %follow ]
+%at = phi i64 [ %at0, %test ], [ %at1, %follow ]
+%time_at = inttoptr i64 %at to ptr
+store i64 %now, ptr %time_at
+%at1 = add i64 %at, 8
+store i64 %at1, ptr %times_at
+store i64 %now, ptr %first_at
+store i64 0, ptr %changed_at
+br label %scan
+{_SCAN}
+%ran = call i32 @companions(ptr %p, i64 %now)
+%urgent = icmp slt i32 %ran, 0
+br i1 %urgent, label %asked, label %calm
+calm:
+%again = load i64, ptr %again_at
+%wanted = icmp ne i64 %again, 0
+%more = icmp ult i64 %at1, %ends
+%go = and i1 %wanted, %more
+br i1 %go, label %follow, label %over
+follow:
+store i64 0, ptr %heard_at
+%told = call i32 %clock(i32 signext %number, ptr %spec)
+%whole = load i64, ptr %spec
+%part = load i64, ptr %second_at
+%ns = mul i64 %whole, {SECOND_NS}
+%time = add i64 %ns, %part
+%next = sub i64 %time, %zero
+br label %begin
+asked:
+ret i32 {ASKED}
+over:
+ret i32 0
+{_TRAP}
+ret i32 %point
+}}
+""")
+
+
+def text(intervals: Sequence[bool], clockwork: Clockwork, watched: int, shapes: Sequence[Shape]) -> str:
+    """The functions @scans and, where there are companions, @burst: both take the address of the parameters, and return
+    a trap's point, ASKED, or 0."""
+    first = ROWS + ROW * len(intervals)
+    parts = {"addresses": _lines(_addresses()), "rows": _lines(_rows(len(intervals))), "clockwork": _lines(_clockwork(clockwork)),
+             "turns": _lines(_turns(intervals)),
+             "points": ", ".join(f"[ %r{n}, %run{n} ]" for n in range(len(intervals)))}  # fmt: skip
+    if shapes:
+        burst = companions_text(shapes, first, TOLD) + _BURST.substitute(parts)
+        return _SCANS.substitute(parts, watched=_REFRESHED, changed=_RAN, burst=burst)
+    return _SCANS.substitute(parts, watched=_lines(_watched(first, watched)), changed=_CHANGED, burst="")
+
+
+def _lines(lines: Iterable[str]) -> str:
+    return "\n".join(lines)
+
+
+def _addresses() -> Iterator[str]:
+    """Where the parameters are, and the words of the system page; some of them as they stay."""
+    for name, number in _PARAMETERS.items():
+        yield f"%{name}_at = getelementptr inbounds i8, ptr %p, i64 {8 * number}"
+    yield from ("%m = load ptr, ptr %memory_at", "%c = load ptr, ptr %context_at", "%amount = load i64, ptr %budgeted_at")
+    for name, offset in {"now": NOW, "due": DUE, "budget": BUDGET, "count": SCANS}.items():
+        yield f"%{name}_at = getelementptr inbounds i8, ptr %m, i64 {offset}"
+
+
+def _clockwork(row: Clockwork) -> Iterator[str]:
+    """What it writes, as instructions."""
+    for n, (offset, stay) in enumerate(row.cleared):
+        yield from (f"%ka{n} = getelementptr inbounds i8, ptr %m, i64 {offset}", f"%kb{n} = load i16, ptr %ka{n}",
+                    f"%kc{n} = and i16 %kb{n}, {stay}", f"store i16 %kc{n}, ptr %ka{n}")
+    if row.cycle_time:
+        now, longest, unit_ns = row.cycle_time
+        yield from ("%tb = sub i64 %now, %before", f"%tu = udiv i64 %tb, {unit_ns}",
+                    f"%tq = call i64 @llvm.umin.i64(i64 %tu, i64 {MOST_CYCLE})", "%tc = trunc i64 %tq to i32",
+                    f"%ta = getelementptr inbounds i8, ptr %m, i64 {now}",
+                    "store i32 %tc, ptr %ta, align 2", f"%tl = getelementptr inbounds i8, ptr %m, i64 {longest}",
+                    "%to = load i32, ptr %tl, align 2", "%tm = call i32 @llvm.umax.i32(i32 %tc, i32 %to)",
+                    "store i32 %tm, ptr %tl, align 2")
+    for n, (offset, unit_ns) in enumerate(row.counters):
+        yield from (f"%qa{n} = udiv i64 %now, {unit_ns}", f"%qb{n} = trunc i64 %qa{n} to i16",
+                    f"%qc{n} = getelementptr inbounds i8, ptr %m, i64 {offset}", f"store i16 %qb{n}, ptr %qc{n}")
+    for n, (offset, stay, bits) in enumerate(row.pulses):
+        yield from (f"%pa{n} = getelementptr inbounds i8, ptr %m, i64 {offset}", f"%pb{n} = load i8, ptr %pa{n}",
+                    f"%p{n}.0 = and i8 %pb{n}, {stay}")
+        for k, (mask, period_ns, from_ns) in enumerate(bits):
+            yield from (f"%ra{n}.{k} = urem i64 %now, {period_ns}", f"%rb{n}.{k} = icmp uge i64 %ra{n}.{k}, {from_ns}",
+                        f"%rc{n}.{k} = select i1 %rb{n}.{k}, i8 {mask}, i8 0",
+                        f"%p{n}.{k + 1} = or i8 %p{n}.{k}, %rc{n}.{k}")
+        yield f"store i8 %p{n}.{len(bits)}, ptr %pa{n}"
+
+
+def _rows(count: int) -> Iterator[str]:
+    """The functions of the turns, and where their times are."""
+    for n in range(count):
+        for letter, number in zip("finw", range(ROWS + ROW * n, ROWS + ROW * n + ROW), strict=True):
+            yield f"%{letter}a{n} = getelementptr inbounds i8, ptr %p, i64 {8 * number}"
+        yield from (f"%fs{n} = load ptr, ptr %fa{n}", f"%f{n} = load ptr, ptr %fs{n}")
+
+
+def _watched(first: int, count: int) -> Iterator[str]:
+    """Whether anything that is watched is not what is expected; its rows begin with parameter `first`."""
+    yield "%j0 = add i1 0, 0"
+    for n in range(count):
+        at = 8 * (first + WATCHED_ROW * n)
+        yield from (f"%joa{n} = getelementptr inbounds i8, ptr %p, i64 {at}", f"%jo{n} = load i64, ptr %joa{n}",
+                    f"%jea{n} = getelementptr inbounds i8, ptr %p, i64 {at + 8}", f"%je{n} = load i64, ptr %jea{n}",
+                    f"%jma{n} = getelementptr inbounds i8, ptr %m, i64 %jo{n}", f"%jm{n} = load i64, ptr %jma{n}, align 1",
+                    f"%jx{n} = icmp ne i64 %jm{n}, %je{n}", f"%j{n + 1} = or i1 %j{n}, %jx{n}")
+    yield f"%changed = or i1 %j{count}, 0"
+
+
+_CHANGED = """store i64 1, ptr %changed_at
+ret i32 0"""
+_REFRESHED = """%ran = call i32 @companions(ptr %p, i64 %now)
+%changed = icmp ne i32 %ran, 0"""
+_RAN = """%answer = ashr i32 %ran, 31
+ret i32 %answer"""
+
+
+def _turns(intervals: Sequence[bool]) -> Iterator[str]:
+    """Which are due is found before the first one runs."""
+    for n in (n for n, has in enumerate(intervals) if has):
+        yield from (f"%x{n} = load i64, ptr %na{n}", f"%y{n} = icmp sge i64 %now, %x{n}", f"%z{n} = zext i1 %y{n} to i64",
+                    f"store i64 %z{n}, ptr %wa{n}", f"br i1 %y{n}, label %due{n}, label %set{n}", f"due{n}:",
+                    f"%u{n} = load i64, ptr %ia{n}", f"%l{n} = sub i64 %now, %x{n}", f"%d{n} = udiv i64 %l{n}, %u{n}",
+                    f"%e{n} = add i64 %d{n}, 1", f"%g{n} = mul i64 %e{n}, %u{n}", f"%h{n} = add i64 %x{n}, %g{n}",
+                    f"store i64 %h{n}, ptr %na{n}", f"br label %set{n}", f"set{n}:")
+    for n, has in enumerate(intervals):
+        if has:
+            yield from (f"%w{n} = load i64, ptr %wa{n}", f"%v{n} = icmp ne i64 %w{n}, 0",
+                        f"br i1 %v{n}, label %run{n}, label %over{n}", f"run{n}:")
+        else:
+            yield from (f"br label %run{n}", f"run{n}:")
+        yield from (f"%r{n} = call i32 %f{n}(ptr %m, ptr %c)", f"%t{n} = icmp eq i32 %r{n}, 0",
+                    f"br i1 %t{n}, label %over{n}, label %trap", f"over{n}:")
