@@ -24,14 +24,14 @@ class HostLink(ChannelLink):
     def events(self, now_ns: int) -> Sequence[Event]:
         if self.is_quiet:
             return ()
-        network = self._network
-        if not network.driven:
-            network.serve(now_ns)
+        driven = self._network.driven
+        if not driven:
+            self._network.serve(now_ns)
         if self.waiting:
             for there in list(self.waiting):
                 there.fetch(now_ns)
         told, self.told = self.told, []
-        self.is_quiet = not self.waiting and (network.driven or not network.watched)
+        self.is_quiet = not self.waiting and (driven or not self._network.watched)
         return told
 
     def stir(self) -> None:

@@ -357,7 +357,7 @@ class _Line(_OnHost):
     def _flush(self, sock: socket.socket, now_ns: int) -> None:
         try:
             while self._outbox:
-                rest = self._outbox[0][self._taken :] if self._taken else self._outbox[0]
+                rest = self._outbox[0][self._taken :]
                 size = sock.send(rest) if rest else 0
                 if size and self.network.tap:
                     self._tap(now_ns, DATA, True, rest[:size])
