@@ -32,10 +32,8 @@ from fbvm.units.unit import Exchanged, ProcessorUnit, Unit
 
 
 def companions(exchange: Exchange) -> list[Companion]:
-    """The units as companions of the PLC's program; none if one of them cannot be, or if one's words on a network of
-    virtual time could reach another in the same refresh."""
-    virtual = [id(attached.network) for attached in exchange.units if attached.network.virtual_time]
-    found = [_companion(attached.unit, exchange) for attached in exchange.units] if len({*virtual}) == len(virtual) else []
+    """The units as companions of the PLC's program; none if one of them cannot be."""
+    found = [_companion(attached.unit, exchange) for attached in exchange.units]
     return [] if None in found else [companion for companion in found if companion]
 
 
@@ -209,7 +207,7 @@ class Accompanied:
         """Have done what the processors ask for that ran; whether that made links have something to tell.
 
         Raises RuntimeError if the program of one has trapped, which is a fault of ours."""
-        numbers, loud = self._numbers, False
+        numbers, submitted = self._numbers, False
         if numbers[FAULTY]:
             number = numbers[FAULTY].bit_length() - 1
             raise RuntimeError(str(self._series.companions[number].trap_at(numbers[POINT])))
@@ -219,6 +217,5 @@ class Accompanied:
                 requests = unit.finish()
                 if requests:
                     link.submit(requests, now_ns)
-                    if not link.is_quiet:
-                        loud = True
-        return loud
+                    submitted = True
+        return submitted and self._is_loud()

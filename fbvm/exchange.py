@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import cast
 
 from fbvm.base.memory import Memory
 from fbvm.net.journal import Journal
-from fbvm.units.unit import Unit
-from fbvm.wire.link import Link, Network
+from fbvm.units.unit import ProcessorUnit, Unit
+from fbvm.wire.link import Link, Network, Request
 
 
 @dataclass(frozen=True)
@@ -18,6 +20,11 @@ class Attached:
     unit: Unit
     link: Link
     network: Network
+
+    @cached_property
+    def own(self) -> ProcessorUnit | None:
+        """The unit, if a processor of its own does what a refresh does."""
+        return cast(ProcessorUnit, self.unit) if self.unit.exchanged else None
 
 
 class Exchange:
@@ -31,28 +38,37 @@ class Exchange:
         """The units changed words in the last refresh, and no scan has come upon it."""
 
     def refresh(self, now_ns: int, journal: Journal | None = None, seen: Callable[[int], None] | None = None) -> bool:
-        """Each unit exchanges its words once, the networks take what the units ask for.
+        """Each unit exchanges its words once and stores what it received; then the networks take what the units ask for.
 
-        `seen` is told the number of each unit that has been refreshed.  True if nobody has anything left to do."""
+        `seen` is told the number of each unit whose words have been exchanged.  True if nobody has anything left to do."""
         if self.passed:
             self.pass_by()
-        memory, news, at_rest = self.memory, False, True
+        memory, news = self.memory, False
+        asked: list[list[Request] | None] = []
+        """What each unit asks for; None if its program is to be asked."""
         for number, attached in enumerate(self.units):
             unit, link = attached.unit, attached.link
             events = link.events(now_ns)
             if journal:
                 journal.told(number, events)
-            requests = unit.refresh(memory, events, now_ns)
-            if requests:
-                link.submit(requests, now_ns)
+            own = attached.own
+            if own is None:
+                asked.append(unit.refresh(memory, events, now_ns))
+            else:
+                asked.append(None if own.exchange(memory, events, now_ns) else [])
             if seen:
                 seen(number)
-            if unit.news:
-                news = True
-            if unit.wake_ns <= now_ns or not link.is_quiet:
-                at_rest = False
+            if own is not None:
+                own.move(memory)
+        for attached, requests in zip(self.units, asked, strict=True):
+            unit, link, own = attached.unit, attached.link, attached.own
+            if requests is None and own is not None:
+                requests = own.finish()
+            if requests:
+                link.submit(requests, now_ns)
+            news = news or unit.news
         self.news = news
-        return at_rest
+        return self.is_idle(now_ns)
 
     def pass_by(self) -> None:
         """Tell the links of refreshes that were left out."""

@@ -73,14 +73,15 @@ class Worker:
             return b""
 
     def _started(self) -> subprocess.Popen[bytes]:
-        if self._process is None or self._process.poll() is not None or self._owner != os.getpid():
+        process = self._process  # which `stop` may take away meanwhile
+        if process is None or process.poll() is not None or self._owner != os.getpid():
             program = (f"import sys; sys.path[:] = {sys.path!r}\n"
                        "from fbvm.engine.native_worker import serve\nserve(sys.stdin.buffer, sys.stdout.buffer)")
-            self._process = subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE,
-                                             stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+            process = self._process = subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE,
+                                                       stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
             self._owner = os.getpid()
             atexit.register(self.stop)
-        return self._process
+        return process
 
     def stop(self) -> None:
         """End the helper process, whatever it is doing."""

@@ -61,6 +61,7 @@ class Etn21:
         self._words: Words | None = None
         self._mask = 1 << self.layout.bit
         """Its bit in words for all units."""
+        self.news = False
         self._connect(processor(PROGRAM, RING_BYTES * len(at.SOCKETS)), odd_filler)
         own = self._processor
         own.view("ETN21_Unit_Bit", "u16")[0] = self._mask
@@ -81,7 +82,7 @@ class Etn21:
         self._error_status = own.view("ETN21_Error_Status", "u16")
         self._seen, self._reported = numbers(self._n)
         """As they were when the last refresh ended."""
-        self._wake, self._changed = own.view("ETN21_Wake", "i64"), own.view("ETN21_News", "u8")
+        self._wake = own.view("ETN21_Wake", "i64")
         self._odd_filler = odd_filler
         self._mail = Mail(own, odd_filler)
         self.faults = Faults(own)
@@ -92,7 +93,7 @@ class Etn21:
         twin = Etn21(**self._made)  # type: ignore[arg-type]
         twin._connect(self._processor.copy(), twin._odd_filler)
         twin._mail.take_over(self._mail)
-        twin._words = self._words
+        twin._words, twin.news = self._words, self.news
         return twin
 
     @property
@@ -112,11 +113,6 @@ class Etn21:
     def wake_ns(self) -> int:
         """When the unit has something to do by itself."""
         return 0 if self._mail.waits else int(self._wake[0])
-
-    @property
-    def news(self) -> bool:
-        """True if the last refresh changed words."""
-        return bool(self._changed[0])
 
     @property
     def link_up(self) -> bool:
@@ -184,6 +180,17 @@ class Etn21:
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
         """One I/O refresh: take the network's events and new switches, end what is ready, show what changed."""
+        if not self.exchange(memory, events, now_ns):
+            return []
+        self.move(memory)
+        return self.finish()
+
+    def move(self, memory: AreaMemory) -> None:
+        """Store what receives were handed."""
+        self._mail.move(memory)
+
+    def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
+        """One I/O refresh but for what network and data have to do with it; False if there was nothing to do."""
         words = self._words
         if words is None or words.memory is not memory:
             words = self._look_at(memory)
@@ -191,10 +198,10 @@ class Etn21:
             self._mail.post(events)
         elif (now_ns < self.wake_ns and words.switches[0] == self._seen[0] and words.status[0] == self._reported[0]
               and not self._asked(words)):  # fmt: skip
-            self._changed[0] = 0
-            return []
+            self.news = False
+            return False
         self._run(words, now_ns)
-        return self.finish()
+        return True
 
     def _asked(self, words: Words) -> bool:
         """Does the program want a force-close, or a restart?"""
@@ -204,9 +211,15 @@ class Etn21:
         """The program of the unit once, between the two halves of the exchange of words."""
         self._n[:], self._m[:] = words.n, words.m
         self._initializing[:], self._restart[:] = words.initializing, words.restart
+        before = self._state()
         self._processor.run(now_ns)
+        self.news = self._state() != before
         words.n[:], words.m[:] = self._n, self._m
         words.initializing[:], words.restart[:] = self._initializing, self._restart
+
+    def _state(self) -> tuple[bytes, bytes, int, int]:
+        """The words that are exchanged, as the program sees them."""
+        return self._n.tobytes(), self._m.tobytes(), self._initializing[0], self._restart[0]
 
     def post(self, events: Iterable[Event]) -> None:
         """Events of the network for the next run of the program."""

@@ -148,9 +148,7 @@ class Mail:
         return True
 
     def collect(self, memory: AreaMemory) -> list[Request]:
-        """After a refresh: what the processor asks of the network; what it asks of the memory is done."""
-        if self._moved[0]:
-            self._move(memory)
+        """After a refresh: what the processor asks of the network."""
         if self._later:
             self.post(())
         requests: list[Request] = []
@@ -167,8 +165,10 @@ class Mail:
                     requests.append(_rare(kind, channel, row, memory))
         return requests
 
-    def _move(self, memory: AreaMemory) -> None:
-        """What was received goes to PLC memory."""
+    def move(self, memory: AreaMemory) -> None:
+        """What was received goes to PLC memory, if that has not been done yet."""
+        if not self._moved[0]:
+            return
         for _, ring, place, size, filler, high, low in MOVE.iter_unpack(self._moves[: MOVE.size * self._moved[0]]):
             first, begin = ring - self._rings_at, place & RING_BYTES - 1
             data = bytes(self._rings[first + begin : first + min(begin + size, RING_BYTES)])

@@ -126,7 +126,14 @@ class Unit(Protocol):
 class ProcessorUnit(Unit, Protocol):
     """A unit of which a processor of its own does all that a refresh does, but for what a network has to know.
 
-    Its `refresh` posts the events, copies the words in, runs, copies them out, finishes.  The machine may do it so, too."""
+    The machine may copy the words and run the program itself, between `post` and `finish`."""
+
+    def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
+        """The first part of `refresh`: posts the events, copies the words in, runs, copies them out.  False if nothing of
+        this was needed; else `finish` comes after the other units have exchanged their words."""
+
+    def move(self, memory: AreaMemory) -> None:
+        """The second part of `refresh`: has moved what the program left to be moved."""
 
     def post(self, events: Sequence[Event]) -> None:
         """Events of the network for the next run of its program, behind those that wait already.  If it has run, `finish`

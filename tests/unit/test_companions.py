@@ -237,15 +237,6 @@ def test_units_of_different_kinds_are_refreshed_from_outside() -> None:
     assert isinstance(way(rig), Alone)
 
 
-@pytest.mark.parametrize("virtual_time", [True, False])
-def test_what_one_unit_says_reaches_another_on_the_same_network_of_virtual_time_at_once(virtual_time: bool) -> None:
-    rig = Rig(image(), (0,), virtual_time=virtual_time)
-    rig.plc.attach(Toy(1), rig.networks[0])
-    for scan in range(5):
-        rig.plc.scan(scan * MS)
-    assert isinstance(way(rig), Alone if virtual_time else Accompanied)
-
-
 def test_a_processor_without_machine_code_is_run_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
     rig, other = Rig(image(), (0,)), Rig(image(), (0,))
     with monkeypatch.context() as patch:

@@ -97,6 +97,12 @@ class Toy:
                 self._posted[0] += 1
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
+        return self.finish() if self.exchange(memory, events, now_ns) else []
+
+    def move(self, memory: AreaMemory) -> None:
+        """It never leaves anything."""
+
+    def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
         self.refreshes += 1
         self.post(events)
         views = [(memory.words(area)[first : first + count], self.own.view(variable, "u16"))
@@ -104,14 +110,14 @@ class Toy:
         changed = any(plc != own for plc, own in views[::2])
         if not changed and not self._posted[0] and now_ns < self._wake[0] and self._has_run:
             self.news = False
-            return []
+            return False
         self._has_run = True
         for plc, own in views:
             own[:] = plc
         self.own.run(now_ns)
         for plc, own in views:
             plc[:] = own
-        return self.finish()
+        return True
 
     def finish(self) -> list[Request]:
         self.news, self.wake_ns = bool(self._news[0]), self._wake[0]
