@@ -12,14 +12,18 @@ from fbvm.engine.native import NativeEngine
 from fbvm.engine.native_companions import NEWS, Companion
 from fbvm.engine.native_scan_code import (
     AGAIN,
+    ALONE,
+    ASKED,
+    ASKED_BEFORE,
     BUDGETED,
     CHANGED,
     DEFERRED,
-    ENDS,
     FAULTY,
     FIRST,
     HEARD,
+    OVER,
     POINT,
+    SCANNED,
     TIMES,
     UNFINISHED,
 )  # fmt: skip
@@ -103,47 +107,41 @@ class Accompanied:
         A refresh that was left out takes place now if there is something for it: waiting comes before the refresh, as in
         a PLC with a fixed cycle time (W394)."""
         series, numbers, exchange = self._series, self._numbers, self._exchange
-        if clock is not series.clock or most > len(series.times):
+        if clock is not series.clock or most != series.most:
             series.follow(clock, most)
-        counts, now_ns, loud = self._counts, clock.now(), self._is_loud()
-        is_stepped = counts or not clock.function_at
-        begin = at = numbers[TIMES] = series.times_at
-        end = begin + 8 * most
-        numbers[BUDGETED], numbers[DEFERRED] = budget, exchange.passed
-        if loud and exchange.passed:
-            exchange.passed -= 1
+        is_stepped = self._counts or not clock.function_at
+        now_ns, loud = clock.now(), self._is_loud()
+        numbers[BUDGETED], numbers[TIMES] = budget, series.times_at
         if self._is_timed:
             series.load_turns()
+        numbers[DEFERRED] = exchange.passed
+        if exchange.passed:
+            exchange.passed -= 1
         try:
             while True:
-                numbers[FIRST], numbers[HEARD], numbers[ENDS] = now_ns, loud, end
+                numbers[FIRST], numbers[HEARD] = now_ns, loud
                 if loud:
                     loud = self._hear(now_ns)
-                if loud or is_stepped:
-                    numbers[ENDS] = at if numbers[DEFERRED] else at + 8
+                numbers[ALONE] = loud or is_stepped
                 point = series.call_burst(self._numbers_at)
+                if point == OVER:
+                    break
                 if point > 0:
+                    numbers[HEARD] = True  # there was no refresh to be counted
                     return self._machine.trap_at(point)
-                is_scan, at = at != numbers[TIMES], numbers[TIMES]
-                if is_scan:
-                    now_ns = numbers[FIRST]
-                    if counts:
-                        self._count()
-                elif numbers[CHANGED]:
-                    exchange.pass_by()
-                if point:
+                if is_stepped:
+                    self._count()
+                now_ns = numbers[FIRST]
+                if point in (ASKED, ASKED_BEFORE):
                     loud = self._finish(now_ns) or loud
-                if is_scan:
-                    if at == end or not numbers[AGAIN]:
-                        break
+                if point >= SCANNED:
                     now_ns = clock.now()
         finally:  # Ctrl-C may come between two calls
             if self._is_timed:
                 series.store_turns()
-            if done := (numbers[TIMES] - begin) // 8:
+            if done := (numbers[TIMES] - series.times_at) // 8:
                 times += series.times[:done]
-                if not counts:
-                    self._count()
+                self._count()
                 self._end(numbers[FIRST])
         return None
 
@@ -189,9 +187,10 @@ class Accompanied:
         return loud
 
     def _count(self) -> None:
-        """A refresh is over; links that were heard for it know of it."""
+        """A refresh is over; links that were heard for it know of it, and others are told if it was not left out."""
         numbers, exchange = self._numbers, self._exchange
         if not numbers[HEARD]:
+            numbers[HEARD] = True
             exchange.passed += 1
             if numbers[CHANGED]:
                 exchange.pass_by()

@@ -30,18 +30,21 @@ class Clockwork:
 
 NOTHING = Clockwork()
 (MEMORY, CONTEXT, LEFT, FIRST, STEP, BUDGETED, SPEND, DONE, CHANGED, UNFINISHED, AGAIN, FAULTY, POINT,
- DEFERRED, HEARD, TIMES, ENDS, CLOCK, NUMBER, ZERO, ROWS) = range(21)  # fmt: skip
+ DEFERRED, ALONE, HEARD, TIMES, ENDS, CLOCK, NUMBER, ZERO, ROWS) = range(22)  # fmt: skip
 """Parameters, 64 bits each, and then the rows of turns, of what is watched and of companions: the addresses of memory and
 context, how many scans, the time of the first one and by how far it goes on, statements that a scan may execute and all
 of them together, how many scans there were, whether something that is watched has changed or which companions ran, and
 what else these tell.
 
-Of a burst only: whether it begins with a refresh; whether somebody was heard for the last refresh, which is so if there
-was but one; where the time of the next scan goes and where there is no more room; the clock, as `Clock` describes it.
-FIRST becomes the time of its last scan."""
+Of a burst only: whether it begins with a refresh; whether there shall be one refresh only; whether somebody was heard for
+the last one, which is so if there was but one; where the time of the next scan goes and where there is no more room; the
+clock, as `Clock` describes it.  FIRST becomes the time of its last scan."""
 TOLD = Told(memory=MEMORY, ran=CHANGED, unfinished=UNFINISHED, again=AGAIN, faulty=FAULTY, point=POINT)
 ASKED = -1
 """In place of a trap's point: companions have requests, or one of them has a trap of its own."""
+OVER, SCANNED, ASKED_BEFORE, REFRESHED = 0, -2, -3, -4
+"""What else a burst returns, which goes on unless it is OVER: ASKED or SCANNED after a scan; after the refresh before it
+ASKED_BEFORE or REFRESHED."""
 ROW = 4
 """Numbers of a turn: where the address of its function lies, interval, next time, whether it is due."""
 WATCHED_ROW, WATCHED_BYTES = 2, 8
@@ -50,8 +53,8 @@ MOST_CYCLE = 0xFFFF_FFFF
 """The longest cycle time that its words can say."""
 SECOND_NS = 1_000_000_000
 _PARAMETERS = {"memory": MEMORY, "context": CONTEXT, "left": LEFT, "first": FIRST, "step": STEP, "budgeted": BUDGETED,
-               "spend": SPEND, "done": DONE, "changed": CHANGED, "again": AGAIN, "deferred": DEFERRED, "heard": HEARD,
-               "times": TIMES, "ends": ENDS, "clock": CLOCK, "number": NUMBER, "zero": ZERO}  # fmt: skip
+               "spend": SPEND, "done": DONE, "changed": CHANGED, "again": AGAIN, "deferred": DEFERRED, "alone": ALONE,
+               "heard": HEARD, "times": TIMES, "ends": ENDS, "clock": CLOCK, "number": NUMBER, "zero": ZERO}  # fmt: skip
 """The names that functions use."""
 _SCAN = f"""scan:
 %before = load i64, ptr %now_at
@@ -125,21 +128,28 @@ $rows
 %ends = load i64, ptr %ends_at
 %first = load i64, ptr %first_at
 %deferred = load i64, ptr %deferred_at
+%alone = load i64, ptr %alone_at
+%single = icmp ne i64 %alone, 0
 %late = icmp ne i64 %deferred, 0
-br i1 %late, label %refresh, label %test
+br i1 %late, label %refresh, label %ready
 refresh:
 store i64 0, ptr %deferred_at
-store i64 0, ptr %heard_at
 %early = call i32 @companions(ptr %p, i64 %first)
 %asks = icmp slt i32 %early, 0
-br i1 %asks, label %asked, label %test
-test:
+%back = or i1 %asks, %single
+br i1 %back, label %refreshed, label %unheard
+refreshed:
+%before_scan = select i1 %asks, i32 {ASKED_BEFORE}, i32 {REFRESHED}
+ret i32 %before_scan
+unheard:
+store i64 0, ptr %heard_at
+br label %ready
+ready:
 %at0 = load i64, ptr %times_at
-%room = icmp ult i64 %at0, %ends
-br i1 %room, label %begin, label %over
+br label %begin
 begin:
-%now = phi i64 [ %first, %test ], [ %next, %follow ]
-%at = phi i64 [ %at0, %test ], [ %at1, %follow ]
+%now = phi i64 [ %first, %ready ], [ %next, %follow ]
+%at = phi i64 [ %at0, %ready ], [ %at1, %follow ]
 %time_at = inttoptr i64 %at to ptr
 store i64 %now, ptr %time_at
 %at1 = add i64 %at, 8
@@ -149,14 +159,18 @@ store i64 0, ptr %changed_at
 br label %scan
 {_SCAN}
 %ran = call i32 @companions(ptr %p, i64 %now)
-%urgent = icmp slt i32 %ran, 0
-br i1 %urgent, label %asked, label %calm
-calm:
 %again = load i64, ptr %again_at
 %wanted = icmp ne i64 %again, 0
 %more = icmp ult i64 %at1, %ends
 %go = and i1 %wanted, %more
-br i1 %go, label %follow, label %over
+br i1 %go, label %on, label %over
+on:
+%urgent = icmp slt i32 %ran, 0
+%away = or i1 %urgent, %single
+br i1 %away, label %scanned, label %follow
+scanned:
+%after_scan = select i1 %urgent, i32 {ASKED}, i32 {SCANNED}
+ret i32 %after_scan
 follow:
 store i64 0, ptr %heard_at
 %told = call i32 %clock(i32 signext %number, ptr %spec)
@@ -166,10 +180,8 @@ store i64 0, ptr %heard_at
 %time = add i64 %ns, %part
 %next = sub i64 %time, %zero
 br label %begin
-asked:
-ret i32 {ASKED}
 over:
-ret i32 0
+ret i32 {OVER}
 {_TRAP}
 ret i32 %point
 }}
@@ -178,7 +190,7 @@ ret i32 %point
 
 def text(intervals: Sequence[bool], clockwork: Clockwork, watched: int, shapes: Sequence[Shape]) -> str:
     """The functions @scans and, where there are companions, @burst: both take the address of the parameters, and return
-    a trap's point, ASKED, or 0."""
+    a trap's point, ASKED, 0, or what else there is for a burst."""
     first = ROWS + ROW * len(intervals)
     parts = {"addresses": _lines(_addresses()), "rows": _lines(_rows(len(intervals))), "clockwork": _lines(_clockwork(clockwork)),
              "turns": _lines(_turns(intervals)),

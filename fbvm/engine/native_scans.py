@@ -24,6 +24,7 @@ from fbvm.engine.native_scan_code import (
     CLOCK,
     CONTEXT,
     DONE,
+    ENDS,
     FIRST,
     LEFT,
     MEMORY,
@@ -87,8 +88,10 @@ class Series:
         shape = tuple(turn.interval_ns > 0 for turn in turns), clockwork, len(offsets)
         self.numbers_at = numbers.buffer_info()[0]
         self.clock: Clock | None = None
+        self.most = 0
+        """Of how many scans a burst is at most."""
         self.times = array("q")
-        """When the scans of a burst began."""
+        """When those of the last one began."""
         self.times_at = 0
         self.call, self.call_burst = _scans(*shape, tuple(companion.shape for companion in companions))
         """Machine code of scans, and of a burst: they take the address of the parameters."""
@@ -105,10 +108,12 @@ class Series:
 
     def follow(self, clock: Clock, most: int) -> None:
         """Bursts are of no more scans than so many from now on, at the time of this clock."""
-        self.clock = clock
+        self.clock, self.most = clock, most
         self.times = array("q", bytes(8 * most))
         self.times_at = self.times.buffer_info()[0]
-        self.numbers[CLOCK], self.numbers[NUMBER], self.numbers[ZERO] = clock.function_at, clock.number, clock.zero_ns
+        told = {ENDS: self.times_at + 8 * most, CLOCK: clock.function_at, NUMBER: clock.number, ZERO: clock.zero_ns}
+        for number, value in told.items():
+            self.numbers[number] = value
 
     def load_turns(self) -> None:
         """Take over when the tasks run next."""
