@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from xml.sax.saxutils import escape
+from html import escape
 
 from fbvm.record.sfc_text import TOKEN
 from fbvm.syntax.box_lines import DOUBLE, DOWN, LEFT, RIGHT, THICK, UP, Surface
@@ -127,7 +127,7 @@ def _text(x: int, y: int, text: str, kind: str = "") -> str:
     """A text stretched to its cells, whatever the reader's font."""
     named = f' class="{kind}"' if kind else ""
     return (f'<text{named} x="{_across(x - 0.5)}" y="{_down(y + 0.28)}" textLength="{len(text) * CELL_WIDTH}" '
-            f'lengthAdjust="spacingAndGlyphs">{escape(text)}</text>') if text.strip() else ""
+            f'lengthAdjust="spacingAndGlyphs">{escape(text, quote=False)}</text>') if text.strip() else ""
 
 
 def _across(x: float) -> str:

@@ -61,7 +61,7 @@ def mixed(chance: random.Random) -> str:
     return with_blocks(chance.sample(SHIPPED, chance.randint(1, 4)), more, front)
 
 
-@pytest.mark.parametrize(("which", "least"), [("m*.st", 2), pytest.param("**/*.st", 20, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("which", "least"), [("m*r.st", 2), pytest.param("**/*.st", 20, marks=pytest.mark.slow)])
 def test_programs_of_the_examples_are_the_same_in_any_order(which: str, least: int) -> None:
     texts = [path.read_text(encoding="utf-8") for path in sorted(EXAMPLES.glob(which))]
     texts = [text for text in texts if compile_text(text).image is not None]
@@ -90,7 +90,7 @@ def programs(count: int) -> Iterator[str]:
     return (mixed(chance) for _ in range(count))
 
 
-@pytest.mark.parametrize("count", [12, pytest.param(150, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [4, pytest.param(150, marks=pytest.mark.slow)])
 def test_programs_that_mix_blocks_are_the_same_as_alone(count: int) -> None:
     for text in programs(count):
         compile_text(text)
@@ -134,9 +134,9 @@ def test_references_into_a_linked_block_and_a_block_that_programs_complete() -> 
 
 
 def test_what_is_kept_leads_to_no_program() -> None:
-    for text in programs(6):
-        compile_text(text)
-        compile_text(text)
+    for text in (with_blocks(["MBP_MSTR", "TON"]), (EXAMPLES / "client.st").read_text(encoding="utf-8")):
+        for _ in range(2):
+            compile_text(text)
     seen: set[int] = set()
     left: list[object] = [*kept().code.values(), *kept().asked.values()]
     assert len(left) > 10
@@ -151,11 +151,11 @@ def test_what_is_kept_leads_to_no_program() -> None:
 def test_what_is_kept_has_an_end() -> None:
     sizes = []
     for number in range(3):
-        for name in ("TON", "MBP_MSTR", "MB_TCP_SERVER"):
-            for size in range(4):
+        for name in ("CTUD", "MTCP_ETN_Fn03"):
+            for size in range(3):
                 compile_text(with_blocks([name], f"pad{number} : ARRAY [0..{size}] OF INT;"))
         sizes.append((len(kept().code), len(kept().asked), len(kept().met)))
-    assert sizes[0] == sizes[1] == sizes[2] and sizes[0][0] > 10
+    assert sizes[0] == sizes[1] == sizes[2] and sizes[0][0] > 5
 
 
 def test_a_library_sees_no_enumeration_of_the_user(tmp_path: Path) -> None:
