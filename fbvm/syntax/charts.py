@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from fbvm.base.types import fold
 from fbvm.syntax.evolution import Evolution, action_flags
 from fbvm.syntax.lexer import Token
+from fbvm.syntax.node import changed
 from fbvm.syntax.sfc import Sfc, Step, Transition
 from fbvm.syntax.sfc_elements import Part, SfcElements
 from fbvm.syntax.sfc_flags import declared
@@ -43,7 +43,7 @@ class Charts:
         for action, inner in charted.items():
             self._alone(action.body, "in another ACTION")
             chart = self._chart(inner, inner[0].start, inner[-1].end, action)
-            self.actions = [replace(each, body=(chart,)) if each is action else each for each in self.actions]
+            self.actions = [changed(each, body=(chart,)) if each is action else each for each in self.actions]
         self.sections.append(action_flags(first.start, first.end, self.actions))
         return body
 

@@ -7,12 +7,12 @@ needs to be complete; the checker is who decides what a name means.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import fields
 from typing import Any, NamedTuple
 
 from fbvm.base.types import ELEMENTARY, GENERIC, SHORT_NAMES, fold
 from fbvm.syntax.format_scopes import Scope, declared_in, element, global_scope, members
 from fbvm.syntax.ladder import Ladder
+from fbvm.syntax.node import names_of
 from fbvm.syntax.sfc import Association, Sfc, Transition
 from fbvm.syntax.tree import (
     Argument,
@@ -238,7 +238,7 @@ def _is_ladder(node: Node) -> bool:
 
 def _children(node: Node) -> Iterator[Node]:
     """The nodes directly below a node; of a chart what was written."""
-    todo: list[Any] = [node.steps, node.transitions] if isinstance(node, Sfc) else [getattr(node, f.name) for f in fields(node)]
+    todo: list[Any] = [node.steps, node.transitions] if isinstance(node, Sfc) else [getattr(node, n) for n in names_of(node)]
     while todo:
         value = todo.pop()
         if isinstance(value, Node):

@@ -7,10 +7,11 @@ A label takes the jump, and so sets the variable back.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from fbvm.base.types import fold
 from fbvm.syntax import tree
+from fbvm.syntax.node import changed
 from fbvm.syntax.tree import Block, Expr, NameRef, Statement
 
 LOOPS = tree.For | tree.While | tree.Repeat
@@ -169,10 +170,10 @@ def _rebuilt(node: Statement, inner: Callable[[Block], Block]) -> Statement:
     """A statement with other blocks in it."""
     if isinstance(node, tree.If):
         branches = tuple((condition, inner(block)) for condition, block in node.branches)
-        return replace(node, branches=branches, otherwise=None if node.otherwise is None else inner(node.otherwise))
+        return changed(node, branches=branches, otherwise=None if node.otherwise is None else inner(node.otherwise))
     if isinstance(node, tree.Case):
-        cases = tuple(replace(branch, body=inner(branch.body)) for branch in node.branches)
-        return replace(node, branches=cases, otherwise=None if node.otherwise is None else inner(node.otherwise))
+        cases = tuple(changed(branch, body=inner(branch.body)) for branch in node.branches)
+        return changed(node, branches=cases, otherwise=None if node.otherwise is None else inner(node.otherwise))
     if isinstance(node, tree.For | tree.While | tree.Repeat):
-        return replace(node, body=inner(node.body))
+        return changed(node, body=inner(node.body))
     return node

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
 from typing import Any
 
+from fbvm.syntax.node import names_of
 from fbvm.syntax.tree import Binary, Direct, EnumLiteral, Literal, Location, Name, NamedType, NameRef, Node
 
 HIDDEN = {"start", "end", "op_start"}
@@ -49,7 +49,7 @@ def _walk(value: Any, label: str, depth: int, lines: list[str]) -> None:
 
 def _node(node: Node, label: str, depth: int, lines: list[str]) -> None:
     short, long = [], []
-    for name in (f.name for f in fields(node) if f.name not in HIDDEN):
+    for name in (name for name in names_of(node) if name not in HIDDEN):
         value = getattr(node, name)
         if value is None or value is False or value == "" or (value == () and name != "otherwise"):
             continue

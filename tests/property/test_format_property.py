@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import re
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from fbvm.syntax.format import REFUSED, formatted
 from fbvm.syntax.format_comments import Comments
 from fbvm.syntax.format_names import Spelling
 from fbvm.syntax.lexer import Lexer, Token, lexis
+from fbvm.syntax.node import names_of
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Literal, Node
 
@@ -80,7 +81,7 @@ def meaning(value: Any) -> Any:
     if isinstance(value, Literal):
         return value.kind, repr(value.value), value.type_name
     if isinstance(value, Node):
-        return type(value).__name__, [meaning(getattr(value, f.name)) for f in fields(value) if f.name not in PLACES]
+        return type(value).__name__, [meaning(getattr(value, name)) for name in names_of(value) if name not in PLACES]
     if isinstance(value, tuple):
         return [meaning(item) for item in value]
     return " ".join(value.upper().split()) if isinstance(value, str) else value

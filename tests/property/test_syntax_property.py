@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fbvm.base.diagnostics import Source
+from fbvm.syntax.node import names_of
 from fbvm.syntax.outline import dump
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Node
@@ -34,7 +34,7 @@ def check_places(text: str) -> None:
             todo.extend(value)
         elif isinstance(value, Node):
             assert 0 <= value.start <= value.end <= len(text)
-            todo.extend(getattr(value, field.name) for field in fields(value))
+            todo.extend(getattr(value, name) for name in names_of(value))
         else:
             assert value is None or isinstance(value, (bool, int, float, str))
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
+from fbvm.syntax.node import names_of
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Binary, Literal, Name, NamedType, NameRef, Node
 
@@ -38,8 +38,8 @@ def test_spans(path: Path) -> None:
             assert text[node.start:node.end].upper() == node.text.upper()
         if isinstance(node, Binary):
             assert text[node.op_start:node.op_start + len(node.op)].upper() == node.op or text[node.op_start] == "&"
-        for field in fields(node):
-            for child in children(getattr(node, field.name)):
+        for name in names_of(node):
+            for child in children(getattr(node, name)):
                 assert node.start <= child.start <= child.end <= node.end, (node, child)
                 todo.append(child)
     assert seen > 20
