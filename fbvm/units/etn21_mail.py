@@ -90,7 +90,7 @@ class Mail:
         """Events for which there is no room now."""
         self._fresh_bytes = 0
         """Received in the rows that are posted."""
-        self._places = [0] * (at.SOCKETS.stop)
+        self._places = dict.fromkeys(at.SOCKETS, 0)
         """Of the next byte in the ring of each socket."""
 
     @property
@@ -105,7 +105,7 @@ class Mail:
 
     def take_over(self, other: Mail) -> None:
         """Go on where this one is; the tables and rings are those of a copy of its processor."""
-        self._later, self._fresh_bytes, self._places = [*other._later], other._fresh_bytes, [*other._places]
+        self._later, self._fresh_bytes, self._places = [*other._later], other._fresh_bytes, {**other._places}
 
     def post(self, events: Iterable[Event]) -> None:
         """Give events to the processor; what does not fit waits for the refresh after, unknown channels are dropped."""
@@ -115,37 +115,42 @@ class Mail:
         if self._later:
             events, self._later = [*self._later, *events], []
         for event in events:
-            channel = event.channel
             if posted == self._most or self._later:
                 self._later.append(event)
-            elif channel in at.SOCKETS:
-                if isinstance(event, Received) and not self._keep(channel, event.data):
+                continue
+            channel = event.channel
+            place = self._places.get(channel)
+            if place is None:
+                continue
+            if isinstance(event, Received):
+                place = self._keep(channel, place, event.data)
+                if place is None:
                     self._later.append(event)
                     continue
-                row = _ROWS[type(event)](event)
-                EVENT.pack_into(self._events, EVENT.size * posted, *row, self._places[channel])
-                posted += 1
+            EVENT.pack_into(self._events, EVENT.size * posted, *_ROWS[type(event)](event), place)
+            posted += 1
         self._posted[0] = posted
 
-    def _keep(self, channel: int, data: bytes) -> bool:
-        """Put bytes into the ring of a socket, behind those that the program has not fetched; False if there is no room now.
+    def _keep(self, channel: int, place: int, data: bytes) -> int | None:
+        """Put bytes into the ring of a socket, behind those that the program has not fetched; the place behind them, or None
+        if there is no room now.
 
         What no socket would keep (more than a buffer) is only told."""
         size = len(data)
         if size > LARGEST:
-            return True
+            return place
         if self._fresh_bytes + size > RING_BYTES - LARGEST:
-            return False
+            return None
         self._fresh_bytes += size
-        begin = self._places[channel] & RING_BYTES - 1
-        ring = RING_BYTES * (channel - 1)
-        if begin + size <= RING_BYTES:
-            self._rings[ring + begin : ring + begin + size] = data
+        begin = RING_BYTES * (channel - 1) + (place & RING_BYTES - 1)
+        if (over := (place & RING_BYTES - 1) + size - RING_BYTES) <= 0:
+            self._rings[begin : begin + size] = data
         else:
-            self._rings[ring + begin : ring + RING_BYTES] = data[: RING_BYTES - begin]
-            self._rings[ring : ring + begin + size - RING_BYTES] = data[RING_BYTES - begin :]
-        self._places[channel] = self._places[channel] + size & COUNTER
-        return True
+            ring = RING_BYTES * channel
+            self._rings[begin:ring] = data[: size - over]
+            self._rings[ring - RING_BYTES : ring - RING_BYTES + over] = data[size - over :]
+        place = self._places[channel] = place + size & COUNTER
+        return place
 
     def collect(self, memory: AreaMemory) -> list[Request]:
         """After a refresh: what the processor asks of the network."""
