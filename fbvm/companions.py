@@ -52,7 +52,8 @@ def _companion(unit: Unit, exchange: Exchange) -> Companion | None:
     copies = [(exchange.offset(area, word), own.offset(variable), 2 * count) for area, word, variable, count in exchanged.words]
     watched = [exchange.offset(area, word) for area, word in unit.watched]
     posted, requested, wake = map(own.offset, (exchanged.posted, exchanged.requested, exchanged.wake))
-    return machine.companion(copies, watched, posted, requested, wake, _moves(exchanged, exchange))
+    left = [own.offset(variable) for variable in exchanged.left]
+    return machine.companion(copies, watched, posted, requested, left, wake, _moves(exchanged, exchange))
 
 
 def _moves(exchanged: Exchanged, exchange: Exchange) -> tuple[int, int, int]:

@@ -84,10 +84,10 @@ class NativeEngine:
         return Series(self.memory, self._memory_at, self._context.at, self._entries, turns, clockwork, watched, companions)
 
     def companion(self, copies: Sequence[tuple[int, int, int]], watched: Sequence[int], posted: int, requested: int,
-                  wake: int, moves: tuple[int, int, int] = (0, 0, 0)) -> Companion:  # fmt: skip
+                  left: Sequence[int], wake: int, moves: tuple[int, int, int] = (0, 0, 0)) -> Companion:  # fmt: skip
         """This program, its first task, as a companion of another; see `Companion` for the offsets."""
         return Companion(self._entries[0].function_at, self._memory_at, self._context.at, self.trap_at, tuple(copies),
-                         tuple(watched), posted, requested, wake, moves)  # fmt: skip
+                         tuple(watched), posted, requested, tuple(left), wake, moves)  # fmt: skip
 
     def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork = NOTHING, *,
                  spend: int = NO_LIMIT) -> tuple[int, Trap | None]:  # fmt: skip

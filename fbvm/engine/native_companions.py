@@ -15,8 +15,9 @@ from fbvm.engine.trap import Trap
 
 STATEMENTS = 2_000_000
 """How many it may execute in a run."""
-Shape = tuple[tuple[int, ...], int, int]
-"""Bytes of each copy, how many groups are watched, bytes of a ring or 0: what its machine code is made for."""
+Shape = tuple[tuple[int, ...], int, int, int]
+"""Bytes of each copy, how many groups are watched, in how many places something may be left, bytes of a ring or 0: what its
+machine code is made for."""
 MOVE_BYTES = 20
 """Of a row of what is to be moved (`fbvm.units.unit.Moves`)."""
 
@@ -38,7 +39,9 @@ class Companion:
     posted: int
     """Offset in its memory of 32 bits that are not 0 if something waits for it."""
     requested: int
-    """Offset in its memory of 32 bits with the number of requests that its last run left."""
+    """Offset in its memory of 32 bits with the number of requests that it has left and somebody has to see at once."""
+    left: tuple[int, ...]
+    """Offsets in its memory of 32 bits each; somebody has to see to it sometime if one of them is not 0."""
     wake: int
     """Offset in its memory of 64 bits without sign: the time from which on it is to run."""
     moves: tuple[int, int, int] = (0, 0, 0)
@@ -47,7 +50,7 @@ class Companion:
     @property
     def shape(self) -> Shape:
         """What its machine code depends on."""
-        return tuple(size for _, _, size in self.copies), len(self.watched), self.moves[2]
+        return tuple(size for _, _, size in self.copies), len(self.watched), len(self.left), self.moves[2]
 
     def row(self, memory_at: int) -> Iterator[int]:
         """Its parameters: addresses, and for what is watched what is expected there."""
@@ -58,6 +61,7 @@ class Companion:
             yield from (memory_at + offset, own + its_offset)
         for offset in self.watched:
             yield from (memory_at + offset, 0)
+        yield from (own + offset for offset in self.left)
 
     def expected(self, memory: Memory) -> list[tuple[memoryview, int]]:
         """What is watched, and which number of the row says what is expected there."""
@@ -66,7 +70,7 @@ class Companion:
 
 
 FUNCTION, MEMORY, CONTEXT, POSTED, REQUESTED, WAKE, MOVED, MOVES, HEAD = range(9)
-"""Numbers of a companion's row, before those of copies and of what is watched: two for each."""
+"""Numbers of a companion's row, before those of copies and of what is watched, two for each, and of what may be left."""
 NEWS, AT_ONCE = 1, 2
 """Why there should be another scan soon: words have changed that the program may look at, a companion has more to do."""
 
@@ -81,7 +85,7 @@ class Told:
     ran: int
     """Which companions ran in the last refresh, a bit each."""
     unfinished: int
-    """Which ones have run since somebody else has set this 0."""
+    """Which ones have left something, or have trapped, since somebody else has set this 0."""
     again: int
     """NEWS, AT_ONCE, both or neither, after the last refresh."""
     faulty: int
@@ -132,6 +136,11 @@ $moves
 %again2 = load i64, ptr %again_at
 %again3 = or i64 %again1, %again2
 store i64 %again3, ptr %again_at
+$left
+%bits = select i1 %left, i64 %bit, i64 0
+%before = load i64, ptr %unfinished_at
+%all = or i64 %before, %bits
+store i64 %all, ptr %unfinished_at
 %requested = load i32, ptr %requested_at
 %asks = icmp ne i32 %requested, 0
 %answer = select i1 %asks, i32 -1, i32 1
@@ -140,6 +149,9 @@ trap:
 %number = zext i32 %point to i64
 store i64 %bit, ptr %faulty_at
 store i64 %number, ptr %point_at
+%others = load i64, ptr %unfinished_at
+%trapped = or i64 %others, %bit
+store i64 %trapped, ptr %unfinished_at
 ret i32 -1
 }}
 """)
@@ -211,10 +223,6 @@ $told
 store i64 0, ptr %ran_at
 store i64 0, ptr %again_at
 $calls
-%ran = load i64, ptr %ran_at
-%before = load i64, ptr %unfinished_at
-%all = or i64 %before, %ran
-store i64 %all, ptr %unfinished_at
 ret i32 %any$count
 }
 """)
@@ -229,7 +237,8 @@ def text(shapes: Sequence[Shape], first: int, told: Told) -> str:
         number=number, fields=_lines(_fields(told)), watched=_lines(_watched(HEAD + 2 * len(copies), groups)),
         into=_lines(_into(copies)), outof=_lines(_out_of(copies)), expected=_lines(_expected(groups)), copies=len(copies),
         moves=_MOVES.substitute(mask=ring - 1) if ring else "",
-    ) for number, (copies, groups, ring) in enumerate(kinds)]  # fmt: skip
+        left=_lines(_left(HEAD + 2 * (len(copies) + groups), places)),
+    ) for number, (copies, groups, places, ring) in enumerate(kinds)]  # fmt: skip
     calls = ["%any0 = add i32 0, 0"]
     for number, shape in enumerate(shapes):
         calls += [_address(f"w{number}", "p", first),
@@ -241,7 +250,8 @@ def text(shapes: Sequence[Shape], first: int, told: Told) -> str:
 
 def size(shape: Shape) -> int:
     """Numbers of a row."""
-    return HEAD + 2 * (len(shape[0]) + shape[1])
+    copies, groups, places, _ = shape
+    return HEAD + 2 * (len(copies) + groups) + places
 
 
 def _lines(lines: Iterable[str]) -> str:
@@ -286,6 +296,15 @@ def _expected(groups: int) -> Iterator[str]:
     """What is watched is expected to stay as it is."""
     for n in range(groups):
         yield from (f"%en{n} = load i64, ptr %vp{n}, align 1", f"store i64 %en{n}, ptr %ve{n}_in")
+
+
+def _left(first: int, places: int) -> Iterator[str]:
+    """Whether anything is left."""
+    yield "%l0 = add i32 0, 0"
+    for n in range(places):
+        yield from _loaded(f"lp{n}", first + n)
+        yield from (f"%lv{n} = load i32, ptr %lp{n}", f"%l{n + 1} = or i32 %l{n}, %lv{n}")
+    yield f"%left = icmp ne i32 %l{places}, 0"
 
 
 def _pieces(bytes_: int) -> Iterator[tuple[int, int]]:

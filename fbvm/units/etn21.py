@@ -107,7 +107,8 @@ class Etn21:
         """The words of the unit, and where its program says what it wants."""
         words = (("CIO", self.layout.n, "ETN21_N", at.CIO_WORDS), ("D", self.layout.m, "ETN21_M", at.D_WORDS),
                  ("A", at.INITIALIZING, "ETN21_Initializing", 1), ("A", at.RESTART, "ETN21_Restart", 1))  # fmt: skip
-        return Exchanged(self._processor, words, "ETN21_Posted", "ETN21_Urgent", "ETN21_Wake", MOVES)
+        left = "ETN21_Requested", "ETN21_Behind"
+        return Exchanged(self._processor, words, "ETN21_Posted", "ETN21_Urgent", left, "ETN21_Wake", MOVES)
 
     @property
     def wake_ns(self) -> int:

@@ -76,6 +76,7 @@ class Mail:
 
     def __init__(self, processor: Processor, odd_filler: int | None) -> None:
         self._posted = processor.view("ETN21_Posted", "u32")
+        self._behind = processor.view("ETN21_Behind", "u32")
         self._events = processor.view("ETN21_Events", "u8")
         self._requested = processor.view("ETN21_Requested", "u32")
         self._urgent = processor.view("ETN21_Urgent", "u32")
@@ -102,6 +103,7 @@ class Mail:
         """As after power-on."""
         self._posted[0] = self._requested[0] = self._urgent[0] = self._moved[0] = 0
         self._later.clear()
+        self._behind[0] = 0
 
     def take_over(self, other: Mail) -> None:
         """Go on where this one is; the tables and rings are those of a copy of its processor."""
@@ -114,9 +116,10 @@ class Mail:
             self._fresh_bytes = 0
         if self._later:
             events, self._later = [*self._later, *events], []
+            self._behind[0] = 0
         for event in events:
             if posted == self._most or self._later:
-                self._later.append(event)
+                self._defer(event)
                 continue
             channel = event.channel
             place = self._places.get(channel)
@@ -125,11 +128,16 @@ class Mail:
             if isinstance(event, Received):
                 place = self._keep(channel, place, event.data)
                 if place is None:
-                    self._later.append(event)
+                    self._defer(event)
                     continue
             EVENT.pack_into(self._events, EVENT.size * posted, *_ROWS[type(event)](event), place)
             posted += 1
         self._posted[0] = posted
+
+    def _defer(self, event: Event) -> None:
+        """Keep an event until the program has run."""
+        self._later.append(event)
+        self._behind[0] = 1
 
     def _keep(self, channel: int, place: int, data: bytes) -> int | None:
         """Put bytes into the ring of a socket, behind those that the program has not fetched; the place behind them, or None

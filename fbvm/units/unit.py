@@ -70,6 +70,8 @@ class Exchanged:
     """UDINT variable: how many events of the network wait for the program, which sets it 0 when it took them."""
     requested: str
     """UDINT variable: how many requests that cannot wait for the end of a burst it has left."""
+    left: tuple[str, ...]
+    """UDINT variables: if all are 0 after a run, `finish` has nothing to do."""
     wake: str
     """64-bit variable: time in ns (of the PLC) from which on the program wants to run although nothing changed."""
     moves: Moves | None = None
@@ -136,9 +138,9 @@ class ProcessorUnit(Unit, Protocol):
         """The second part of `refresh`: has moved what the program left to be moved."""
 
     def post(self, events: Sequence[Event]) -> None:
-        """Events of the network for the next run of its program, behind those that wait already.  If it has run, `finish`
-        comes before."""
+        """Events of the network for the next run of its program, behind those that wait already.  If it has left something,
+        `finish` comes before."""
 
     def finish(self) -> list[Request]:
-        """After the program ran elsewhere than in `refresh`, at once if it left requests, else at the latest before
-        something is posted: take over `news` and `wake_ns`; what the network has to do."""
+        """After a run of the program: what the network has to do.  At once if it requested something, else if something is
+        left, at the latest before something is posted."""

@@ -146,6 +146,18 @@ def test_an_answer_is_fetched_before_the_program_that_it_wakes(image: Image, clo
         assert network.looks == looks + 2
 
 
+def test_more_events_than_a_unit_takes_at_once_reach_it_in_the_same_burst(image: Image, clock: Clock) -> None:
+    plc, network = polling(image, clock)
+    assert run(plc, for_ns=20 * MS, pace="event") == "time"
+    network.answers.clear()
+    network.told += [Received(1, bytes(1)) for _ in range(300)]
+    before = plc.read("D30001")
+    assert before == 0
+    while plc.due_ns <= plc.now_ns or network.told:
+        assert 0 < len(plc.scan_at_once(16, PlcClock(lambda: plc.now_ns + 1000))) < 16
+    assert plc.read("D30001") == 300
+
+
 def test_a_burst_ends_so_that_others_have_their_turn(clock: Clock) -> None:
     """A program that asks its unit for something in each scan."""
     compilation = compile_text("""PROGRAM Main

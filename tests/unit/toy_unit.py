@@ -66,7 +66,7 @@ class Toy:
 
     @property
     def exchanged(self) -> Exchanged | None:
-        return Exchanged(self.own, self.words, "Posted", "Requested", "Wake") if self.is_inside else None
+        return Exchanged(self.own, self.words, "Posted", "Requested", ("Requested",), "Wake") if self.is_inside else None
 
     @property
     def watched(self) -> Sequence[tuple[str, int]]:
@@ -76,7 +76,11 @@ class Toy:
         self.own: OwnProcessor = processor(PROGRAM)
         self.own.view("Bit", "u16")[0], self.own.view("Delay", "i64")[0] = self._bit, self._delay_ns
         self.connect()
-        self.news, self.wake_ns, self.refreshes, self._has_run = False, 0, 0, False
+        self.news, self.refreshes, self._has_run = False, 0, False
+
+    @property
+    def wake_ns(self) -> int:
+        return self._wake[0] if self._has_run else 0
 
     def connect(self) -> None:
         """Use the processor that there is."""
@@ -117,10 +121,10 @@ class Toy:
         self.own.run(now_ns)
         for plc, own in views:
             plc[:] = own
+        self.news = bool(self._news[0])
         return True
 
     def finish(self) -> list[Request]:
-        self.news, self.wake_ns = bool(self._news[0]), self._wake[0]
         return [Send(1, bytes([value & 0xFF])) for value in self._asked[: self._requested[0]]]
 
 
