@@ -89,10 +89,10 @@ class Mail:
         self._most = len(self._events) // EVENT.size
         self._later: list[Event] = []
         """Events for which there is no room now."""
-        self._fresh_bytes = 0
-        """Received in the rows that are posted."""
-        self._places = dict.fromkeys(at.SOCKETS, 0)
-        """Of the next byte in the ring of each socket."""
+        self._ends = processor.view("ETN21_Ends", "u32")
+        """Of what each socket has kept: the places behind the last bytes in their rings."""
+        self._fresh: dict[int, int] = {}
+        """How many bytes of the rows that are posted lie behind these, by socket."""
 
     @property
     def waits(self) -> bool:
@@ -107,49 +107,41 @@ class Mail:
 
     def take_over(self, other: Mail) -> None:
         """Go on where this one is; the tables and rings are those of a copy of its processor."""
-        self._later, self._fresh_bytes, self._places = [*other._later], other._fresh_bytes, {**other._places}
+        self._later, self._fresh = [*other._later], {**other._fresh}
 
     def post(self, events: Iterable[Event]) -> None:
         """Give events to the processor; what does not fit waits for the refresh after, unknown channels are dropped."""
         posted: int = self._posted[0]
-        if not posted:
-            self._fresh_bytes = 0
+        if not posted:  # what the program has not kept gives way to the next
+            self._fresh.clear()
         if self._later:
             events, self._later = [*self._later, *events], []
             self._behind[0] = 0
         for event in events:
-            if posted == self._most or self._later:
-                self._defer(event)
+            if posted == self._most:
+                self._later.append(event)
+                self._behind[0] = 1
                 continue
-            channel = event.channel
-            place = self._places.get(channel)
-            if place is None:
+            channel, place = event.channel, 0
+            if channel not in at.SOCKETS:
                 continue
             if isinstance(event, Received):
-                place = self._keep(channel, place, event.data)
-                if place is None:
-                    self._defer(event)
+                place = self._keep(channel, event.data)
+                if place < 0:
                     continue
             EVENT.pack_into(self._events, EVENT.size * posted, *_ROWS[type(event)](event), place)
             posted += 1
         self._posted[0] = posted
 
-    def _defer(self, event: Event) -> None:
-        """Keep an event until the program has run."""
-        self._later.append(event)
-        self._behind[0] = 1
+    def _keep(self, channel: int, data: bytes) -> int:
+        """Put bytes into the ring of a socket; the place behind them, or -1: they are lost, and are more than it would keep.
 
-    def _keep(self, channel: int, place: int, data: bytes) -> int | None:
-        """Put bytes into the ring of a socket, behind those that the program has not fetched; the place behind them, or None
-        if there is no room now.
-
-        What no socket would keep (more than a buffer) is only told."""
-        size = len(data)
-        if size > LARGEST:
-            return place
-        if self._fresh_bytes + size > RING_BYTES - LARGEST:
-            return None
-        self._fresh_bytes += size
+        In the ring there may be a full buffer and, if it is not stored yet, what the last receive was handed."""
+        fresh, size = self._fresh.get(channel, 0), len(data)
+        if fresh + size > RING_BYTES - 2 * LARGEST:
+            return -1
+        self._fresh[channel] = fresh + size
+        place = self._ends[channel - 1] + fresh
         begin = RING_BYTES * (channel - 1) + (place & RING_BYTES - 1)
         if (over := (place & RING_BYTES - 1) + size - RING_BYTES) <= 0:
             self._rings[begin : begin + size] = data
@@ -157,8 +149,7 @@ class Mail:
             ring = RING_BYTES * channel
             self._rings[begin:ring] = data[: size - over]
             self._rings[ring - RING_BYTES : ring - RING_BYTES + over] = data[size - over :]
-        place = self._places[channel] = place + size & COUNTER
-        return place
+        return place + size & COUNTER
 
     def collect(self, memory: AreaMemory) -> list[Request]:
         """After a refresh: what the processor asks of the network."""

@@ -380,6 +380,39 @@ def test_udp_datagrams_past_the_buffer_are_lost() -> None:
     assert counts == [("0000", 1400)] * 6 + [("0080", 0)]
 
 
+def test_udp_datagrams_that_are_lost_leave_those_that_wait_as_they_are() -> None:
+    rig = bound()
+    rig.scan(Received(1, b"first", STATION), Received(1, bytes(4506), STATION), Received(1, bytes(4505), STATION))
+    for number in range(60):
+        rig.scan(*[Received(1, bytes([number]) * 1472, STATION)] * (number % 5))
+    counts = []
+    for _ in range(3):
+        rig.parameters(count=5)
+        assert rig.ask(Switch.RECEIVE) == "0000"
+        counts.append((rig.result(5), got(rig, 2)))
+    assert counts == [(5, [0x6669, 0x7273]), (5, [0, 0]), (5, [0, 0])]
+
+
+@pytest.mark.parametrize("size", [1, 700, 4096, 9016, 9017])
+def test_bytes_past_the_buffer_leave_those_that_wait_as_they_are(size: int) -> None:
+    """No network should send what it has no room for.  What comes next is whole again."""
+    rig = opened()
+    rig.scan(Received(1, b"abcd" + bytes(4090)))
+    for number in range(60):
+        rig.scan(*[Received(1, bytes([number]) * size)] * (number % 5), Received(1, bytes(3)))
+    taken = 0
+    while rig.waiting():
+        rig.parameters(count=1984)
+        assert rig.ask(Switch.RECEIVE) == "0000"
+        assert taken or got(rig, 3) == [0x6162, 0x6364, 0]
+        taken += rig.result(5)
+    assert taken in (4094, 4096)
+    rig.parameters(count=4)
+    rig.scan(Received(1, b"next"))
+    assert rig.ask(Switch.RECEIVE) == "0000"
+    assert got(rig, 2) == [0x6E65, 0x7874]
+
+
 def test_udp_close() -> None:
     rig = bound()
     rig.parameters()
