@@ -39,9 +39,9 @@ def used() -> frozenset[int]:
     """Numbers of the rules by which the programs were reduced."""
     seen: set[int] = set()
 
-    def noting(number: int, action: Callable[..., Any] | None, *children: Any) -> Any:
+    def noting(number: int, action: Callable[..., Any] | None, builder: Types, *children: Any) -> Any:
         seen.add(number)
-        return action(*children) if action else children[0]
+        return action(builder, *children) if action else children[0]
 
     for text in programs():
         source = Source("program.st", text)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, repeat
 from typing import Any, Protocol
 
@@ -35,6 +35,16 @@ FUNCTION_OPERATORS = frozenset(("AND", "OR", "XOR", "MOD", "NOT"))
 """Reserved words that are names in front of `(`, as in `AND(a, b)`."""
 
 
+_known: dict[tuple[type, str], tuple[Callable[..., Any] | None, ...]] = {}
+
+
+def _actions(kind: type, language: str) -> tuple[Callable[..., Any] | None, ...]:
+    """What a kind of builder does for each rule; looked up once, as most texts are shorter than the rules are many."""
+    if (kind, language) not in _known:
+        _known[kind, language] = tuple(getattr(kind, r.action) if r.action else None for r in tables(language).rules)
+    return _known[kind, language]
+
+
 class Mender(Protocol):
     """Who takes over at an error.  It changes the stacks, and says which tokens come next before the lexer's."""
 
@@ -48,11 +58,11 @@ class Mender(Protocol):
 class Automaton:
     """One parse in progress.  `states` and `values` are its stacks; `states` is longer by the start."""
 
-    def __init__(self, builder: Any, stream: Iterator[Token], text: str = "", language: str = "st") -> None:
+    def __init__(self, builder: object, stream: Iterator[Token], text: str = "", language: str = "st") -> None:
         self.tables: Tables = tables(language)
         self.rows = self.tables.actions
-        self.actions: list[Callable[..., Any] | None] = [
-            getattr(builder, r.action) if r.action else None for r in self.tables.rules]
+        self.builder = builder
+        self.actions: Sequence[Callable[..., Any] | None] = _actions(type(builder), language)
         self.states: list[int] = [self.tables.start]
         self.values: list[Any] = []
         self.stream = chain(stream, repeat(Token("$END", "", len(text), len(text))))
@@ -121,8 +131,7 @@ class Automaton:
         """Take one token: reduce as it demands, then shift it.  Returns the token if it cannot stand here; nothing is
         undone then, since reducing more cannot do harm."""
         rows, rules, actions, states, values = self.rows, self.tables.rules, self.actions, self.states, self.values
-        end = self.tables.end
-        kind = token.type
+        builder, end, kind = self.builder, self.tables.end, token.type
         while True:
             act = rows[states[-1]].get(kind)
             if act is None:
@@ -142,7 +151,7 @@ class Automaton:
             if action is None:
                 del states[-1]
             elif size == 1 and rule.places is None:
-                values[-1] = action(values[-1])
+                values[-1] = action(builder, values[-1])
                 del states[-1]
             else:
                 at = len(values) - size
@@ -150,7 +159,7 @@ class Automaton:
                 del values[at:], states[at + 1:]
                 if rule.places is not None:
                     children = [None if p is None else children[p] for p in rule.places]
-                values.append(action(*children))
+                values.append(action(builder, *children))
             row = rows[states[-1]]
             state = row[rule.origin]
             act = rows[state].get(kind)
@@ -179,7 +188,7 @@ class Automaton:
         del self.states[at + 1:]
         if rule.places is not None:
             children = [None if p is None else children[p] for p in rule.places]
-        self.values.append(action(*children) if action else children[0])
+        self.values.append(action(self.builder, *children) if action else children[0])
         self.states.append(self.rows[self.states[-1]][rule.origin])
 
     def misspelt(self, token: Token) -> bool:
