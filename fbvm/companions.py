@@ -21,6 +21,7 @@ from fbvm.engine.native_scan_code import (
     FAULTY,
     FIRST,
     HEARD,
+    KNOWN,
     OVER,
     POINT,
     SCANNED,
@@ -101,7 +102,7 @@ class Accompanied:
         self._end(now_ns)
         return None
 
-    def burst(self, times: list[int], most: int, clock: Clock, budget: int) -> Trap | None:
+    def burst(self, times: list[int], most: int, now_ns: int, clock: Clock, budget: int) -> Trap | None:
         """Scans each at the time that the clock tells, one upon the other for as long as units have news for the program;
         `times` takes when they began.
 
@@ -110,40 +111,43 @@ class Accompanied:
         series, numbers, exchange = self._series, self._numbers, self._exchange
         if clock is not series.clock or most != series.most:
             series.follow(clock, most)
-        is_stepped = self._counts or not clock.function_at
-        now_ns, loud = clock.now(), self._is_loud()
+        is_stepped, loud, point = self._counts or not clock.function_at, self._is_loud(), SCANNED
         numbers[BUDGETED], numbers[TIMES] = budget, series.times_at
         if self._is_timed:
             series.load_turns()
-        numbers[DEFERRED] = exchange.passed
         if exchange.passed:
             exchange.passed -= 1
+            numbers[DEFERRED] = 1
         try:
             while True:
-                numbers[FIRST], numbers[HEARD] = now_ns, loud
+                if is_stepped and point >= SCANNED:
+                    now_ns = numbers[FIRST] = clock.now()
+                    numbers[KNOWN] = 1
                 if loud:
                     loud = self._hear(now_ns)
-                numbers[ALONE] = loud or is_stepped
+                    numbers[HEARD] = 1
+                if loud or is_stepped:
+                    numbers[ALONE] = 1
                 point = series.call_burst(self._numbers_at)
                 if point == OVER:
+                    self._count()
                     break
                 if point > 0:
-                    numbers[HEARD] = True  # there was no refresh to be counted
                     return self._machine.trap_at(point)
                 if is_stepped:
                     self._count()
                 now_ns = numbers[FIRST]
                 if point in (ASKED, ASKED_BEFORE):
                     loud = self._finish(now_ns) or loud
-                if point >= SCANNED:
-                    now_ns = clock.now()
         finally:  # Ctrl-C may come between two calls
             if self._is_timed:
                 series.store_turns()
             if done := (numbers[TIMES] - series.times_at) // 8:
                 times += series.times[:done]
-                self._count()
                 self._end(numbers[FIRST])
+            else:
+                exchange.passed += numbers[DEFERRED]
+                numbers[DEFERRED] = numbers[KNOWN] = 0
         return None
 
     def many(self, most: int, now_ns: int, step_ns: int, budget: int, spend: int) -> tuple[int, Trap | None]:
@@ -157,7 +161,6 @@ class Accompanied:
         exchange.passed += done - 1
         if point > 0:
             return done, self._machine.trap_at(point)
-        self._numbers[HEARD] = False
         self._count()
         self._end(now_ns + done * step_ns)
         return done, None
@@ -189,12 +192,14 @@ class Accompanied:
 
     def _count(self) -> None:
         """A refresh is over; links that were heard for it know of it, and others are told if it was not left out."""
-        numbers, exchange = self._numbers, self._exchange
-        if not numbers[HEARD]:
-            numbers[HEARD] = True
-            exchange.passed += 1
-            if numbers[CHANGED]:
-                exchange.pass_by()
+        numbers = self._numbers
+        if numbers[HEARD]:
+            numbers[HEARD] = 0
+            return
+        exchange = self._exchange
+        exchange.passed += 1
+        if numbers[CHANGED]:
+            exchange.pass_by()
 
     def _end(self, now_ns: int) -> None:
         """The last of some scans is over."""

@@ -91,7 +91,7 @@ class Alone:
             self.refresh(now_ns)
         return None
 
-    def burst(self, times: list[int], most: int, clock: Clock, budget: int) -> Trap | None:
+    def burst(self, times: list[int], most: int, now_ns: int, clock: Clock, budget: int) -> Trap | None:
         """Scans each at the time that the clock tells, one upon the other for as long as units have news for the program;
         `times` takes when they began.
 

@@ -253,14 +253,14 @@ class Plc:
         self.now_ns += done * self.cycle_ns
         return done > 0
 
-    def scan_at_once(self, most: int, clock: Clock) -> list[int]:
-        """Scans in the time that `clock` tells, one upon the other for as long as units have news for the program; when
-        they began.  There is none if somebody has to be told between them, or has a part in one: then it takes `scan`."""
+    def scan_at_once(self, most: int, now_ns: int, clock: Clock) -> list[int]:
+        """Scans in the time that `clock` tells, which was `now_ns` before, one upon the other for as long as units have news
+        for the program; when they began.  None if somebody has to be told between them, or has a part in one: use `scan`."""
         times: list[int] = []
         if self.watchers or self._past.maxlen or self.trap or not (way := self._way()):
             return times
         try:
-            self.trap = way.burst(times, most, clock, self.budget)
+            self.trap = way.burst(times, most, now_ns, clock, self.budget)
         finally:  # Ctrl-C may come between two of them
             if times:
                 self.scans += len(times)

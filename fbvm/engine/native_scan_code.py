@@ -30,15 +30,15 @@ class Clockwork:
 
 NOTHING = Clockwork()
 (MEMORY, CONTEXT, LEFT, FIRST, STEP, BUDGETED, SPEND, DONE, CHANGED, UNFINISHED, AGAIN, FAULTY, POINT,
- DEFERRED, ALONE, HEARD, TIMES, ENDS, CLOCK, NUMBER, ZERO, ROWS) = range(22)  # fmt: skip
+ DEFERRED, KNOWN, ALONE, HEARD, TIMES, ENDS, CLOCK, NUMBER, ZERO, ROWS) = range(23)  # fmt: skip
 """Parameters, 64 bits each, and then the rows of turns, of what is watched and of companions: the addresses of memory and
 context, how many scans, the time of the first one and by how far it goes on, statements that a scan may execute and all
 of them together, how many scans there were, whether something that is watched has changed or which companions ran, and
 what else these tell.
 
-Of a burst only: whether it begins with a refresh; whether there shall be one refresh only; whether somebody was heard for
-the last one, which is so if there was but one; where the time of the next scan goes and where there is no more room; the
-clock, as `Clock` describes it.  FIRST becomes the time of its last scan."""
+Of a burst only: whether it begins with a refresh, whether FIRST is the time of its next scan, whether there shall be one
+refresh only, which become 0; whether somebody was heard for the last refresh, when it is over; where the time of the next
+scan goes and where there is no more room; the clock, as `Clock` describes it.  FIRST becomes the time of the last scan."""
 TOLD = Told(memory=MEMORY, ran=CHANGED, unfinished=UNFINISHED, again=AGAIN, faulty=FAULTY, point=POINT)
 ASKED = -1
 """In place of a trap's point: companions have requests, or one of them has a trap of its own."""
@@ -52,9 +52,11 @@ WATCHED_ROW, WATCHED_BYTES = 2, 8
 MOST_CYCLE = 0xFFFF_FFFF
 """The longest cycle time that its words can say."""
 SECOND_NS = 1_000_000_000
-_PARAMETERS = {"memory": MEMORY, "context": CONTEXT, "left": LEFT, "first": FIRST, "step": STEP, "budgeted": BUDGETED,
-               "spend": SPEND, "done": DONE, "changed": CHANGED, "again": AGAIN, "deferred": DEFERRED, "alone": ALONE,
-               "heard": HEARD, "times": TIMES, "ends": ENDS, "clock": CLOCK, "number": NUMBER, "zero": ZERO}  # fmt: skip
+_PARAMETERS = {
+    "memory": MEMORY, "context": CONTEXT, "left": LEFT, "first": FIRST, "step": STEP, "budgeted": BUDGETED, "spend": SPEND,
+    "done": DONE, "changed": CHANGED, "again": AGAIN, "deferred": DEFERRED, "known": KNOWN, "alone": ALONE, "heard": HEARD,
+    "times": TIMES, "ends": ENDS, "clock": CLOCK, "number": NUMBER, "zero": ZERO,
+}  # fmt: skip
 """The names that functions use."""
 _SCAN = f"""scan:
 %before = load i64, ptr %now_at
@@ -116,20 +118,40 @@ declare i32 @llvm.umax.i32(i32, i32)
 declare i64 @llvm.umin.i64(i64, i64)
 """)
 _BURST = Template(f"""
+define internal i64 @time(ptr %p) {{
+$addresses
+%spec = alloca [2 x i64]
+%part_at = getelementptr inbounds i8, ptr %spec, i64 8
+%clock = load ptr, ptr %clock_at
+%number = load i32, ptr %number_at
+%told = call i32 %clock(i32 signext %number, ptr %spec)
+%whole = load i64, ptr %spec
+%part = load i64, ptr %part_at
+%ns = mul i64 %whole, {SECOND_NS}
+%time = add i64 %ns, %part
+%zero = load i64, ptr %zero_at
+%less = sub i64 %time, %zero
+ret i64 %less
+}}
 define i32 @burst(ptr %p) {{
 entry:
 $addresses
 $rows
-%clock = load ptr, ptr %clock_at
-%number = load i32, ptr %number_at
-%zero = load i64, ptr %zero_at
-%spec = alloca [2 x i64]
-%second_at = getelementptr inbounds i8, ptr %spec, i64 8
-%ends = load i64, ptr %ends_at
-%first = load i64, ptr %first_at
-%deferred = load i64, ptr %deferred_at
 %alone = load i64, ptr %alone_at
 %single = icmp ne i64 %alone, 0
+store i64 0, ptr %alone_at
+%ends = load i64, ptr %ends_at
+%given = load i64, ptr %first_at
+%known = load i64, ptr %known_at
+%is_known = icmp ne i64 %known, 0
+br i1 %is_known, label %start, label %look
+look:
+%looked = call i64 @time(ptr %p)
+store i64 %looked, ptr %first_at
+br label %start
+start:
+%first = phi i64 [ %given, %entry ], [ %looked, %look ]
+%deferred = load i64, ptr %deferred_at
 %late = icmp ne i64 %deferred, 0
 br i1 %late, label %refresh, label %ready
 refresh:
@@ -139,12 +161,14 @@ store i64 0, ptr %deferred_at
 %back = or i1 %asks, %single
 br i1 %back, label %refreshed, label %unheard
 refreshed:
+store i64 1, ptr %known_at
 %before_scan = select i1 %asks, i32 {ASKED_BEFORE}, i32 {REFRESHED}
-ret i32 %before_scan
+br label %return
 unheard:
 store i64 0, ptr %heard_at
 br label %ready
 ready:
+store i64 0, ptr %known_at
 %at0 = load i64, ptr %times_at
 br label %begin
 begin:
@@ -170,16 +194,17 @@ on:
 br i1 %away, label %scanned, label %follow
 scanned:
 %after_scan = select i1 %urgent, i32 {ASKED}, i32 {SCANNED}
-ret i32 %after_scan
+br label %return
 follow:
 store i64 0, ptr %heard_at
-%told = call i32 %clock(i32 signext %number, ptr %spec)
-%whole = load i64, ptr %spec
-%part = load i64, ptr %second_at
-%ns = mul i64 %whole, {SECOND_NS}
-%time = add i64 %ns, %part
-%next = sub i64 %time, %zero
+%next = call i64 @time(ptr %p)
 br label %begin
+return:
+%answer = phi i32 [ %before_scan, %refreshed ], [ %after_scan, %scanned ]
+%heard = load i64, ptr %heard_at
+%stays = select i1 %single, i64 %heard, i64 0
+store i64 %stays, ptr %heard_at
+ret i32 %answer
 over:
 ret i32 {OVER}
 {_TRAP}

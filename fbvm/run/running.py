@@ -83,7 +83,7 @@ class Running:
         if self._writes:
             self._write(max(now_ns - self._behind_ns, plc.now_ns))
         if self._clock and (many := self._cycles_left if self._writes else self._goal.scans_left) > 1:
-            times = plc.scan_at_once(min(many, MOST_AT_ONCE), self._clock)
+            times = plc.scan_at_once(min(many, MOST_AT_ONCE), now_ns - self._behind_ns, self._clock)
         if times:
             now_ns = times[-1] + self._behind_ns
         elif self.alone and (many := self._cycles_left) > 1 and plc.scan_many(many):

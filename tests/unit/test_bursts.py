@@ -137,11 +137,11 @@ def test_an_answer_is_fetched_before_the_program_that_it_wakes(image: Image, clo
     plc, network = polling(image, clock)
     assert run(plc, for_ns=20 * MS, pace="event") == "time"
     network.serve(0)
-    plc.scan_at_once(16, PlcClock(lambda: plc.now_ns + 1000))
+    plc.scan_at_once(16, plc.now_ns, PlcClock(lambda: plc.now_ns + 1000))
     for _ in range(20):
         exchanges, looks = plc.read("Main.Exchanges"), network.looks
         network.serve(0)
-        assert len(plc.scan_at_once(16, PlcClock(lambda: plc.now_ns + 1000))) == 5
+        assert len(plc.scan_at_once(16, plc.now_ns, PlcClock(lambda: plc.now_ns + 1000))) == 5
         assert plc.read("Main.Exchanges") == exchanges + 1  # type: ignore[operator]
         assert network.looks == looks + 2
 
@@ -154,7 +154,7 @@ def test_more_events_than_a_unit_takes_at_once_reach_it_in_the_same_burst(image:
     before = plc.read("D30001")
     assert before == 0
     while plc.due_ns <= plc.now_ns or network.told:
-        assert 0 < len(plc.scan_at_once(16, PlcClock(lambda: plc.now_ns + 1000))) < 16
+        assert 0 < len(plc.scan_at_once(16, plc.now_ns, PlcClock(lambda: plc.now_ns + 1000))) < 16
     assert plc.read("D30001") == 300
 
 
@@ -186,8 +186,8 @@ def test_time_ends_a_run_between_two_bursts(image: Image, clock: Clock, monkeypa
     bursts: list[int] = []
     at_once = plc.scan_at_once
 
-    def counted(most: int, clock: PlcClock) -> list[int]:
-        times = at_once(most, clock)
+    def counted(most: int, now_ns: int, clock: PlcClock) -> list[int]:
+        times = at_once(most, now_ns, clock)
         bursts.append(len(times))
         return times
 
@@ -211,7 +211,7 @@ def test_ctrl_c_in_a_burst_loses_no_scan(image: Image, clock: Clock) -> None:
         return now_ns + looks
 
     with pytest.raises(KeyboardInterrupt):
-        plc.scan_at_once(16, PlcClock(interrupted))
+        plc.scan_at_once(16, plc.now_ns, PlcClock(interrupted))
     assert (plc.scans, plc.now_ns) == (scans + 2, now_ns + 2)
     assert plc.read("Main.Scans") == plc.scans
 

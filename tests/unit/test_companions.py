@@ -262,7 +262,7 @@ def bursts(rig: Rig, count: int, most: int, pause_ns: int, stop: int = 0) -> lis
         for network in rig.networks:
             network.serve(clock.now_ns)
         try:
-            found.append(rig.plc.scan_at_once(most, rig.time))
+            found.append(rig.plc.scan_at_once(most, clock.now_ns, rig.time))
         except KeyboardInterrupt:
             found.append([])
         if rig.plc.trap:
@@ -310,17 +310,21 @@ def test_ctrl_c_in_a_burst_loses_nothing() -> None:
         assert inside.state == beside.state
 
 
-def test_ctrl_c_between_two_calls_of_machine_code_loses_nothing() -> None:
+def test_ctrl_c_when_machine_code_comes_back_loses_nothing() -> None:
     for stop in range(1, 12):
-        rig, looks = Rig(image(2), (0,), virtual_time=False, is_told=False), iter(range(1, 1000))
+        rig, calls = Rig(image(2), (0,), virtual_time=False, is_told=False), iter(range(1, 1000))
         bursts(rig, 5, 16, 1000)
+        series = cast(Accompanied, way(rig))._series
+        call = series.call_burst
 
-        def now(rig: Rig = rig, looks: Iterator[int] = looks, stop: int = stop) -> int:
-            if next(looks) == stop:
+        def interrupted(at: int, call: Any = call, calls: Iterator[int] = calls, stop: int = stop) -> int:
+            point: int = call(at)
+            if next(calls) == stop:
                 raise KeyboardInterrupt
-            return rig.clock()
+            return point
 
-        rig.time = Clock(now, rig.time.function_at, NUMBER, ZERO_NS)
+        series.call_burst = interrupted
         times = bursts(rig, 12, 16, 1000)
         assert [] in times and rig.plc.scans == rig.plc.read("Main.n")
         assert rig.plc.now_ns == rig.plc.memory.views["i64"][NOW // 8]
+        assert len(rig.networks[0].log) >= rig.plc.read("D20001") > 3  # type: ignore[operator]
