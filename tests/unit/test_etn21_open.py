@@ -231,6 +231,18 @@ def test_the_port_is_free_at_once_with_linger() -> None:
     assert reopened(rig) == "0000"
 
 
+def test_of_more_than_64_held_ports_the_first_is_free_again_assumed() -> None:
+    rig = Rig()
+    for port in range(3000, 3065):
+        rig.open(local_port=port)
+        rig.close()
+    codes = []
+    for port in (3001, 3064, 3000):
+        rig.parameters(local_port=port)
+        codes.append(rig.ask(Switch.ACTIVE_OPEN, Opened(1, port, SERVER)))
+    assert codes == ["0049", "0049", "0000"]
+
+
 def test_a_port_that_the_unit_chose_is_not_held() -> None:
     rig = Rig()
     rig.open(local_port=0)

@@ -380,6 +380,22 @@ def test_udp_datagrams_past_the_buffer_are_lost() -> None:
     assert counts == [("0000", 1400)] * 6 + [("0080", 0)]
 
 
+def test_a_socket_keeps_128_datagrams_assumed() -> None:
+    rig = bound()
+    rig.scan(*[Received(1, bytes([number]), STATION) for number in range(140)])
+    for _ in range(3):
+        rig.scan()
+    taken = []
+    for _ in range(129):
+        rig.parameters(count=2, timeout=1)
+        rig.scan(Switch.RECEIVE)
+        rig.wait(1)
+        if rig.code() == "0000":
+            taken.append(rig.d[1000] >> 8)
+    assert taken == [*range(128)]
+    assert rig.code() == "0080"
+
+
 def test_udp_datagrams_that_are_lost_leave_those_that_wait_as_they_are() -> None:
     rig = bound()
     rig.scan(Received(1, b"first", STATION), Received(1, bytes(4506), STATION), Received(1, bytes(4505), STATION))

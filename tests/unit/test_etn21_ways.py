@@ -69,7 +69,9 @@ END_VAR
   ELSIF is_open THEN switch := 3 + k MOD 7 MOD 2;
   ELSIF k MOD 7 = 0 THEN switch := 0; d[p + 1] := 4000;
   ELSIF k MOD 5 = 0 THEN switch := 1; d[p + 1] := 3000; d[p + 2] := 0; d[p + 3] := 0; d[p + 4] := 0;
+  ELSIF k MOD 5 = 1 THEN d[p + 3] := UDINT_TO_WORD(16#FA02 - u); d[p + 4] := 3000;
   END_IF;
+  IF cio[25 * u + 1 + area].15 THEN d[p + 3] := UDINT_TO_WORD(16#FA02 - u); d[p + 4] := 4000; END_IF;
   {address}
   d[p + 8] := UDINT_TO_WORD(k MOD 6 * 2); d[p + 9] := 16#FFFF;
   cio[place] := cio[place] OR SHL(WORD#1, switch + 8 * (area MOD 2));
@@ -91,11 +93,13 @@ def image(**values: object) -> Image:
 def plc_of(way: str, code: Image, dice: Random, monkeypatch: pytest.MonkeyPatch) -> Plc:
     """A PLC with two units, on one network or on one each."""
     plc = Plc(code, dice.choice([1, 10]) * 1_000_000, engine="python" if way == "in Python" else "native")
-    timing, networks = dice.choice(["exact", "real"]), [network(dice) for _ in range(dice.randint(1, UNITS))]
+    timing, filler = dice.choice(["exact", "real"]), dice.choice([0, None, 0xAA])
+    networks = [network(dice) for _ in range(dice.randint(1, UNITS))]
     with monkeypatch.context() as patched:
         if way in ("beside", "in Python"):
             patched.setattr(native, "available", lambda: False)
-        units = [Etn21(number, f"192.168.250.{number + 1}", timing=timing, seed=number) for number in range(UNITS)]
+        units = [Etn21(number, f"192.168.250.{number + 1}", timing=timing, seed=number, odd_filler=filler)
+                 for number in range(UNITS)]  # fmt: skip
     for unit in units:
         plc.attach(unit, networks[unit.layout.bit % len(networks)])
     if way == "looked into":
