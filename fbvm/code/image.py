@@ -9,6 +9,7 @@ import hashlib
 import marshal
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from functools import cached_property
 from typing import Any
 
 from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, Area, Mailbox, e_bank
@@ -76,7 +77,7 @@ class Layout:
     e_banks: tuple[str, ...] = ()
     mailboxes: tuple[Mailbox, ...] = ()
 
-    @property
+    @cached_property
     def areas(self) -> dict[str, Area]:
         """All areas that a PLC with this image has: behind the slots what units bring, then E banks."""
         areas = dict(AREAS)
@@ -86,7 +87,7 @@ class Layout:
             at = _page_up(at + area.size_bytes)
         return areas
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Bytes of the whole buffer, in whole pages."""
         return _page_up(max(SLOTS_OFFSET + self.slots_size, *(a.offset + a.size_bytes for a in self.areas.values())))
