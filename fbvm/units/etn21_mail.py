@@ -164,7 +164,10 @@ class Mail:
                     requests.append(Grant(channel, size))
                 elif kind == SEND:
                     data = fetch(memory, high, low, size)
-                    requests += [Send(channel, data[at : at + TCP_PART]) for at in range(0, size, TCP_PART)]
+                    if size <= TCP_PART:
+                        requests.append(Send(channel, data))
+                    else:
+                        requests += [Send(channel, data[at : at + TCP_PART]) for at in range(0, size, TCP_PART)]
                 else:
                     requests.append(_rare(kind, channel, row, memory))
         return requests
