@@ -66,6 +66,18 @@ def test_other_unit_numbers_are_a_mistake(number: int) -> None:
         Etn21(number)
 
 
+@pytest.mark.parametrize("address", ["", "x", "1.2.3", "1.2.3.256", "1.2.3.-4", "1.2.3.4.5", "::1"])
+def test_an_address_that_is_none_is_a_mistake(address: str) -> None:
+    with pytest.raises(ValueError, match=r'is no IPv4 address; write "192\.168\.250\.1"'):
+        Etn21(address=address)
+
+
+@pytest.mark.parametrize("filler", [-1, 256])
+def test_an_odd_filler_that_is_no_byte_is_a_mistake(filler: int) -> None:
+    with pytest.raises(ValueError, match="is no byte"):
+        Etn21(odd_filler=filler)
+
+
 def test_an_unknown_timing_is_a_mistake() -> None:
     with pytest.raises(ValueError, match="timing"):
         Etn21(timing="swift")
