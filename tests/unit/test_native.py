@@ -167,6 +167,12 @@ def test_a_helper_process_that_is_ended_while_it_is_told_something() -> None:
     assert process.stdin.closed
 
 
+def test_a_helper_process_that_is_ended_while_it_starts_answers_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    helper = type(worker)()
+    monkeypatch.setattr("atexit.register", lambda stop: stop())
+    assert helper._answer(b"define i32 @f() { ret i32 7 }") == b""
+
+
 # --- budget, references and the system page ---------------------------------------------------------------------------
 
 
