@@ -9,7 +9,6 @@ import hashlib
 import marshal
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from functools import cached_property
 from typing import Any
 
 from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, Area, Mailbox, e_bank
