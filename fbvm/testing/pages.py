@@ -1,4 +1,6 @@
-"""The page of a failed test: its last scans are done again, recorded with every statement, and written as one HTML file."""
+"""The page of a failed test: its last scans are done again, recorded with every statement, and written as one HTML file.
+
+What draws it is loaded when a test has failed."""
 
 from __future__ import annotations
 
@@ -10,8 +12,6 @@ from pathlib import Path
 
 from fbvm.plc import Plc
 from fbvm.record.history import History
-from fbvm.record.page import page
-from fbvm.record.page_data import frame_rows, page_data
 from fbvm.record.trace import Trace
 from fbvm.record.trace_writer import Depth, TraceWriter, descriptions, meanings, source_lines
 from fbvm.record.traffic import Passed
@@ -40,6 +40,9 @@ def write_page(path: Path, title: str, history: History, subject: Subject, units
     scans = range(history.scans.start, history.scans.stop + unfinished)
     if not scans:
         return False
+    from fbvm.record.page import page
+    from fbvm.record.page_data import frame_rows, page_data
+
     file = io.BytesIO()
 
     @contextmanager
