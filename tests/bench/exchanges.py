@@ -7,20 +7,18 @@ pymodbus's plain client adds about as much again.
 
 The blocks do it as on the device: send switch, sending flag, data-received flag, receive switch, words in memory.  That is five
 scans an exchange: a unit finishes what it accepted one refresh later, a program sees it in the next scan, and the block asks for
-data when the unit says that they are there.  Scans that follow at once are one burst, and what wakes a PLC is fetched before its
-program runs, so two bursts do it: one until nothing is left but to wait, one from the reply to the next request.  Up to its
-refresh a scan is one call of machine code, a microsecond with the program in it.  What is left is Python, some 7,500 of its
-instructions an exchange: more than half of them in the unit (it accepts a request in 7 us and ends one in 5: parameters, checks,
-words shown), a tenth in the connection, the rest in burst, loop and the measuring of times; the send alone takes a fifth of the
-time, as in any client.
+data when the unit says that they are there.  Scans that follow at once are one burst of machine code, the unit's own program
+among it (0.3 us a refresh, as much as the block's), and what wakes a PLC is fetched before its program runs.  So Python is
+called twice an exchange: when the reply has come, and when the next request is to be sent.  It executes some 2,200 of its
+instructions then, in equal parts for the loop with its clock, goal and times, for the connection, for the rows that the unit's
+program and the network exchange, and for the burst; send, wait and receive are one call of the host each, as in any client.
 
-So the blocks reach 0.78 to 0.87 of pymodbus's rate where the host lets its processors sleep between two changes of processes (one
-x86-64 machine: 6,000 to 8,300 a second beside 7,500 to 10,400), and there the time is our own processor time, with hardly any
-waiting in it.  Where changes of processes are quick, because the machine is busy, whoever computes least wins: pymodbus does
-33,000 a second there and the blocks 10,500, a third.  More than that takes the unit itself into machine code, with its words,
-checks and services: then Python would be called twice an exchange, to send and to receive.  A server in Python, as most
-simulators are, takes part of the difference away: the second table.  In `cyclic` pace an exchange takes four periods, whatever
-everybody's speed."""
+Where the host lets its processors sleep between two changes of processes the blocks reach 1.1 times pymodbus's rate (one x86-64
+machine: 1.11, 1.13, 1.16 and, in a bad minute, 0.72; 5,600 to 8,600 a second beside 5,000 to 7,800), and two thirds of what C does
+that does nothing else.  Where changes of processes are quick, because the machine is busy, whoever computes least wins: pymodbus
+does 33,000 a second there with 20 us of its own, the blocks 18,000 to 20,000 with 35, three fifths.  What is left would have to
+go out of Python's loop and connections.  A server in Python, as most simulators are, takes the difference away: the second table.
+In `cyclic` pace an exchange takes four periods, whatever everybody's speed."""
 
 from __future__ import annotations
 
