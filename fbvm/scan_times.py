@@ -9,7 +9,7 @@ from fbvm.base.areas import NEVER
 
 SIZES_NS: tuple[int, ...] = (*range(32), *(digits << zeros for zeros in range(1, 60) for digits in range(16, 32)))
 """Where each size begins: a time is sorted in by its five highest bits, so a share is true to 3 %."""
-RECENT = 256
+RECENT = 1024
 """Scans of bursts that wait to be sorted in together, which takes a fifth of the time."""
 
 
