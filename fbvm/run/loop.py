@@ -14,6 +14,7 @@ from fbvm.base.areas import NEVER
 from fbvm.engine.clock import Clock
 from fbvm.plc import Plc
 from fbvm.run.host_clock import function_at
+from fbvm.run.interrupts import Interrupts
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
 from fbvm.wire.link import RealNetwork
 
@@ -52,9 +53,10 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     They share one time: real if a network of any of them is, so that a network may have units of several PLCs."""
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
     start_ns = max((run.plc.elapsed_ns for run in runs), default=0)
+    interrupts = Interrupts()
     clock: _Clock = _Virtual()
     if networks:
-        clock = real = _Real(cast(list[RealNetwork], list(networks.values())), runs, start_ns)
+        clock = real = _Real(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
         for run in runs:
             run.begin(start_ns + run.phase_ns, real.behind)
     else:  # nothing happens between two periods of virtual time
@@ -64,12 +66,14 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     queue = _Alone(runs) if len(runs) == 1 else _Queue(runs)
     told_ns = time.monotonic_ns()
     try:
-        while (due_ns := queue.next_ns()) is not None:
-            now_ns, woken = clock.reach(due_ns)
-            _scan_all(queue, now_ns, woken, clock.real)
-            if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
-                told_ns = time.monotonic_ns()
-                progress()
+        with interrupts:
+            while (due_ns := queue.next_ns()) is not None:
+                now_ns, woken = clock.reach(due_ns)
+                _scan_all(queue, now_ns, woken, clock.real)
+                interrupts.check()
+                if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
+                    told_ns = time.monotonic_ns()
+                    progress()
     except KeyboardInterrupt:
         for run in runs:
             run.reason = run.reason or "interrupted"
@@ -208,8 +212,9 @@ class _Real:
 
     real = True
 
-    def __init__(self, networks: Sequence[RealNetwork], runs: Sequence[Running], start_ns: int) -> None:
-        self._networks = networks
+    def __init__(self, networks: Sequence[RealNetwork], runs: Sequence[Running], start_ns: int,
+                 interrupts: Interrupts) -> None:  # fmt: skip
+        self._networks, self._interrupts = networks, interrupts
         for network in networks:
             network.driven = True
         self._numbers = {unit.link: number for number, run in enumerate(runs) if run.pace == EVENT
@@ -226,9 +231,14 @@ class _Real:
     def reach(self, due_ns: int) -> tuple[int, Numbers]:
         zero_ns = self._zero_ns
         while (left_ns := due_ns - (now_ns := time.monotonic_ns() - zero_ns)) > 0:
+            self._interrupts.begin_wait()
             if not self._waits:
                 time.sleep(left_ns / 1e9)
-            elif self._networks[0].wait(left_ns / 1e9):
+                found = False
+            else:
+                found = self._networks[0].wait(left_ns / 1e9)
+            self._interrupts.waits = False
+            if found:
                 if woken := self._serve(now_ns := time.monotonic_ns() - zero_ns):
                     return now_ns, woken
                 time.sleep(min(left_ns, PATIENCE_NS) / 1e9)
