@@ -36,22 +36,27 @@ from fbvm.net.journal import Journal
 from fbvm.units.unit import Exchanged, ProcessorUnit, Unit
 
 
+def can_accompany(exchange: Exchange) -> bool:
+    """True if there are units, and each has a processor at work that runs as machine code."""
+    for attached in exchange.units:
+        exchanged = attached.unit.exchanged
+        if exchanged is None or attached.unit.watched is None or exchanged.processor.machine is None:
+            return False
+    return bool(exchange.units)
+
+
 def companions(exchange: Exchange) -> list[Companion]:
     """The units as companions of the PLC's program; none if one of them cannot be."""
-    found = [_companion(attached.unit, exchange) for attached in exchange.units]
-    return [] if None in found else [companion for companion in found if companion]
+    return [_companion(attached.unit, exchange) for attached in exchange.units] if can_accompany(exchange) else []
 
 
-def _companion(unit: Unit, exchange: Exchange) -> Companion | None:
-    exchanged = unit.exchanged
-    if exchanged is None or unit.watched is None:
-        return None
+def _companion(unit: Unit, exchange: Exchange) -> Companion:
+    exchanged, groups = unit.exchanged, unit.watched
+    assert exchanged and groups is not None
     own = exchanged.processor
-    machine: NativeEngine | None = own.machine
-    if machine is None:
-        return None
+    machine: NativeEngine = own.machine
     copies = [(exchange.offset(area, word), own.offset(variable), 2 * count) for area, word, variable, count in exchanged.words]
-    watched = [exchange.offset(area, word) for area, word in unit.watched]
+    watched = [exchange.offset(area, word) for area, word in groups]
     posted, requested, wake = map(own.offset, (exchanged.posted, exchanged.requested, exchanged.wake))
     left = [own.offset(variable) for variable in exchanged.left]
     return machine.companion(copies, watched, posted, requested, left, wake, _moves(exchanged, exchange))
@@ -82,6 +87,8 @@ class Accompanied:
                       for number, attached in enumerate(exchange.units)]  # fmt: skip
         self._counts = any(attached.network.virtual_time for attached in exchange.units)
         """There are links that want to know of each refresh."""
+        self.is_outdated = False
+        """It stays as it is."""
         self.is_open = False
         """What the units watch is expected to be as their last refresh left it."""
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import cast
 
 from fbvm.base.memory import Memory
 from fbvm.net.journal import Journal
@@ -23,8 +22,8 @@ class Attached:
 
     @cached_property
     def own(self) -> ProcessorUnit | None:
-        """The unit, if a processor of its own does what a refresh does."""
-        return cast(ProcessorUnit, self.unit) if self.unit.exchanged else None
+        """The unit, if a processor of its own does what a refresh does, or will when there is something to do."""
+        return self.unit if isinstance(self.unit, ProcessorUnit) else None
 
 
 class Exchange:

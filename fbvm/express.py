@@ -6,7 +6,7 @@ For scans in which nobody else has a part: no breakpoints, forces, phases, journ
 from __future__ import annotations
 
 from fbvm.base.areas import NEVER
-from fbvm.companions import Accompanied, companions
+from fbvm.companions import Accompanied, can_accompany, companions
 from fbvm.engine.clock import Clock
 from fbvm.engine.native import NativeEngine
 from fbvm.engine.native_scans import Turn
@@ -29,9 +29,10 @@ class Express:
     def way(self, machine: NativeEngine) -> Way | None:
         """The way of this machine code; None if the next scan cannot go it: a variable says which tasks run, one has not
         run yet, units have not been refreshed."""
-        if machine is not self._machine or self._exchange.units != self._known:
-            self._prepare(machine)
         way = self._way
+        if machine is not self._machine or self._exchange.units != self._known or (way and way.is_outdated):
+            self._prepare(machine)
+            way = self._way
         return way if way and way.is_open else None
 
     def _prepare(self, machine: NativeEngine) -> None:
@@ -63,6 +64,8 @@ class Alone:
 
     is_open = True
     """Any scan may go this way."""
+    is_outdated = False
+    """All units could accompany the program by now."""
 
     def __init__(self, exchange: Exchange, machine: NativeEngine, turns: list[Turn]) -> None:
         self._exchange, self._machine = exchange, machine
@@ -77,6 +80,7 @@ class Alone:
         """I/O refresh, and a look whether the next ones may be left out."""
         seen = self._series.expect if self._all_watch else None
         self._idle = self._exchange.refresh(now_ns, journal, seen) and self._all_watch
+        self.is_outdated = can_accompany(self._exchange)
 
     def once(self, now_ns: int, budget: int) -> Trap | None:
         """One scan."""
@@ -114,7 +118,7 @@ class Alone:
         No other begins when all together have executed `spend` statements."""
         exchange = self._exchange
         most = min(most, (exchange.unit_ns(NEVER) - now_ns - 1) // step_ns)
-        if not self._idle or most <= 0:
+        if not self._idle or most <= 0 or not exchange.is_idle(now_ns):
             return 0, None
         exchange.news = False
         done, point = self._series.run(most, now_ns + step_ns, step_ns, budget, spend)

@@ -12,21 +12,21 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any
 
-from fbvm.processor import OwnProcessor, processor
 from fbvm.units import etn21_map as at
 from fbvm.units.etn21_data import AREA_OF_CODE, lengths
 from fbvm.units.etn21_faults import Fault, Faults
-from fbvm.units.etn21_mail import RING_BYTES, Mail
+from fbvm.units.etn21_inside import Inside, power_on
+from fbvm.units.etn21_mail import RING_BYTES
 from fbvm.units.etn21_map import Layout
 from fbvm.units.etn21_names import descriptions, meanings
-from fbvm.units.etn21_words import Words, numbers
+from fbvm.units.etn21_words import Words
 from fbvm.units.unit import AreaMemory, Exchanged, Moves
 from fbvm.wire.link import Event, Request
 
 __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
 
 TIME_WAIT_NS = 60_000_000_000  # W421 6-9-3 p156
-PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
+NEVER_NS = 100_000 * 86_400 * 10**9  # ETN21_NEVER of its program
 TIMINGS = ("exact", "real")
 MOVES = Moves("ETN21_Moved", "ETN21_Moves", RING_BYTES, (
     "ETN21_Targets", {code - at.FIRST_AREA_CODE: area for code, (area, _) in AREA_OF_CODE.items()}))  # fmt: skip
@@ -61,45 +61,51 @@ class Etn21:
         self.layout = Layout.of(unit_number)
         self.name = f"ETN21 {unit_number}"
         self.address = address
-        self._made = {"unit_number": unit_number, "address": address, "timing": timing, "seed": seed,
+        self._made: dict[str, Any] = {"unit_number": unit_number, "address": address, "timing": timing, "seed": seed,
                       "time_wait_ns": time_wait_ns, "odd_filler": odd_filler}  # fmt: skip
         self._words: Words | None = None
         self._mask = 1 << self.layout.bit
         """Its bit in words for all units."""
+        self._service_status, self._error_status = at.LINK_UP, 0
         self.news = False
-        self._connect(processor(PROGRAM, RING_BYTES * len(at.SOCKETS)), odd_filler)
-        own = self._processor
-        own.view("ETN21_Unit_Bit", "u16")[0] = self._mask
-        ip = own.view("ETN21_IP", "u16")
-        ip[0], ip[1] = at.words_of(address)
-        own.view("ETN21_Real", "u8")[0] = timing == "real"
-        own.view("ETN21_Random", "u64")[0] = _scattered(seed)
-        own.view("ETN21_Time_Wait", "i64")[0] = time_wait_ns
-        self._service_status[0] = at.LINK_UP
-        self.faults += faults
+        self._processor: Inside | None = None
+        """Switched on when there is something to do for it: most programs ask nothing of an ETN21."""
+        if faults := list(faults):
+            self._inside.faults.extend(faults)
 
-    def _connect(self, own: OwnProcessor, odd_filler: int | None) -> None:
-        """The unit's processor, and where its program keeps what is exchanged with it."""
-        self._processor = own
-        self._n, self._m = own.view("ETN21_N", "u16"), own.view("ETN21_M", "u16")
-        self._initializing, self._restart = own.view("ETN21_Initializing", "u16"), own.view("ETN21_Restart", "u16")
-        self._service_status = own.view("ETN21_Service_Status", "u16")
-        self._error_status = own.view("ETN21_Error_Status", "u16")
-        self._seen, self._reported = numbers(self._n)
-        """As they were when the last refresh ended."""
-        self._wake = own.view("ETN21_Wake", "i64")
-        self._odd_filler = odd_filler
-        self._mail = Mail(own, odd_filler)
-        self.faults = Faults(own)
-        """Each is used up by the first request that it fits."""
+    @property
+    def _inside(self) -> Inside:
+        """The processor, which begins now if it has not yet."""
+        inside = self._processor
+        if inside is None:
+            made = self._made
+            inside = self._processor = power_on(
+                self.layout, self.address, real=made["timing"] == "real", seed=made["seed"],
+                time_wait_ns=made["time_wait_ns"], odd_filler=made["odd_filler"])  # fmt: skip
+            inside.report(self._service_status, self._error_status)
+            inside.begin()
+            if self._words:
+                inside.know(lengths(self._words.memory))
+        return inside
 
     def __deepcopy__(self, known: dict[int, Any]) -> Etn21:
         """Another unit in the same state, which shares the PLC's memory."""
-        twin = Etn21(**self._made)  # type: ignore[arg-type]
-        twin._connect(self._processor.copy(), twin._odd_filler)
-        twin._mail.take_over(self._mail)
+        twin = Etn21(**self._made)
+        if self._processor:
+            twin._processor = self._processor.copy(self._made["odd_filler"])
+        twin._service_status, twin._error_status = self._service_status, self._error_status
         twin._words, twin.news = self._words, self.news
         return twin
+
+    @property
+    def faults(self) -> Faults:
+        """Each is used up by the first request that it fits."""
+        return self._inside.faults
+
+    @faults.setter
+    def faults(self, faults: Iterable[Fault]) -> None:
+        if faults is not self._inside.faults:
+            self._inside.faults[:] = faults
 
     @property
     def watched(self) -> tuple[tuple[str, int], ...]:
@@ -108,37 +114,43 @@ class Etn21:
         return ("CIO", n), ("CIO", n + at.SERVICE_STATUS), ("CIO", n + at.SWITCHES), ("A", at.RESTART)
 
     @property
-    def exchanged(self) -> Exchanged:
-        """The words of the unit, and where its program says what it wants."""
+    def exchanged(self) -> Exchanged | None:
+        """The words of the unit, and where its program says what it wants; None as long as it has nothing to do."""
+        inside = self._processor
+        if inside is None:
+            return None
         words = (("CIO", self.layout.n, "ETN21_N", at.CIO_WORDS), ("D", self.layout.m, "ETN21_M", at.D_WORDS),
                  ("A", at.INITIALIZING, "ETN21_Initializing", 1), ("A", at.RESTART, "ETN21_Restart", 1))  # fmt: skip
         left = "ETN21_Requested", "ETN21_Behind"
-        return Exchanged(self._processor, words, "ETN21_Posted", "ETN21_Urgent", left, "ETN21_Wake", MOVES)
+        return Exchanged(inside.own, words, "ETN21_Posted", "ETN21_Urgent", left, "ETN21_Wake", MOVES)
 
     @property
     def wake_ns(self) -> int:
         """When the unit has something to do by itself."""
-        return 0 if self._mail.waits else int(self._wake[0])
+        inside = self._processor
+        if inside is None:
+            return NEVER_NS
+        return 0 if inside.mail.waits else int(inside.wake[0])
 
     @property
     def link_up(self) -> bool:
         """Whether n+17 says that the cable is plugged; what the network does is the network's affair."""
-        return self._service_status[0] != 0
+        return self._service_status != 0
 
     @link_up.setter
     def link_up(self, up: bool) -> None:
-        self._service_status[0] = at.LINK_UP if up else 0
-        self._wake[0] = 0
+        self._service_status = at.LINK_UP if up else 0
+        self._inside.report(self._service_status, self._error_status)
 
     @property
     def error_status(self) -> int:
         """What n+18 shows."""
-        return int(self._error_status[0])
+        return self._error_status
 
     @error_status.setter
     def error_status(self, status: int) -> None:
-        self._error_status[0] = status
-        self._wake[0] = 0
+        self._inside.report(self._service_status, status)
+        self._error_status = status
 
     @cached_property
     def descriptions(self) -> dict[str, str]:
@@ -158,7 +170,8 @@ class Etn21:
     @property
     def settings(self) -> dict[str, Any]:
         """What may be set on the unit while it runs, as plain data: faults, link, error status."""
-        faults = [[fault.code, fault.switch, fault.socket] for fault in self.faults]
+        waiting = self.faults if self._processor else ()
+        faults = [[fault.code, fault.switch, fault.socket] for fault in waiting]
         return {"faults": faults, "link_up": self.link_up, "error_status": self.error_status}
 
     @settings.setter
@@ -170,18 +183,19 @@ class Etn21:
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on: the unit's own words and all switches 0, connections broken by RST."""
         words = self._look_at(memory)
-        self._mail.forget()
-        self._processor.view("ETN21_Reset", "u8")[0] = 1
-        self._run(words, 0)
+        asks = self._asks(words) or words.initializing[0] & self._mask
+        if self._processor is None and words.are_blank and not asks:
+            self._report(words)
+            return []
+        self._inside.reset()
+        self.news = self._inside.run(words, 0)
         return self.finish()
 
     def _look_at(self, memory: AreaMemory) -> Words:
         """The words of the PLC that the unit is in now."""
         words = self._words = Words(self.layout, memory)
-        table = self._processor.view("ETN21_Lengths", "u32")
-        known = lengths(memory)
-        for number in range(len(table)):
-            table[number] = known.get(at.FIRST_AREA_CODE + number, 0)
+        if self._processor:
+            self._processor.know(lengths(memory))
         return words
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
@@ -193,53 +207,46 @@ class Etn21:
 
     def move(self, memory: AreaMemory) -> None:
         """Store what receives were handed."""
-        self._mail.move(memory)
+        if self._processor:
+            self._processor.mail.move(memory)
 
     def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
         """One I/O refresh but for what network and data have to do with it; False if there was nothing to do."""
-        words = self._words
+        words, inside = self._words, self._processor
         if words is None or words.memory is not memory:
             words = self._look_at(memory)
         if events:
-            self._mail.post(events)
-        elif (now_ns < self.wake_ns and words.switches[0] == self._seen[0] and words.status[0] == self._reported[0]
-              and not self._asked(words)):  # fmt: skip
-            self.news = False
-            return False
-        self._run(words, now_ns)
+            self._inside.mail.post(events)
+        elif not self._asks(words):
+            if inside is None:
+                self.news = self._report(words)
+                return False
+            if words.switches[0] == inside.seen[0] and words.status[0] == inside.reported[0] and now_ns < self.wake_ns:
+                self.news = False
+                return False
+        self.news = self._inside.run(words, now_ns)
         return True
 
-    def _asked(self, words: Words) -> bool:
-        """Does the program want a force-close, or a restart?"""
-        return bool(words.n[0] & at.FORCE_CLOSE or words.restart[0] & self._mask)
+    def _asks(self, words: Words) -> bool:
+        """Does the program want a force-close, or a restart, or anything of a processor that has nothing to do yet?"""
+        if words.n[0] & at.FORCE_CLOSE or words.restart[0] & self._mask:
+            return True
+        return self._processor is None and words.switches[0] != 0
 
-    def _run(self, words: Words, now_ns: int) -> None:
-        """The program of the unit once, between the two halves of the exchange of words."""
-        self._n[:], self._m[:] = words.n, words.m
-        self._initializing[:], self._restart[:] = words.initializing, words.restart
-        before = self._state()
-        self._processor.run(now_ns)
-        self.news = self._state() != before
-        words.n[:], words.m[:] = self._n, self._m
-        words.initializing[:], words.restart[:] = self._initializing, self._restart
-
-    def _state(self) -> tuple[bytes, bytes, int, int]:
-        """The words that are exchanged, as the program sees them."""
-        return self._n.tobytes(), self._m.tobytes(), self._initializing[0], self._restart[0]
+    def _report(self, words: Words) -> bool:
+        """Show n+17 and n+18 as a processor does that has nothing to do; whether they have changed."""
+        status = self._service_status, self._error_status
+        if (words.n[at.SERVICE_STATUS], words.n[at.ERROR_STATUS]) == status:
+            return False
+        words.n[at.SERVICE_STATUS], words.n[at.ERROR_STATUS] = status
+        return True
 
     def post(self, events: Iterable[Event]) -> None:
         """Events of the network for the next run of the program."""
-        self._mail.post(events)
+        self._inside.mail.post(events)
 
     def finish(self) -> list[Request]:
         """What the program asked for since the last time, as far as it is the network's affair; the rest is done."""
-        assert self._words is not None
-        return self._mail.collect(self._words.memory)
-
-
-def _scattered(seed: int) -> int:
-    """A state to draw numbers from that is far from those of seeds nearby, and not 0 (splitmix64, G. Steele 2014)."""
-    mixed = (seed + 1) * 0x9E37_79B9_7F4A_7C15 & 0xFFFF_FFFF_FFFF_FFFF
-    mixed = (mixed ^ mixed >> 30) * 0xBF58_476D_1CE4_E5B9 & 0xFFFF_FFFF_FFFF_FFFF
-    mixed = (mixed ^ mixed >> 27) * 0x94D0_49BB_1331_11EB & 0xFFFF_FFFF_FFFF_FFFF
-    return mixed ^ mixed >> 31 or 1
+        if self._processor is None or self._words is None:
+            return []
+        return self._processor.mail.collect(self._words.memory)

@@ -17,6 +17,7 @@ UNIT_NUMBERS = range(16)
 UDP_STATUS = 0  # + socket number: n+1..n+8
 TCP_STATUS = 8  # + socket number: n+9..n+16
 SERVICE_STATUS = 17
+ERROR_STATUS = 18
 SWITCHES = 19  # n+19..n+22, two areas a word
 FINS_TCP_STATUS = 23
 CIO_WORDS = 24

@@ -25,3 +25,8 @@ class Words:
         self.m = memory.words("D")[layout.m : layout.m + at.D_WORDS]
         self.initializing, self.restart = a[at.INITIALIZING : at.INITIALIZING + 1], a[at.RESTART : at.RESTART + 1]
         self.switches, self.status = numbers(self.n)
+
+    @property
+    def are_blank(self) -> bool:
+        """True if nobody has used the unit: its own words, switches among them, are 0."""
+        return not any(self.n) and not any(self.m[1 : at.PARAMETERS])

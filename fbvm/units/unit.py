@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from fbvm.wire.link import Event, Request
 
@@ -125,6 +125,7 @@ class Unit(Protocol):
         """Power on or unit restart: words to their initial state; returns what closes connections left open."""
 
 
+@runtime_checkable
 class ProcessorUnit(Unit, Protocol):
     """A unit of which a processor of its own does all that a refresh does, but for what a network has to know.
 

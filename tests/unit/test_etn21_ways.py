@@ -100,6 +100,8 @@ def plc_of(way: str, code: Image, dice: Random, monkeypatch: pytest.MonkeyPatch)
             patched.setattr(native, "available", lambda: False)
         units = [Etn21(number, f"192.168.250.{number + 1}", timing=timing, seed=number, odd_filler=filler)
                  for number in range(UNITS)]  # fmt: skip
+        for unit in units if way != "inside" else ():  # the others switch themselves on when there is something to do
+            unit.faults.clear()
     for unit in units:
         plc.attach(unit, networks[unit.layout.bit % len(networks)])
     if way == "looked into":

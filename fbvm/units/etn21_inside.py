@@ -1,0 +1,88 @@
+"""What is inside an ETN21: the processor with its program, and where the program keeps what is exchanged with it."""
+
+from __future__ import annotations
+
+from fbvm.processor import OwnProcessor, processor
+from fbvm.units import etn21_map as at
+from fbvm.units.etn21_faults import Faults
+from fbvm.units.etn21_mail import RING_BYTES, Mail
+from fbvm.units.etn21_words import Words, numbers
+
+PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
+
+
+def power_on(layout: at.Layout, address: str, *, real: bool, seed: int, time_wait_ns: int, odd_filler: int | None) -> Inside:
+    """A processor that has just been switched on."""
+    own = processor(PROGRAM, RING_BYTES * len(at.SOCKETS))
+    own.view("ETN21_Unit_Bit", "u16")[0] = 1 << layout.bit
+    ip = own.view("ETN21_IP", "u16")
+    ip[0], ip[1] = at.words_of(address)
+    own.view("ETN21_Real", "u8")[0] = real
+    own.view("ETN21_Random", "u64")[0] = _scattered(seed)
+    own.view("ETN21_Time_Wait", "i64")[0] = time_wait_ns
+    return Inside(own, odd_filler)
+
+
+class Inside:
+    """Views of a processor's memory, by what they are for."""
+
+    def __init__(self, own: OwnProcessor, odd_filler: int | None) -> None:
+        self.own = own
+        self.n, self.m = own.view("ETN21_N", "u16"), own.view("ETN21_M", "u16")
+        self.initializing, self.restart = own.view("ETN21_Initializing", "u16"), own.view("ETN21_Restart", "u16")
+        self.service_status = own.view("ETN21_Service_Status", "u16")
+        self.error_status = own.view("ETN21_Error_Status", "u16")
+        self.seen, self.reported = numbers(self.n)
+        """As they were when the last refresh ended."""
+        self.wake = own.view("ETN21_Wake", "i64")
+        self.mail = Mail(own, odd_filler)
+        self.faults = Faults(own)
+
+    def copy(self, odd_filler: int | None) -> Inside:
+        """Another processor in the same state."""
+        twin = Inside(self.own.copy(), odd_filler)
+        twin.mail.take_over(self.mail)
+        return twin
+
+    def begin(self) -> None:
+        """Power-on, before any word has been exchanged."""
+        self.reset()
+        self.own.run(0)
+
+    def report(self, service_status: int, error_status: int) -> None:
+        """What n+17 and n+18 show from the next refresh on."""
+        self.service_status[0], self.error_status[0] = service_status, error_status
+        self.wake[0] = 0
+
+    def know(self, lengths: dict[int, int]) -> None:
+        """How many words the data areas have, by area code."""
+        table = self.own.view("ETN21_Lengths", "u32")
+        for number in range(len(table)):
+            table[number] = lengths.get(at.FIRST_AREA_CODE + number, 0)
+
+    def reset(self) -> None:
+        """The next run is a power-on."""
+        self.mail.forget()
+        self.own.view("ETN21_Reset", "u8")[0] = 1
+
+    def run(self, words: Words, now_ns: int) -> bool:
+        """The program once, between the two halves of the exchange of words; whether any of them has changed."""
+        self.n[:], self.m[:] = words.n, words.m
+        self.initializing[:], self.restart[:] = words.initializing, words.restart
+        before = self._state()
+        self.own.run(now_ns)
+        words.n[:], words.m[:] = self.n, self.m
+        words.initializing[:], words.restart[:] = self.initializing, self.restart
+        return self._state() != before
+
+    def _state(self) -> tuple[bytes, bytes, int, int]:
+        """The words that are exchanged, as the program sees them."""
+        return self.n.tobytes(), self.m.tobytes(), self.initializing[0], self.restart[0]
+
+
+def _scattered(seed: int) -> int:
+    """A state to draw numbers from that is far from those of seeds nearby, and not 0 (splitmix64, G. Steele 2014)."""
+    mixed = (seed + 1) * 0x9E37_79B9_7F4A_7C15 & 0xFFFF_FFFF_FFFF_FFFF
+    mixed = (mixed ^ mixed >> 30) * 0xBF58_476D_1CE4_E5B9 & 0xFFFF_FFFF_FFFF_FFFF
+    mixed = (mixed ^ mixed >> 27) * 0x94D0_49BB_1331_11EB & 0xFFFF_FFFF_FFFF_FFFF
+    return mixed ^ mixed >> 31 or 1
