@@ -18,8 +18,8 @@ finally:
 """
 
 
-USED = {"fbvm.engine", "fbvm.plc", "fbvm.run", "fbvm.net", "llvmlite"}
-"""What a run needs; its units have processors of their own, whose programs are machine code."""
+USED = {"fbvm.engine", "fbvm.plc", "fbvm.run", "fbvm.net"}
+"""What a run needs whose program asks nothing of a unit."""
 
 
 @pytest.mark.slow
