@@ -90,7 +90,7 @@ def programs(count: int) -> Iterator[str]:
     return (mixed(chance) for _ in range(count))
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(150, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [4, pytest.param(80, marks=pytest.mark.slow)])
 def test_programs_that_mix_blocks_are_the_same_as_alone(count: int) -> None:
     for text in programs(count):
         compile_text(text)
