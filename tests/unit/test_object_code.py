@@ -77,12 +77,14 @@ def test_programs_of_the_examples_are_the_same_in_any_order(which: str, least: i
 @pytest.mark.slow
 @pytest.mark.parametrize("dialect", DIALECTS)
 def test_every_shipped_block_is_the_same_linked_in_any_company(dialect: str) -> None:
+    """All of them in the standard dialect, of the others a third each, which is not the same third."""
+    place = list(DIALECTS).index(dialect)
     usable = [name for name in SHIPPED if compile_text(with_blocks([name]), dialect=dialect).image]
-    for name in usable:
+    for name in usable if dialect == "standard" else usable[place % 3 :: 3]:
         text = with_blocks([name], "pad : ARRAY [0..9] OF INT; first : R_TRIG;")
         alone = by_itself(text, dialect)
         assert [whole(compile_text(text, dialect=dialect)) for _ in range(3)] == [alone] * 3, name
-    assert len(kept(dialect).code) >= len(usable) * 3 // 4
+    assert len(kept(dialect).code) >= len(usable) * 3 // 4 // (1 if dialect == "standard" else 3)
 
 
 def programs(count: int) -> Iterator[str]:
