@@ -13,12 +13,12 @@ called twice an exchange: when the reply has come, and when the next request is 
 instructions then, in equal parts for the loop with its clock, goal and times, for the connection, for the rows that the unit's
 program and the network exchange, and for the burst; send, wait and receive are one call of the host each, as in any client.
 
-Where the host lets its processors sleep between two changes of processes the blocks reach 1.1 times pymodbus's rate (one
-x86-64 machine: 1.11, 1.13, 1.16 and, in a bad minute, 0.72; 5,600 to 8,600 a second beside 5,000 to 7,800), and two thirds of
-what C does that does nothing else.  Where changes of processes are quick, because the machine is busy, whoever computes least
-wins: pymodbus does 33,000 a second there with 20 us of its own, the blocks 18,000 to 20,000 with 35, three fifths.  What is
-left would have to go out of Python's loop and connections.  A server in Python, as most simulators are, takes the difference
-away: the second table.  In `cyclic` pace an exchange takes four periods, whatever everybody's speed."""
+Where the host lets its processors sleep between two changes of processes the blocks reach 1.1 to 1.2 times pymodbus's rate
+(one x86-64 machine: 1.12, 1.19, 1.20; 8,600 to 10,400 a second beside 7,200 to 9,100; in a disturbed minute 0.72), and two
+thirds of what C does that does nothing else.  Where changes of processes are quick, because the machine is busy, whoever
+computes least wins: pymodbus does 33,000 a second there with 20 us of its own, the blocks 18,000 to 20,000 with 35, three
+fifths.  What is left would have to go out of Python's loop and connections.  A server in Python, as most simulators are,
+takes the difference away: the second table.  In `cyclic` pace an exchange takes four periods, whatever everybody's speed."""
 
 from __future__ import annotations
 
