@@ -27,7 +27,8 @@ from fbvm.check.foreign import comma_hint
 from fbvm.check.generics import Generics, is_generic
 from fbvm.check.standard import StandardCalls, is_known
 from fbvm.check.writes import note_count, writable
-from fbvm.syntax import ladder, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder
 
 if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions

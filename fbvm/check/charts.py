@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, TIME, base, fold
 from fbvm.check.writes import writable
-from fbvm.syntax import sfc, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import sfc
 
 if TYPE_CHECKING:
     from fbvm.check.statements import Statements

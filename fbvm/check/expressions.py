@@ -51,7 +51,8 @@ from fbvm.check.fitting import (
 from fbvm.check.operators import Operators
 from fbvm.check.subscripts import Subscripts
 from fbvm.check.values import is_any
-from fbvm.syntax import ladder, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker

@@ -17,7 +17,7 @@ from fbvm.check.fitting import is_untyped, same
 from fbvm.check.functions import RESULT_STRING
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
-from fbvm.syntax.node import copied, walk
+from fbvm.syntax.tree.node import copied, walk
 
 if TYPE_CHECKING:
     from fbvm.check.calls import Calls

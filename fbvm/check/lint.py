@@ -14,7 +14,7 @@ from fbvm.check.facts import Pou, Variable
 from fbvm.check.lint_body import Body
 from fbvm.check.lint_flow import flow
 from fbvm.check.lint_writes import Writes
-from fbvm.syntax import sfc
+from fbvm.syntax.tree import sfc
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker

@@ -9,7 +9,8 @@ from typing import Any
 from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Source
 from fbvm.check.facts import Facts, Pou, Report
-from fbvm.syntax import ladder, sfc, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder, sfc
 
 Nodes = tuple[tree.Node | None, ...]
 

@@ -9,7 +9,8 @@ from fbvm.base.types import BOOL, ArrayType, Type, base
 from fbvm.check.facts import Facts, Pou, PouCall, Report, Variable, is_block
 from fbvm.check.lint_body import Body
 from fbvm.check.values import is_any
-from fbvm.syntax import sfc, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import sfc
 
 OWN = ("VAR", "VAR_TEMP", "VAR_STAT")
 """Sections whose variables nobody outside can have asked for."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from fbvm.base.types import Elementary, EnumType, base
 from fbvm.check.lint_body import Body
 from fbvm.check.values import is_any
-from fbvm.syntax import ladder, sfc, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder, sfc
 
 _LEAVES = {tree.Return: "RETURN", tree.Exit: "EXIT", tree.Continue: "CONTINUE"}
 _TURNED = {"<": ">", ">": "<", "<=": ">=", ">=": "<="}

@@ -10,8 +10,8 @@ from itertools import combinations
 
 from fbvm.base.types import fold
 from fbvm.check.lint_body import Body
-from fbvm.syntax import sfc
 from fbvm.syntax.sfc_rules import networks
+from fbvm.syntax.tree import sfc
 
 MOST = 5000
 """Situations of one network that are looked at."""

@@ -16,7 +16,8 @@ from fbvm.base.types import BOOL, base
 from fbvm.check.facts import PouCall, Variable
 from fbvm.check.lint_body import Body
 from fbvm.check.writes import place
-from fbvm.syntax import ladder, sfc, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder, sfc
 
 SCANNED = frozenset((
     "R_TRIG", "F_TRIG", "TP", "TON", "TOF", "CTU", "CTD", "CTUD",

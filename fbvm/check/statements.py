@@ -13,7 +13,8 @@ from fbvm.check.facts import Pou, Value
 from fbvm.check.fitting import as_number, assignable, conversion_hint
 from fbvm.check.values import is_any
 from fbvm.check.writes import note_count, place, writable
-from fbvm.syntax import ladder, sfc, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder, sfc
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker

@@ -13,7 +13,7 @@ from fbvm.check.facts import UNTYPED_INT, Facts, Pou, Value, Variable
 from fbvm.check.foreign import comma_hint
 from fbvm.check.project import Project
 from fbvm.syntax import tree
-from fbvm.syntax.node import walk
+from fbvm.syntax.tree.node import walk
 
 
 class Values:

@@ -22,8 +22,9 @@ from fbvm.code.pou_calls import CallLowering
 from fbvm.code.st_rungs import Mark, NoRung, st_rung
 from fbvm.code.values import DEEPEST, ValueLowering, is_aggregate
 from fbvm.code.weights import counted
-from fbvm.syntax import ladder, sfc, tree
+from fbvm.syntax import tree
 from fbvm.syntax.pragmas import hides_inside
+from fbvm.syntax.tree import ladder, sfc
 
 if TYPE_CHECKING:
     from fbvm.code.program import Program

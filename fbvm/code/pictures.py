@@ -7,8 +7,7 @@ from collections.abc import Callable
 from fbvm.base.types import StructType, fold
 from fbvm.check.facts import Pou
 from fbvm.code.image import SfcPicture
-from fbvm.syntax import sfc
-from fbvm.syntax.tree import Assign, Node
+from fbvm.syntax.tree import Assign, Node, sfc
 
 
 def sfc_picture(chart: sfc.Sfc, pou: Pou, site: Callable[[Node], int]) -> SfcPicture:

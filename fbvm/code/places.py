@@ -32,7 +32,8 @@ from fbvm.check.facts import StandardCall, Value, Variable
 from fbvm.code import aggregates, plc_addresses
 from fbvm.code.layout import variable_bit
 from fbvm.code.operations import SIZES, WHOLE_BYTES, Address, Node
-from fbvm.syntax import ladder, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder
 
 if TYPE_CHECKING:
     from fbvm.code.lower import BodyLowering

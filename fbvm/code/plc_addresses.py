@@ -11,7 +11,8 @@ from fbvm.base.areas import E_NAMES, E_PLC_ADDRESS, E_WORDS, PLC_ADDRESSES
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import BOOL, Type
 from fbvm.code.operations import BIT_MASK, OFFSET_MASK, OFFSET_SHIFT, Node
-from fbvm.syntax import ladder, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder
 
 if TYPE_CHECKING:
     from fbvm.code.lower import BodyLowering

@@ -22,7 +22,8 @@ from fbvm.check.values import is_any
 from fbvm.code import plc_addresses
 from fbvm.code.functions import FUNCTIONS, saturated
 from fbvm.code.operations import FLOATS, TEXT_UNITS, Node
-from fbvm.syntax import ladder, tree
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder
 
 if TYPE_CHECKING:
     from fbvm.code.lower import BodyLowering

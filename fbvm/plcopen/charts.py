@@ -18,7 +18,7 @@ from fbvm.plcopen.read_types import duration
 from fbvm.plcopen.scope import Scope
 from fbvm.plcopen.statements import Statements
 from fbvm.plcopen.values import Unexecutable
-from fbvm.syntax.sfc import QUALIFIERS
+from fbvm.syntax.tree.sfc import QUALIFIERS
 
 PASSING = ("selectionDivergence", "selectionConvergence", "simultaneousDivergence", "simultaneousConvergence")
 _ASSIGNED = re.compile(r"(?s)\s*([^\W\d]\w*)?\s*:=\s*(.*?);?\s*\Z")

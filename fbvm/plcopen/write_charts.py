@@ -9,7 +9,7 @@ from fbvm.plcopen.layout import End, wired
 from fbvm.plcopen.markup import Element, element
 from fbvm.plcopen.write_types import Types
 from fbvm.syntax import tree
-from fbvm.syntax.sfc import Sfc, Step, Transition
+from fbvm.syntax.tree.sfc import Sfc, Step, Transition
 
 LANE, HIGH, TOP = 320, 160, 40
 """Places in the drawing: how far apart columns and rows of steps are, and where the first row is."""

@@ -11,8 +11,8 @@ from fbvm.plcopen.write_rungs import RungWriter
 from fbvm.plcopen.write_statements import StatementWriter
 from fbvm.plcopen.write_types import Types, Unsayable
 from fbvm.syntax import tree
-from fbvm.syntax.ladder import Ladder
-from fbvm.syntax.sfc import Sfc
+from fbvm.syntax.tree.ladder import Ladder
+from fbvm.syntax.tree.sfc import Sfc
 
 KINDS = {"FUNCTION": "function", "FUNCTION_BLOCK": "functionBlock", "PROGRAM": "program"}
 _END = re.compile(r"(?i)END_(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|ACTION)\s*$")

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.syntax.ladder import Ladder
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
 from fbvm.syntax.tree import Expr, Name, Refused, Statement
+from fbvm.syntax.tree.ladder import Ladder
 
 CHAIN_LIMIT = 1000
 """Deepest tree of one expression, in nodes; those who walk trees rely on it."""

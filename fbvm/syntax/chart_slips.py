@@ -13,7 +13,7 @@ from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, anch
 from fbvm.syntax.lexer import Lexer, Token
 from fbvm.syntax.mend import Mend
 from fbvm.syntax.phrases import found
-from fbvm.syntax.sfc import QUALIFIERS, Step, Transition
+from fbvm.syntax.tree.sfc import QUALIFIERS, Step, Transition
 
 HEADS = {"STEP": "STEP", "INITIAL_STEP": "STEP", "TRANSITION": "TRANSITION", "ACTION": "ACTION"}
 """Words that begin an element -> their terminals."""

@@ -8,7 +8,6 @@ from fbvm.syntax.expressions import Item
 from fbvm.syntax.jumps import Jumps, Tangled
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
-from fbvm.syntax.sfc import Step, Transition
 from fbvm.syntax.sfc_elements import Part, SfcElements
 from fbvm.syntax.statements import Items
 from fbvm.syntax.tree import (
@@ -43,6 +42,7 @@ from fbvm.syntax.tree import (
     VarDecl,
     VarSection,
 )
+from fbvm.syntax.tree.sfc import Step, Transition
 
 Head = tuple[Name, list[Refused]]
 Settings = AccessVars | ConfigVars

@@ -15,12 +15,12 @@ from collections.abc import Iterable, Sequence
 from fbvm.base.types import fold
 from fbvm.syntax import tree
 from fbvm.syntax.expressions import Expressions
-from fbvm.syntax.ladder import Element
 from fbvm.syntax.lexer import Token
-from fbvm.syntax.node import walk
-from fbvm.syntax.sfc import Association, Sfc, Step, Transition
 from fbvm.syntax.sfc_flags import steered
 from fbvm.syntax.tree import Expr, Name, NameRef, Statement, VarDecl, VarSection
+from fbvm.syntax.tree.ladder import Element
+from fbvm.syntax.tree.node import walk
+from fbvm.syntax.tree.sfc import Association, Sfc, Step, Transition
 
 CONTROL = "SFC_ACTION_CONTROL"
 """The block that decides when an action is executed, in `fblib/iec` and, where a dialect has another answer, there."""

@@ -11,9 +11,6 @@ from typing import Any, NamedTuple
 
 from fbvm.base.types import ELEMENTARY, GENERIC, SHORT_NAMES, fold
 from fbvm.syntax.format_scopes import Scope, declared_in, element, global_scope, members
-from fbvm.syntax.ladder import Ladder
-from fbvm.syntax.node import names_of
-from fbvm.syntax.sfc import Association, Sfc, Transition
 from fbvm.syntax.tree import (
     Argument,
     ArrayInit,
@@ -39,6 +36,9 @@ from fbvm.syntax.tree import (
     VarDecl,
     VarSection,
 )
+from fbvm.syntax.tree.ladder import Ladder
+from fbvm.syntax.tree.node import names_of
+from fbvm.syntax.tree.sfc import Association, Sfc, Transition
 
 TYPE_WORDS = frozenset(ELEMENTARY) | GENERIC | set(SHORT_NAMES) | {"STRING", "WSTRING"}
 Shape = TypeSpec | Pou | None

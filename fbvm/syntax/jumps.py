@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from fbvm.base.types import fold
 from fbvm.syntax import tree
-from fbvm.syntax.node import changed
 from fbvm.syntax.tree import Block, Expr, NameRef, Statement
+from fbvm.syntax.tree.node import changed
 
 LOOPS = tree.For | tree.While | tree.Repeat
 

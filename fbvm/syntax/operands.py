@@ -21,8 +21,8 @@ from fbvm.base.areas import (
     parse_address,
 )
 from fbvm.syntax import tree
-from fbvm.syntax.ladder import Memory, Words
 from fbvm.syntax.tree import Argument, Binary, Call, Direct, Expr, Index, Literal, Member, Name, NameRef
+from fbvm.syntax.tree.ladder import Memory, Words
 
 SYMBOLS = {
     "P_GE": "CF000", "P_NE": "CF001", "P_LE": "CF002", "P_ER": "CF003", "P_CY": "CF004", "P_GT": "CF005", "P_EQ": "CF006",

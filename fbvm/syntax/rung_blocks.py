@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from fbvm.syntax.instruction_set import Instruction, instruction_set
-from fbvm.syntax.ladder import Ladder
 from fbvm.syntax.mnemonics import RungText
 from fbvm.syntax.operands import SYMBOLS, Wrong
 from fbvm.syntax.rung_diagram import WIRE
@@ -25,6 +24,7 @@ from fbvm.syntax.tree import (
     VarDecl,
     VarSection,
 )
+from fbvm.syntax.tree.ladder import Ladder
 
 if TYPE_CHECKING:
     from fbvm.syntax.rungs import Rungs

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from fbvm.syntax import tree
-from fbvm.syntax.ladder import Rung
 from fbvm.syntax.mnemonics import RungText
 from fbvm.syntax.tree import Action, Block, Continue, Exit, Expr, For, If, NameRef, Repeat, Return, Statement
+from fbvm.syntax.tree.ladder import Rung
 
 if TYPE_CHECKING:
     from fbvm.syntax.rungs import Rungs

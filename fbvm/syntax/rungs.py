@@ -11,7 +11,6 @@ from collections.abc import Callable
 from fbvm.syntax import tree
 from fbvm.syntax.expressions import Expressions
 from fbvm.syntax.instruction_set import Instruction, instruction_set, spelling
-from fbvm.syntax.ladder import Edge, Element, Ladder, Rung
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.mnemonics import Line, RungText, is_input, read_rungs
 from fbvm.syntax.operands import Operands, Wrong
@@ -20,6 +19,7 @@ from fbvm.syntax.rung_sequences import Steps
 from fbvm.syntax.rung_spans import Spans, StepRefused
 from fbvm.syntax.symbols import declaration, number
 from fbvm.syntax.tree import Assign, Binary, Expr, If, NameRef, Statement, Unary
+from fbvm.syntax.tree.ladder import Edge, Element, Ladder, Rung
 
 DEEPEST = 32
 """Most conditions that may be saved (8 on the real CPU units; assumed)."""

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 
 from fbvm.base.types import fold
-from fbvm.syntax.sfc import Step, Transition
 from fbvm.syntax.tree import Name
+from fbvm.syntax.tree.sfc import Step, Transition
 
 Report = Callable[..., None]
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise, zip_longest
 
 from fbvm.syntax.expressions import Expressions
-from fbvm.syntax.ladder import Ladder
 from fbvm.syntax.lexer import Token
 from fbvm.syntax.literals import ELEMENTARY
 from fbvm.syntax.refused import refused_what
@@ -30,6 +29,7 @@ from fbvm.syntax.tree import (
     Statement,
     While,
 )
+from fbvm.syntax.tree.ladder import Ladder
 
 Value = tuple[Expr, Expr | None]
 Branch = tuple[Expr, Block]

@@ -9,8 +9,8 @@ from pathlib import Path
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.outline import dump
 from fbvm.syntax.parser import parse
+from fbvm.syntax.tree.outline import dump
 
 HERE = Path(__file__).resolve().parent
 REWRITE = bool(os.environ.get("FBVM_REWRITE"))

@@ -19,9 +19,9 @@ from fbvm.syntax.format import REFUSED, formatted
 from fbvm.syntax.format_comments import Comments
 from fbvm.syntax.format_names import Spelling
 from fbvm.syntax.lexer import Lexer, Token, lexis
-from fbvm.syntax.node import names_of
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Literal, Node
+from fbvm.syntax.tree.node import names_of
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 CORPUS = ("tests/lang/**/", "tests/golden/**/", "tests/bench/", "tests/conformance/", "fblib/**/", "examples/**/")

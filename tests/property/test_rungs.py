@@ -11,9 +11,9 @@ from fbvm.code.compiler import compile_text
 from fbvm.plc import Plc
 from fbvm.syntax.format import formatted
 from fbvm.syntax.instruction_set import Instruction, instruction_set
-from fbvm.syntax.ladder import Ladder, Step
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Pou
+from fbvm.syntax.tree.ladder import Ladder, Step
 
 ROWS = instruction_set().rows
 OUTPUTS = sorted(name for name, row in ROWS.items() if row.kind != "?" and row.does.startswith(

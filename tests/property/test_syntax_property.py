@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.node import names_of
-from fbvm.syntax.outline import dump
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Node
+from fbvm.syntax.tree.node import names_of
+from fbvm.syntax.tree.outline import dump
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden"
 TEXTS = [path.read_text(encoding="utf-8") for path in sorted(GOLDEN.glob("*/*.st"))]

@@ -6,8 +6,9 @@ import pickle
 
 import pytest
 
-from fbvm.syntax import ladder, sfc, tree
-from fbvm.syntax.node import Node, changed, copied, names_of, node, walk
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder, sfc
+from fbvm.syntax.tree.node import Node, changed, copied, names_of, node, walk
 
 CLASSES = [each for module in (tree, ladder, sfc) for each in vars(module).values()
            if isinstance(each, type) and issubclass(each, Node)]

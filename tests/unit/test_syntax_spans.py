@@ -9,9 +9,9 @@ from typing import Any
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.node import names_of
 from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Binary, Literal, Name, NamedType, NameRef, Node
+from fbvm.syntax.tree.node import names_of
 
 GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "syntax"
 

@@ -6,9 +6,9 @@ whoever checks, lowers or executes needs to know these two, and whoever draws or
 
 from __future__ import annotations
 
-from fbvm.syntax.node import Node
-from fbvm.syntax.node import node as _node
 from fbvm.syntax.tree import Action, Block, Expr, NameRef, Statement, VarDecl
+from fbvm.syntax.tree.node import Node
+from fbvm.syntax.tree.node import node as _node
 
 
 @_node

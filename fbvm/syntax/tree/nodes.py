@@ -7,25 +7,9 @@ Names are kept as written; comparing them without case is the checker's work.
 
 from __future__ import annotations
 
-from fbvm.syntax.node import Node as Node
-from fbvm.syntax.node import node as _node
-from fbvm.syntax.tree_expressions import Argument as Argument
-from fbvm.syntax.tree_expressions import ArrayInit as ArrayInit
-from fbvm.syntax.tree_expressions import Binary as Binary
-from fbvm.syntax.tree_expressions import Call as Call
-from fbvm.syntax.tree_expressions import Deref as Deref
-from fbvm.syntax.tree_expressions import Direct as Direct
-from fbvm.syntax.tree_expressions import EnumLiteral as EnumLiteral
-from fbvm.syntax.tree_expressions import Expr as Expr
-from fbvm.syntax.tree_expressions import Index as Index
-from fbvm.syntax.tree_expressions import Literal as Literal
-from fbvm.syntax.tree_expressions import Member as Member
-from fbvm.syntax.tree_expressions import Name as Name
-from fbvm.syntax.tree_expressions import NameRef as NameRef
-from fbvm.syntax.tree_expressions import NullLiteral as NullLiteral
-from fbvm.syntax.tree_expressions import Part as Part
-from fbvm.syntax.tree_expressions import StructInit as StructInit
-from fbvm.syntax.tree_expressions import Unary as Unary
+from fbvm.syntax.tree.expressions import Argument, ArrayInit, Expr, Name
+from fbvm.syntax.tree.node import Node
+from fbvm.syntax.tree.node import node as _node
 
 # --- initial values (6.4.4, 6.5.1.4) -------------------------------------------------------------------------------
 

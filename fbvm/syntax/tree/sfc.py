@@ -7,9 +7,9 @@ and whoever checks, draws or prints finds them here.
 
 from __future__ import annotations
 
-from fbvm.syntax.node import Node
-from fbvm.syntax.node import node as _node
 from fbvm.syntax.tree import Block, Expr, Name, Statement, VarSection
+from fbvm.syntax.tree.node import Node
+from fbvm.syntax.tree.node import node as _node
 
 QUALIFIERS = {"N": False, "R": False, "S": False, "P": False, "P0": False, "P1": False,
               "L": True, "D": True, "SD": True, "DS": True, "SL": True}

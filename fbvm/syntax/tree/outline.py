@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from fbvm.syntax.node import names_of
 from fbvm.syntax.tree import Binary, Direct, EnumLiteral, Literal, Location, Name, NamedType, NameRef, Node
+from fbvm.syntax.tree.node import names_of
 
 HIDDEN = {"start", "end", "op_start"}
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.node import Node
-from fbvm.syntax.node import node as _node
+from fbvm.syntax.tree.node import Node
+from fbvm.syntax.tree.node import node as _node
 
 
 @_node
