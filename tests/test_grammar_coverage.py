@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.automaton import Automaton
-from fbvm.syntax.builder import Stop
-from fbvm.syntax.lexer import Lexer
 from fbvm.syntax.recovery import Recovery
-from fbvm.syntax.tables import Rule, tables
-from fbvm.syntax.types import Types
+from fbvm.syntax.st.automaton import Automaton
+from fbvm.syntax.st.builder import Stop
+from fbvm.syntax.st.lexer import Lexer
+from fbvm.syntax.st.tables import Rule, tables
+from fbvm.syntax.st.types import Types
 
 HOUSE = Path(__file__).resolve().parent.parent
 LONGEST = 20_000

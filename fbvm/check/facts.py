@@ -11,7 +11,7 @@ from fbvm.base.areas import Address
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.types import BOOL, ArrayType, Elementary, Field, RefType, StructType, Type, base, fold
 from fbvm.syntax import tree
-from fbvm.syntax.pragmas import shown_in_hexadecimal
+from fbvm.syntax.st.pragmas import shown_in_hexadecimal
 from fbvm.syntax.tree import Action, Node, VarDecl, VarSection
 
 Value = int | float | bool | bytes | str

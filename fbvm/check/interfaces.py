@@ -31,7 +31,7 @@ from fbvm.check.locations import location_of
 from fbvm.check.names import refuse_reserved
 from fbvm.check.statements import writes_eno
 from fbvm.syntax import tree
-from fbvm.syntax.pragmas import passes_places
+from fbvm.syntax.st.pragmas import passes_places
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker

@@ -9,7 +9,7 @@ from fbvm.check.constants import convert, limits
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
-from fbvm.syntax.literals import WRONG
+from fbvm.syntax.st.literals import WRONG
 
 if TYPE_CHECKING:
     from fbvm.check.expressions import Expressions

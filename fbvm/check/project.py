@@ -21,7 +21,7 @@ from fbvm.check.library import Libraries
 from fbvm.check.names import refuse_reserved
 from fbvm.check.room import Room
 from fbvm.syntax import tree
-from fbvm.syntax.pragmas import attributes, external, pack_mode
+from fbvm.syntax.st.pragmas import attributes, external, pack_mode
 
 
 @dataclass(eq=False)

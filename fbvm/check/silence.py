@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.dialects import Dialect
-from fbvm.syntax.pragmas import NO_EFFECT, dialectal, in_place
+from fbvm.syntax.st.pragmas import NO_EFFECT, dialectal, in_place
 
 if TYPE_CHECKING:
     from fbvm.syntax.tree import SourceText

@@ -21,7 +21,7 @@ from fbvm.cli.files import writing
 from fbvm.cli.sources import show
 from fbvm.syntax.format import formatted
 from fbvm.syntax.format_names import Outside
-from fbvm.syntax.parser import parse
+from fbvm.syntax.st.parser import parse
 from fbvm.syntax.text import MARKS, decode, read
 from fbvm.syntax.tree import Declaration, Pou, TypeDecl
 

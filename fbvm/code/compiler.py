@@ -29,7 +29,7 @@ from fbvm.code.layout import place
 from fbvm.code.object_code import Shelf, shelf_of
 from fbvm.code.program import Program
 from fbvm.syntax import tree
-from fbvm.syntax.parser import parse
+from fbvm.syntax.st.parser import parse
 from fbvm.syntax.text import read
 
 LONG = 50_000

@@ -14,7 +14,7 @@ from fbvm.check.facts import StandardCall, Value
 from fbvm.code.functions import FUNCTIONS
 from fbvm.code.operations import FLOATS, INTEGERS, TEXT_UNITS, Node
 from fbvm.code.values import constant
-from fbvm.syntax import texts
+from fbvm.syntax.st import texts
 
 VARYING = frozenset(("TIME", "LTIME", "__DUE"))
 """Functions whose value is another one each time."""

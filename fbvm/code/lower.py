@@ -23,7 +23,7 @@ from fbvm.code.st_rungs import Mark, NoRung, st_rung
 from fbvm.code.values import DEEPEST, ValueLowering, is_aggregate
 from fbvm.code.weights import counted
 from fbvm.syntax import tree
-from fbvm.syntax.pragmas import hides_inside
+from fbvm.syntax.st.pragmas import hides_inside
 from fbvm.syntax.tree import ladder, sfc
 
 if TYPE_CHECKING:

@@ -23,7 +23,7 @@ from fbvm.engine.native_reading import (
 from fbvm.engine.native_routines import INFINITE
 from fbvm.engine.native_subset import data, peek, poke_all
 from fbvm.engine.native_times import read_clock, read_date, read_duration, read_moment
-from fbvm.syntax.texts import LEADING
+from fbvm.syntax.st.texts import LEADING
 
 
 def read_special(out: int, at: int, n: int) -> int:

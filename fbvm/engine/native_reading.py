@@ -1,6 +1,6 @@
 """Routines of native code that read numbers from text, in the subset that `native_subset` translates.
 
-They take what `syntax.literals` takes, and find the same fault first.  A routine named `read_...` yields GOOD, MALFORMED
+They take what `syntax.st.literals` takes, and find the same fault first.  A routine named `read_...` yields GOOD, MALFORMED
 or OUTSIDE (the type cannot hold it) and writes the value to `out`: an integer, or the bits of a double."""
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from fbvm.base.types import SHORT_NAMES
 from fbvm.engine.native_context import DIGITS, FIELDS
 from fbvm.engine.native_routines import INFINITE
 from fbvm.engine.native_subset import data, float_bits, peek, peek_all, poke, poke_all, text_float
-from fbvm.syntax.literals import LONGEST, REALS
+from fbvm.syntax.st.literals import LONGEST, REALS
 
 GOOD, MALFORMED, OUTSIDE = 0, 1, 2
 KINDS = {name: number for number, name in enumerate((

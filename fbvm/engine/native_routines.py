@@ -9,7 +9,7 @@ import struct
 
 from fbvm.base.types import DAY_NS
 from fbvm.engine.native_subset import data, float_text, free_text, peek, poke, single_bits, text_float
-from fbvm.syntax.literals import SECOND_NS, UNITS_NS
+from fbvm.syntax.st.literals import SECOND_NS, UNITS_NS
 
 UNITS = b"".join(unit.encode().ljust(2, b"\0") for unit in UNITS_NS)
 SIZES = b"".join(struct.pack("<Q", size) for size in UNITS_NS.values())

@@ -19,7 +19,7 @@ from fbvm.engine.native_reading import (
 )
 from fbvm.engine.native_routines import UNITS, unit_ns
 from fbvm.engine.native_subset import data, peek, peek_all, poke_all
-from fbvm.syntax.literals import LONGEST, SECOND_NS
+from fbvm.syntax.st.literals import LONGEST, SECOND_NS
 
 MOST = (1 << 63) - 1
 LAST_DAY = MOST // DAY_NS

@@ -24,7 +24,7 @@ from fbvm.code.operations import (
     OFFSET_SHIFT,
 )
 from fbvm.engine.trap import Stop
-from fbvm.syntax import texts
+from fbvm.syntax.st import texts
 
 T = TypeVar("T")
 NO_SITE = -1

@@ -12,8 +12,8 @@ from fbvm.plcopen.markup import Element, element, written
 from fbvm.plcopen.write_pous import pou
 from fbvm.plcopen.write_types import Types, Unsayable
 from fbvm.syntax import tree
-from fbvm.syntax.parser import parse
-from fbvm.syntax.pragmas import harmless
+from fbvm.syntax.st.parser import parse
+from fbvm.syntax.st.pragmas import harmless
 from fbvm.syntax.text import read
 
 NAMESPACE = "http://www.plcopen.org/xml/tc6_0201"

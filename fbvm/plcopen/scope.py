@@ -17,7 +17,7 @@ from fbvm.plcopen.diagram import Object, Wire
 from fbvm.plcopen.document import Document, Pou, Variable
 from fbvm.syntax import tree
 from fbvm.syntax.operands import Operands, Wrong
-from fbvm.syntax.parser import parse
+from fbvm.syntax.st.parser import parse
 from fbvm.syntax.text import read
 
 SHARED = "%"

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from fbvm.syntax.automaton import ELEMENTS, Automaton
 from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, anchor, frames
-from fbvm.syntax.lexer import Lexer, Token
 from fbvm.syntax.mend import Mend
 from fbvm.syntax.phrases import found
+from fbvm.syntax.st.automaton import ELEMENTS, Automaton
+from fbvm.syntax.st.lexer import Lexer, Token
 from fbvm.syntax.tree.sfc import QUALIFIERS, Step, Transition
 
 HEADS = {"STEP": "STEP", "INITIAL_STEP": "STEP", "TRANSITION": "TRANSITION", "ACTION": "ACTION"}

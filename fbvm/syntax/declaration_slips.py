@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 
-from fbvm.syntax.automaton import Automaton
 from fbvm.syntax.frames import anchor, cut, frames
-from fbvm.syntax.lexer import Token
-from fbvm.syntax.literals import ELEMENTARY
 from fbvm.syntax.mend import Mend
 from fbvm.syntax.phrases import found
 from fbvm.syntax.prospect import advance, symbols
+from fbvm.syntax.st.automaton import Automaton
+from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.literals import ELEMENTARY
 from fbvm.syntax.tree import Name
 
 ARRAY = "an array is written ARRAY [0..9] OF INT"

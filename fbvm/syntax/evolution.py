@@ -14,9 +14,9 @@ from collections.abc import Iterable, Sequence
 
 from fbvm.base.types import fold
 from fbvm.syntax import tree
-from fbvm.syntax.expressions import Expressions
-from fbvm.syntax.lexer import Token
 from fbvm.syntax.sfc_flags import steered
+from fbvm.syntax.st.expressions import Expressions
+from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import Expr, Name, NameRef, Statement, VarDecl, VarSection
 from fbvm.syntax.tree.ladder import Element
 from fbvm.syntax.tree.node import walk

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 
-from fbvm.syntax.automaton import Automaton
-from fbvm.syntax.lexer import Token
-from fbvm.syntax.literals import ELEMENTARY
 from fbvm.syntax.mend import Mend
 from fbvm.syntax.phrases import found, sign
 from fbvm.syntax.prospect import advance, expected
+from fbvm.syntax.st.automaton import Automaton
+from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.literals import ELEMENTARY
 from fbvm.syntax.tree import NameRef, Node
 
 OPERANDS = {"NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "LPAR", "DIRECT", "NOT"}

@@ -10,13 +10,13 @@ from __future__ import annotations
 from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
-from fbvm.syntax.automaton import Automaton, Mender
 from fbvm.syntax.format_comments import Comments
 from fbvm.syntax.format_declarations import DeclarationLayout
 from fbvm.syntax.format_layout import Doc, Printer
 from fbvm.syntax.format_names import NOTHING, Outside, Spelling
-from fbvm.syntax.lexer import Lexer
-from fbvm.syntax.parser import parse
+from fbvm.syntax.st.automaton import Automaton, Mender
+from fbvm.syntax.st.lexer import Lexer
+from fbvm.syntax.st.parser import parse
 
 REFUSED = {"S0901", "S0902"}
 """Errors of texts that are understood, so that they can be written too."""

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from fbvm.syntax.lexer import Token
+from fbvm.syntax.st.lexer import Token
 
 TAB = 4
 BESIDE = "  "

@@ -7,7 +7,7 @@ from fbvm.syntax.format_layout import BLANK, HARD, Doc, Indent, Leaf
 from fbvm.syntax.format_sfc import SfcLayout
 from fbvm.syntax.format_statements import Row, lines
 from fbvm.syntax.format_types import TypeLayout
-from fbvm.syntax.lexer import Token
+from fbvm.syntax.st.lexer import Token
 
 
 class DeclarationLayout(TypeLayout, SfcLayout):

@@ -9,8 +9,8 @@ from typing import Any
 from fbvm.syntax.format_comments import Comments
 from fbvm.syntax.format_layout import SPACE, Doc, Fill, Group, Hang, Indent, Leaf, Verbatim
 from fbvm.syntax.frames import LEVELS
-from fbvm.syntax.lexer import Token, lexis
-from fbvm.syntax.literals import ELEMENTARY
+from fbvm.syntax.st.lexer import Token, lexis
+from fbvm.syntax.st.literals import ELEMENTARY
 
 TEXTS = {"NAME", "NUMBER", "STRING_LITERAL", "TYPED_LITERAL", "DATE_LITERAL"}
 """Terminals that keep their case; all others are written in capitals."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fbvm.syntax.format_expressions import Phrase, in_capitals
 from fbvm.syntax.format_layout import HARD, Doc
 from fbvm.syntax.format_statements import StatementLayout
-from fbvm.syntax.lexer import Token
+from fbvm.syntax.st.lexer import Token
 
 
 class SfcLayout(StatementLayout):

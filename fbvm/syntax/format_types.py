@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fbvm.syntax.format_expressions import Phrase
 from fbvm.syntax.format_layout import HARD, Doc, Fill, Hang, Indent, Leaf, flat_width
 from fbvm.syntax.format_statements import Row, StatementLayout, lines
-from fbvm.syntax.lexer import Token
+from fbvm.syntax.st.lexer import Token
 
 SPREAD = 16
 """Largest difference of the lengths of what is aligned."""

@@ -6,7 +6,7 @@ from typing import Any
 
 from fbvm.base.diagnostics import Source
 from fbvm.syntax.frames import ENDS, OPENERS
-from fbvm.syntax.lexer import Lexer, Token
+from fbvm.syntax.st.lexer import Lexer, Token
 
 LONGEST = 200_000
 """Characters of a block beyond which nobody looks for the culprit."""

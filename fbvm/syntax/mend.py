@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fbvm.syntax.lexer import Token
+from fbvm.syntax.st.lexer import Token
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple
 
-from fbvm.syntax.automaton import Automaton, Mender
 from fbvm.syntax.instruction_set import NO_INSTRUCTIONS, Instruction, instruction_set, meant, spelling
-from fbvm.syntax.lexer import Token
 from fbvm.syntax.rung_grid import Bad
 from fbvm.syntax.rung_reading import Picture, Placed, is_drawn, read_drawing, remark_of
-from fbvm.syntax.tables import tables
+from fbvm.syntax.st.automaton import Automaton, Mender
+from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.tables import tables
 from fbvm.syntax.tree.ladder import Step
 
 Report = Callable[..., None]

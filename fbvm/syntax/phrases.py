@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.lexer import Token, lexis
-from fbvm.syntax.tables import tables
+from fbvm.syntax.st.lexer import Token, lexis
+from fbvm.syntax.st.tables import tables
 
 GROUPS = (
     ("a declaration (FUNCTION, FUNCTION_BLOCK, PROGRAM, TYPE, VAR_GLOBAL, CONFIGURATION)", {"FUNCTION", "TYPE"}, {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import cache
 
-from fbvm.syntax.tables import tables
+from fbvm.syntax.st.tables import tables
 
 State = list[int]
 

@@ -6,8 +6,6 @@ comes what stands open: an END that is missing or has no beginning.  At last the
 from __future__ import annotations
 
 from fbvm.base.diagnostics import Diagnostic
-from fbvm.syntax.automaton import ELEMENTS, NESTING_LIMIT, Automaton
-from fbvm.syntax.builder import CHAIN_LIMIT, Builder, Stop
 from fbvm.syntax.chart_slips import pass_over
 from fbvm.syntax.frames import (
     ENDS,
@@ -24,12 +22,14 @@ from fbvm.syntax.frames import (
     reopen,
 )
 from fbvm.syntax.indentation import BLOCKS, advice, ends_alike
-from fbvm.syntax.lexer import Token
 from fbvm.syntax.mend import Mend
 from fbvm.syntax.mends import BRACKETS, best_mend
 from fbvm.syntax.phrases import found, hint, sign, unlike
 from fbvm.syntax.prospect import advance, expected
 from fbvm.syntax.slips import open_bracket
+from fbvm.syntax.st.automaton import ELEMENTS, NESTING_LIMIT, Automaton
+from fbvm.syntax.st.builder import CHAIN_LIMIT, Builder, Stop
+from fbvm.syntax.st.lexer import Token
 
 LOOK = 4
 """Tokens by which a mend is judged."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.lexer import Token
-from fbvm.syntax.statements import Items, Statements
+from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.statements import Items, Statements
 from fbvm.syntax.tree import Action, Block, Call, CallStatement, Expr, Name, NameRef
 from fbvm.syntax.tree.sfc import QUALIFIERS, Association, Step, Transition
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import fold
 from fbvm.syntax import tree
-from fbvm.syntax.lexer import Token
+from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import Expr, Statement
 
 if TYPE_CHECKING:

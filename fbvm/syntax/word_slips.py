@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.automaton import Automaton
 from fbvm.syntax.frames import ENDS, POUS, UNITS, anchor, frames
-from fbvm.syntax.lexer import Token
 from fbvm.syntax.mend import Mend
 from fbvm.syntax.phrases import found
 from fbvm.syntax.prospect import advance
+from fbvm.syntax.st.automaton import Automaton
+from fbvm.syntax.st.lexer import Token
 
 DROPPED = {"LET": "an assignment has no word in front of it: x := 5;", "SET": "write x := TRUE;",
            "CALL": "a block is called by the name of its instance: timer(IN := a);",

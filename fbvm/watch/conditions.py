@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fbvm.base.types import Elementary, EnumType, StringType, base, fold
-from fbvm.syntax.literals import ELEMENTARY
+from fbvm.syntax.st.literals import ELEMENTARY
 from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.scanner import ConditionError as ConditionError
 from fbvm.watch.scanner import tokens

@@ -34,8 +34,8 @@ from fbvm.base.types import (
     followed,
     machine,
 )
-from fbvm.syntax import literals
-from fbvm.syntax.texts import to_text
+from fbvm.syntax.st import literals
+from fbvm.syntax.st.texts import to_text
 
 Value: TypeAlias = "bool | int | float | str | list[Value] | dict[str, Value] | None"
 """What a place holds, as a Python value; None is a null reference, another one its 64 bits, or the text that `Names` makes of

@@ -18,8 +18,8 @@ from fbvm.code.compiler import compile_text
 from fbvm.syntax.format import REFUSED, formatted
 from fbvm.syntax.format_comments import Comments
 from fbvm.syntax.format_names import Spelling
-from fbvm.syntax.lexer import Lexer, Token, lexis
-from fbvm.syntax.parser import parse
+from fbvm.syntax.st.lexer import Lexer, Token, lexis
+from fbvm.syntax.st.parser import parse
 from fbvm.syntax.tree import Literal, Node
 from fbvm.syntax.tree.node import names_of
 

@@ -1,4 +1,4 @@
-"""Texts of values and values of texts: machine code writes and reads what `fbvm.syntax.texts` does, to the bit."""
+"""Texts of values and values of texts: machine code writes and reads what `fbvm.syntax.st.texts` does, to the bit."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fbvm.base.arithmetic import Undefined, single
 from fbvm.base.memory import STRUCTS
 from fbvm.base.types import ELEMENTARY
 from fbvm.engine import native
-from fbvm.syntax import texts
+from fbvm.syntax.st import texts
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)

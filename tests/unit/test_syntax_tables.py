@@ -11,8 +11,8 @@ import lark
 import pytest
 
 from fbvm.base.data import data_folder
-from fbvm.syntax import tables as module
-from fbvm.syntax.tables import FILES, STARTS, Tables, compile_grammar, grammar_text, tables
+from fbvm.syntax.st import tables as module
+from fbvm.syntax.st.tables import FILES, STARTS, Tables, compile_grammar, grammar_text, tables
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from rows import each_of
 
 from fbvm.base.arithmetic import Undefined
 from fbvm.base.types import ELEMENTARY
-from fbvm.syntax.texts import from_text, to_text
+from fbvm.syntax.st.texts import from_text, to_text
 
 WRITTEN = sorted(name for name, kind in ELEMENTARY.items() if "ANY_CHAR" not in kind.families)
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.declarations import Declarations
-from fbvm.syntax.expressions import Item
-from fbvm.syntax.lexer import Token
+from fbvm.syntax.st.declarations import Declarations
+from fbvm.syntax.st.expressions import Item
+from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import (
     Argument,
     ArraySpec,

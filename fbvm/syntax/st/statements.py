@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from itertools import pairwise, zip_longest
 
-from fbvm.syntax.expressions import Expressions
-from fbvm.syntax.lexer import Token
-from fbvm.syntax.literals import ELEMENTARY
 from fbvm.syntax.refused import refused_what
+from fbvm.syntax.st.expressions import Expressions
+from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.literals import ELEMENTARY
 from fbvm.syntax.tree import (
     Assign,
     Block,

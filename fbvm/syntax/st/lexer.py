@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from typing import NamedTuple
 
-from fbvm.syntax.pragmas import NO_EFFECT, dialectal, harmless
-from fbvm.syntax.tables import Terminal, tables
+from fbvm.syntax.st.pragmas import NO_EFFECT, dialectal, harmless
+from fbvm.syntax.st.tables import Terminal, tables
 from fbvm.syntax.tree import Pragma
 
 Report = Callable[..., None]

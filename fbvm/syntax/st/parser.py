@@ -6,11 +6,11 @@ import re
 from collections.abc import Callable, Iterator
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.syntax.automaton import Automaton, Mender
-from fbvm.syntax.builder import Stop
-from fbvm.syntax.lexer import Lexer, Token
+from fbvm.syntax.st.automaton import Automaton, Mender
+from fbvm.syntax.st.builder import Stop
+from fbvm.syntax.st.lexer import Lexer, Token
+from fbvm.syntax.st.types import Types
 from fbvm.syntax.tree import SourceText
-from fbvm.syntax.types import Types
 
 
 def parse(source: Source, reached: Callable[[int], None] | None = None) -> tuple[SourceText, list[Diagnostic]]:

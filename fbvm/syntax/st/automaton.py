@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, repeat
 from typing import Any, Protocol
 
-from fbvm.syntax.builder import TooDeep
-from fbvm.syntax.lexer import Token, lexis, meant
 from fbvm.syntax.prospect import advance
 from fbvm.syntax.refused import whole
-from fbvm.syntax.tables import Tables, tables
+from fbvm.syntax.st.builder import TooDeep
+from fbvm.syntax.st.lexer import Token, lexis, meant
+from fbvm.syntax.st.tables import Tables, tables
 
 NESTING_LIMIT = 200
 """Most brackets, blocks and composite types inside one another; those who walk trees rely on it."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fbvm.syntax.expressions import Item
-from fbvm.syntax.jumps import Jumps, Tangled
-from fbvm.syntax.lexer import Token
 from fbvm.syntax.refused import refused_what
 from fbvm.syntax.sfc_elements import Part, SfcElements
-from fbvm.syntax.statements import Items
+from fbvm.syntax.st.expressions import Item
+from fbvm.syntax.st.jumps import Jumps, Tangled
+from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.statements import Items
 from fbvm.syntax.tree import (
     Access,
     AccessVars,

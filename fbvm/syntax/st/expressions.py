@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fbvm.syntax import literals
-from fbvm.syntax.builder import Builder
-from fbvm.syntax.lexer import Token
+from fbvm.syntax.st import literals
+from fbvm.syntax.st.builder import Builder
+from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import (
     Argument,
     ArrayInit,

@@ -11,7 +11,7 @@ from datetime import date, timedelta
 
 from fbvm.base.arithmetic import INF, NAN, Undefined, shortest, single
 from fbvm.base.types import DAY_NS, SHORT_NAMES
-from fbvm.syntax.literals import ELEMENTARY, SECOND_NS, UNITS_NS, Malformed, OutOfRange, typed
+from fbvm.syntax.st.literals import ELEMENTARY, SECOND_NS, UNITS_NS, Malformed, OutOfRange, typed
 
 LEADING = 64
 """How many characters may belong to a literal that a text begins with."""

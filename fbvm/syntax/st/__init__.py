@@ -1,0 +1,1 @@
+"""Structured Text: characters to tokens, tokens to a tree."""
