@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.recovery import Recovery
+from fbvm.syntax.recovery.recovery import Recovery
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.builder import Stop
 from fbvm.syntax.st.lexer import Lexer

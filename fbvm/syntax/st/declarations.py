@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fbvm.syntax.refused import refused_what
+from fbvm.syntax.recovery.refused import refused_what
 from fbvm.syntax.sfc_elements import Part, SfcElements
 from fbvm.syntax.st.expressions import Item
 from fbvm.syntax.st.jumps import Jumps, Tangled

@@ -53,6 +53,6 @@ OFTEN = 5000
 
 def _recovery(automaton: Automaton, builder: Types) -> Mender:
     """Who mends; loaded when there is something to mend."""
-    from fbvm.syntax.recovery import Recovery
+    from fbvm.syntax.recovery.recovery import Recovery
 
     return Recovery(automaton, builder)

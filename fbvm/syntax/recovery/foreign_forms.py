@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-from fbvm.syntax.mend import Mend
-from fbvm.syntax.phrases import found, sign
-from fbvm.syntax.prospect import advance, expected
+from fbvm.syntax.recovery.lookahead import advance, expected
+from fbvm.syntax.recovery.repair import Mend
+from fbvm.syntax.recovery.wording import found, sign
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.literals import ELEMENTARY

@@ -6,8 +6,8 @@ comes what stands open: an END that is missing or has no beginning.  At last the
 from __future__ import annotations
 
 from fbvm.base.diagnostics import Diagnostic
-from fbvm.syntax.chart_slips import pass_over
-from fbvm.syntax.frames import (
+from fbvm.syntax.recovery.chart_mistakes import pass_over
+from fbvm.syntax.recovery.frames import (
     ENDS,
     HEADS,
     OPENERS,
@@ -21,12 +21,12 @@ from fbvm.syntax.frames import (
     open_head,
     reopen,
 )
-from fbvm.syntax.indentation import BLOCKS, advice, ends_alike
-from fbvm.syntax.mend import Mend
-from fbvm.syntax.mends import BRACKETS, best_mend
-from fbvm.syntax.phrases import found, hint, sign, unlike
-from fbvm.syntax.prospect import advance, expected
-from fbvm.syntax.slips import open_bracket
+from fbvm.syntax.recovery.indentation import BLOCKS, advice, ends_alike
+from fbvm.syntax.recovery.lookahead import advance, expected
+from fbvm.syntax.recovery.mistakes import open_bracket
+from fbvm.syntax.recovery.repair import Mend
+from fbvm.syntax.recovery.repairs import BRACKETS, best_mend
+from fbvm.syntax.recovery.wording import found, hint, sign, unlike
 from fbvm.syntax.st.automaton import ELEMENTS, NESTING_LIMIT, Automaton
 from fbvm.syntax.st.builder import CHAIN_LIMIT, Builder, Stop
 from fbvm.syntax.st.lexer import Token

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fbvm.syntax.chart_slips import chart_slip
-from fbvm.syntax.frames import OPENERS, UNITS, anchor, frames
-from fbvm.syntax.mend import Mend
-from fbvm.syntax.phrases import found, hint, quoted, sign, unlike
-from fbvm.syntax.prospect import State, advance, expected
-from fbvm.syntax.slips import open_bracket, slip
+from fbvm.syntax.recovery.chart_mistakes import chart_slip
+from fbvm.syntax.recovery.frames import OPENERS, UNITS, anchor, frames
+from fbvm.syntax.recovery.lookahead import State, advance, expected
+from fbvm.syntax.recovery.mistakes import open_bracket, slip
+from fbvm.syntax.recovery.repair import Mend
+from fbvm.syntax.recovery.wording import found, hint, quoted, sign, unlike
 from fbvm.syntax.st.automaton import ELEMENTS, Automaton
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import EnumLiteral, Literal

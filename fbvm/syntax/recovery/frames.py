@@ -7,7 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fbvm.syntax.prospect import State, symbols
+from fbvm.syntax.recovery.lookahead import State, symbols
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.tables import tables
 from fbvm.syntax.tree import Binary, EnumLiteral, Literal, NullLiteral, Unary

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.frames import ENDS, OPENERS
+from fbvm.syntax.recovery.frames import ENDS, OPENERS
 from fbvm.syntax.st.lexer import Lexer, Token
 
 LONGEST = 200_000

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.frames import ENDS, POUS, UNITS, anchor, frames
-from fbvm.syntax.mend import Mend
-from fbvm.syntax.phrases import found
-from fbvm.syntax.prospect import advance
+from fbvm.syntax.recovery.frames import ENDS, POUS, UNITS, anchor, frames
+from fbvm.syntax.recovery.lookahead import advance
+from fbvm.syntax.recovery.repair import Mend
+from fbvm.syntax.recovery.wording import found
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token
 

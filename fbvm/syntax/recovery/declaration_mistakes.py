@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from fbvm.syntax.frames import anchor, cut, frames
-from fbvm.syntax.mend import Mend
-from fbvm.syntax.phrases import found
-from fbvm.syntax.prospect import advance, symbols
+from fbvm.syntax.recovery.frames import anchor, cut, frames
+from fbvm.syntax.recovery.lookahead import advance, symbols
+from fbvm.syntax.recovery.repair import Mend
+from fbvm.syntax.recovery.wording import found
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.literals import ELEMENTARY

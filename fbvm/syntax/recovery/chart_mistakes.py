@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from fbvm.syntax.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, anchor, frames
-from fbvm.syntax.mend import Mend
-from fbvm.syntax.phrases import found
+from fbvm.syntax.recovery.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, anchor, frames
+from fbvm.syntax.recovery.repair import Mend
+from fbvm.syntax.recovery.wording import found
 from fbvm.syntax.st.automaton import ELEMENTS, Automaton
 from fbvm.syntax.st.lexer import Lexer, Token
 from fbvm.syntax.tree.sfc import QUALIFIERS, Step, Transition

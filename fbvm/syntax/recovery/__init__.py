@@ -1,0 +1,1 @@
+"""What happens at a syntax error: the message, the repair, and where reading goes on."""
