@@ -20,7 +20,7 @@ from fbvm.record.ladder_svg import ladder_svg
 from fbvm.record.ladder_text import ladder_surface, ladder_text
 from fbvm.record.power import Power
 from fbvm.record.rung_values import Values
-from fbvm.syntax.rung_widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Sight
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
 

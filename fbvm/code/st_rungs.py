@@ -11,8 +11,8 @@ from typing import NamedTuple
 from fbvm.base.types import BOOL
 from fbvm.check.facts import Facts, PouCall
 from fbvm.syntax import tree
-from fbvm.syntax.rung_diagram import Box, Coil, Contact, Parallel, Pin, Point, Series, StepText, Undrawable, diagram
-from fbvm.syntax.rung_steps import steps
+from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Pin, Point, Series, StepText, Undrawable, diagram
+from fbvm.syntax.ladder.drawing.steps import steps
 
 COMPARISONS = {"=": "<>", "<>": "=", "<": ">=", ">=": "<", ">": "<=", "<=": ">"}
 """Comparisons and their opposites."""

@@ -8,9 +8,9 @@ import re
 from fbvm.plcopen.diagram import Object, Pin, Wire
 from fbvm.plcopen.networks import Network
 from fbvm.plcopen.scope import Scope
-from fbvm.syntax.instruction_set import Instruction, instruction_set
-from fbvm.syntax.operands import Operands, Wrong
-from fbvm.syntax.rung_text import instruction_text
+from fbvm.syntax.ladder.instruction_set import Instruction, instruction_set
+from fbvm.syntax.ladder.operands import Operands, Wrong
+from fbvm.syntax.ladder.text import instruction_text
 from fbvm.syntax.tree import Index, Member, NameRef
 
 CONTACTS = {(False, ""): "", (True, ""): "NOT", (False, "rising"): "@", (False, "falling"): "%"}

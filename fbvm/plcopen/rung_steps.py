@@ -12,7 +12,7 @@ from fbvm.plcopen.diagram import Object, Wire
 from fbvm.plcopen.networks import Network
 from fbvm.plcopen.rung_parts import Inexact, Parts
 from fbvm.plcopen.scope import Scope
-from fbvm.syntax.rung_text import instruction_text
+from fbvm.syntax.ladder.text import instruction_text
 
 BRANCHES = 16
 """TR0 to TR15, each for one branch point of a rung."""

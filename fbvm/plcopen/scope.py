@@ -16,7 +16,7 @@ from fbvm.check.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversi
 from fbvm.plcopen.diagram import Object, Wire
 from fbvm.plcopen.document import Document, Pou, Variable
 from fbvm.syntax import tree
-from fbvm.syntax.operands import Operands, Wrong
+from fbvm.syntax.ladder.operands import Operands, Wrong
 from fbvm.syntax.st.parser import parse
 from fbvm.syntax.text import read
 

@@ -16,11 +16,11 @@ from fbvm.plcopen.markup import Element, element
 from fbvm.plcopen.read_types import LOCATION
 from fbvm.plcopen.write_types import Types, Unsayable
 from fbvm.syntax import tree
-from fbvm.syntax.instruction_set import JOINS, Instruction, instruction_set
-from fbvm.syntax.mnemonics import Symbol, read_rungs
-from fbvm.syntax.operands import SYMBOLS, Operands, Wrong
-from fbvm.syntax.rung_diagram import WIRE
-from fbvm.syntax.symbols import number
+from fbvm.syntax.ladder.drawing.diagram import WIRE
+from fbvm.syntax.ladder.instruction_set import JOINS, Instruction, instruction_set
+from fbvm.syntax.ladder.mnemonics import Symbol, read_rungs
+from fbvm.syntax.ladder.operands import SYMBOLS, Operands, Wrong
+from fbvm.syntax.ladder.symbols import number
 from fbvm.syntax.tree.ladder import Ladder, Rung, Step
 
 COILS = {"OUT": {}, "OUTNOT": {"negated": "true"}, "SET": {"storage": "set"}, "RSET": {"storage": "reset"},

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from html import escape
 
 from fbvm.record.sfc_text import TOKEN
-from fbvm.syntax.box_lines import DOUBLE, DOWN, LEFT, RIGHT, THICK, UP, Surface
+from fbvm.syntax.ladder.drawing.box_lines import DOUBLE, DOWN, LEFT, RIGHT, THICK, UP, Surface
 
 CELL_WIDTH, CELL_HEIGHT = 9, 18
 """Pixels of a character."""

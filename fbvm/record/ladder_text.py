@@ -1,11 +1,11 @@
-"""Rungs of an Image as drawings: the headline, and what `syntax/rung_drawing.py` draws of the steps."""
+"""Rungs of an Image as drawings: the headline, and what `syntax/ladder/drawing/drawing.py` draws of the steps."""
 
 from __future__ import annotations
 
 from fbvm.code.image import RungPicture
-from fbvm.syntax.box_lines import Surface
-from fbvm.syntax.rung_drawing import rung_surface
-from fbvm.syntax.rung_widths import Sight
+from fbvm.syntax.ladder.drawing.box_lines import Surface
+from fbvm.syntax.ladder.drawing.drawing import rung_surface
+from fbvm.syntax.ladder.drawing.widths import Sight
 
 AT_REST = Sight()
 

@@ -31,7 +31,7 @@ from fbvm.record.trace_format import PHASES
 from fbvm.record.trace_signals import chosen_signals
 from fbvm.record.trace_writer import Depth
 from fbvm.record.traffic import Passed, Reader
-from fbvm.syntax.rung_widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Sight
 from fbvm.watch.paths import UnknownPlace
 
 MOST_ROWS = 200_000

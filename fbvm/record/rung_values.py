@@ -11,7 +11,7 @@ from fbvm.record.inside import Read, Write
 from fbvm.record.power import Executed
 from fbvm.record.recorder import Signal
 from fbvm.record.table import Scanned
-from fbvm.syntax.rung_diagram import joined
+from fbvm.syntax.ladder.drawing.diagram import joined
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, UnknownPlace, find_place
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from textwrap import wrap
 
 from fbvm.record.sfc_graph import Node
-from fbvm.syntax.box_lines import Surface
+from fbvm.syntax.ladder.drawing.box_lines import Surface
 
 Paint = Callable[[Surface, int, int], None]
 """Draws something on a surface, from a column and a row on."""

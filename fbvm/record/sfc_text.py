@@ -11,7 +11,7 @@ from fbvm.code.image import SfcPicture
 from fbvm.record import sfc_pieces as pieces
 from fbvm.record.sfc_graph import Graph, Node
 from fbvm.record.sfc_pieces import Piece
-from fbvm.syntax.box_lines import Surface
+from fbvm.syntax.ladder.drawing.box_lines import Surface
 
 LEAST = 24
 """Columns that a chart needs for anything to be drawn."""

@@ -11,7 +11,7 @@ from fbvm.record.ladder_text import ladder_text
 from fbvm.record.sfc_seen import active_steps
 from fbvm.record.sfc_text import Sighted, sfc_text
 from fbvm.step.session import Session
-from fbvm.syntax.rung_widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Sight
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, show, show_time
 

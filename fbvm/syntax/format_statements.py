@@ -9,8 +9,8 @@ from typing import NamedTuple
 from fbvm.syntax.format_comments import Comment
 from fbvm.syntax.format_expressions import ExpressionLayout, Phrase
 from fbvm.syntax.format_layout import BLANK, HARD, Doc, Hang, Indent, Leaf, Verbatim
-from fbvm.syntax.mnemonics import read_rungs
-from fbvm.syntax.rung_text import rung_lines
+from fbvm.syntax.ladder.mnemonics import read_rungs
+from fbvm.syntax.ladder.text import rung_lines
 from fbvm.syntax.st.lexer import Token
 
 Branch = tuple[Token, Phrase, Token, list[Phrase]]

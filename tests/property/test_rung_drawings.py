@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fbvm.syntax.box_lines import DOWN, LEFT, RIGHT, UP
-from fbvm.syntax.mnemonics import read_rungs
-from fbvm.syntax.rung_diagram import Box, Coil, Contact, Parallel, Pin, Point, Series, StepText, diagram
-from fbvm.syntax.rung_drawing import drawn, rung_surface, rung_text
-from fbvm.syntax.rung_steps import steps
-from fbvm.syntax.rung_text import rung_lines
-from fbvm.syntax.rung_widths import Sight
+from fbvm.syntax.ladder.drawing.box_lines import DOWN, LEFT, RIGHT, UP
+from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Pin, Point, Series, StepText, diagram
+from fbvm.syntax.ladder.drawing.drawing import drawn, rung_surface, rung_text
+from fbvm.syntax.ladder.drawing.steps import steps
+from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.mnemonics import read_rungs
+from fbvm.syntax.ladder.text import rung_lines
 
 NAMES = ("a", "Start", "0.00", "W3.15", "Motor_running", "T0010", "P_On", "list[3]", "Pump.Ready", "P_First_Cycle_Task")
 MARKS = (" ", " ", " ", "/", "↑", "↓", "/↑", "!", "!/")

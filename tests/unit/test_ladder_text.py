@@ -15,7 +15,7 @@ from fbvm.record.ladder_svg import ladder_svg
 from fbvm.record.ladder_text import ladder_surface, ladder_text
 from fbvm.record.power import Executed, Power
 from fbvm.record.rung_values import Values
-from fbvm.syntax.rung_widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Sight
 
 
 def image(rungs: str, declarations: str = "a, b, c, d, e, f : BOOL;") -> Image:

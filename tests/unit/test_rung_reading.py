@@ -8,8 +8,8 @@ from rows import each_of
 
 from fbvm.code.compiler import compile_text
 from fbvm.plc import Plc
-from fbvm.syntax.mnemonics import read_rungs
-from fbvm.syntax.rung_text import rung_lines
+from fbvm.syntax.ladder.mnemonics import read_rungs
+from fbvm.syntax.ladder.text import rung_lines
 
 Message = tuple[str, int, int, str, str]
 

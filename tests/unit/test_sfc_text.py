@@ -14,7 +14,7 @@ from fbvm.code.image import SfcPicture
 from fbvm.record import sfc_text as drawing
 from fbvm.record.ladder_svg import ladder_svg
 from fbvm.record.sfc_text import Sighted, sfc_surface, sfc_text
-from fbvm.syntax.box_lines import Surface
+from fbvm.syntax.ladder.drawing.box_lines import Surface
 
 sys.path.append(str(Path(__file__).parent.parent / "property"))
 from sfc_model import Chart, random_chart, text

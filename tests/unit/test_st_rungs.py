@@ -12,7 +12,7 @@ from fbvm.plc import Plc
 from fbvm.record.history import looking
 from fbvm.record.ladder_text import ladder_text
 from fbvm.record.power import Executed, Power
-from fbvm.syntax.rung_widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Sight
 
 DECLARED = """a, b, c, d, e, f : BOOL; n, m : INT; r : REAL; w : WORD; t : TON; k : CTUD; s : SR; list : ARRAY[0..3] OF BOOL;
     seen : BOOL; edge : R_TRIG;"""

@@ -85,7 +85,7 @@ class Declarations(SfcElements):
         declared = [s for s in sections if isinstance(s, VarSection)]
         own = [a for a in actions if isinstance(a, Action)]
         if self.ladders:
-            from fbvm.syntax.rung_blocks import begin
+            from fbvm.syntax.ladder.blocks import begin
 
             own += [subroutine for ladder in self.ladders for subroutine in ladder.subroutines]
             if word.type == "PROGRAM":
@@ -120,7 +120,7 @@ class Declarations(SfcElements):
 
     def ladder_sections(self, sections: list[VarSection]) -> list[VarSection]:
         """What the LADDERs of a POU need: memory of their steps, and instances that the POU has not declared itself."""
-        from fbvm.syntax.rung_blocks import undeclared
+        from fbvm.syntax.ladder.blocks import undeclared
 
         first, last = self.ladders[0], self.ladders[-1]
         instances = undeclared([i for ladder in self.ladders for i in ladder.instances], sections, self.report)

@@ -158,7 +158,7 @@ class Statements(Expressions):
 
     def ladder(self, token: Token) -> Ladder:
         """LADDER .. END_LADDER, which has a front end of its own."""
-        from fbvm.syntax.rungs import read_ladder
+        from fbvm.syntax.ladder.lowering import read_ladder
 
         made = read_ladder(self, token)
         self.ladders.append(made)

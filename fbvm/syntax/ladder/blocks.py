@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from fbvm.syntax.instruction_set import Instruction, instruction_set
-from fbvm.syntax.mnemonics import RungText
-from fbvm.syntax.operands import SYMBOLS, Wrong
-from fbvm.syntax.rung_diagram import WIRE
+from fbvm.syntax.ladder.drawing.diagram import WIRE
+from fbvm.syntax.ladder.instruction_set import Instruction, instruction_set
+from fbvm.syntax.ladder.mnemonics import RungText
+from fbvm.syntax.ladder.operands import SYMBOLS, Wrong
 from fbvm.syntax.tree import (
     Argument,
     Assign,
@@ -27,7 +27,7 @@ from fbvm.syntax.tree import (
 from fbvm.syntax.tree.ladder import Ladder
 
 if TYPE_CHECKING:
-    from fbvm.syntax.rungs import Rungs
+    from fbvm.syntax.ladder.lowering import Rungs
 
 TIMERS = 4096
 """Numbers of timers, and of counters."""

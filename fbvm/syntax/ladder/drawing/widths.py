@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from fbvm.syntax.rung_boxes import Shape, shape
-from fbvm.syntax.rung_diagram import Box, Coil, Contact, Part, Point, Series
+from fbvm.syntax.ladder.drawing.boxes import Shape, shape
+from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Part, Point, Series
 
 LINK = 5
 """Columns of the arrow with a number at the end of a line that goes on below."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
-from fbvm.syntax.rung_diagram import Box, Pin
+from fbvm.syntax.ladder.drawing.diagram import Box, Pin
 
 Values = Callable[[int, str], str]
 

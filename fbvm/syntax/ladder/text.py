@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.mnemonics import Line, RungText, Symbol
-from fbvm.syntax.rung_drawing import ARROW, drawn
-from fbvm.syntax.rung_reading import Picture
-from fbvm.syntax.rung_widths import Sight
+from fbvm.syntax.ladder.drawing.drawing import ARROW, drawn
+from fbvm.syntax.ladder.drawing.reading import Picture
+from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.mnemonics import Line, RungText, Symbol
 
 STEP = "    "
 """What instructions stand further in than their RUNG."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Hashable
 from typing import NamedTuple
 
-from fbvm.syntax.box_lines import LEFT, RIGHT, UP
-from fbvm.syntax.rung_grid import RAIL, WAYS, Bad, Cell, Grid
+from fbvm.syntax.ladder.drawing.box_lines import LEFT, RIGHT, UP
+from fbvm.syntax.ladder.drawing.grid import RAIL, WAYS, Bad, Cell, Grid
 
 BUS, SINK = "bus", "sink"
 """The nets of the left and of the right rail."""

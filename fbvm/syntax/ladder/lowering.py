@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fbvm.syntax import tree
-from fbvm.syntax.instruction_set import Instruction, instruction_set, spelling
-from fbvm.syntax.mnemonics import Line, RungText, is_input, read_rungs
-from fbvm.syntax.operands import Operands, Wrong
-from fbvm.syntax.rung_blocks import LadderBlocks
-from fbvm.syntax.rung_sequences import Steps
-from fbvm.syntax.rung_spans import Spans, StepRefused
+from fbvm.syntax.ladder.blocks import LadderBlocks
+from fbvm.syntax.ladder.instruction_set import Instruction, instruction_set, spelling
+from fbvm.syntax.ladder.mnemonics import Line, RungText, is_input, read_rungs
+from fbvm.syntax.ladder.operands import Operands, Wrong
+from fbvm.syntax.ladder.sequences import Steps
+from fbvm.syntax.ladder.spans import Spans, StepRefused
+from fbvm.syntax.ladder.symbols import declaration, number
 from fbvm.syntax.st.expressions import Expressions
 from fbvm.syntax.st.lexer import Token
-from fbvm.syntax.symbols import declaration, number
 from fbvm.syntax.tree import Assign, Binary, Expr, If, NameRef, Statement, Unary
 from fbvm.syntax.tree.ladder import Edge, Element, Ladder, Rung
 

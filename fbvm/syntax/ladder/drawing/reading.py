@@ -6,11 +6,11 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fbvm.syntax.box_lines import LEFT
-from fbvm.syntax.rung_diagram import Box, Point
-from fbvm.syntax.rung_grid import Bad, DrawnBox, Grid
-from fbvm.syntax.rung_network import Network
-from fbvm.syntax.rung_steps import Coded, steps
+from fbvm.syntax.ladder.drawing.box_lines import LEFT
+from fbvm.syntax.ladder.drawing.diagram import Box, Point
+from fbvm.syntax.ladder.drawing.grid import Bad, DrawnBox, Grid
+from fbvm.syntax.ladder.drawing.network import Network
+from fbvm.syntax.ladder.drawing.steps import Coded, steps
 
 _BEGINS = re.compile(r"[ \t]*(?:[│┃├┣┝┠║╟|]|\+-)")
 _BARE = re.compile(r"[ \t]*[-─]+[\[\]|┤].*[-─]\(")

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from fbvm.syntax.box_lines import Surface
-from fbvm.syntax.rung_boxes import Shape
-from fbvm.syntax.rung_diagram import Box, Coil, Contact, Parallel, Part, Point, Series, StepText, Undrawable, diagram
-from fbvm.syntax.rung_widths import LEAD, LINK, SLACK, Sight, Widths
+from fbvm.syntax.ladder.drawing.box_lines import Surface
+from fbvm.syntax.ladder.drawing.boxes import Shape
+from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Part, Point, Series, StepText, Undrawable, diagram
+from fbvm.syntax.ladder.drawing.widths import LEAD, LINK, SLACK, Sight, Widths
 
 ARROW = "►"
 LEAST = 24
@@ -26,7 +26,7 @@ def rung_text(steps: Sequence[StepText], width: int = 80, sight: Sight = AT_REST
 
 
 def rung_surface(steps: Sequence[StepText], width: int = 80, sight: Sight = AT_REST) -> Surface:
-    """The drawing of a rung; see `rung_text`."""
+    """The drawing of a rung; see `ladder.text`."""
     try:
         return drawn(diagram(steps), width, sight)
     except Undrawable:

@@ -11,12 +11,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from fbvm.syntax import tree
-from fbvm.syntax.mnemonics import RungText
+from fbvm.syntax.ladder.mnemonics import RungText
 from fbvm.syntax.tree import Action, Block, Continue, Exit, Expr, For, If, NameRef, Repeat, Return, Statement
 from fbvm.syntax.tree.ladder import Rung
 
 if TYPE_CHECKING:
-    from fbvm.syntax.rungs import Rungs
+    from fbvm.syntax.ladder.lowering import Rungs
 
 INTERLOCK = "$IL"
 INTERLOCKS = 16

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 
-from fbvm.syntax.mnemonics import Symbol
+from fbvm.syntax.ladder.mnemonics import Symbol
 from fbvm.syntax.tree import ArraySpec, Literal, Location, Name, NamedType, TypeSpec, VarDecl
 
 _TYPES = {"CHANNEL": "WORD", "UINT_BCD": "WORD", "UDINT_BCD": "DWORD", "ULINT_BCD": "LWORD"}

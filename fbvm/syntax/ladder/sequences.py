@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.syntax.rung_spans import Interlock, StepRefused
+from fbvm.syntax.ladder.spans import Interlock, StepRefused
 from fbvm.syntax.tree import Statement
 
 if TYPE_CHECKING:
-    from fbvm.syntax.rungs import Rungs
+    from fbvm.syntax.ladder.lowering import Rungs
 
 AREA = "STEP"
 """The name of the jump and of the interlock."""

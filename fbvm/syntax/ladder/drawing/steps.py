@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from fbvm.syntax.rung_diagram import CALL, COILS, EDGES, WIRE, Box, Coil, Contact, Parallel, Part, Point, Series
+from fbvm.syntax.ladder.drawing.diagram import CALL, COILS, EDGES, WIRE, Box, Coil, Contact, Parallel, Part, Point, Series
 
 _COILS = {mark.strip(): mnemonic for mnemonic, mark in COILS.items()} | {"P": "DIFU", "N": "DIFD"}
 """Marks of coils; P and N are those of IEC 61131-3, table 76."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 
-from fbvm.syntax.box_lines import LEFT, RIGHT
-from fbvm.syntax.rung_diagram import Box, Coil, Contact, Parallel, Part, Pin, Point, Series
-from fbvm.syntax.rung_grid import Bad, Drawn, DrawnBox, Grid
-from fbvm.syntax.rung_wires import BUS, SINK, Net, Order, Wires, border
+from fbvm.syntax.ladder.drawing.box_lines import LEFT, RIGHT
+from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Part, Pin, Point, Series
+from fbvm.syntax.ladder.drawing.grid import Bad, Drawn, DrawnBox, Grid
+from fbvm.syntax.ladder.drawing.wires import BUS, SINK, Net, Order, Wires, border
 
 INLINE = ("NOT", "UP", "DOWN")
 """Instructions that are boxes on a line."""

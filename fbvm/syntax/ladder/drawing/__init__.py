@@ -1,0 +1,1 @@
+"""Rungs drawn with characters: a drawing to steps, and steps to a drawing."""
