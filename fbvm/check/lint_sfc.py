@@ -10,7 +10,7 @@ from itertools import combinations
 
 from fbvm.base.types import fold
 from fbvm.check.lint_body import Body
-from fbvm.syntax.sfc_rules import networks
+from fbvm.syntax.sfc.rules import networks
 from fbvm.syntax.tree import sfc
 
 MOST = 5000

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fbvm.syntax.recovery.refused import refused_what
-from fbvm.syntax.sfc_elements import Part, SfcElements
+from fbvm.syntax.sfc.elements import Part, SfcElements
 from fbvm.syntax.st.expressions import Item
 from fbvm.syntax.st.jumps import Jumps, Tangled
 from fbvm.syntax.st.lexer import Token
@@ -94,7 +94,7 @@ class Declarations(SfcElements):
         self.numbered = dict(self.numbered_everywhere)
         body = self.without_jumps(body, declared)
         if self.charted or any(isinstance(a, Step | Transition) for a in actions):
-            from fbvm.syntax.charts import Charts
+            from fbvm.syntax.sfc.charts import Charts
 
             charts = Charts(self, own, declared)
             body = charts.body(word, body, [a for a in actions if not isinstance(a, Refused)])

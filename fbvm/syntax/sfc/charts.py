@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fbvm.base.types import fold
-from fbvm.syntax.evolution import Evolution, action_flags
-from fbvm.syntax.sfc_elements import Part, SfcElements
-from fbvm.syntax.sfc_flags import declared
-from fbvm.syntax.sfc_rules import sound
+from fbvm.syntax.sfc.elements import Part, SfcElements
+from fbvm.syntax.sfc.flags import declared
+from fbvm.syntax.sfc.lowering import Evolution, action_flags
+from fbvm.syntax.sfc.rules import sound
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import Action, Block, VarSection
 from fbvm.syntax.tree.node import changed

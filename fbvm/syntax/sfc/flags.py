@@ -16,7 +16,7 @@ from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import Expr, Statement
 
 if TYPE_CHECKING:
-    from fbvm.syntax.evolution import Evolution, Used
+    from fbvm.syntax.sfc.lowering import Evolution, Used
 
 ASKED = "SFC_FLAG"
 BOOLS = ("SFCINIT", "SFCRESET", "SFCPAUSE", "SFCTRANS")

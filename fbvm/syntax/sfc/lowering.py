@@ -14,7 +14,7 @@ from collections.abc import Iterable, Sequence
 
 from fbvm.base.types import fold
 from fbvm.syntax import tree
-from fbvm.syntax.sfc_flags import steered
+from fbvm.syntax.sfc.flags import steered
 from fbvm.syntax.st.expressions import Expressions
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import Expr, Name, NameRef, Statement, VarDecl, VarSection

@@ -1,0 +1,1 @@
+"""Sequential function charts: their elements, their rules, and the statements that execute them."""
