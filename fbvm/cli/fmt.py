@@ -19,8 +19,8 @@ from fbvm.check.standard import is_known
 from fbvm.cli import status
 from fbvm.cli.files import writing
 from fbvm.cli.sources import show
-from fbvm.syntax.format import formatted
-from fbvm.syntax.format_names import Outside
+from fbvm.syntax.formatter.formatter import formatted
+from fbvm.syntax.formatter.names import Outside
 from fbvm.syntax.st.parser import parse
 from fbvm.syntax.text import MARKS, decode, read
 from fbvm.syntax.tree import Declaration, Pou, TypeDecl

@@ -9,7 +9,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.plcopen.bodies import Bodies
 from fbvm.plcopen.document import Configuration, DataType, Document, Pou, Reading, Resource, Variable, VarList
 from fbvm.plcopen.read_types import remark
-from fbvm.syntax.format import formatted
+from fbvm.syntax.formatter.formatter import formatted
 
 GLOBALS = "globals"
 """File of the lists of globals that have no name."""

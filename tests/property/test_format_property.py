@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from fbvm.base.diagnostics import Source, errors
 from fbvm.code.compiler import compile_text
-from fbvm.syntax.format import REFUSED, formatted
-from fbvm.syntax.format_comments import Comments
-from fbvm.syntax.format_names import Spelling
+from fbvm.syntax.formatter.comments import Comments
+from fbvm.syntax.formatter.formatter import REFUSED, formatted
+from fbvm.syntax.formatter.names import Spelling
 from fbvm.syntax.st.lexer import Lexer, Token, lexis
 from fbvm.syntax.st.parser import parse
 from fbvm.syntax.tree import Literal, Node

@@ -8,8 +8,8 @@ import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.format import formatted
-from fbvm.syntax.format_layout import WIDTH, shifted
+from fbvm.syntax.formatter.formatter import formatted
+from fbvm.syntax.formatter.layout import WIDTH, shifted
 
 
 def written(text: str) -> str:

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-from fbvm.syntax.format_comments import Comments
-from fbvm.syntax.format_layout import SPACE, Doc, Fill, Group, Hang, Indent, Leaf, Verbatim
+from fbvm.syntax.formatter.comments import Comments
+from fbvm.syntax.formatter.layout import SPACE, Doc, Fill, Group, Hang, Indent, Leaf, Verbatim
 from fbvm.syntax.recovery.frames import LEVELS
 from fbvm.syntax.st.lexer import Token, lexis
 from fbvm.syntax.st.literals import ELEMENTARY

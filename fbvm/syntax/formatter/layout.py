@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fbvm.syntax.format_comments import Comment, Comments
+from fbvm.syntax.formatter.comments import Comment, Comments
 
 WIDTH = 100
 """Columns of a line, where it can be helped."""

@@ -10,10 +10,10 @@ from __future__ import annotations
 from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
-from fbvm.syntax.format_comments import Comments
-from fbvm.syntax.format_declarations import DeclarationLayout
-from fbvm.syntax.format_layout import Doc, Printer
-from fbvm.syntax.format_names import NOTHING, Outside, Spelling
+from fbvm.syntax.formatter.comments import Comments
+from fbvm.syntax.formatter.declarations import DeclarationLayout
+from fbvm.syntax.formatter.layout import Doc, Printer
+from fbvm.syntax.formatter.names import NOTHING, Outside, Spelling
 from fbvm.syntax.st.automaton import Automaton, Mender
 from fbvm.syntax.st.lexer import Lexer
 from fbvm.syntax.st.parser import parse

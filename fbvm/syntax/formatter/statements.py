@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from itertools import pairwise
 from typing import NamedTuple
 
-from fbvm.syntax.format_comments import Comment
-from fbvm.syntax.format_expressions import ExpressionLayout, Phrase
-from fbvm.syntax.format_layout import BLANK, HARD, Doc, Hang, Indent, Leaf, Verbatim
+from fbvm.syntax.formatter.comments import Comment
+from fbvm.syntax.formatter.expressions import ExpressionLayout, Phrase
+from fbvm.syntax.formatter.layout import BLANK, HARD, Doc, Hang, Indent, Leaf, Verbatim
 from fbvm.syntax.ladder.mnemonics import read_rungs
 from fbvm.syntax.ladder.text import rung_lines
 from fbvm.syntax.st.lexer import Token

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.format_expressions import Phrase, in_capitals
-from fbvm.syntax.format_layout import HARD, Doc
-from fbvm.syntax.format_statements import StatementLayout
+from fbvm.syntax.formatter.expressions import Phrase, in_capitals
+from fbvm.syntax.formatter.layout import HARD, Doc
+from fbvm.syntax.formatter.statements import StatementLayout
 from fbvm.syntax.st.lexer import Token
 
 

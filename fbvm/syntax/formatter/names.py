@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from fbvm.base.types import ELEMENTARY, GENERIC, SHORT_NAMES, fold
-from fbvm.syntax.format_scopes import Scope, declared_in, element, global_scope, members
+from fbvm.syntax.formatter.scopes import Scope, declared_in, element, global_scope, members
 from fbvm.syntax.tree import (
     Argument,
     ArrayInit,

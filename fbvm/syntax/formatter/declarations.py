@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.format_expressions import Phrase, in_capitals
-from fbvm.syntax.format_layout import BLANK, HARD, Doc, Indent, Leaf
-from fbvm.syntax.format_sfc import SfcLayout
-from fbvm.syntax.format_statements import Row, lines
-from fbvm.syntax.format_types import TypeLayout
+from fbvm.syntax.formatter.expressions import Phrase, in_capitals
+from fbvm.syntax.formatter.layout import BLANK, HARD, Doc, Indent, Leaf
+from fbvm.syntax.formatter.sfc import SfcLayout
+from fbvm.syntax.formatter.statements import Row, lines
+from fbvm.syntax.formatter.types import TypeLayout
 from fbvm.syntax.st.lexer import Token
 
 

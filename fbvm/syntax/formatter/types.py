@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fbvm.syntax.format_expressions import Phrase
-from fbvm.syntax.format_layout import HARD, Doc, Fill, Hang, Indent, Leaf, flat_width
-from fbvm.syntax.format_statements import Row, StatementLayout, lines
+from fbvm.syntax.formatter.expressions import Phrase
+from fbvm.syntax.formatter.layout import HARD, Doc, Fill, Hang, Indent, Leaf, flat_width
+from fbvm.syntax.formatter.statements import Row, StatementLayout, lines
 from fbvm.syntax.st.lexer import Token
 
 SPREAD = 16

@@ -1,0 +1,1 @@
+"""`fbvm fmt`: text to canonical text."""
