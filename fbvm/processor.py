@@ -14,7 +14,7 @@ from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
 from fbvm.engine import native
 from fbvm.engine.native import NativeEngine
-from fbvm.engine.python import PythonEngine
+from fbvm.engine.python.engine import PythonEngine
 from fbvm.watch.paths import Place, find_place
 
 BUDGET_STATEMENTS = 2_000_000

@@ -17,8 +17,8 @@ from fbvm.engine import native
 from fbvm.engine.native_code import code_of
 from fbvm.engine.native_scan_code import Clockwork
 from fbvm.engine.native_scans import Turn
-from fbvm.engine.python import PythonEngine
-from fbvm.engine.runtime import NO_SITE, Observation
+from fbvm.engine.python.engine import PythonEngine
+from fbvm.engine.python.runtime import NO_SITE, Observation
 from fbvm.engine.stops import STOPPED, State, Stops
 from fbvm.engine.tiers import PAYS
 from fbvm.engine.trap import Trap

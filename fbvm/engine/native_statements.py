@@ -11,8 +11,8 @@ from fbvm.engine.native_expressions import flag_mask, place
 from fbvm.engine.native_guard import observe
 from fbvm.engine.native_texts import in_bytes, keep
 from fbvm.engine.native_writer import TRAPPED, Writer, ir, signed, stored
+from fbvm.engine.python.statements import case_table
 from fbvm.engine.ranges import is_float
-from fbvm.engine.statements import case_table
 
 FEW_VALUES = 8
 """Values up to which a range of a CASE is taken value by value."""

@@ -16,7 +16,7 @@ from fbvm.code.image import Image
 from fbvm.engine import native
 from fbvm.engine.native import NativeEngine
 from fbvm.engine.native_code import code_of
-from fbvm.engine.python import PythonEngine
+from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.trap import Trap
 
 CHOICES = ("auto", "python", "native")

@@ -37,7 +37,7 @@ from fbvm.engine import native_statements  # noqa: E402
 from fbvm.engine.native import NativeEngine  # noqa: E402
 from fbvm.engine.native_scans import Turn  # noqa: E402
 from fbvm.engine.native_writer import Writer  # noqa: E402
-from fbvm.engine.python import PythonEngine  # noqa: E402
+from fbvm.engine.python.engine import PythonEngine  # noqa: E402
 from fbvm.engine.stops import Stops  # noqa: E402
 from fbvm.plc import Plc  # noqa: E402
 

@@ -22,7 +22,7 @@ from fbvm.base.types import ELEMENTARY
 from fbvm.code.image import Image
 from fbvm.code.operations import INTEGERS, SIZES, TEXT_UNITS, Address, Block, Node, limits
 from fbvm.engine.native import NativeEngine
-from fbvm.engine.python import PythonEngine
+from fbvm.engine.python.engine import PythonEngine
 
 FLOATS = ("f32", "f64")
 NUMBERS = INTEGERS + FLOATS

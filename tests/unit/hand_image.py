@@ -9,7 +9,7 @@ from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SLOTS_OFFSET
 from fbvm.base.memory import Memory
 from fbvm.code.image import Body, Image, Layout, ProgramRun, Site, TaskRow
 from fbvm.code.operations import EXPRESSIONS, STATEMENTS, Block, Node
-from fbvm.engine.python import PythonEngine
+from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.trap import Trap
 
 SLOTS_BYTES = 4096

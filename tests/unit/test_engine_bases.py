@@ -11,7 +11,7 @@ from fbvm.code.image import ProgramRun, TaskRow
 from fbvm.code.operations import Node
 from fbvm.code.shapes import statements
 from fbvm.engine.bases import fixed_bases
-from fbvm.engine.python import PythonEngine
+from fbvm.engine.python.engine import PythonEngine
 
 MAIN = SLOTS_OFFSET + SLOTS_BYTES
 COUNT = (("store", "u8", own(0), ("add", "u8", ("load", "u8", own(0)), const("u8", 1))),)

@@ -12,7 +12,7 @@ from rows import each_of
 
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.code.operations import Block, Node
-from fbvm.engine.python import PythonEngine
+from fbvm.engine.python.engine import PythonEngine
 
 ONE = const("i16", 1)
 

@@ -17,7 +17,7 @@ from fbvm.base import arithmetic
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.base.memory import STRUCTS
 from fbvm.code.operations import INTEGERS, Node, limits
-from fbvm.engine.python import PythonEngine
+from fbvm.engine.python.engine import PythonEngine
 
 integer_types = st.sampled_from(INTEGERS)
 

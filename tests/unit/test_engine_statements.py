@@ -11,8 +11,8 @@ from rows import each_of
 from fbvm.base.areas import BUDGET, DUE, NEVER, SLOTS_OFFSET
 from fbvm.base.memory import STRUCTS
 from fbvm.code.operations import STATEMENTS, Block, Node
-from fbvm.engine.python import PythonEngine
-from fbvm.engine.runtime import Observation
+from fbvm.engine.python.engine import PythonEngine
+from fbvm.engine.python.runtime import Observation
 
 INSTANCE = SLOTS_OFFSET + 4096
 """Where the instance of the first body lies."""

@@ -20,8 +20,8 @@ from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Body, Image, ProgramRun
 from fbvm.engine.bases import fixed_bases
 from fbvm.engine.depths import however_deep
-from fbvm.engine.runtime import NO_SITE, Observation, environment
-from fbvm.engine.statements import BodyWriter, function_name
+from fbvm.engine.python.runtime import NO_SITE, Observation, environment
+from fbvm.engine.python.statements import BodyWriter, function_name
 from fbvm.engine.trap import NO_INSTANCE, Stop, Trap, trap
 
 _NUMBERS = count(1)

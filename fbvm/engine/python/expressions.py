@@ -10,8 +10,8 @@ from typing import Any
 from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import width
 from fbvm.code.operations import BUFFER_OBJECT, INTEGERS, OBJECT_SHIFT, OFFSET_SHIFT, SIZES, TEXT_UNITS, Address, Node
+from fbvm.engine.python.writer import Expressions, Rows, bare
 from fbvm.engine.ranges import fits, is_float, mask, may_trap, number, span
-from fbvm.engine.writer import Expressions, Rows, bare
 
 SIGNS = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^",
          "eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}

@@ -14,10 +14,10 @@ from fbvm.base.areas import BUDGET, DUE
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.image import Body, Image
 from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
-from fbvm.engine.expressions import ROWS, flag_operands, view
+from fbvm.engine.python.expressions import ROWS, flag_operands, view
+from fbvm.engine.python.runtime import NO_SITE
+from fbvm.engine.python.writer import Expressions, bare, plus
 from fbvm.engine.ranges import may_trap
-from fbvm.engine.runtime import NO_SITE
-from fbvm.engine.writer import Expressions, bare, plus
 
 MOST_LOOPS = 15
 """Nested loops in one function of Python, which takes 20 blocks."""

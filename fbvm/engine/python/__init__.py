@@ -1,0 +1,1 @@
+"""The reference engine: an Image becomes Python source over the flat memory."""
