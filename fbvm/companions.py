@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from typing import cast
 
 from fbvm.engine.clock import Clock
-from fbvm.engine.native import NativeEngine
-from fbvm.engine.native_companions import NEWS, Companion
-from fbvm.engine.native_scan_code import (
+from fbvm.engine.native.engine import NativeEngine
+from fbvm.engine.native.scans.code import (  # fmt: skip
     AGAIN,
     ALONE,
     ASKED,
@@ -27,8 +26,9 @@ from fbvm.engine.native_scan_code import (
     SCANNED,
     TIMES,
     UNFINISHED,
-)  # fmt: skip
-from fbvm.engine.native_scans import Turn
+)
+from fbvm.engine.native.scans.scans import Turn
+from fbvm.engine.native.scans.units import NEWS, Companion
 from fbvm.engine.trap import Trap
 from fbvm.exchange import Exchange
 from fbvm.flags import CLOCKWORK

@@ -8,8 +8,8 @@ from __future__ import annotations
 from fbvm.base.areas import NEVER
 from fbvm.companions import Accompanied, can_accompany, companions
 from fbvm.engine.clock import Clock
-from fbvm.engine.native import NativeEngine
-from fbvm.engine.native_scans import Turn
+from fbvm.engine.native.engine import NativeEngine
+from fbvm.engine.native.scans.scans import Turn
 from fbvm.engine.trap import Trap
 from fbvm.exchange import Attached, Exchange
 from fbvm.flags import CLOCKWORK

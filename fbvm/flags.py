@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fbvm.base.areas import AREAS
 from fbvm.base.memory import Memory
-from fbvm.engine.native_scan_code import MOST_CYCLE, Clockwork
+from fbvm.engine.native.scans.code import MOST_CYCLE, Clockwork
 
 FIRST_CYCLE = (200, 11)
 """A200.11: ON in the first cycle after a change to RUN."""

@@ -12,8 +12,8 @@ from fbvm.base.memory import STRUCTS, Memory
 from fbvm.code import image_cache
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
-from fbvm.engine import native
-from fbvm.engine.native import NativeEngine
+from fbvm.engine.native import engine as native
+from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.watch.paths import Place, find_place
 

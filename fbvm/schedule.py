@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from fbvm.base.areas import NEVER
 from fbvm.code.image import TaskRow
-from fbvm.engine.native_scans import Turn
+from fbvm.engine.native.scans.scans import Turn
 from fbvm.watch.values import show_time
 
 UNPLANNED = -1

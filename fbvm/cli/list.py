@@ -8,7 +8,7 @@ import click
 
 from fbvm.cli.sources import compiled, source_arguments
 from fbvm.code.listing import listing
-from fbvm.engine.native_module import translate
+from fbvm.engine.native.module import translate
 
 
 @click.command("list")

@@ -13,10 +13,10 @@ from typing import NamedTuple
 from fbvm.base.areas import BUDGET
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
-from fbvm.engine import native
-from fbvm.engine.native_code import code_of
-from fbvm.engine.native_scan_code import Clockwork
-from fbvm.engine.native_scans import Turn
+from fbvm.engine.native import engine as native
+from fbvm.engine.native.code import code_of
+from fbvm.engine.native.scans.code import Clockwork
+from fbvm.engine.native.scans.scans import Turn
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.python.runtime import NO_SITE, Observation
 from fbvm.engine.stops import STOPPED, State, Stops

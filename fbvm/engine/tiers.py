@@ -13,9 +13,9 @@ from typing import Protocol
 from fbvm.base.areas import BUDGET
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
-from fbvm.engine import native
-from fbvm.engine.native import NativeEngine
-from fbvm.engine.native_code import code_of
+from fbvm.engine.native import engine as native
+from fbvm.engine.native.code import code_of
+from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.trap import Trap
 

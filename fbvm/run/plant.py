@@ -10,7 +10,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.check.silence import ANY, Wanted
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork

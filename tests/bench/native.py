@@ -33,10 +33,10 @@ from fbvm.base.diagnostics import Source  # noqa: E402
 from fbvm.base.memory import Memory  # noqa: E402
 from fbvm.code.compiler import compile_sources  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
-from fbvm.engine import native_statements  # noqa: E402
-from fbvm.engine.native import NativeEngine  # noqa: E402
-from fbvm.engine.native_scans import Turn  # noqa: E402
-from fbvm.engine.native_writer import Writer  # noqa: E402
+from fbvm.engine.native.emit import statements as native_statements  # noqa: E402
+from fbvm.engine.native.emit.writer import Writer  # noqa: E402
+from fbvm.engine.native.engine import NativeEngine  # noqa: E402
+from fbvm.engine.native.scans.scans import Turn  # noqa: E402
 from fbvm.engine.python.engine import PythonEngine  # noqa: E402
 from fbvm.engine.stops import Stops  # noqa: E402
 from fbvm.plc import Plc  # noqa: E402

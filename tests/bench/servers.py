@@ -43,7 +43,7 @@ sys.path.insert(0, str(HOUSE))
 sys.path.insert(0, str(HOUSE / "tests" / "interop"))
 
 from fbvm import Etn21, Noc, Peer, Plc, TcpNetwork, Tianxing, compile_text  # noqa: E402
-from fbvm.engine import native_scans  # noqa: E402
+from fbvm.engine.native.scans import scans as native_scans  # noqa: E402
 from fbvm.run import run  # noqa: E402
 
 BENCH = Path(__file__).resolve().parent

@@ -13,7 +13,7 @@ from lang_corpus import Program, programs, read
 from rows import go_through
 
 from fbvm.code.image import Image
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 from fbvm.plc import Plc
 
 

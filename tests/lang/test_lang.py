@@ -12,7 +12,7 @@ from lang_corpus import Program, programs
 from rows import go_through
 
 from fbvm.base.codes import CODES
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 
 each_file = pytest.mark.parametrize(
     "file", [pytest.param(list(inside), id=name) for name, inside in groupby(programs(), lambda p: p.name)])

@@ -21,7 +21,7 @@ from fbvm.base.memory import Memory
 from fbvm.base.types import ELEMENTARY
 from fbvm.code.image import Image
 from fbvm.code.operations import INTEGERS, SIZES, TEXT_UNITS, Address, Block, Node, limits
-from fbvm.engine.native import NativeEngine
+from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.python.engine import PythonEngine
 
 FLOATS = ("f32", "f64")

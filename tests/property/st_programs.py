@@ -26,8 +26,8 @@ from st_text import text_of
 from fbvm.base.types import ArrayType, RefType, StructType, Type, base
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
-from fbvm.engine import native
-from fbvm.engine.native import NativeEngine
+from fbvm.engine.native import engine as native
+from fbvm.engine.native.engine import NativeEngine
 from fbvm.plc import Plc
 from fbvm.watch.paths import Place
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from rows import first_quick
 
 from fbvm.code.compiler import compile_text
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 from fbvm.plc import Plc
 
 SIGNED = {"SINT": 8, "INT": 16, "DINT": 32, "LINT": 64}

@@ -20,7 +20,7 @@ import test_engine_statements as statements
 from fbvm.base import cache
 from fbvm.code.image import Image
 from fbvm.code.operations import Block
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 from fbvm.plc import Plc
 
 if not native.available():

@@ -7,7 +7,7 @@ from random import Random
 import pytest
 
 from fbvm.code.operations import EXPRESSIONS, STATEMENTS
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)

@@ -16,7 +16,7 @@ from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import Undefined, single
 from fbvm.base.memory import STRUCTS
 from fbvm.base.types import ELEMENTARY
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 from fbvm.syntax.st import texts
 
 if not native.available():

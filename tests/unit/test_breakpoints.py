@@ -9,8 +9,9 @@ import pytest
 from fbvm import Plc, compile_text
 from fbvm.breakpoints import Halt
 from fbvm.code.image import Image
-from fbvm.engine import native, tiers
-from fbvm.engine.native_code import code_of
+from fbvm.engine import tiers
+from fbvm.engine.native import engine as native
+from fbvm.engine.native.code import code_of
 from fbvm.plc import Mode, Phase
 from fbvm.watch.conditions import ConditionError
 

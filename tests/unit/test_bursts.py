@@ -12,8 +12,8 @@ from test_run_loop import Clock
 
 from fbvm import Etn21, Plc, compile_text
 from fbvm.code.image import Image
-from fbvm.engine import native
 from fbvm.engine.clock import Clock as PlcClock
+from fbvm.engine.native import engine as native
 from fbvm.run import loop as run_loop
 from fbvm.run import run
 from fbvm.run.running import MOST_AT_ONCE

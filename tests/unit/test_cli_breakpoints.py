@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from fbvm.cli.main import main
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 
 PLANT = """\
 FUNCTION_BLOCK Adder

@@ -17,8 +17,8 @@ from fbvm import Plc, compile_text
 from fbvm.base.areas import NOW
 from fbvm.code.image import Image
 from fbvm.companions import Accompanied
-from fbvm.engine import native
 from fbvm.engine.clock import Clock
+from fbvm.engine.native import engine as native
 from fbvm.express import Alone, Way
 from fbvm.plc import Mode
 

@@ -85,7 +85,7 @@ def test_the_unit_does_the_same_without_machine_code(
 ) -> None:
     rigs = [Rig(Etn21(timing=timing, faults=[Fault(0x2211, Switch.SEND)]))]
     with monkeypatch.context() as patched:
-        patched.setattr("fbvm.engine.native.available", lambda: False)
+        patched.setattr("fbvm.engine.native.engine.available", lambda: False)
         rigs.append(Rig(Etn21(timing=timing, faults=[Fault(0x2211, Switch.SEND)])))
     assert rigs[1].unit.exchanged.processor.machine is None
     for program, told, _, force, cycle_ms in script:

@@ -13,7 +13,7 @@ from rows import first_quick
 
 from fbvm import Plc, compile_text
 from fbvm.code.image import Image
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 from fbvm.net.faults import Fault as NetFault
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer

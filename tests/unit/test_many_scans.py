@@ -12,8 +12,8 @@ from rows import first_quick
 
 from fbvm import Etn21, LoopNetwork, ModbusPeer, Peer, Plc, compile_text
 from fbvm.code.image import Image
-from fbvm.engine import native
-from fbvm.engine.native_scans import Series
+from fbvm.engine.native import engine as native
+from fbvm.engine.native.scans.scans import Series
 from fbvm.net.loop import LoopLink
 from fbvm.plc import Mode
 from fbvm.run import TimedWrite, loop

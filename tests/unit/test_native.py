@@ -20,17 +20,19 @@ from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS, SLOTS_OFFSET
 from fbvm.base.arithmetic import FUNCTIONS, NAN, limits, power, single
 from fbvm.base.memory import STRUCTS
 from fbvm.code.operations import EXPRESSIONS, STATEMENTS, Node
-from fbvm.engine import native
-from fbvm.engine.native import NativeEngine
+from fbvm.engine.native import engine as native
+from fbvm.engine.native.engine import NativeEngine
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
 from fbvm.base import cache
-from fbvm.engine import native_compiler, native_conversions, native_entries
-from fbvm.engine.native_module import BodyWriter, translate
-from fbvm.engine.native_scans import Turn
-from fbvm.engine.native_worker import worker
+from fbvm.engine.native import compiler as native_compiler
+from fbvm.engine.native import entries
+from fbvm.engine.native.emit import conversions
+from fbvm.engine.native.module import BodyWriter, translate
+from fbvm.engine.native.scans.scans import Turn
+from fbvm.engine.native.worker import worker
 
 ONE = const("i16", 1)
 COUNT = (store("i16", 0, ("add", "i16", load("i16", 0), ONE)),)
@@ -72,7 +74,7 @@ def test_source_is_the_module() -> None:
 
 def test_plcs_with_one_image_share_its_code() -> None:
     program = image(COUNT)
-    engines = [NativeEngine(program, power_on(program), 0) for _ in range(3 * native_entries.BLOCK)]
+    engines = [NativeEngine(program, power_on(program), 0) for _ in range(3 * entries.BLOCK)]
     for number, e in enumerate(engines):
         for _ in range(number % 3):
             e.run(0)
@@ -90,7 +92,7 @@ def test_an_entry_is_used_again() -> None:
     where = ctypes.addressof(slot_of)
     e = None
     gc.collect()
-    others = [NativeEngine(program, power_on(program), 0) for _ in range(8 * native_entries.BLOCK)]
+    others = [NativeEngine(program, power_on(program), 0) for _ in range(8 * entries.BLOCK)]
     assert where in [ctypes.addressof(other._entries[0]._slot) for other in others]
 
 
@@ -297,9 +299,9 @@ def test_large_floats_become_ulint(level: int, number: float, operation: str) ->
 @pytest.mark.parametrize("operation", first_quick(["truncate", "nearest"]))
 def test_what_does_not_fit_an_integer_with_the_instruction_of_a_processor_and_without(
         monkeypatch: pytest.MonkeyPatch, operation: str, one_step: bool) -> None:
-    if one_step and not native_conversions.ONE_STEP:
+    if one_step and not conversions.ONE_STEP:
         pytest.skip("this processor has no such instruction")
-    monkeypatch.setattr(native_conversions, "ONE_STEP", one_step)
+    monkeypatch.setattr(conversions, "ONE_STEP", one_step)
     cache.switch(False)
     try:
         for source in ("f32", "f64"):

@@ -9,17 +9,18 @@ from pathlib import Path
 
 import pytest
 
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
 from fbvm.base import cache
 from fbvm.code.compiler import compile_text
-from fbvm.engine import native_cache, native_code
-from fbvm.engine.native_cache import Stored
-from fbvm.engine.native_code import Code
-from fbvm.engine.native_compiler import Linked
+from fbvm.engine.native import cache as native_cache
+from fbvm.engine.native import code as native_code
+from fbvm.engine.native.cache import Stored
+from fbvm.engine.native.code import Code
+from fbvm.engine.native.compiler import Linked
 
 STORED = Stored({"points": [["R0101", 3, [["i64", None]]]], "context": 512}, b"object" * 100)
 NAME = "a" * 64

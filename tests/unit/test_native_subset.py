@@ -9,14 +9,15 @@ from typing import Any
 import pytest
 from rows import each_of
 
-from fbvm.engine import native, native_routines
+from fbvm.engine.native import engine as native
+from fbvm.engine.native.library import routines
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
-from fbvm.engine.native_compiler import Linked, compile_text
-from fbvm.engine.native_library import PARTS, parts_of, routines_of
-from fbvm.engine.native_subset import Routine
+from fbvm.engine.native.compiler import Linked, compile_text
+from fbvm.engine.native.library.library import PARTS, parts_of, routines_of
+from fbvm.engine.native.library.subset import Routine
 
 
 def compiled(source: str, **names: Any) -> Any:
@@ -84,9 +85,9 @@ def test_what_falls_off_the_end_yields_zero() -> None:
 def test_routines_run_in_python_too() -> None:
     out = ctypes.create_string_buffer(64)
     at = ctypes.addressof(out)
-    assert native_routines.put_time(at, -90_061_000_000_000) == len(b"T#-1d1h1m1s") and out.value == b"T#-1d1h1m1s"
+    assert routines.put_time(at, -90_061_000_000_000) == len(b"T#-1d1h1m1s") and out.value == b"T#-1d1h1m1s"
     ctypes.memset(at, 0, 64)
-    assert native_routines.put_real(at, 0x3FB99999A0000000) == 3 and out.value == b"0.1"
+    assert routines.put_real(at, 0x3FB99999A0000000) == 3 and out.value == b"0.1"
 
 
 def test_a_part_calls_only_parts_before_it() -> None:

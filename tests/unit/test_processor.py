@@ -7,7 +7,7 @@ from copy import deepcopy
 import pytest
 
 from fbvm.base.areas import AREAS
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 from fbvm.processor import OwnProcessor, processor
 from fbvm.units.unit import Processor
 from fbvm.watch.paths import UnknownPlace

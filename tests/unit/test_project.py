@@ -8,7 +8,7 @@ import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
-from fbvm.engine import native
+from fbvm.engine.native import engine as native
 from fbvm.net.faults import KINDS
 from fbvm.net.loop import LoopNetwork
 from fbvm.run import run_all

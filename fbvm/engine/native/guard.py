@@ -7,11 +7,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.code.operations import Node
-from fbvm.engine.native_context import FIELDS
+from fbvm.engine.native.context import FIELDS
 from fbvm.engine.stops import ASK, AT_STATEMENT, COUNT, ROW_BYTES, ROWS, STOPPED, TABLE, WATCHING
 
 if TYPE_CHECKING:
-    from fbvm.engine.native_writer import Writer
+    from fbvm.engine.native.emit.writer import Writer
 
 GUARD = f"""
 define internal i64 @guard(ptr %m, ptr %c, i64 %site, i64 %statement) #5 {{

@@ -10,8 +10,8 @@ from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import limits, width
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT, SIZES, TEXT_UNITS, Address, Node
-from fbvm.engine.native_conversions import bits, convert, nearest, truncate
-from fbvm.engine.native_writer import NAN_BITS, Text, Writer, ir, literal, signed, stored
+from fbvm.engine.native.emit.conversions import bits, convert, nearest, truncate
+from fbvm.engine.native.emit.writer import NAN_BITS, Text, Writer, ir, literal, signed, stored
 from fbvm.engine.ranges import is_float, may_trap, span
 
 Row = Callable[..., str]

@@ -12,14 +12,14 @@ from weakref import finalize
 from fbvm.base.areas import BUDGET, NOW
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
-from fbvm.engine import native_compiler
-from fbvm.engine.native_code import Code, code_of
-from fbvm.engine.native_companions import Companion
-from fbvm.engine.native_context import Context
-from fbvm.engine.native_entries import Entry, entry
-from fbvm.engine.native_scan_code import NOTHING, Clockwork
-from fbvm.engine.native_scans import NO_LIMIT, Series, Turn
-from fbvm.engine.native_writer import Unsupported
+from fbvm.engine.native import compiler as native_compiler
+from fbvm.engine.native.code import Code, code_of
+from fbvm.engine.native.context import Context
+from fbvm.engine.native.emit.writer import Unsupported
+from fbvm.engine.native.entries import Entry, entry
+from fbvm.engine.native.scans.code import NOTHING, Clockwork
+from fbvm.engine.native.scans.scans import NO_LIMIT, Series, Turn
+from fbvm.engine.native.scans.units import Companion
 from fbvm.engine.stops import PAUSE, STOPPED, Stops
 from fbvm.engine.trap import Trap, trap
 

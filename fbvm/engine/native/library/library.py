@@ -8,10 +8,13 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from types import ModuleType
 
-from fbvm.engine import native_literals, native_reading, native_routines, native_times
-from fbvm.engine.native_subset import OUTSIDE, Routine
+from fbvm.engine.native.library import literals as native_literals
+from fbvm.engine.native.library import reading
+from fbvm.engine.native.library import routines as native_routines
+from fbvm.engine.native.library import times as native_times
+from fbvm.engine.native.library.subset import OUTSIDE, Routine
 
-PARTS: tuple[tuple[ModuleType, ...], ...] = ((native_routines,), (native_reading, native_times, native_literals))
+PARTS: tuple[tuple[ModuleType, ...], ...] = ((native_routines,), (reading, native_times, native_literals))
 """Modules of routines that are compiled together; a part may call those before it."""
 
 

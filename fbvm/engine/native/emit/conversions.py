@@ -6,7 +6,7 @@ import platform
 
 from fbvm.base.arithmetic import limits, width
 from fbvm.code.operations import Node
-from fbvm.engine.native_writer import Writer, ir, literal, signed
+from fbvm.engine.native.emit.writer import Writer, ir, literal, signed
 from fbvm.engine.ranges import is_float
 
 ONE_STEP = platform.machine() in ("x86_64", "AMD64")

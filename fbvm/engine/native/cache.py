@@ -9,7 +9,7 @@ from typing import Any
 
 from fbvm.base import cache
 from fbvm.base.cache import Cache
-from fbvm.engine.native_compiler import host
+from fbvm.engine.native.compiler import host
 
 FILES = Cache("native", b"fbvm object 1\n", 256 << 20)
 
@@ -24,7 +24,7 @@ class Stored:
 
 def name_of(*parts: str) -> str:
     """The name for what depends on these texts, on this package's engines, on LLVM and on the processor."""
-    return cache.name_of((*parts, *host(), cache.state_of(Path(__file__).parent)))
+    return cache.name_of((*parts, *host(), cache.state_of(Path(__file__).parents[1])))
 
 
 def read(name: str) -> Stored | None:

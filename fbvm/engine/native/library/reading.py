@@ -1,4 +1,4 @@
-"""Routines of native code that read numbers from text, in the subset that `native_subset` translates.
+"""Routines of native code that read numbers from text, in the subset that `library.subset` translates.
 
 They take what `syntax.st.literals` takes, and find the same fault first.  A routine named `read_...` yields GOOD, MALFORMED
 or OUTSIDE (the type cannot hold it) and writes the value to `out`: an integer, or the bits of a double."""
@@ -8,9 +8,9 @@ from __future__ import annotations
 import struct
 
 from fbvm.base.types import SHORT_NAMES
-from fbvm.engine.native_context import DIGITS, FIELDS
-from fbvm.engine.native_routines import INFINITE
-from fbvm.engine.native_subset import data, float_bits, peek, peek_all, poke, poke_all, text_float
+from fbvm.engine.native.context import DIGITS, FIELDS
+from fbvm.engine.native.library.routines import INFINITE
+from fbvm.engine.native.library.subset import data, float_bits, peek, peek_all, poke, poke_all, text_float
 from fbvm.syntax.st.literals import LONGEST, REALS
 
 GOOD, MALFORMED, OUTSIDE = 0, 1, 2

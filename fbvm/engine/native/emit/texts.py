@@ -12,9 +12,9 @@ from fbvm.base.strings import packed
 from fbvm.base.types import SHORT_NAMES
 from fbvm.code.operations import TEXT_UNITS, Address, Block, Node
 from fbvm.code.shapes import statements
-from fbvm.engine.native_expressions import as_double, chooser, cut, text_order
-from fbvm.engine.native_reading import KINDS
-from fbvm.engine.native_writer import Text, Unsupported, Writer, ir
+from fbvm.engine.native.emit.expressions import as_double, chooser, cut, text_order
+from fbvm.engine.native.emit.writer import Text, Unsupported, Writer, ir
+from fbvm.engine.native.library.reading import KINDS
 from fbvm.engine.ranges import is_float
 
 LONGEST_NUMBER = 48

@@ -1,6 +1,6 @@
 """Scans inside machine code: what a scan does up to its refresh, for as long as nobody outside has to be told.
 
-What their functions are made of is in `native_scan_code`."""
+What their functions are made of is in `scans.code`."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from functools import cache
 from itertools import count
 
 from fbvm.base.memory import Memory
-from fbvm.engine import native_cache, native_scan_code
 from fbvm.engine.clock import Clock
-from fbvm.engine.native_cache import Stored, name_of
-from fbvm.engine.native_companions import Companion, Shape
-from fbvm.engine.native_compiler import Linked, compile_text
-from fbvm.engine.native_entries import Entry
-from fbvm.engine.native_scan_code import (
+from fbvm.engine.native import cache as native_cache
+from fbvm.engine.native.cache import Stored, name_of
+from fbvm.engine.native.compiler import Linked, compile_text
+from fbvm.engine.native.entries import Entry
+from fbvm.engine.native.scans import code as native_scan_code
+from fbvm.engine.native.scans.code import (  # fmt: skip
     BUDGETED,
     CHANGED,
     CLOCK,
@@ -37,7 +37,8 @@ from fbvm.engine.native_scan_code import (
     WATCHED_ROW,
     ZERO,
     Clockwork,
-)  # fmt: skip
+)
+from fbvm.engine.native.scans.units import Companion, Shape
 
 
 @dataclass

@@ -1,6 +1,6 @@
 """What the rows of native code write with: names, blocks, addresses, traps and constants of one body in LLVM's language.
 
-A body is a function `i64 (ptr %m, ptr %c, i64 %self, i64 %left)`: the flat memory, the context (see `native_context`), the
+A body is a function `i64 (ptr %m, ptr %c, i64 %self, i64 %left)`: the flat memory, the context (see `native.context`), the
 place of its instance, the step budget.  It returns what is left of the budget; or, far below 0, the point at which the
 run has to end, whose values are in the context.  The budget is stored whenever it changes, but not read back, which would
 make each charge wait for the one before."""
@@ -17,10 +17,10 @@ from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import single
 from fbvm.code.image import Image
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT, Address, Block, Node
-from fbvm.engine.native_calls import Range
-from fbvm.engine.native_context import FIELDS, INSTANCE, SCRATCH, Point, Shown
-from fbvm.engine.native_guard import is_seen_later
-from fbvm.engine.native_regions import SYSTEM, Regions
+from fbvm.engine.native.calls import Range
+from fbvm.engine.native.context import FIELDS, INSTANCE, SCRATCH, Point, Shown
+from fbvm.engine.native.guard import is_seen_later
+from fbvm.engine.native.regions import SYSTEM, Regions
 from fbvm.engine.ranges import is_float, span
 from fbvm.engine.trap import NO_INSTANCE
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from string import Template
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
-from fbvm.engine.native_companions import Shape, Told
-from fbvm.engine.native_companions import text as companions_text
+from fbvm.engine.native.scans.units import Shape, Told
+from fbvm.engine.native.scans.units import text as companions_text
 
 
 @dataclass(frozen=True)

@@ -9,20 +9,20 @@ from types import MappingProxyType
 
 from fbvm.base.areas import BUDGET
 from fbvm.code.image import Image
-from fbvm.engine import native_texts
 from fbvm.engine.bases import fixed_bases
 from fbvm.engine.depths import however_deep
-from fbvm.engine.native_calls import call_graph, heights, instance_places
-from fbvm.engine.native_compiler import MATH
-from fbvm.engine.native_context import Point
-from fbvm.engine.native_conversions import ONE_STEP
-from fbvm.engine.native_expressions import VALUES
-from fbvm.engine.native_guard import GUARD, at_end
-from fbvm.engine.native_library import declaration, definitions
-from fbvm.engine.native_objects import objects
-from fbvm.engine.native_regions import METADATA, Regions, resolved
-from fbvm.engine.native_statements import EMITTERS
-from fbvm.engine.native_writer import RARE, TRAPPED, Module, Writer
+from fbvm.engine.native.calls import call_graph, heights, instance_places
+from fbvm.engine.native.compiler import MATH
+from fbvm.engine.native.context import Point
+from fbvm.engine.native.emit import texts as native_texts
+from fbvm.engine.native.emit.conversions import ONE_STEP
+from fbvm.engine.native.emit.expressions import VALUES
+from fbvm.engine.native.emit.statements import EMITTERS
+from fbvm.engine.native.emit.writer import RARE, TRAPPED, Module, Writer
+from fbvm.engine.native.guard import GUARD, at_end
+from fbvm.engine.native.library.library import declaration, definitions
+from fbvm.engine.native.objects import objects
+from fbvm.engine.native.regions import METADATA, Regions, resolved
 from fbvm.engine.stops import STOPPED
 
 SMALL, LARGE = 40, 600

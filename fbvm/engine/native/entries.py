@@ -9,9 +9,9 @@ import ctypes
 from collections.abc import Callable
 from functools import cache
 
-from fbvm.engine import native_cache
-from fbvm.engine.native_cache import Stored, name_of
-from fbvm.engine.native_compiler import Linked, compile_text
+from fbvm.engine.native import cache as native_cache
+from fbvm.engine.native.cache import Stored, name_of
+from fbvm.engine.native.compiler import Linked, compile_text
 
 BLOCK = 32
 """Entries that are loaded together."""

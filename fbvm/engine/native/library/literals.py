@@ -1,8 +1,8 @@
-"""The routine that `from_text` calls, in the subset that `native_subset` translates: any literal, with or without prefix."""
+"""The routine that `from_text` calls, in the subset that `library.subset` translates: any literal, with or without prefix."""
 
 from __future__ import annotations
 
-from fbvm.engine.native_reading import (
+from fbvm.engine.native.library.reading import (
     CANONICAL_NAN,
     DATE,
     DT,
@@ -20,9 +20,9 @@ from fbvm.engine.native_reading import (
     read_number,
     says,
 )
-from fbvm.engine.native_routines import INFINITE
-from fbvm.engine.native_subset import data, peek, poke_all
-from fbvm.engine.native_times import read_clock, read_date, read_duration, read_moment
+from fbvm.engine.native.library.routines import INFINITE
+from fbvm.engine.native.library.subset import data, peek, poke_all
+from fbvm.engine.native.library.times import read_clock, read_date, read_duration, read_moment
 from fbvm.syntax.st.texts import LEADING
 
 

@@ -1,4 +1,4 @@
-"""Routines of native code over bytes, and those that write values as text, in the subset that `native_subset` translates.
+"""Routines of native code over bytes, and those that write values as text, in the subset that `library.subset` translates.
 
 Texts are given as the address of their first byte and their length.  A routine named `put_...` writes a text and yields
 its length."""
@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 
 from fbvm.base.types import DAY_NS
-from fbvm.engine.native_subset import data, float_text, free_text, peek, poke, single_bits, text_float
+from fbvm.engine.native.library.subset import data, float_text, free_text, peek, poke, single_bits, text_float
 from fbvm.syntax.st.literals import SECOND_NS, UNITS_NS
 
 UNITS = b"".join(unit.encode().ljust(2, b"\0") for unit in UNITS_NS)

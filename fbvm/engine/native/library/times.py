@@ -1,11 +1,11 @@
-"""Routines of native code that read times and dates from text, in the subset that `native_subset` translates.
+"""Routines of native code that read times and dates from text, in the subset that `library.subset` translates.
 
-They work as those of `native_reading`: the values are nanoseconds."""
+They work as those of `library.reading`: the values are nanoseconds."""
 
 from __future__ import annotations
 
 from fbvm.base.types import DAY_NS
-from fbvm.engine.native_reading import (
+from fbvm.engine.native.library.reading import (
     GOOD,
     MALFORMED,
     OUTSIDE,
@@ -17,8 +17,8 @@ from fbvm.engine.native_reading import (
     run_of_digits,
     upper,
 )
-from fbvm.engine.native_routines import UNITS, unit_ns
-from fbvm.engine.native_subset import data, peek, peek_all, poke_all
+from fbvm.engine.native.library.routines import UNITS, unit_ns
+from fbvm.engine.native.library.subset import data, peek, peek_all, poke_all
 from fbvm.syntax.st.literals import LONGEST, SECOND_NS
 
 MOST = (1 << 63) - 1

@@ -1,0 +1,1 @@
+"""LLVM text for each operation of code: one row an operation."""

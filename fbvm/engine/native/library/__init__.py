@@ -1,0 +1,1 @@
+"""Routines that machine code calls, such as those that read and write values as text."""
