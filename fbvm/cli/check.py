@@ -11,7 +11,7 @@ from pathlib import Path
 import click
 
 from fbvm.base.diagnostics import Diagnostic, errors
-from fbvm.check.silence import Wanted
+from fbvm.check.lint.suppression import Wanted
 from fbvm.cli import status
 from fbvm.cli.beside import check_options, project_named
 from fbvm.cli.sources import chosen, report, source_options

@@ -17,9 +17,9 @@ from fbvm.base.types import Type, fold
 from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, Report, TaskFact
 from fbvm.check.library import Libraries, LibraryError
-from fbvm.check.lint import lint as look_for_slips
+from fbvm.check.lint.linter import lint as look_for_slips
+from fbvm.check.lint.suppression import Silence, Wanted
 from fbvm.check.project import Project
-from fbvm.check.silence import Silence, Wanted
 from fbvm.code import image_cache
 from fbvm.code.damage import Damage
 from fbvm.code.evaluation import evaluate

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from ipaddress import IPv4Address
 
 from fbvm.base.diagnostics import Diagnostic, errors
-from fbvm.check.silence import ANY, Wanted
+from fbvm.check.lint.suppression import ANY, Wanted
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native

@@ -16,7 +16,7 @@ from types import TracebackType
 from typing import Any
 
 from fbvm.base.types import fold
-from fbvm.check.silence import ANY, Wanted
+from fbvm.check.lint.suppression import ANY, Wanted
 from fbvm.engine.trap import Trap
 from fbvm.net.loop import LoopNetwork
 from fbvm.plc import Mode, Plc

@@ -17,7 +17,7 @@ from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.types import fold
 from fbvm.check.facts import Report
 from fbvm.check.library import Libraries
-from fbvm.check.silence import ANY, Wanted
+from fbvm.check.lint.suppression import ANY, Wanted
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
 from fbvm.record.source_texts import source_texts

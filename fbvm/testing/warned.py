@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from fbvm.check.silence import Wanted
+from fbvm.check.lint.suppression import Wanted
 
 if TYPE_CHECKING:
     from fbvm.testing.subject import Subject

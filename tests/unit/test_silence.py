@@ -10,7 +10,7 @@ from rows import each_of
 
 from fbvm import Source, compile_files, compile_sources, compile_text
 from fbvm.base.diagnostics import errors
-from fbvm.check.silence import Wanted
+from fbvm.check.lint.suppression import Wanted
 
 TEXT = """PROGRAM Main
 VAR r : REAL; q : BOOL; idle : INT; END_VAR

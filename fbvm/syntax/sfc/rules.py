@@ -1,6 +1,6 @@
 """Whether steps and transitions are a chart: every name is there once, and each network has one initial step.
 
-What is allowed and hardly meant, such as steps that nothing reaches, is told by `check/lint_sfc.py`.
+What is allowed and hardly meant, such as steps that nothing reaches, is told by `check/lint/sfc.py`.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fbvm.base.types import Elementary, EnumType, base
-from fbvm.check.lint_body import Body
+from fbvm.check.lint.body import Body
 from fbvm.check.values import is_any
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder, sfc

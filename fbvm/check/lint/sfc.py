@@ -9,7 +9,7 @@ from collections import deque
 from itertools import combinations
 
 from fbvm.base.types import fold
-from fbvm.check.lint_body import Body
+from fbvm.check.lint.body import Body
 from fbvm.syntax.sfc.rules import networks
 from fbvm.syntax.tree import sfc
 

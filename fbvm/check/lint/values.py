@@ -9,7 +9,7 @@ from typing import Any
 from fbvm.base.types import BOOL, LREAL, Type, base
 from fbvm.check.constants import wrap
 from fbvm.check.facts import Pou, PouCall, StandardCall, Variable
-from fbvm.check.lint_body import Body
+from fbvm.check.lint.body import Body
 from fbvm.check.values import is_any
 from fbvm.check.writes import place
 from fbvm.syntax import tree

@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from fbvm.check import lint_declared, lint_sfc, lint_values
 from fbvm.check.facts import Pou, Variable
-from fbvm.check.lint_body import Body
-from fbvm.check.lint_flow import flow
-from fbvm.check.lint_writes import Writes
+from fbvm.check.lint import declared
+from fbvm.check.lint import sfc as lint_sfc
+from fbvm.check.lint import values as lint_values
+from fbvm.check.lint.body import Body
+from fbvm.check.lint.flow import flow
+from fbvm.check.lint.writes import Writes
 from fbvm.syntax.tree import sfc
 
 if TYPE_CHECKING:
@@ -27,7 +29,7 @@ def lint(checker: Checker, program: str | None) -> None:
     """Report what the bodies and declarations of a checked project are to be warned of; `program` is the one to run."""
     facts, report = checker.project.facts, checker.report
     own = [pou for pou in checker.bodies if not pou.source.library and " " not in pou.name]
-    uses, writes = lint_declared.Uses(facts), Writes()
+    uses, writes = declared.Uses(facts), Writes()
     for pou in own:
         body = Body(pou, facts, report)
         for node in body.nodes:
@@ -35,11 +37,11 @@ def lint(checker: Checker, program: str | None) -> None:
                 rule(body, node)
         flow(body)
         writes.body(body)
-        lint_declared.result(body)
-        lint_declared.overlaps(report, pou.order)
+        declared.result(body)
+        declared.overlaps(report, pou.order)
     for pou in own:
-        lint_declared.unused(report, pou, uses)
-        lint_declared.pins(report, pou, uses)
+        declared.unused(report, pou, uses)
+        declared.pins(report, pou, uses)
     writes.finish()
     for source, expr, code, message in facts.losses:
         if not source.library:
@@ -49,15 +51,15 @@ def lint(checker: Checker, program: str | None) -> None:
         _tasks(checker, own)
 
 
-def _globals(checker: Checker, uses: lint_declared.Uses) -> None:
+def _globals(checker: Checker, uses: declared.Uses) -> None:
     """Look at global variables; those of one source stand side by side."""
     by_source: dict[str, list[Variable]] = {}
     for variable in checker.global_order:
         if not variable.source.library and variable.kind == "VAR_GLOBAL":
             by_source.setdefault(variable.source.name, []).append(variable)
-            lint_declared.never_called(checker.report, variable, uses)
+            declared.never_called(checker.report, variable, uses)
     for variables in by_source.values():
-        lint_declared.overlaps(checker.report, variables)
+        declared.overlaps(checker.report, variables)
 
 
 def _tasks(checker: Checker, own: list[Pou]) -> None:
