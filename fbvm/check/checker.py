@@ -9,18 +9,19 @@ from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import RefType, StructType, Type, fold
-from fbvm.check import beginnings, references
+from fbvm.check import references
 from fbvm.check.asked import Asked, is_lasting, key_of
 from fbvm.check.calls import Calls
-from fbvm.check.configurations import Configurations
+from fbvm.check.declarations import initializers
+from fbvm.check.declarations.configurations import Configurations
+from fbvm.check.declarations.globals import Globals
+from fbvm.check.declarations.interfaces import Interfaces
+from fbvm.check.declarations.specs import Specs, settle
+from fbvm.check.declarations.var_config import Settings
 from fbvm.check.expressions import Expressions
 from fbvm.check.facts import Pou, StandardCall, Start, TaskFact, Value, Variable
 from fbvm.check.generics import is_generic
-from fbvm.check.globals import Globals
-from fbvm.check.interfaces import Interfaces
 from fbvm.check.project import Project
-from fbvm.check.settings import Settings
-from fbvm.check.specs import Specs, settle
 from fbvm.check.statements import Statements, writes_eno
 from fbvm.check.values import Values
 from fbvm.syntax import tree
@@ -172,7 +173,7 @@ class Checker:
         expressions = self._constants(source)
         good = expressions.fit(expr, kind, "S0705", "the initial value")
         if good and self.project.dialect.initial_variables and expr not in self.project.facts.constants and \
-                beginnings.worked_out(expressions, expr):
+                initializers.worked_out(expressions, expr):
             return expressions.fit(expr, kind, "S0705", "the initial value")
         return good
 

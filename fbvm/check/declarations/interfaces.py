@@ -25,10 +25,10 @@ from fbvm.base.types import (
     followed,
     on_bits,
 )
-from fbvm.check import beginnings
+from fbvm.check.declarations import initializers
+from fbvm.check.declarations.locations import location_of
+from fbvm.check.declarations.reserved_names import refuse_reserved
 from fbvm.check.facts import Edge, Pou, Variable, is_block, is_open
-from fbvm.check.locations import location_of
-from fbvm.check.names import refuse_reserved
 from fbvm.check.statements import writes_eno
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import passes_places
@@ -78,7 +78,7 @@ class Interfaces:
         for name in sorted(self.project.tasked(pou.name)) if pou.kind == "PROGRAM" else ():
             self._tasked(name, pou)
         if begun := self._begun[mark:]:
-            pou.tree, pou.as_written = beginnings.with_assignments(pou, begun), False
+            pou.tree, pou.as_written = initializers.with_assignments(pou, begun), False
             del self._begun[mark:]
         if pou.tree.result is not None:
             self._result(pou, pou.tree.result)
@@ -198,7 +198,7 @@ class Interfaces:
                 return None
             kind, initial = resolved
             if declared.initial is not None and late and pou is not None and self.project.dialect.initial_variables and \
-                    beginnings.varies(self.checker.expressions(source, pou), declared.initial):
+                    initializers.varies(self.checker.expressions(source, pou), declared.initial):
                 self._begun.append(declared)
             elif declared.initial is not None:
                 before = len(self.project.facts.starts)

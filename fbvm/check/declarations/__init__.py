@@ -1,0 +1,1 @@
+"""Declarations: types, variables, initial values, configurations."""
