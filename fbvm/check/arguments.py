@@ -13,7 +13,7 @@ from fbvm.check.foreign import comma_hint
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 MIXED = "a call names all of its parameters or none"
 MIXED_HINT = f"name them: parameter := value, or take {takers('mixed_arguments')}"

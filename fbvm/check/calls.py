@@ -19,10 +19,10 @@ from fbvm.base.types import (
     fold,
     followed,
 )
-from fbvm.check import qualified, references
 from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
+from fbvm.check.expressions import qualified, references
+from fbvm.check.expressions.assignability import assignable, holds, lent, same
 from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
-from fbvm.check.fitting import assignable, holds, lent, same
 from fbvm.check.foreign import comma_hint
 from fbvm.check.generics import Generics, is_generic
 from fbvm.check.standard import StandardCalls, is_known
@@ -31,7 +31,7 @@ from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 PARAMETER_KINDS = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
 

@@ -9,7 +9,6 @@ from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import RefType, StructType, Type, fold
-from fbvm.check import references
 from fbvm.check.asked import Asked, is_lasting, key_of
 from fbvm.check.calls import Calls
 from fbvm.check.declarations import initializers
@@ -18,12 +17,13 @@ from fbvm.check.declarations.globals import Globals
 from fbvm.check.declarations.interfaces import Interfaces
 from fbvm.check.declarations.specs import Specs, settle
 from fbvm.check.declarations.var_config import Settings
-from fbvm.check.expressions import Expressions
+from fbvm.check.expressions import references
+from fbvm.check.expressions.infer import Expressions
+from fbvm.check.expressions.values import Values
 from fbvm.check.facts import Pou, StandardCall, Start, TaskFact, Value, Variable
 from fbvm.check.generics import is_generic
 from fbvm.check.project import Project
 from fbvm.check.statements import Statements, writes_eno
-from fbvm.check.values import Values
 from fbvm.syntax import tree
 
 _AS_IT_IS = nullcontext()

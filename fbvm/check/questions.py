@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.types import BOOL, DINT, DWORD, UDINT, AnyType, ArrayType, OpenArrayType, Type, string
 from fbvm.check.arguments import Arguments
+from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import UNTYPED_INT, StandardCall
-from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 _PARAMETERS = {"SIZEOF": ["IN"], "XSIZEOF": ["IN"], "LOWER_BOUND": ["ARR", "DIM"], "UPPER_BOUND": ["ARR", "DIM"],
                "__ISVALIDREF": ["REF"], "__POUNAME": [], "BITADR": ["IN"], "__PLC_ADDRESS": ["IN"]}

@@ -24,17 +24,18 @@ from fbvm.base.types import (
     machine,
     string,
 )
-from fbvm.check import foreign, functions, questions, references, unknown
+from fbvm.check import foreign, functions, questions
 from fbvm.check.arguments import Arguments, callee
+from fbvm.check.expressions import references, unknown_names
+from fbvm.check.expressions.assignability import BOUNDS_HINT, as_number, convertible, is_untyped, same
+from fbvm.check.expressions.literals import as_character
+from fbvm.check.expressions.values import MAKERS, is_any
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
-from fbvm.check.fitting import BOUNDS_HINT, as_number, convertible, is_untyped, same
 from fbvm.check.functions import Conversion, Signature
-from fbvm.check.literals import as_character
-from fbvm.check.values import MAKERS, is_any
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 _SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations", "ANY_STRING": "STRING and WSTRING"}
 _NUMBERS = ("ANY_NUM", "ANY_BIT")
@@ -98,7 +99,7 @@ class StandardCalls:
         for argument in call.arguments:
             if argument.value is not None:
                 self.expressions.infer(argument.value)
-        if unknown.told(self.expressions, call.callee):
+        if unknown_names.told(self.expressions, call.callee):
             return None
         project = self.expressions.project
         known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.dialects import takers
 from fbvm.base.types import BOOL, EnumType, RefType, StringType, Type, base, fold
-from fbvm.check import charts, references
+from fbvm.check import charts
+from fbvm.check.expressions import references
+from fbvm.check.expressions.assignability import as_number, assignable, conversion_hint
+from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import Pou, Value
-from fbvm.check.fitting import as_number, assignable, conversion_hint
-from fbvm.check.values import is_any
 from fbvm.check.writes import note_count, place, writable
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder, sfc

@@ -11,7 +11,7 @@ from fbvm.check.facts import Facts, Variable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 _OWN = {"VAR": "a variable of its own body", "VAR_OUTPUT": "an output"}
 """What members are that only their own body writes."""

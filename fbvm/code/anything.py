@@ -17,7 +17,7 @@ from fbvm.base.types import (
     Type,
     base,
 )
-from fbvm.check.anything import type_class
+from fbvm.check.expressions.any_parameters import type_class
 from fbvm.code.operations import Node
 from fbvm.code.places import Place
 from fbvm.syntax import tree

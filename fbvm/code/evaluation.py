@@ -9,7 +9,7 @@ from typing import Any, cast
 from fbvm.base import arithmetic, strings
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import base, machine
-from fbvm.check.constants import convert
+from fbvm.check.expressions.constants import convert
 from fbvm.check.facts import StandardCall, Value
 from fbvm.code.functions import FUNCTIONS
 from fbvm.code.operations import FLOATS, INTEGERS, TEXT_UNITS, Node

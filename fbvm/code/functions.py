@@ -8,8 +8,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import DAY_NS, DINT, EnumType, StringType, Type, base, machine
+from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import StandardCall
-from fbvm.check.values import is_any
 from fbvm.code import plc_addresses
 from fbvm.code.operations import FLOATS, SIZES, Node
 

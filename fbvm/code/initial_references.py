@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 from fbvm.base.memory import STRUCTS
 from fbvm.base.types import ArrayType, RefType, StructType, Type
 from fbvm.check.checker import Checker
+from fbvm.check.expressions.references import MARK
 from fbvm.check.facts import Pou, Start
-from fbvm.check.references import MARK
 from fbvm.code.evaluation import value_of
 from fbvm.code.layout import Placed
 from fbvm.code.lower import BodyLowering

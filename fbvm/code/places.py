@@ -27,7 +27,7 @@ from fbvm.base.types import (
     fold,
     machine,
 )
-from fbvm.check.anything import NUMBERS, VIEWS
+from fbvm.check.expressions.any_parameters import NUMBERS, VIEWS
 from fbvm.check.facts import StandardCall, Value, Variable
 from fbvm.code import aggregates, plc_addresses
 from fbvm.code.layout import variable_bit

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import ANY_SIZE, UDINT, AnyType, OpenArrayType, RefType, Type, machine
 from fbvm.check.declarations.interfaces import OBJECTS_AT
+from fbvm.check.expressions.values import is_null
 from fbvm.check.facts import Holder, Variable
-from fbvm.check.values import is_null
 from fbvm.code.anything import size_of
 from fbvm.code.operations import (
     BUFFER_OBJECT,

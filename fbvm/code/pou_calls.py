@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, RefType, followed, machine
-from fbvm.check.constants import default
+from fbvm.check.expressions.constants import default
 from fbvm.check.facts import PouCall, Variable
 from fbvm.code.anything import described
 from fbvm.code.operations import INTEGERS, Address, Block, Node

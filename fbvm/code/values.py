@@ -16,9 +16,9 @@ from fbvm.base.types import (
     base,
     machine,
 )
-from fbvm.check.constants import convert as convert_constant
+from fbvm.check.expressions.constants import convert as convert_constant
+from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import Guard, PouCall, StandardCall, Value
-from fbvm.check.values import is_any
 from fbvm.code import plc_addresses
 from fbvm.code.functions import FUNCTIONS, saturated
 from fbvm.code.operations import FLOATS, TEXT_UNITS, Node

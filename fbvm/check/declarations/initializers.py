@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import ArrayType, Type, machine
-from fbvm.check.constants import decode
+from fbvm.check.expressions.constants import decode
 from fbvm.check.facts import Pou
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 
 def worked_out(expressions: Expressions, expr: tree.Expr) -> bool:

@@ -31,12 +31,12 @@ from fbvm.base.types import (
 )
 from fbvm.check import foreign
 from fbvm.check.asked import Asked
-from fbvm.check.constants import default
 from fbvm.check.declarations.reserved_names import refuse_reserved
 from fbvm.check.declarations.structures import RELATIVE, Members
+from fbvm.check.expressions.constants import default
+from fbvm.check.expressions.values import Values
 from fbvm.check.facts import Pou, is_block, is_open
 from fbvm.check.project import Project, TypeEntry
-from fbvm.check.values import Values
 from fbvm.syntax import tree
 
 MAX_STRING = 65534

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from fbvm.base.types import Elementary, EnumType, base
+from fbvm.check.expressions.values import is_any
 from fbvm.check.lint.body import Body
-from fbvm.check.values import is_any
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder, sfc
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from fbvm.base.types import BOOL, LREAL, Type, base
-from fbvm.check.constants import wrap
+from fbvm.check.expressions.constants import wrap
+from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import Pou, PouCall, StandardCall, Variable
 from fbvm.check.lint.body import Body
-from fbvm.check.values import is_any
 from fbvm.check.writes import place
 from fbvm.syntax import tree
 

@@ -30,15 +30,15 @@ from fbvm.base.types import (
     fold,
     machine,
 )
-from fbvm.check import constants
+from fbvm.check.expressions import constants
+from fbvm.check.expressions.assignability import UNSIGNED, as_number, conversion_hint, convertible, is_untyped
+from fbvm.check.expressions.literals import as_character
+from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
-from fbvm.check.fitting import UNSIGNED, as_number, conversion_hint, convertible, is_untyped
-from fbvm.check.literals import as_character
-from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 COMPARISONS = ("=", "<>", "<", ">", "<=", ">=")
 _FAMILY = {

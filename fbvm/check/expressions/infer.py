@@ -34,11 +34,9 @@ from fbvm.base.types import (
     base,
     fold,
 )
-from fbvm.check import anything, literals, qualified, unknown
-from fbvm.check.aggregates import Aggregates
-from fbvm.check.constants import convert, cut, limits
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
-from fbvm.check.fitting import (
+from fbvm.check.expressions import any_parameters, literals, qualified, unknown_names
+from fbvm.check.expressions.aggregates import Aggregates
+from fbvm.check.expressions.assignability import (
     BOUNDS_HINT,
     assignable,
     conversion_hint,
@@ -48,9 +46,11 @@ from fbvm.check.fitting import (
     lent,
     literal_hint,
 )
-from fbvm.check.operators import Operators
-from fbvm.check.subscripts import Subscripts
-from fbvm.check.values import is_any
+from fbvm.check.expressions.constants import convert, cut, limits
+from fbvm.check.expressions.operators import Operators
+from fbvm.check.expressions.subscripts import Subscripts
+from fbvm.check.expressions.values import is_any
+from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
 
@@ -221,7 +221,7 @@ class Expressions:
             self.error("S0201", expr, f"{expr.text} is a member of several enumerations",
                        "write which: " + " or ".join(f"{kind}#{expr.text}" for kind, _, _ in wanted))
             return None
-        unknown.complain(self, expr)
+        unknown_names.complain(self, expr)
         return None
 
     def program(self, expr: tree.NameRef) -> bool:
@@ -276,7 +276,7 @@ class Expressions:
         if whole is None:
             return None
         if isinstance(whole, AnyType):
-            return anything.member(self, expr, whole)
+            return any_parameters.member(self, expr, whole)
         if not isinstance(whole, StructType):
             if qualified.is_bit(self, expr, whole):
                 return self._part(self.facts.bits[expr], want)
@@ -299,7 +299,7 @@ class Expressions:
         if whole.block and member.kind not in READABLE and \
                 not (member.kind == "VAR" and (self.project.dialect.locals_are_read or
                                                self.checker.block_of(whole).kind == "PROGRAM")):
-            unknown.complain_internal(self, expr.name, member, whole)
+            unknown_names.complain_internal(self, expr.name, member, whole)
             return None
         self.facts.fields[expr] = member
         return member.type
@@ -331,7 +331,7 @@ class Expressions:
     def is_variable(self, expr: tree.Expr) -> bool:
         """True for an expression that names a place in memory."""
         if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
-            return anything.is_array(expr)
+            return any_parameters.is_array(expr)
         return expr not in self.facts.rewritten and self._is_variable(expr) and \
             (isinstance(expr, _PLACES) or expr in self.facts.followed)
 
@@ -364,14 +364,14 @@ class Expressions:
 
     def _memory(self, expr: ladder.Memory, want: Type | None) -> Type | None:
         self.fit(expr.address, UDINT)
-        return ELEMENTARY[expr.kind] if expr.kind else anything.VIEWS["WORDS"]
+        return ELEMENTARY[expr.kind] if expr.kind else any_parameters.VIEWS["WORDS"]
 
     def _words(self, expr: ladder.Words, want: Type | None) -> Type | None:
         kind = self.infer(expr.of)
         if kind is not None and (base(kind) == BOOL or not self.is_variable(expr.of)):
             self.error("S0405", expr, f"words are needed here, this is {kind}")
             return None
-        return kind and anything.VIEWS["WORDS"]
+        return kind and any_parameters.VIEWS["WORDS"]
 
     def _unary(self, expr: tree.Unary, want: Type | None) -> Type | None:
         return self.operators.unary(expr, want)

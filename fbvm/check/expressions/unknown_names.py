@@ -12,7 +12,7 @@ from fbvm.check import foreign
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 _USES = {
     "FUNCTION": "call it: {}(...)",

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, RefType, StringType, Type, characters
-from fbvm.check.fitting import as_number, fitting_hint
-from fbvm.check.values import is_any
+from fbvm.check.expressions.assignability import as_number, fitting_hint
+from fbvm.check.expressions.values import is_any
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 
 _ANY_NUMBER = -(1 << 63), (1 << 63) - 1

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.dialects import takers
 from fbvm.base.types import ArrayType, Field, RefType, StructType, Type, fold, followed
-from fbvm.check import references
-from fbvm.check.constants import encode
+from fbvm.check.expressions import references
+from fbvm.check.expressions.assignability import is_untyped
+from fbvm.check.expressions.constants import encode
+from fbvm.check.expressions.values import flattened, initialisable
 from fbvm.check.facts import Aggregate, AggregatePart, Variable
-from fbvm.check.fitting import is_untyped
-from fbvm.check.values import flattened, initialisable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 Written = tree.ArrayInit | tree.StructInit
 Value = tuple[tuple[int, ...], int | None, Type, tree.Expr]

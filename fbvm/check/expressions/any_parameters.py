@@ -35,11 +35,11 @@ from fbvm.base.types import (
     fold,
     open_array,
 )
-from fbvm.check import references
+from fbvm.check.expressions import references
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 VIEWS = {name: open_array(1, kind) for name, kind in (
     ("BITS", BOOL), ("BYTES", BYTE), ("WORDS", WORD), ("DWORDS", DWORD), ("LWORDS", LWORD))}

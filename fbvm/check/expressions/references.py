@@ -18,13 +18,13 @@ from fbvm.base.types import (
     pointer,
     reference,
 )
+from fbvm.check.expressions.values import MAKERS, is_null
 from fbvm.check.facts import Facts, Holder, StandardCall, Start, Variable
-from fbvm.check.values import MAKERS, is_null
 from fbvm.check.writes import writable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 
 def refer(expressions: Expressions, expr: tree.Expr, lasting: bool) -> Type | None:

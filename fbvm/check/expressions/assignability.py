@@ -22,9 +22,9 @@ from fbvm.base.types import (
     families_of,
     fold,
 )
-from fbvm.check.constants import limits
+from fbvm.check.expressions.constants import limits
+from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
-from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
 _BORROWED = OpenArrayType | AnyType

@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, ELEMENTARY, Elementary, EnumType, SubrangeType, Type, base, fold, string
-from fbvm.check.constants import convert, limits
+from fbvm.check.expressions.constants import convert, limits
+from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
-from fbvm.check.values import is_any
 from fbvm.syntax import tree
 from fbvm.syntax.st.literals import WRONG
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 
 def literal(expressions: Expressions, expr: tree.Literal, want: Type | None) -> Type | None:

@@ -13,12 +13,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import Elementary, EnumType, Type, base, fold
+from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import Variable
-from fbvm.check.values import is_any
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.expressions import Expressions
+    from fbvm.check.expressions.infer import Expressions
 
 
 def bare(expressions: Expressions, expr: tree.Expr) -> str | None:

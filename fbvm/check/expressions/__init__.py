@@ -1,0 +1,1 @@
+"""Expressions: their types, constants, references, and what may be assigned to what."""
