@@ -9,19 +9,19 @@ from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import RefType, StructType, Type, fold
-from fbvm.check.asked import Asked, is_lasting, key_of
-from fbvm.check.calls import Calls
+from fbvm.check.calls.calls import Calls
+from fbvm.check.calls.generics import is_generic
 from fbvm.check.declarations import initializers
 from fbvm.check.declarations.configurations import Configurations
 from fbvm.check.declarations.globals import Globals
 from fbvm.check.declarations.interfaces import Interfaces
 from fbvm.check.declarations.specs import Specs, settle
 from fbvm.check.declarations.var_config import Settings
+from fbvm.check.dependencies import Asked, is_lasting, key_of
 from fbvm.check.expressions import references
 from fbvm.check.expressions.infer import Expressions
 from fbvm.check.expressions.values import Values
 from fbvm.check.facts import Pou, StandardCall, Start, TaskFact, Value, Variable
-from fbvm.check.generics import is_generic
 from fbvm.check.project import Project
 from fbvm.check.statements import Statements, writes_eno
 from fbvm.syntax import tree

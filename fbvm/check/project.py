@@ -15,9 +15,9 @@ from typing import TypeVar
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import STANDARD, Dialect
 from fbvm.base.types import EnumType, RefType, Type, fold
-from fbvm.check.asked import Asked
 from fbvm.check.declarations.reserved_names import refuse_reserved
 from fbvm.check.declarations.size_limits import Room
+from fbvm.check.dependencies import Asked
 from fbvm.check.facts import Facts, Pou, Report, Variable, list_name
 from fbvm.check.library import Libraries
 from fbvm.syntax import tree

@@ -15,7 +15,7 @@ import click
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source, whole_lines
 from fbvm.base.types import fold
-from fbvm.check.standard import is_known
+from fbvm.check.calls.standard import is_known
 from fbvm.cli import status
 from fbvm.cli.files import writing
 from fbvm.cli.sources import show

@@ -11,8 +11,8 @@ from typing import Any
 from fbvm.base.areas import AREAS
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import ArrayType, RefType, StructType, Type, fold
-from fbvm.check.asked import Asked, Key, key_of
 from fbvm.check.checker import Checker
+from fbvm.check.dependencies import Asked, Key, key_of
 from fbvm.check.facts import Pou, Variable
 from fbvm.code.image import Body, Site
 from fbvm.code.lower import BodyLowering

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from fbvm.check.functions import is_standard
+from fbvm.check.calls.functions import is_standard
 from fbvm.plcopen.diagram import Object, Pin, Wire
 from fbvm.plcopen.rung_parts import instruction
 from fbvm.plcopen.scope import SHARED

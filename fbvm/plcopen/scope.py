@@ -12,7 +12,7 @@ from pathlib import Path
 
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source
-from fbvm.check.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversion, typed_name
+from fbvm.check.calls.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversion, typed_name
 from fbvm.plcopen.diagram import Object, Wire
 from fbvm.plcopen.document import Document, Pou, Variable
 from fbvm.syntax import tree

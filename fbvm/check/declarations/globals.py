@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
-from fbvm.check.asked import Asked
+from fbvm.check.dependencies import Asked
 from fbvm.check.facts import Variable, is_open, list_name
 from fbvm.syntax import tree
 

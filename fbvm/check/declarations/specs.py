@@ -29,10 +29,10 @@ from fbvm.base.types import (
     reference,
     string,
 )
-from fbvm.check import foreign
-from fbvm.check.asked import Asked
+from fbvm.check.calls import vendor_names
 from fbvm.check.declarations.reserved_names import refuse_reserved
 from fbvm.check.declarations.structures import RELATIVE, Members
+from fbvm.check.dependencies import Asked
 from fbvm.check.expressions.constants import default
 from fbvm.check.expressions.values import Values
 from fbvm.check.facts import Pou, is_block, is_open
@@ -167,13 +167,13 @@ class Specs:
 
     def _meant(self, name: str) -> str:
         """A hint for a type that there is not."""
-        if fold(name) in foreign.TYPES:
+        if fold(name) in vendor_names.TYPES:
             also = ", and BIT in structures" if fold(name) == "BIT" else ""
-            return f"its name here is {foreign.TYPES[fold(name)]}{also}"
+            return f"its name here is {vendor_names.TYPES[fold(name)]}{also}"
         project = self.project
         known = (*ELEMENTARY, "STRING", *(entry.tree.name.text for entry in project.types.values()),
                  *(pou.name for pou in project.pous.values()), *project.libraries.block_names())
-        return foreign.library_of(name) or project.nearest(name, known)
+        return vendor_names.library_of(name) or project.nearest(name, known)
 
     def named_type(self, name: str, source: Source) -> Type | None:
         """The type of that name, elementary or declared, without any complaint."""

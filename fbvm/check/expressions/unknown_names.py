@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.dialects import takers
 from fbvm.base.types import Field, StructType, fold
-from fbvm.check import foreign
+from fbvm.check.calls import vendor_names
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def _hint(expressions: Expressions, expr: tree.NameRef) -> str:
         return f"for the address write %{name}, or declare a variable AT {address}"
     except AddressError:
         known = [v.name for v in expressions.pou.order] if expressions.pou else []
-    hint = foreign.VALUES.get(fold(name)) or foreign.duration(name) or foreign.library_of(name) or project.nearest_global(
+    hint = vendor_names.VALUES.get(fold(name)) or vendor_names.duration(name) or vendor_names.library_of(name) or project.nearest_global(
         name, [*known, *_members(expressions)])
     if not hint and expr in expressions.spaces:
         return "if it is a library, an enumeration or a file of global variables, give its source with the files"

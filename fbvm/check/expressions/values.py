@@ -8,9 +8,9 @@ from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import takers
 from fbvm.base.types import ArrayType, Field, RefType, StructType, Type, families, fold
+from fbvm.check.calls.vendor_names import comma_hint
 from fbvm.check.expressions.constants import encode
 from fbvm.check.facts import UNTYPED_INT, Facts, Pou, Value, Variable
-from fbvm.check.foreign import comma_hint
 from fbvm.check.project import Project
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import walk

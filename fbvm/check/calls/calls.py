@@ -19,13 +19,13 @@ from fbvm.base.types import (
     fold,
     followed,
 )
-from fbvm.check.arguments import MIXED, MIXED_HINT, mixed
+from fbvm.check.calls.arguments import MIXED, MIXED_HINT, mixed
+from fbvm.check.calls.generics import Generics, is_generic
+from fbvm.check.calls.standard import StandardCalls, is_known
+from fbvm.check.calls.vendor_names import comma_hint
 from fbvm.check.expressions import qualified, references
 from fbvm.check.expressions.assignability import assignable, holds, lent, same
 from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
-from fbvm.check.foreign import comma_hint
-from fbvm.check.generics import Generics, is_generic
-from fbvm.check.standard import StandardCalls, is_known
 from fbvm.check.writes import note_count, writable
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.types import BOOL, DINT, DWORD, UDINT, AnyType, ArrayType, OpenArrayType, Type, string
-from fbvm.check.arguments import Arguments
+from fbvm.check.calls.arguments import Arguments
 from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import UNTYPED_INT, StandardCall
 from fbvm.syntax import tree

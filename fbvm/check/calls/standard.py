@@ -24,14 +24,14 @@ from fbvm.base.types import (
     machine,
     string,
 )
-from fbvm.check import foreign, functions, questions
-from fbvm.check.arguments import Arguments, callee
+from fbvm.check.calls import functions, intrinsics, vendor_names
+from fbvm.check.calls.arguments import Arguments, callee
+from fbvm.check.calls.functions import Conversion, Signature
 from fbvm.check.expressions import references, unknown_names
 from fbvm.check.expressions.assignability import BOUNDS_HINT, as_number, convertible, is_untyped, same
 from fbvm.check.expressions.literals import as_character
 from fbvm.check.expressions.values import MAKERS, is_any
 from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
-from fbvm.check.functions import Conversion, Signature
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ _NUMBERS = ("ANY_NUM", "ANY_BIT")
 
 def is_known(name: str) -> bool:
     """True for the folded name of what can be called without being declared: a standard function, or what looks like one."""
-    return functions.is_standard(name) or name in MAKERS or name in questions.NAMES and name not in questions.REFUSED
+    return functions.is_standard(name) or name in MAKERS or name in intrinsics.NAMES and name not in intrinsics.REFUSED
 
 
 class StandardCalls:
@@ -77,8 +77,8 @@ class StandardCalls:
             self.facts.constants[call] = value
 
     def _typed(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
-        if name in questions.NAMES:
-            return questions.answer(self.expressions, call, name)
+        if name in intrinsics.NAMES:
+            return intrinsics.answer(self.expressions, call, name)
         if name in MAKERS:
             values = Arguments(self.expressions, call, ["IN"]).in_order()
             return references.make(self.expressions, call, name, values[0]) if values is not None else None
@@ -104,7 +104,7 @@ class StandardCalls:
         project = self.expressions.project
         known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]
         self.error("S0401", call.callee, f"there is no function or instance {callee(call)}",
-                   foreign.FUNCTIONS.get(name) or foreign.library_of(callee(call)) or
+                   vendor_names.FUNCTIONS.get(name) or vendor_names.library_of(callee(call)) or
                    project.nearest(callee(call), known))
         return None
 

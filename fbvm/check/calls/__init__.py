@@ -1,0 +1,1 @@
+"""Calls of POUs, standard functions and intrinsics, and their arguments."""
