@@ -22,12 +22,12 @@ from fbvm.check.lint.suppression import Silence, Wanted
 from fbvm.check.project import Project
 from fbvm.code import image_cache
 from fbvm.code.damage import Damage
-from fbvm.code.evaluation import evaluate
 from fbvm.code.image import Image, ProgramRun, TaskRow
-from fbvm.code.initial_references import InitialReferences
-from fbvm.code.layout import place
+from fbvm.code.lowering.evaluation import evaluate
+from fbvm.code.lowering.initial_references import InitialReferences
+from fbvm.code.lowering.layout import place
+from fbvm.code.lowering.program import Program
 from fbvm.code.object_code import Shelf, shelf_of
-from fbvm.code.program import Program
 from fbvm.syntax import tree
 from fbvm.syntax.st.parser import parse
 from fbvm.syntax.text import read

@@ -15,8 +15,8 @@ from fbvm.check.checker import Checker
 from fbvm.check.dependencies import Asked, Key, key_of
 from fbvm.check.facts import Pou, Variable
 from fbvm.code.image import Body, Site
-from fbvm.code.lower import BodyLowering
-from fbvm.code.program import Origin, Program
+from fbvm.code.lowering.bodies import BodyLowering
+from fbvm.code.lowering.program import Origin, Program
 from fbvm.syntax import tree
 
 

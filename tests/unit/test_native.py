@@ -330,7 +330,7 @@ def _bounds(e: NativeEngine, operation: str, machine: str, source: str) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(native_compiler.llvm().llvm_version_info[:3] != (22, 1, 0), reason="of LLVM 22.1.0 alone it is known")
 def test_crc_bit_by_bit_shows_the_fault_that_is_switched_off() -> None:
-    program = ("from fbvm.engine import native_compiler; native_compiler.FAULTS.clear(); from fbvm.base import cache\n"
+    program = ("from fbvm.engine.native import compiler; compiler.FAULTS.clear(); from fbvm.base import cache\n"
                "cache.switch(False); import test_native; test_native.test_crc_bit_by_bit(2)")
     folder = Path(__file__).parent
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True,

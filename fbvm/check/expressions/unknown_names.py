@@ -57,8 +57,8 @@ def _hint(expressions: Expressions, expr: tree.NameRef) -> str:
         return f"for the address write %{name}, or declare a variable AT {address}"
     except AddressError:
         known = [v.name for v in expressions.pou.order] if expressions.pou else []
-    hint = vendor_names.VALUES.get(fold(name)) or vendor_names.duration(name) or vendor_names.library_of(name) or project.nearest_global(
-        name, [*known, *_members(expressions)])
+    hint = (vendor_names.VALUES.get(fold(name)) or vendor_names.duration(name) or vendor_names.library_of(name)
+            or project.nearest_global(name, [*known, *_members(expressions)]))  # fmt: skip
     if not hint and expr in expressions.spaces:
         return "if it is a library, an enumeration or a file of global variables, give its source with the files"
     return hint

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, Elementary, SubrangeType, Type, base, machine
+from fbvm.code.lowering.places import Place
+from fbvm.code.lowering.step_costs import counted
 from fbvm.code.operations import Block, Node
-from fbvm.code.places import Place
-from fbvm.code.weights import counted
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.code.lower import BodyLowering
+    from fbvm.code.lowering.bodies import BodyLowering
 
 LEAVE: Block = (("exit",),)
 

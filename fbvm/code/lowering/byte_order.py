@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import ArrayType, Elementary, EnumType, StringType, StructType, SubrangeType, Type, base
 from fbvm.check.facts import StandardCall
-from fbvm.code.values import is_aggregate
+from fbvm.code.lowering.values import is_aggregate
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.code.lower import BodyLowering
+    from fbvm.code.lowering.bodies import BodyLowering
 
 Run = tuple[int, int, int, int]
 """Items of equal size: offset of the first, how many, bytes from one to the next, size."""

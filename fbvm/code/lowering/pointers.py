@@ -8,7 +8,8 @@ from fbvm.base.types import ANY_SIZE, UDINT, AnyType, OpenArrayType, RefType, Ty
 from fbvm.check.declarations.interfaces import OBJECTS_AT
 from fbvm.check.expressions.values import is_null
 from fbvm.check.facts import Holder, Variable
-from fbvm.code.anything import size_of
+from fbvm.code.lowering.any_parameters import size_of
+from fbvm.code.lowering.places import Place
 from fbvm.code.operations import (
     BUFFER_OBJECT,
     LEASE_BYTES,
@@ -20,11 +21,10 @@ from fbvm.code.operations import (
     Block,
     Node,
 )
-from fbvm.code.places import Place
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.code.lower import BodyLowering
+    from fbvm.code.lowering.bodies import BodyLowering
 
 _COMPARE = {"=": "eq", "<>": "ne", "<": "lt", ">": "gt", "<=": "le", ">=": "ge"}
 _WHERE = (1 << OBJECT_SHIFT) - 1

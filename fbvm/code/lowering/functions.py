@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import DAY_NS, DINT, EnumType, StringType, Type, base, machine
 from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import StandardCall
-from fbvm.code import plc_addresses
+from fbvm.code.lowering import plc_addresses
 from fbvm.code.operations import FLOATS, SIZES, Node
 
 if TYPE_CHECKING:
-    from fbvm.code.lower import BodyLowering
+    from fbvm.code.lowering.bodies import BodyLowering
 
 Lowering = Callable[["BodyLowering", list[Node], StandardCall, int], Node]
 _MATH = ("SQRT", "LN", "LOG", "EXP", "SIN", "COS", "TAN", "ASIN", "ACOS", "ATAN")

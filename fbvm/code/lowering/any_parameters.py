@@ -18,12 +18,12 @@ from fbvm.base.types import (
     base,
 )
 from fbvm.check.expressions.any_parameters import type_class
+from fbvm.code.lowering.places import Place
 from fbvm.code.operations import Node
-from fbvm.code.places import Place
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.code.lower import BodyLowering
+    from fbvm.code.lowering.bodies import BodyLowering
 
 NUMBERS = (ANY_SIZE, ANY_BITS, ANY_STRIDE, ANY_CLASS)
 

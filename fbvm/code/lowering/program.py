@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import Area
 from fbvm.check.facts import Pou, Start, Variable
 from fbvm.code.image import Objects, RungPicture, SfcPicture, Site
-from fbvm.code.layout import Placed
+from fbvm.code.lowering.layout import Placed
 from fbvm.code.operations import FIRST_OBJECT
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.code.initial_references import InitialReferences
+    from fbvm.code.lowering.initial_references import InitialReferences
 
 Origin = tuple[str, int]
 """The first two parts of an address: what the offset counts from, and the offset."""

@@ -14,14 +14,14 @@ from fbvm.base.types import ArrayType, RefType, StructType, Type
 from fbvm.check.checker import Checker
 from fbvm.check.expressions.references import MARK
 from fbvm.check.facts import Pou, Start
-from fbvm.code.evaluation import value_of
-from fbvm.code.layout import Placed
-from fbvm.code.lower import BodyLowering
+from fbvm.code.lowering.bodies import BodyLowering
+from fbvm.code.lowering.evaluation import value_of
+from fbvm.code.lowering.layout import Placed
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_SHIFT, Address, Node
 from fbvm.code.shapes import is_expression
 
 if TYPE_CHECKING:
-    from fbvm.code.program import Program
+    from fbvm.code.lowering.program import Program
 
 Instances = Mapping[Pou, int]
 """Where the instances around a value begin."""

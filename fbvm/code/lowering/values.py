@@ -19,15 +19,15 @@ from fbvm.base.types import (
 from fbvm.check.expressions.constants import convert as convert_constant
 from fbvm.check.expressions.values import is_any
 from fbvm.check.facts import Guard, PouCall, StandardCall, Value
-from fbvm.code import plc_addresses
-from fbvm.code.functions import FUNCTIONS, saturated
+from fbvm.code.lowering import plc_addresses
+from fbvm.code.lowering.functions import FUNCTIONS, saturated
 from fbvm.code.operations import FLOATS, TEXT_UNITS, Node
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
 
 if TYPE_CHECKING:
-    from fbvm.code.lower import BodyLowering
-    from fbvm.code.st_rungs import Mark
+    from fbvm.code.lowering.bodies import BodyLowering
+    from fbvm.code.lowering.st_rungs import Mark
 
 DEEPEST = 40
 """Operations nested deeper than this are cut by a temporary, so that no back end meets deep nesting."""

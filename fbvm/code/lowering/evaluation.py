@@ -11,9 +11,9 @@ from fbvm.base.dialects import Dialect
 from fbvm.base.types import base, machine
 from fbvm.check.expressions.constants import convert
 from fbvm.check.facts import StandardCall, Value
-from fbvm.code.functions import FUNCTIONS
+from fbvm.code.lowering.functions import FUNCTIONS
+from fbvm.code.lowering.values import constant
 from fbvm.code.operations import FLOATS, INTEGERS, TEXT_UNITS, Node
-from fbvm.code.values import constant
 from fbvm.syntax.st import texts
 
 VARYING = frozenset(("TIME", "LTIME", "__DUE"))

@@ -29,14 +29,14 @@ from fbvm.base.types import (
 )
 from fbvm.check.expressions.any_parameters import NUMBERS, VIEWS
 from fbvm.check.facts import StandardCall, Value, Variable
-from fbvm.code import aggregates, plc_addresses
-from fbvm.code.layout import variable_bit
+from fbvm.code.lowering import aggregates, plc_addresses
+from fbvm.code.lowering.layout import variable_bit
 from fbvm.code.operations import SIZES, WHOLE_BYTES, Address, Node
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
 
 if TYPE_CHECKING:
-    from fbvm.code.lower import BodyLowering
+    from fbvm.code.lowering.bodies import BodyLowering
 
 
 Detail = tuple[object, Address, int]

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, RefType, followed, machine
 from fbvm.check.expressions.constants import default
 from fbvm.check.facts import PouCall, Variable
-from fbvm.code.anything import described
+from fbvm.code.lowering.any_parameters import described
+from fbvm.code.lowering.places import Place
+from fbvm.code.lowering.values import is_aggregate, nothing
 from fbvm.code.operations import INTEGERS, Address, Block, Node
-from fbvm.code.places import Place
-from fbvm.code.values import is_aggregate, nothing
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.code.lower import BodyLowering
+    from fbvm.code.lowering.bodies import BodyLowering
 
 TRUE: Node = ("const", "b", 1)
 FALSE: Node = ("const", "b", 0)

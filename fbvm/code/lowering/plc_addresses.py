@@ -15,8 +15,8 @@ from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
 
 if TYPE_CHECKING:
-    from fbvm.code.lower import BodyLowering
-    from fbvm.code.places import Place
+    from fbvm.code.lowering.bodies import BodyLowering
+    from fbvm.code.lowering.places import Place
 
 LOST = (1 << 32) - 1
 """An offset at which nothing lies."""
@@ -70,7 +70,7 @@ def address_of(body: BodyLowering, expr: tree.Expr) -> Node:
 
 def place_at(body: BodyLowering, expr: ladder.Memory, kind: Type) -> Place:
     """The place at an address; where nothing lies it traps."""
-    from fbvm.code.places import Place
+    from fbvm.code.lowering.places import Place
 
     site = body.site(expr)
     address = body.keep(("convert", "i64", "u32", body.value(expr.address)))

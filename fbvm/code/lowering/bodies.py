@@ -10,24 +10,24 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import BOOL, NULL, Type, base, machine
 from fbvm.check.checker import Checker
 from fbvm.check.facts import Pou, PouCall, StandardCall
-from fbvm.code import byte_order
-from fbvm.code.functions import FUNCTIONS
 from fbvm.code.image import Body, RungPicture
-from fbvm.code.loops import LoopLowering
+from fbvm.code.lowering import byte_order
+from fbvm.code.lowering.functions import FUNCTIONS
+from fbvm.code.lowering.loops import LoopLowering
+from fbvm.code.lowering.places import Place, Places, detail
+from fbvm.code.lowering.pointers import PointerLowering
+from fbvm.code.lowering.pou_calls import CallLowering
+from fbvm.code.lowering.st_rungs import Mark, NoRung, st_rung
+from fbvm.code.lowering.step_costs import counted
+from fbvm.code.lowering.values import DEEPEST, ValueLowering, is_aggregate
 from fbvm.code.operations import Block, Node
 from fbvm.code.pictures import sfc_picture
-from fbvm.code.places import Place, Places, detail
-from fbvm.code.pointers import PointerLowering
-from fbvm.code.pou_calls import CallLowering
-from fbvm.code.st_rungs import Mark, NoRung, st_rung
-from fbvm.code.values import DEEPEST, ValueLowering, is_aggregate
-from fbvm.code.weights import counted
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import hides_inside
 from fbvm.syntax.tree import ladder, sfc
 
 if TYPE_CHECKING:
-    from fbvm.code.program import Program
+    from fbvm.code.lowering.program import Program
 
 
 class BodyLowering:

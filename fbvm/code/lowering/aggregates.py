@@ -10,8 +10,8 @@ from fbvm.syntax import tree
 
 if TYPE_CHECKING:
     from fbvm.check.facts import AggregatePart
-    from fbvm.code.lower import BodyLowering
-    from fbvm.code.places import Place
+    from fbvm.code.lowering.bodies import BodyLowering
+    from fbvm.code.lowering.places import Place
 
 
 def written_out(body: BodyLowering, expr: tree.ArrayInit | tree.StructInit) -> Place:

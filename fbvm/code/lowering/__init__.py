@@ -1,0 +1,1 @@
+"""Lowering: a checked tree to operations.  Every meaning is decided here."""
