@@ -9,9 +9,9 @@ from typing import Any
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW
 from fbvm.base.diagnostics import Source
 from fbvm.base.memory import STRUCTS, Memory
-from fbvm.code import image_cache
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
+from fbvm.code.store import cache as image_cache
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.python.engine import PythonEngine

@@ -20,14 +20,14 @@ from fbvm.check.library import Libraries, LibraryError
 from fbvm.check.lint.linter import lint as look_for_slips
 from fbvm.check.lint.suppression import Silence, Wanted
 from fbvm.check.project import Project
-from fbvm.code import image_cache
 from fbvm.code.damage import Damage
 from fbvm.code.image import Image, ProgramRun, TaskRow
 from fbvm.code.lowering.evaluation import evaluate
 from fbvm.code.lowering.initial_references import InitialReferences
 from fbvm.code.lowering.layout import place
 from fbvm.code.lowering.program import Program
-from fbvm.code.object_code import Shelf, shelf_of
+from fbvm.code.store import cache as image_cache
+from fbvm.code.store.object_code import Shelf, shelf_of
 from fbvm.syntax import tree
 from fbvm.syntax.st.parser import parse
 from fbvm.syntax.text import read

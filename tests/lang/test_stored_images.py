@@ -8,7 +8,7 @@ import pytest
 from lang_corpus import programs
 
 from fbvm.code.compiler import compile_text
-from fbvm.code.stored_image import decode, encode
+from fbvm.code.store.encoding import decode, encode
 
 EACH = 6
 """Every sixth program is taken: all would take long."""

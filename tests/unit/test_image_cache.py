@@ -10,9 +10,10 @@ from click.testing import CliRunner
 
 from fbvm.base import cache
 from fbvm.cli.main import main
-from fbvm.code import compiler, image_cache
+from fbvm.code import compiler
 from fbvm.code.compiler import Compilation, compile_files
-from fbvm.code.stored_image import encode
+from fbvm.code.store import cache as image_cache
+from fbvm.code.store.encoding import encode
 
 PROGRAM = """
 FUNCTION_BLOCK Own

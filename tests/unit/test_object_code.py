@@ -13,9 +13,9 @@ from fbvm.base.data import data_folder
 from fbvm.base.dialects import DIALECTS
 from fbvm.check.facts import Facts, Pou, Variable
 from fbvm.check.project import Project
-from fbvm.code import object_code
 from fbvm.code.compiler import Compilation, compile_text
-from fbvm.code.stored_image import encode
+from fbvm.code.store import object_code
+from fbvm.code.store.encoding import encode
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 SHIPPED = sorted({path.stem: path for path in data_folder("fblib").rglob("*.st")

@@ -10,9 +10,9 @@ from rows import first_quick
 
 from fbvm.base.dialects import STANDARD
 from fbvm.check import library
-from fbvm.code import object_code
 from fbvm.code.compiler import compile_text
-from fbvm.code.stored_image import encode
+from fbvm.code.store import object_code
+from fbvm.code.store.encoding import encode
 
 LIBRARY = """
 a/library.toml

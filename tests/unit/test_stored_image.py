@@ -12,7 +12,7 @@ from fbvm.base.types import ELEMENTARY, Field, RefType, StructType, Type
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Body, Image
 from fbvm.code.listing import listing
-from fbvm.code.stored_image import decode, encode
+from fbvm.code.store.encoding import decode, encode
 from fbvm.plc import Plc
 
 TYPES = """

@@ -13,7 +13,7 @@ from fbvm.base.cache import Cache, name_of, state_of
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.code.image import Image
-from fbvm.code.stored_image import decode, encode
+from fbvm.code.store.encoding import decode, encode
 
 FILES = Cache("images", b"fbvm image 1\n", 128 << 20)
 LENGTH_BYTES = 4

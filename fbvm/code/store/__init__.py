@@ -1,0 +1,1 @@
+"""Images on disk, and code of library blocks that is linked into each program."""
