@@ -7,14 +7,16 @@ import sys
 from functools import cache
 from pathlib import Path
 
+PACKAGE = Path(__file__).resolve().parent.parent
+"""The folder of this package."""
+
 
 @cache
 def data_folder(name: str) -> Path:
     """The folder `grammar` or `fblib`: inside the package in a wheel, beside it in a checkout or an editable install.
 
     Raises FileNotFoundError if the installation is damaged and has neither."""
-    package = Path(__file__).resolve().parent.parent
-    for folder in (package / "_data" / name, package.parent / name):
+    for folder in (PACKAGE / "_data" / name, PACKAGE.parent / name):
         if folder.is_dir():
             return folder
     raise FileNotFoundError(f"{name}/ is missing from this installation of fbvm")

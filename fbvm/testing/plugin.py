@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
 
+from fbvm.base.data import PACKAGE
 from fbvm.testing.warned import NAME as WARNED
 from fbvm.testing.warned import Warned, add_options, warned_of
 
@@ -38,8 +39,6 @@ PAGES: pytest.StashKey[list[Path]] = pytest.StashKey()
 """The pages that were written for failed tests."""
 MOST_PAGES = 20
 """Pages of failed tests that one session writes."""
-PACKAGE = Path(__file__).resolve().parent.parent
-"""Frames of a failure that lie here say nothing about the test."""
 SOURCE_FOLDER = "src"
 """Where a project keeps its blocks, below the folder of its pytest.ini or pyproject.toml."""
 
@@ -259,7 +258,7 @@ def _shorten(error: BaseException) -> None:
         return
     entry, last = error.__traceback__, None
     while entry is not None:
-        if not Path(entry.tb_frame.f_code.co_filename).is_relative_to(PACKAGE):
+        if not Path(entry.tb_frame.f_code.co_filename).is_relative_to(PACKAGE):  # frames of this package say nothing about the test
             last = entry
         entry = entry.tb_next
     if last is not None:

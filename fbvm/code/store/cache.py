@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fbvm.base.cache import Cache, name_of, state_of
-from fbvm.base.data import data_folder
+from fbvm.base.data import PACKAGE, data_folder
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.code.image import Image
 from fbvm.code.store.encoding import decode, encode
@@ -67,8 +67,7 @@ def _diagnostic(row: list[Any], sources: Sequence[Source]) -> Diagnostic:
 @cache
 def _own() -> str:
     """What stands for the modules that make images, the grammar and the libraries that come along."""
-    package = Path(__file__).parents[1]
-    return state_of(*(package / room for room in ROOMS), data_folder("grammar"), data_folder("fblib"))
+    return state_of(*(PACKAGE / room for room in ROOMS), data_folder("grammar"), data_folder("fblib"))
 
 
 def _library(folder: Path) -> str:

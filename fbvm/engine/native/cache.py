@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from fbvm.base import cache
 from fbvm.base.cache import Cache
+from fbvm.base.data import PACKAGE
 from fbvm.engine.native.compiler import host
 
 FILES = Cache("native", b"fbvm object 1\n", 256 << 20)
@@ -24,7 +24,7 @@ class Stored:
 
 def name_of(*parts: str) -> str:
     """The name for what depends on these texts, on this package's engines, on LLVM and on the processor."""
-    return cache.name_of((*parts, *host(), cache.state_of(Path(__file__).parents[1])))
+    return cache.name_of((*parts, *host(), cache.state_of(PACKAGE / "engine")))
 
 
 def read(name: str) -> Stored | None:
