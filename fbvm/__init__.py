@@ -24,23 +24,23 @@ if TYPE_CHECKING:
     from fbvm.code.compiler import compile_text as compile_text
     from fbvm.code.image import Image as Image
     from fbvm.engine.trap import Trap as Trap
+    from fbvm.machine.plc import Mode as Mode
+    from fbvm.machine.plc import Plc as Plc
+    from fbvm.machine.plc import Stopped as Stopped
     from fbvm.net.journal import Journal as Journal
     from fbvm.net.journal import JournalError as JournalError
     from fbvm.net.journal import open_journal as open_journal
     from fbvm.net.loop import LoopNetwork as LoopNetwork
     from fbvm.net.peers import ModbusPeer as ModbusPeer
     from fbvm.net.tcp import TcpNetwork as TcpNetwork
-    from fbvm.plc import Mode as Mode
-    from fbvm.plc import Plc as Plc
-    from fbvm.plc import Stopped as Stopped
     from fbvm.plcopen.exporting import Exported as Exported
     from fbvm.plcopen.exporting import export_xml as export_xml
     from fbvm.plcopen.importing import Imported as Imported
     from fbvm.plcopen.importing import import_xml as import_xml
-    from fbvm.record.chart import chart as chart
-    from fbvm.record.chart import draw as draw
-    from fbvm.record.pcapng import Capture as Capture
-    from fbvm.record.recorder import Recorder as Recorder
+    from fbvm.record.draw.chart import chart as chart
+    from fbvm.record.draw.chart import draw as draw
+    from fbvm.record.export.pcapng import Capture as Capture
+    from fbvm.record.trace.recorder import Recorder as Recorder
     from fbvm.run.replay import Replay as Replay
     from fbvm.units.etn21 import Etn21 as Etn21
     from fbvm.units.noc import Noc as Noc
@@ -61,9 +61,9 @@ _HOMES = {
     "plc": ("Mode", "Plc", "Stopped"),
     "plcopen.exporting": ("Exported", "export_xml"),
     "plcopen.importing": ("Imported", "import_xml"),
-    "record.chart": ("chart", "draw"),
-    "record.pcapng": ("Capture",),
-    "record.recorder": ("Recorder",),
+    "record.draw.chart": ("chart", "draw"),
+    "record.export.pcapng": ("Capture",),
+    "record.trace.recorder": ("Recorder",),
     "run.replay": ("Replay",),
     "units.etn21": ("Etn21",),
     "units.noc": ("Noc",),

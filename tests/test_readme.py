@@ -13,8 +13,8 @@ from click.testing import CliRunner
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
-from fbvm.record.chart import chart
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.chart import chart
 
 HOUSE = Path(__file__).resolve().parent.parent
 README = (HOUSE / "README.md").read_text(encoding="utf-8")

@@ -12,9 +12,9 @@ from fbvm.cli.options import Mapping
 from fbvm.cli.run import build_network, mailboxes
 from fbvm.cli.sources import report
 from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.plc import Plc
-from fbvm.record.traffic import Passed, Reader
+from fbvm.record.trace.traffic import Passed, Reader
 from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import Project, read_project
 from fbvm.run.running import Running

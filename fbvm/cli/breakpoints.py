@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from fbvm.breakpoints import Frame, Halt
-from fbvm.plc import Plc
+from fbvm.machine.breakpoints import Frame, Halt
+from fbvm.machine.plc import Plc
 from fbvm.watch.names import Names
 
 

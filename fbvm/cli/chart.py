@@ -9,7 +9,7 @@ import click
 from fbvm.cli.options import split_names
 from fbvm.cli.outcome import chart_width
 from fbvm.cli.traces import opened, recorded, scans_option, trace_argument
-from fbvm.record.chart import draw
+from fbvm.record.draw.chart import draw
 
 
 @click.command("chart")

@@ -12,15 +12,15 @@ import click
 from fbvm.cli.files import writing
 from fbvm.cli.options import split_names
 from fbvm.cli.traces import SUFFIX, opened, recorded, scans_option
-from fbvm.record.page import page
-from fbvm.record.page_data import page_data
-from fbvm.record.pcapng import Capture
-from fbvm.record.rows import write_rows
-from fbvm.record.rows_reader import RowsError, read_rows
-from fbvm.record.svg import Drawing
-from fbvm.record.trace import Trace
-from fbvm.record.trace_signals import happenings, traffic
-from fbvm.record.vcd import write_vcd
+from fbvm.record.draw.svg import Drawing
+from fbvm.record.export.pcapng import Capture
+from fbvm.record.export.vcd import write_vcd
+from fbvm.record.page.data import page_data
+from fbvm.record.page.page import page
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.rows import write_rows
+from fbvm.record.trace.rows_reader import RowsError, read_rows
+from fbvm.record.trace.signals import happenings, traffic
 
 CSV = ".csv"
 Names = Sequence[str]

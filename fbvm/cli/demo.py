@@ -30,10 +30,10 @@ from fbvm.cli import status
 from fbvm.cli.outcome import chart_width
 from fbvm.cli.peer import LISTENING
 from fbvm.code.compiler import compile_files
+from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork
-from fbvm.plc import Plc
-from fbvm.record.chart import draw
-from fbvm.record.recorder import Recorder
+from fbvm.record.draw.chart import draw
+from fbvm.record.trace.recorder import Recorder
 from fbvm.run import loop
 from fbvm.units.backplane import ETN21_ADDRESS
 from fbvm.units.etn21 import Etn21

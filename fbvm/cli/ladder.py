@@ -14,12 +14,12 @@ from fbvm.cli.files import writing
 from fbvm.cli.outcome import chart_width
 from fbvm.cli.sources import compiled, source_arguments
 from fbvm.code.image import Image, RungPicture
-from fbvm.plc import Plc
-from fbvm.record.history import looking
-from fbvm.record.ladder_svg import ladder_svg
-from fbvm.record.ladder_text import ladder_surface, ladder_text
-from fbvm.record.power import Power
-from fbvm.record.rung_values import Values
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.ladder_svg import ladder_svg
+from fbvm.record.draw.ladder_text import ladder_surface, ladder_text
+from fbvm.record.draw.power import Power
+from fbvm.record.draw.rung_values import Values
+from fbvm.record.trace.history import looking
 from fbvm.syntax.ladder.drawing.widths import Sight
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fbvm.breakpoints import Halt
 from fbvm.cli import status
 from fbvm.engine.trap import Trap
-from fbvm.plc import Plc
-from fbvm.record.chart import draw
-from fbvm.record.recorder import Recorder
+from fbvm.machine.breakpoints import Halt
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.chart import draw
+from fbvm.record.trace.recorder import Recorder
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, in_hexadecimal, plain_value, show, show_time

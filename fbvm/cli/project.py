@@ -15,11 +15,11 @@ from fbvm.cli import status
 from fbvm.cli.beside import check_options
 from fbvm.cli.outcome import EXIT_STATUS, Progress, for_scripts, shown, trap_for_scripts
 from fbvm.cli.sources import report, show
+from fbvm.machine.scan_times import Lateness, ScanTimes
 from fbvm.run import run_all
 from fbvm.run.plant import Kind, Plant
 from fbvm.run.project import Project, read_project
 from fbvm.run.running import Running
-from fbvm.scan_times import Lateness, ScanTimes
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value, show_time

@@ -11,7 +11,7 @@ from fbvm.cli import journals
 from fbvm.cli.options import charted_names, show_option
 from fbvm.cli.outcome import Outcome
 from fbvm.net.journal import JournalError
-from fbvm.record.recorder import Recorder
+from fbvm.record.trace.recorder import Recorder
 from fbvm.run.replay import Replay
 
 

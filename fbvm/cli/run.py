@@ -23,14 +23,14 @@ from fbvm.cli.sources import compiled, source_options
 from fbvm.cli.traces import paging, statement_lines, tracing
 from fbvm.code.image import Image
 from fbvm.engine.tiers import CHOICES
+from fbvm.machine.plc import Plc
 from fbvm.net.journal import Journal
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
-from fbvm.plc import Plc
-from fbvm.record.pcapng import Capture
-from fbvm.record.recorder import Recorder
-from fbvm.record.trace_writer import Depth
+from fbvm.record.export.pcapng import Capture
+from fbvm.record.trace.recorder import Recorder
+from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
 from fbvm.run.running import EVENT, PACES, TimedWrite
 from fbvm.units.backplane import usual_units

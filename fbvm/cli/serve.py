@@ -19,10 +19,10 @@ from fbvm.cli.files import writing
 from fbvm.cli.options import time_ns
 from fbvm.cli.peer import LISTENING
 from fbvm.code.compiler import compile_files
+from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork
-from fbvm.plc import Plc
-from fbvm.record import images
-from fbvm.record.requests import RequestLog
+from fbvm.record.trace import images
+from fbvm.record.trace.requests import RequestLog
 from fbvm.run import loop
 from fbvm.run.running import EVENT
 from fbvm.units.backplane import ETN21_ADDRESS

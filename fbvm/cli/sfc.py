@@ -13,11 +13,11 @@ from fbvm.cli.ladder import SVG_WIDTH, scans_named, tell_nothing_drawn
 from fbvm.cli.outcome import chart_width
 from fbvm.cli.sources import compiled, source_arguments
 from fbvm.code.image import Image, SfcPicture
-from fbvm.plc import Plc
-from fbvm.record.history import looking
-from fbvm.record.ladder_svg import ladder_svg
-from fbvm.record.sfc_seen import Evolutions
-from fbvm.record.sfc_text import LEAST, sfc_surface, sfc_text
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.ladder_svg import ladder_svg
+from fbvm.record.draw.sfc_seen import Evolutions
+from fbvm.record.draw.sfc_text import LEAST, sfc_surface, sfc_text
+from fbvm.record.trace.history import looking
 from fbvm.watch.names import Names
 
 

@@ -14,7 +14,7 @@ from fbvm.cli.options import Mapping, Setting, mapping, setting, time_ns
 from fbvm.cli.prompt import prompted
 from fbvm.cli.run import CYCLE_NS
 from fbvm.cli.sources import compiled, source_options
-from fbvm.record.source_texts import source_texts
+from fbvm.record.trace.source_texts import source_texts
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.session import Session
 from fbvm.step.words import Words

@@ -10,9 +10,9 @@ import click
 from fbvm.cli import status
 from fbvm.cli.options import split_names
 from fbvm.cli.traces import opened, scans_option, trace_argument
-from fbvm.record.recorder import signals_at
-from fbvm.record.table import ScanTable
-from fbvm.record.trace_writer import Depth
+from fbvm.record.draw.table import ScanTable
+from fbvm.record.trace.recorder import signals_at
+from fbvm.record.trace.writer import Depth
 
 
 @click.command("table")

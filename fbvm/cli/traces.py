@@ -12,15 +12,15 @@ import click
 
 from fbvm.cli.files import writing
 from fbvm.code.image import Image
-from fbvm.plc import Plc
-from fbvm.record.page import page
-from fbvm.record.page_data import page_data
-from fbvm.record.recorder import Recording
-from fbvm.record.source_texts import source_texts
-from fbvm.record.trace import Trace
-from fbvm.record.trace_format import TraceError
-from fbvm.record.trace_signals import recording
-from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
+from fbvm.machine.plc import Plc
+from fbvm.record.page.data import page_data
+from fbvm.record.page.page import page
+from fbvm.record.trace.format import TraceError
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.recorder import Recording
+from fbvm.record.trace.signals import recording
+from fbvm.record.trace.source_texts import source_texts
+from fbvm.record.trace.writer import Depth, TraceWriter, source_lines
 from fbvm.watch.paths import UnknownPlace
 
 SUFFIX = ".fbtrace"

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from fbvm.cli.traces import SUFFIX, opened
-from fbvm.record.trace_writer import Depth
-from fbvm.record.why import DEEPEST, told, why
+from fbvm.record.draw.why import DEEPEST, told, why
+from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import Place
 
 

@@ -12,7 +12,7 @@ from typing import Protocol, cast
 
 from fbvm.base.areas import NEVER
 from fbvm.engine.clock import Clock
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.run.host_clock import function_at
 from fbvm.run.interrupts import Interrupts
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite

@@ -11,10 +11,10 @@ from fbvm.check.lint.suppression import ANY, Wanted
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
-from fbvm.plc import Plc
 from fbvm.run.project import PlcRow, Project, SetRow
 from fbvm.run.running import Running, TimedWrite
 from fbvm.run.toml_keys import Path, span

@@ -9,9 +9,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from fbvm.code.image import Image
-from fbvm.goal import Goal
+from fbvm.machine.goal import Goal
+from fbvm.machine.plc import Mode, Plc, Stopped
 from fbvm.net.journal import Act, End, Entry, Fingerprint, Header, JournalError, Scan
-from fbvm.plc import Mode, Plc, Stopped
 from fbvm.units.backplane import UNITS
 from fbvm.units.unit import Unit
 from fbvm.wire.link import Event, Request

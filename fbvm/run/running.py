@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from fbvm.engine.clock import Clock
-from fbvm.goal import Goal
-from fbvm.plc import Plc
+from fbvm.machine.goal import Goal
+from fbvm.machine.plc import Plc
 from fbvm.watch.paths import Place, Span
 
 CYCLIC, EVENT = "cyclic", "event"

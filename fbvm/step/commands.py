@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from functools import partial
 
 from fbvm.base.types import fold
-from fbvm.plc import Mode, Plc
-from fbvm.record.recorder import signals_at
-from fbvm.record.table import ScanTable
-from fbvm.record.traffic import Passed
-from fbvm.record.why import told, why
+from fbvm.machine.plc import Mode, Plc
+from fbvm.record.draw.table import ScanTable
+from fbvm.record.draw.why import told, why
+from fbvm.record.trace.recorder import signals_at
+from fbvm.record.trace.traffic import Passed
 from fbvm.step.past import Past
 from fbvm.step.session import Session
 from fbvm.step.targets import Target, target

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from fbvm.code.image import Site
-from fbvm.plc import Plc
-from fbvm.record.outline import outer_statements
-from fbvm.record.why import Follower
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.why import Follower
+from fbvm.record.trace.outline import outer_statements
 from fbvm.step.session import Session
 from fbvm.step.words import Words
 from fbvm.watch.names import Names

@@ -14,13 +14,13 @@ from functools import partial
 
 from fbvm.base.memory import compare
 from fbvm.engine.trap import Trap
-from fbvm.plc import Phase, Plc, State
-from fbvm.record.history import looking
-from fbvm.record.inside import Statement
-from fbvm.record.power import Executed
-from fbvm.record.recorder import HEXADECIMAL_AREAS, Signal
-from fbvm.record.rung_values import Values
-from fbvm.record.sfc_seen import Called
+from fbvm.machine.plc import Phase, Plc, State
+from fbvm.record.draw.power import Executed
+from fbvm.record.draw.rung_values import Values
+from fbvm.record.draw.sfc_seen import Called
+from fbvm.record.trace.events import Statement
+from fbvm.record.trace.history import looking
+from fbvm.record.trace.recorder import HEXADECIMAL_AREAS, Signal
 from fbvm.step.twin import END, Act, Injector, Seen, Stop, Told, Twin, depth
 from fbvm.watch import places
 from fbvm.watch.names import Names

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from fbvm.base.types import fold
-from fbvm.breakpoints import find_line
 from fbvm.code.image import Site
-from fbvm.record.inside import Statement
+from fbvm.machine.breakpoints import find_line
+from fbvm.record.trace.events import Statement
 from fbvm.step.session import Session
 from fbvm.watch.conditions import parse_condition
 

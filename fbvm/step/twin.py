@@ -13,11 +13,11 @@ from typing import Protocol
 
 from fbvm.base.memory import Memory
 from fbvm.engine.trap import Trap
-from fbvm.plc import Phase, Plc, State
-from fbvm.record.inside import Event, Frame, Inside, Statement
-from fbvm.record.power import Power
-from fbvm.record.rung_values import Values
-from fbvm.record.sfc_seen import Evolutions
+from fbvm.machine.plc import Phase, Plc, State
+from fbvm.record.draw.power import Power
+from fbvm.record.draw.rung_values import Values
+from fbvm.record.draw.sfc_seen import Evolutions
+from fbvm.record.trace.events import Event, Frame, Inside, Statement
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value
 

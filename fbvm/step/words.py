@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 
 from fbvm.base.types import StructType, base
 from fbvm.code.image import Site
-from fbvm.record.inside import Frame
-from fbvm.record.ladder_text import ladder_text
-from fbvm.record.sfc_seen import active_steps
-from fbvm.record.sfc_text import Sighted, sfc_text
+from fbvm.record.draw.ladder_text import ladder_text
+from fbvm.record.draw.sfc_seen import active_steps
+from fbvm.record.draw.sfc_text import Sighted, sfc_text
+from fbvm.record.trace.events import Frame
 from fbvm.step.session import Session
 from fbvm.syntax.ladder.drawing.widths import Sight
 from fbvm.watch.paths import Place, Span

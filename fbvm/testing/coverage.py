@@ -12,9 +12,9 @@ from typing import Any
 
 from fbvm.base.data import data_folder
 from fbvm.code.image import Site
-from fbvm.plc import Phase, Plc
-from fbvm.record.branches import Fork, forks, statements
-from fbvm.record.inside import Ended, Event, Frame, Statement
+from fbvm.machine.plc import Phase, Plc
+from fbvm.record.trace.branches import Fork, forks, statements
+from fbvm.record.trace.events import Ended, Event, Frame, Statement
 from fbvm.testing.subject import LIBRARY, Subject
 
 Spot = tuple[int, int]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from itertools import zip_longest
 from pathlib import Path
 
-from fbvm.record.recorder import Recording
+from fbvm.record.trace.recorder import Recording
 from fbvm.watch.values import show_time
 
 OPTION = "--fbvm-golden"

@@ -10,11 +10,11 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from fbvm.plc import Plc
-from fbvm.record.history import History
-from fbvm.record.trace import Trace
-from fbvm.record.trace_writer import Depth, TraceWriter, descriptions, meanings, source_lines
-from fbvm.record.traffic import Passed
+from fbvm.machine.plc import Plc
+from fbvm.record.trace.history import History
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.traffic import Passed
+from fbvm.record.trace.writer import Depth, TraceWriter, descriptions, meanings, source_lines
 from fbvm.testing.subject import Subject
 from fbvm.watch.paths import Place
 
@@ -40,8 +40,8 @@ def write_page(path: Path, title: str, history: History, subject: Subject, units
     scans = range(history.scans.start, history.scans.stop + unfinished)
     if not scans:
         return False
-    from fbvm.record.page import page
-    from fbvm.record.page_data import frame_rows, page_data
+    from fbvm.record.page.data import frame_rows, page_data
+    from fbvm.record.page.page import page
 
     file = io.BytesIO()
 

@@ -24,8 +24,8 @@ from fbvm.testing.warned import NAME as WARNED
 from fbvm.testing.warned import Warned, add_options, warned_of
 
 if TYPE_CHECKING:
+    from fbvm.machine.plc import Plc
     from fbvm.net.loop import LoopNetwork
-    from fbvm.plc import Plc
     from fbvm.testing.coverage_plugin import CoveragePlugin
     from fbvm.testing.plant_rig import PlantRig
     from fbvm.testing.recorded import Recorded
@@ -93,7 +93,7 @@ def counted(config: pytest.Config, plc: Plc, subject: Subject) -> Iterator[None]
     if counting is None:
         yield
         return
-    from fbvm.record.history import looking
+    from fbvm.record.trace.history import looking
 
     with looking(plc, counting.coverage.listener(subject)):
         yield
@@ -258,7 +258,7 @@ def _shorten(error: BaseException) -> None:
         return
     entry, last = error.__traceback__, None
     while entry is not None:
-        if not Path(entry.tb_frame.f_code.co_filename).is_relative_to(PACKAGE):  # frames of this package say nothing about the test
+        if not Path(entry.tb_frame.f_code.co_filename).is_relative_to(PACKAGE):  # our own frames say nothing of the test
             last = entry
         entry = entry.tb_next
     if last is not None:

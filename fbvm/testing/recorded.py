@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from fbvm.record.chart import Chart, draw
-from fbvm.record.recorder import Recording
-from fbvm.record.table import ScanTable
-from fbvm.record.trace import Trace
-from fbvm.record.trace_signals import recording
-from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
-from fbvm.record.why import told, why
+from fbvm.record.draw.chart import Chart, draw
+from fbvm.record.draw.table import ScanTable
+from fbvm.record.draw.why import told, why
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.recorder import Recording
+from fbvm.record.trace.signals import recording
+from fbvm.record.trace.writer import Depth, TraceWriter, source_lines
 from fbvm.testing.golden import check
 from fbvm.testing.rig import Rig
 from fbvm.watch.paths import Place

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from fbvm.base.types import StructType
-from fbvm.plc import Phase, Plc
-from fbvm.record.history import History
-from fbvm.record.recorder import Signal
-from fbvm.record.table import ScanTable, Writer
+from fbvm.machine.plc import Phase, Plc
+from fbvm.record.draw.table import ScanTable, Writer
+from fbvm.record.trace.history import History
+from fbvm.record.trace.recorder import Signal
 from fbvm.testing.reads import Reads
 from fbvm.testing.subject import Subject
 from fbvm.watch.names import Names, is_single

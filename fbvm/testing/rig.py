@@ -18,12 +18,12 @@ from typing import Any
 from fbvm.base.types import fold
 from fbvm.check.lint.suppression import ANY, Wanted
 from fbvm.engine.trap import Trap
+from fbvm.machine.plc import Mode, Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.plc import Mode, Plc
-from fbvm.record.chart import Chart, draw
-from fbvm.record.history import History
-from fbvm.record.recorder import Recorder
-from fbvm.record.traffic import Passed, Reader, listen
+from fbvm.record.draw.chart import Chart, draw
+from fbvm.record.trace.history import History
+from fbvm.record.trace.recorder import Recorder
+from fbvm.record.trace.traffic import Passed, Reader, listen
 from fbvm.testing.pages import write_page
 from fbvm.testing.reads import Reads
 from fbvm.testing.report import Report

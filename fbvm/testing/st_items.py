@@ -15,11 +15,11 @@ import pytest
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, fold
 from fbvm.code.image import Site
-from fbvm.plc import Phase, Plc
-from fbvm.record.history import History, looking
-from fbvm.record.inside import Began, Event, Frame, Read, Statement, Write
-from fbvm.record.recorder import Signal
-from fbvm.record.table import ScanTable
+from fbvm.machine.plc import Phase, Plc
+from fbvm.record.draw.table import ScanTable
+from fbvm.record.trace.events import Began, Event, Frame, Read, Statement, Write
+from fbvm.record.trace.history import History, looking
+from fbvm.record.trace.recorder import Signal
 from fbvm.syntax.text import read
 from fbvm.testing.pages import write_page
 from fbvm.testing.plugin import counted, library_folders, page_of

@@ -20,7 +20,7 @@ from fbvm.check.library import Libraries
 from fbvm.check.lint.suppression import ANY, Wanted
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
-from fbvm.record.source_texts import source_texts
+from fbvm.record.trace.source_texts import source_texts
 from fbvm.syntax import tree
 from fbvm.syntax.st.parser import parse
 from fbvm.syntax.text import read

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.types import StructType, base
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.values import Value, parse_value, sort_of
 

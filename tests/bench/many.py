@@ -24,8 +24,8 @@ sys.path.insert(0, str(HOUSE))
 
 from fbvm import Etn21, Plc, TcpNetwork, compile_files, compile_text  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
+from fbvm.machine.scan_times import Lateness  # noqa: E402
 from fbvm.run import Running, run_all  # noqa: E402
-from fbvm.scan_times import Lateness  # noqa: E402
 
 BENCH = Path(__file__).resolve().parent
 MS = 1_000_000

@@ -39,7 +39,7 @@ from fbvm.engine.native.engine import NativeEngine  # noqa: E402
 from fbvm.engine.native.scans.scans import Turn  # noqa: E402
 from fbvm.engine.python.engine import PythonEngine  # noqa: E402
 from fbvm.engine.stops import Stops  # noqa: E402
-from fbvm.plc import Plc  # noqa: E402
+from fbvm.machine.plc import Plc  # noqa: E402
 
 BENCH = Path(__file__).resolve().parent
 PROGRAMS = {"logic": 10_000_000, "pid": 1_000_000, "crc": 1_000_000, "mtcp": 1_000_000}

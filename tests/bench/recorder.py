@@ -21,14 +21,14 @@ sys.path.insert(0, str(HOUSE))
 from fbvm.cli.demo import SIGNALS  # noqa: E402
 from fbvm.code.compiler import compile_files  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
+from fbvm.machine.plc import Plc  # noqa: E402
 from fbvm.net.loop import LoopNetwork  # noqa: E402
 from fbvm.net.peers import ModbusPeer  # noqa: E402
-from fbvm.plc import Plc  # noqa: E402
-from fbvm.record.page import page  # noqa: E402
-from fbvm.record.page_data import page_data  # noqa: E402
-from fbvm.record.recorder import Recorder  # noqa: E402
-from fbvm.record.trace import Trace  # noqa: E402
-from fbvm.record.trace_writer import Depth, TraceWriter  # noqa: E402
+from fbvm.record.page.data import page_data  # noqa: E402
+from fbvm.record.page.page import page  # noqa: E402
+from fbvm.record.trace.reader import Trace  # noqa: E402
+from fbvm.record.trace.recorder import Recorder  # noqa: E402
+from fbvm.record.trace.writer import Depth, TraceWriter  # noqa: E402
 from fbvm.units.etn21 import Etn21  # noqa: E402
 from fbvm.wire.link import Peer  # noqa: E402
 

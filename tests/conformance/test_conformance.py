@@ -14,7 +14,7 @@ from rows import go_through
 
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 
 @pytest.mark.parametrize(

@@ -13,9 +13,9 @@ from stream_client import Client
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.plc import Plc
-from fbvm.record.chart import chart
+from fbvm.record.draw.chart import chart
 from fbvm.units.tianxing import Tianxing
 from fbvm.wire.link import Peer
 

@@ -15,10 +15,10 @@ from functools import cache
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer, Station
-from fbvm.plc import Plc
-from fbvm.record.chart import chart
+from fbvm.record.draw.chart import chart
 from fbvm.units import noc_map
 from fbvm.units.noc import Noc
 from fbvm.wire.link import Peer

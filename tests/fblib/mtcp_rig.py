@@ -18,10 +18,10 @@ from textwrap import dedent
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import Action, ModbusPeer, Say, Station
-from fbvm.plc import Plc
-from fbvm.record.chart import chart
+from fbvm.record.draw.chart import chart
 from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21_map import Layout
 from fbvm.units.etn21_names import descriptions

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus_server import ModbusServer
 

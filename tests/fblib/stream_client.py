@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopLink
-from fbvm.plc import Plc
 from fbvm.wire.link import Broken, Close, Connect, Event, Failed, Grant, Opened, Peer, PeerClosed, Received, Send
 from fbvm.wire.modbus import Adu, Splitter
 

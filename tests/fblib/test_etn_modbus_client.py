@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from rows import each_of, first_quick
 
 from fbvm import compile_files
+from fbvm.machine.plc import Mode, Plc
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS
 from fbvm.net.peers import Action, ModbusPeer, Say, Station
-from fbvm.plc import Mode, Plc
-from fbvm.record.chart import chart
+from fbvm.record.draw.chart import chart
 from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21 import Fault as UnitFault
 from fbvm.wire.link import Peer

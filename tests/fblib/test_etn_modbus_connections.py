@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from rows import first_quick
 
 from fbvm.base.data import data_folder
+from fbvm.machine.plc import Mode, Plc
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
-from fbvm.plc import Mode, Plc
-from fbvm.record.chart import chart
+from fbvm.record.draw.chart import chart
 from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21 import Fault as UnitFault
 from fbvm.units.etn21_map import Layout

@@ -15,7 +15,7 @@ from rows import each_of
 from fbvm.base.data import data_folder
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 MS = 1_000_000
 FOLDER = data_folder("fblib") / "iec"

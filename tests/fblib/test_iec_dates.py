@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 FIRST, LAST = date(1677, 9, 22), date(2262, 4, 11)
 """Between them lie the dates whose nanoseconds since 1970 have 64 bits."""

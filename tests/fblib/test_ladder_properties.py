@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_ladder_instructions import plc_of
 
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 pytestmark = pytest.mark.slow
 WORD = st.one_of(st.sampled_from([0, 1, 0x7FFF, 0x8000, 0xFFFF]), st.integers(0, 0xFFFF))

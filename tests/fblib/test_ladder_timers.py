@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from test_ladder_instructions import MS, plc_of
 
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 
 def run_bits(rungs: str, rows: list[dict[str, bool]], shown: str) -> list[list[int]]:

@@ -12,10 +12,10 @@ from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import Leave, ModbusPeer, Say
-from fbvm.plc import Plc
-from fbvm.record.chart import chart
+from fbvm.record.draw.chart import chart
 from fbvm.units.etn21 import Etn21
 
 FBLIB = data_folder("fblib")

@@ -10,8 +10,8 @@ from mb_tcp_rig import ADDRESS, CYCLE_NS, Rig, image_of
 from rows import each_of, first_quick
 
 from fbvm.base.data import data_folder
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.plc import Plc
 from fbvm.units.tianxing import Tianxing
 from fbvm.wire.link import Close, Connect, Grant, Send
 from fbvm.wire.modbus import Adu

@@ -11,10 +11,10 @@ from mstr_rig import SERVER, SERVER_IP, Rig
 from rows import each_of, first_quick
 
 from fbvm.base.data import data_folder
+from fbvm.machine.plc import Mode
 from fbvm.net.faults import Fault
 from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS
 from fbvm.net.peers import Action, Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer, Station
-from fbvm.plc import Mode
 from fbvm.units import noc_map
 from fbvm.units.noc import Noc
 from fbvm.wire.modbus_server import ModbusServer

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from mstr_rig import CYCLE_NS, SERVER_IP, Rig, image_of, program
 from test_mstr_errors import documented
 
+from fbvm.machine.plc import Plc
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer, Reset, Say
-from fbvm.plc import Plc
 from fbvm.units.noc import Noc
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus_server import ModbusServer

@@ -13,8 +13,8 @@ from rows import each_of
 from stream_client import Client
 
 from fbvm.base.areas import AREAS
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.plc import Plc
 from fbvm.units import noc_map
 from fbvm.units.noc import Noc
 from fbvm.wire.link import Close, Connect, Peer, Send

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from mtcp_rig import SERVER, Rig
 
+from fbvm.machine.plc import Mode
 from fbvm.net.faults import Fault
 from fbvm.net.peers import Action, Fin, Reset, ScriptedPeer
-from fbvm.plc import Mode
 
 PINS = ("Connect", "conn.ENO", "conn.Waiting_Server", "conn.Error")
 WORDS = ("CIO 1519.02", "CIO 1519.05", "CIO 1509.15", "D30009")

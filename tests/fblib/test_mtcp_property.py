@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mtcp_rig import SERVER, Rig
 
+from fbvm.machine.plc import Mode
 from fbvm.net.faults import Fault
 from fbvm.net.peers import Action, Fin, Leave, Reset, Say
-from fbvm.plc import Mode
 
 READS = {
     "a": "Fn03(Register_Address := 10, Register_Qty := 2, RespData_DM := 100)",

@@ -13,9 +13,9 @@ from tables import COILS, DISCRETE_INPUTS, HOLDING_REGISTERS, INPUT_REGISTERS
 from wireshark import TSHARK, dissected
 
 from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork
-from fbvm.plc import Plc
-from fbvm.record.pcapng import Capture
+from fbvm.record.export.pcapng import Capture
 from fbvm.run import run
 from fbvm.units.etn21 import Etn21
 from fbvm.wire.link import Peer

@@ -22,12 +22,12 @@ import fbvm.net.switchboard
 import fbvm.net.tcp
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
+from fbvm.machine.plc import Plc
 from fbvm.net.addresses import AddressMap
 from fbvm.net.journal import Journal, open_journal
 from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS, by_script, right
 from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
-from fbvm.plc import Plc
 from fbvm.run import run
 from fbvm.run.replay import Replay
 from fbvm.units.etn21 import Etn21

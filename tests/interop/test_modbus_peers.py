@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from fbvm.net.tcp import TcpLink, TcpNetwork
-from fbvm.record.pcapng import Capture
+from fbvm.record.export.pcapng import Capture
 from fbvm.wire import modbus
 from fbvm.wire.link import Close, Connect, Event, Grant, Listen, Opened, Peer, PeerClosed, Received, Send
 from fbvm.wire.modbus import Adu, Splitter, mismatch

@@ -12,14 +12,14 @@ from typing import Any
 import pytest
 
 from fbvm.code.compiler import compile_files, compile_text
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
-from fbvm.plc import Plc
-from fbvm.record.page import page
-from fbvm.record.page_data import page_data
-from fbvm.record.recorder import signals_at
-from fbvm.record.trace import Trace
-from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
+from fbvm.record.page.data import page_data
+from fbvm.record.page.page import page
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.recorder import signals_at
+from fbvm.record.trace.writer import Depth, TraceWriter, source_lines
 from fbvm.units.etn21 import Etn21
 from fbvm.watch.paths import Place
 from fbvm.wire.link import Peer

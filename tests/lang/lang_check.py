@@ -12,7 +12,7 @@ from fbvm.base.memory import compare
 from fbvm.base.types import fold
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.watch.paths import Place, Span, UnknownPlace
 
 BUDGET = 100_000

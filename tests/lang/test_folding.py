@@ -8,7 +8,7 @@ import pytest
 
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_sources
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 INTEGERS = {"SINT": -8, "INT": -16, "DINT": -32, "LINT": -64, "USINT": 8, "UINT": 16, "UDINT": 32, "ULINT": 64}
 """Bits of each integer type, negative for the signed ones."""

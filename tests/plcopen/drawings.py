@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_sources
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.plcopen.importing import Imported, import_xml
 
 NAMESPACE = "http://www.plcopen.org/xml/tc6_0201"

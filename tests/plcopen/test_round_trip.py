@@ -16,7 +16,7 @@ from schema_rules import breaches, wires_lead_somewhere
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.code.compiler import compile_sources
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.plcopen.exporting import Exported, export_xml
 from fbvm.plcopen.importing import Imported, import_xml
 from fbvm.plcopen.markup import Element, parse_markup

@@ -28,7 +28,7 @@ from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.engine import NativeEngine
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.watch.paths import Place
 
 SCANS, CYCLE_NS = 4, 10_000_000

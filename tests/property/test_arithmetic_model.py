@@ -14,7 +14,7 @@ from rows import first_quick
 
 from fbvm.code.compiler import compile_text
 from fbvm.engine.native import engine as native
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 SIGNED = {"SINT": 8, "INT": 16, "DINT": 32, "LINT": 64}
 UNSIGNED = {"USINT": 8, "UINT": 16, "UDINT": 32, "ULINT": 64}

@@ -21,7 +21,7 @@ from fbvm.base import cache
 from fbvm.code.image import Image
 from fbvm.code.operations import Block
 from fbvm.engine.native import engine as native
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)

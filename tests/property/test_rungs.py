@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.syntax.formatter.formatter import formatted
 from fbvm.syntax.ladder.instruction_set import Instruction, instruction_set
 from fbvm.syntax.st.parser import parse

@@ -12,7 +12,7 @@ from sfc_model import CODED, INPUTS, VARIABLES, Chart, Control, Model, random_ch
 from fbvm.base.memory import compare
 from fbvm.code.compiler import compile_text
 from fbvm.engine.native import engine as native
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 CYCLE_MS = 10
 SCANS = 14

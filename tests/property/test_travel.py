@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 PROGRAM = """
 PROGRAM Main

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import pytest
 
 from fbvm import Plc, compile_text
-from fbvm.breakpoints import Halt
 from fbvm.code.image import Image
 from fbvm.engine import tiers
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
-from fbvm.plc import Mode, Phase
+from fbvm.machine.breakpoints import Halt
+from fbvm.machine.plc import Mode, Phase
 from fbvm.watch.conditions import ConditionError
 
 TEXT = """\
@@ -335,7 +335,7 @@ def test_a_block_in_python_stands_in_with_breakpoints_too() -> None:
 
 
 def test_a_recorder_of_every_statement_excludes_breakpoints() -> None:
-    from fbvm.record.inside import Inside
+    from fbvm.record.trace.events import Inside
 
     plc = Plc(image())
     plc.engine = Inside(plc.image, plc.memory, lambda event: None, plc.engine)

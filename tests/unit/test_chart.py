@@ -6,10 +6,10 @@ import pytest
 from images import counter_image
 
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
-from fbvm.record.chart import Chart, chart, draw
-from fbvm.record.recorder import Recorder, Signal
-from fbvm.record.symbols import from_data, to_data
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.chart import Chart, chart, draw
+from fbvm.record.trace.recorder import Recorder, Signal
+from fbvm.record.trace.symbols import from_data, to_data
 from fbvm.watch.paths import UnknownPlace, find_place
 
 

@@ -14,7 +14,7 @@ from rows import first_quick
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 FOLDER = Path(__file__).resolve().parents[2] / "examples" / "classics"
 NAMES = sorted(path.stem.removesuffix("_ladder") for path in FOLDER.glob("*_ladder.st"))

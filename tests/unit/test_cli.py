@@ -14,7 +14,7 @@ from fbvm.base.codes import CODES
 from fbvm.cli.demo import called
 from fbvm.cli.main import VERBS, main
 from fbvm.cli.options import split_names
-from fbvm.record.chart import Chart
+from fbvm.record.draw.chart import Chart
 
 HOUSE = Path(__file__).resolve().parents[2]
 DEMO = str(HOUSE / "examples" / "demo.st")

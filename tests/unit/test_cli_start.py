@@ -14,11 +14,11 @@ from fbvm.cli.main import main
 try:
     main(sys.argv[1:], standalone_mode=False)
 finally:
-    print(*({"rich", "lark", "llvmlite", "fbvm.engine", "fbvm.plc", "fbvm.run", "fbvm.net"} & set(sys.modules)))
+    print(*({"rich", "lark", "llvmlite", "fbvm.engine", "fbvm.machine.plc", "fbvm.run", "fbvm.net"} & set(sys.modules)))
 """
 
 
-USED = {"fbvm.engine", "fbvm.plc", "fbvm.run", "fbvm.net"}
+USED = {"fbvm.engine", "fbvm.machine.plc", "fbvm.run", "fbvm.net"}
 """What a run needs whose program asks nothing of a unit."""
 
 

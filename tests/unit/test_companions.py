@@ -16,11 +16,11 @@ from toy_unit import Echoing, Toy
 from fbvm import Plc, compile_text
 from fbvm.base.areas import NOW
 from fbvm.code.image import Image
-from fbvm.companions import Accompanied
 from fbvm.engine.clock import Clock
 from fbvm.engine.native import engine as native
-from fbvm.express import Alone, Way
-from fbvm.plc import Mode
+from fbvm.machine.fast.paths import Alone, Way
+from fbvm.machine.fast.units_in_code import Accompanied
+from fbvm.machine.plc import Mode
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 from fbvm.base.dialects import DIALECTS, QUESTIONS, SWITCHES, dialect, page
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files, compile_text
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 TEXT = "PROGRAM Main VAR w : WORD; i : INT; END_VAR w := w + 1; i := w; END_PROGRAM"
 

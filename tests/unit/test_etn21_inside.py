@@ -8,8 +8,8 @@ import pytest
 
 from fbvm import Etn21, LoopNetwork, Peer, Plc, compile_text
 from fbvm.code.image import Image
-from fbvm.companions import Accompanied
 from fbvm.engine.native import engine as native
+from fbvm.machine.fast.units_in_code import Accompanied
 from fbvm.net.peers import Actions, Conversation, Say, Station
 
 SERVER = Peer("192.168.250.7", 7)

@@ -7,9 +7,9 @@ from images import counter_image
 from rows import each_of
 
 from fbvm.base.areas import parse_address
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.plc import Plc
-from fbvm.record.chart import chart
+from fbvm.record.draw.chart import chart
 from fbvm.units.etn21 import Etn21
 
 

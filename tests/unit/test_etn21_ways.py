@@ -14,10 +14,10 @@ from rows import first_quick
 from fbvm import Plc, compile_text
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
+from fbvm.machine.plc import Mode
 from fbvm.net.faults import Fault as NetFault
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer
-from fbvm.plc import Mode
 from fbvm.units.etn21 import Etn21, Fault
 from fbvm.units.etn21_map import Switch
 from fbvm.wire.link import Peer

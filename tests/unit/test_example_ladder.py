@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from fbvm.code.compiler import compile_files
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
-from fbvm.plc import Plc
 from fbvm.units.etn21 import Etn21
 from fbvm.wire.link import Peer
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fbvm.code.compiler import compile_files
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 EXAMPLE = Path(__file__).resolve().parent.parent.parent / "examples" / "sfc.st"
 SECOND_NS = 10**9

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Mode, Plc
+from fbvm.machine.plc import Mode, Plc
 
 
 def test_the_first_task_flag_is_on_while_a_task_is_executed_for_the_first_time() -> None:

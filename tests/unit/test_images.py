@@ -10,7 +10,7 @@ import pytest
 from fbvm.base.areas import AREAS
 from fbvm.base.memory import Memory
 from fbvm.code.compiler import compile_text
-from fbvm.record import images
+from fbvm.record.trace import images
 
 ALL = {"CIO": 6144, "W": 512, "H": 512, "D": 32768}
 

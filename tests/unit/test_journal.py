@@ -16,11 +16,11 @@ from rows import first_quick
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
+from fbvm.machine.plc import Mode, Plc
 from fbvm.net.faults import Fault
 from fbvm.net.journal import Act, End, Entry, Header, Journal, JournalError, Scan, open_journal
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
-from fbvm.plc import Mode, Plc
 from fbvm.run.replay import Replay
 from fbvm.units.etn21 import Etn21
 from fbvm.units.etn21 import Fault as UnitFault

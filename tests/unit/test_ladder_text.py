@@ -9,12 +9,12 @@ from rows import each_of
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
-from fbvm.plc import Plc
-from fbvm.record.history import looking
-from fbvm.record.ladder_svg import ladder_svg
-from fbvm.record.ladder_text import ladder_surface, ladder_text
-from fbvm.record.power import Executed, Power
-from fbvm.record.rung_values import Values
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.ladder_svg import ladder_svg
+from fbvm.record.draw.ladder_text import ladder_surface, ladder_text
+from fbvm.record.draw.power import Executed, Power
+from fbvm.record.draw.rung_values import Values
+from fbvm.record.trace.history import looking
 from fbvm.syntax.ladder.drawing.widths import Sight
 
 

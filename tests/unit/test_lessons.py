@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files
-from fbvm.record.trace import Trace
+from fbvm.record.trace.reader import Trace
 from fbvm.testing.class_report import report, summary
 from fbvm.testing.lesson import predicted
 from fbvm.testing.lessons import ANSWERS, GIVEN, PROGRAM, Lesson, check_class, lessons, run_pytest

@@ -12,10 +12,10 @@ from fbvm.base.areas import AREAS, PAGE_BYTES, SLOTS_OFFSET, AddressError, Mailb
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image, Layout
 from fbvm.code.listing import listing
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.plc import Plc
-from fbvm.record.trace import Trace
-from fbvm.record.trace_writer import TraceWriter
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.writer import TraceWriter
 from fbvm.units.unit import AreaMemory
 from fbvm.watch.paths import UnknownPlace
 from fbvm.wire.link import Event, Request

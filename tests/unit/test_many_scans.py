@@ -14,8 +14,8 @@ from fbvm import Etn21, LoopNetwork, ModbusPeer, Peer, Plc, compile_text
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.scans.scans import Series
+from fbvm.machine.plc import Mode
 from fbvm.net.loop import LoopLink
-from fbvm.plc import Mode
 from fbvm.run import TimedWrite, loop
 from fbvm.wire import registers
 
@@ -121,7 +121,7 @@ def test_they_are_used(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_a_long_run_comes_back_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     """For Ctrl-C: machine code cannot be interrupted."""
-    monkeypatch.setattr("fbvm.plc.STEP_BUDGET", 5000)
+    monkeypatch.setattr("fbvm.machine.plc.STEP_BUDGET", 5000)
     plc = Plc(IMAGE, engine="native")
     plc.run(scans=100)
     counts = []

@@ -13,16 +13,16 @@ from xml.etree import ElementTree
 import pytest
 from trace_rig import image, record, traced
 
-from fbvm.plc import Plc
-from fbvm.record import page_data as module
-from fbvm.record.page import page
-from fbvm.record.page_data import page_data
-from fbvm.record.recorder import Signal
-from fbvm.record.svg import Drawing
-from fbvm.record.trace import Trace
-from fbvm.record.trace_signals import recording
-from fbvm.record.trace_writer import Depth
-from fbvm.record.traffic import Passed
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.svg import Drawing
+from fbvm.record.page import data as module
+from fbvm.record.page.data import page_data
+from fbvm.record.page.page import page
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.recorder import Signal
+from fbvm.record.trace.signals import recording
+from fbvm.record.trace.traffic import Passed
+from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import Place, UnknownPlace
 from fbvm.wire.link import Peer
 

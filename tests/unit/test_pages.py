@@ -15,7 +15,7 @@ from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.pages import UnknownCode, near, page
 from fbvm.code.compiler import Compilation, compile_sources
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.plcopen.exporting import export_xml
 from fbvm.plcopen.importing import import_xml
 from fbvm.run.project import Project, read_project

@@ -14,9 +14,9 @@ import pytest
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import Fin, ModbusPeer, Reset, Say, ScriptedPeer, Station
-from fbvm.record import frames
-from fbvm.record.frames import ACK, FIN, PSH, RST, SYN
-from fbvm.record.pcapng import Capture
+from fbvm.record.export import frames
+from fbvm.record.export.frames import ACK, FIN, PSH, RST, SYN
+from fbvm.record.export.pcapng import Capture
 from fbvm.wire import modbus
 from fbvm.wire.link import Bind, Close, Connect, Event, Grant, Listen, Peer, Received, Send, SendTo
 from fbvm.wire.modbus import Adu

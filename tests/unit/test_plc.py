@@ -8,7 +8,7 @@ import pytest
 from images import D200, counter_image, task
 
 from fbvm.base.areas import DUE
-from fbvm.plc import Mode, Plc, Stopped
+from fbvm.machine.plc import Mode, Plc, Stopped
 from fbvm.units.unit import AreaMemory
 from fbvm.watch.conditions import ConditionError
 from fbvm.watch.paths import UnknownPlace

@@ -13,7 +13,7 @@ from prompt_toolkit.output import DummyOutput
 
 from fbvm.cli.prompt import HISTORY, Completions, prompted
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.step.commands import Commands
 from fbvm.step.session import Session
 from fbvm.step.words import Words

@@ -8,11 +8,11 @@ import pytest
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
-from fbvm.plc import Phase, Plc
-from fbvm.record.history import History, looking
-from fbvm.record.inside import Began, Ended, Event, Inside, Read, Statement, Write
-from fbvm.record.recorder import Signal, signals_of
-from fbvm.record.table import ScanTable
+from fbvm.machine.plc import Phase, Plc
+from fbvm.record.draw.table import ScanTable
+from fbvm.record.trace.events import Began, Ended, Event, Inside, Read, Statement, Write
+from fbvm.record.trace.history import History, looking
+from fbvm.record.trace.recorder import Signal, signals_of
 from fbvm.watch.names import Names
 
 TEXT = """\

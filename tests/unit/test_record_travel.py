@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from trace_rig import image, press
 
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 
 @pytest.fixture

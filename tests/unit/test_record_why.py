@@ -8,12 +8,12 @@ import pytest
 from trace_rig import image, press, traced
 
 from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Phase, Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.plc import Phase, Plc
-from fbvm.record.outline import outer_statements
-from fbvm.record.trace import Trace
-from fbvm.record.trace_writer import Depth, TraceWriter
-from fbvm.record.why import Cause, told, why
+from fbvm.record.draw.why import Cause, told, why
+from fbvm.record.trace.outline import outer_statements
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.writer import Depth, TraceWriter
 from fbvm.units.etn21 import Etn21
 from fbvm.watch.paths import Place
 

@@ -13,16 +13,16 @@ from trace_rig import record
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
-from fbvm.record.chart import draw
-from fbvm.record.page_data import page_data
-from fbvm.record.rows import write_rows
-from fbvm.record.table import ScanTable
-from fbvm.record.trace import Trace
-from fbvm.record.trace_signals import chosen_signals, recording
-from fbvm.record.trace_writer import Depth
-from fbvm.record.vcd import write_vcd
-from fbvm.record.why import told, why
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.chart import draw
+from fbvm.record.draw.table import ScanTable
+from fbvm.record.draw.why import told, why
+from fbvm.record.export.vcd import write_vcd
+from fbvm.record.page.data import page_data
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.rows import write_rows
+from fbvm.record.trace.signals import chosen_signals, recording
+from fbvm.record.trace.writer import Depth
 from fbvm.step.session import Session
 from fbvm.step.words import Words
 from fbvm.watch.names import Names

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import json
 
-from fbvm.record.requests import RequestLog
+from fbvm.record.trace.requests import RequestLog
 from fbvm.wire import modbus
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus import Adu, exception_reply

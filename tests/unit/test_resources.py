@@ -8,7 +8,7 @@ from click.testing import CliRunner
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 TEXT = """
 PROGRAM Count

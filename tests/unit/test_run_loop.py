@@ -13,7 +13,7 @@ import pytest
 from images import counter_image, task
 
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.run import Running, TimedWrite, loop, run, run_all
 from fbvm.units.unit import AreaMemory
 from fbvm.wire.link import Event, Link, Request

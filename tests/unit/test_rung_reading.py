@@ -7,7 +7,7 @@ from textwrap import dedent
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 from fbvm.syntax.ladder.mnemonics import read_rungs
 from fbvm.syntax.ladder.text import rung_lines
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.scan_times import Lateness, ScanTimes
+from fbvm.machine.scan_times import Lateness, ScanTimes
 
 
 def test_nothing_measured() -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from rows import each_of
 
 from fbvm.code.compiler import compile_text
-from fbvm.plc import RUN, Plc
-from fbvm.state import Mode
+from fbvm.machine.plc import RUN, Plc
+from fbvm.machine.state import Mode
 
 MS = 10**6
 TWO = """FUNCTION_BLOCK Seq

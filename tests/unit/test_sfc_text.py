@@ -11,9 +11,9 @@ import pytest
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import SfcPicture
-from fbvm.record import sfc_text as drawing
-from fbvm.record.ladder_svg import ladder_svg
-from fbvm.record.sfc_text import Sighted, sfc_surface, sfc_text
+from fbvm.record.draw import sfc_text as drawing
+from fbvm.record.draw.ladder_svg import ladder_svg
+from fbvm.record.draw.sfc_text import Sighted, sfc_surface, sfc_text
 from fbvm.syntax.ladder.drawing.box_lines import Surface
 
 sys.path.append(str(Path(__file__).parent.parent / "property"))

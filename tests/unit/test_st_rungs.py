@@ -8,10 +8,10 @@ from rows import each_of
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
-from fbvm.plc import Plc
-from fbvm.record.history import looking
-from fbvm.record.ladder_text import ladder_text
-from fbvm.record.power import Executed, Power
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.ladder_text import ladder_text
+from fbvm.record.draw.power import Executed, Power
+from fbvm.record.trace.history import looking
 from fbvm.syntax.ladder.drawing.widths import Sight
 
 DECLARED = """a, b, c, d, e, f : BOOL; n, m : INT; r : REAL; w : WORD; t : TON; k : CTUD; s : SR; list : ARRAY[0..3] OF BOOL;

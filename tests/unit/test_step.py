@@ -13,9 +13,9 @@ from rows import each_of
 
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
-from fbvm.plc import Plc
 from fbvm.step.commands import COMMANDS, CommandError, Commands, ExpectationError
 from fbvm.step.session import Position, Session
 from fbvm.step.words import Words

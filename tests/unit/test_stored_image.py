@@ -13,7 +13,7 @@ from fbvm.code.compiler import compile_text
 from fbvm.code.image import Body, Image
 from fbvm.code.listing import listing
 from fbvm.code.store.encoding import decode, encode
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 TYPES = """
 TYPE

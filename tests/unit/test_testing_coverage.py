@@ -11,9 +11,9 @@ from rows import each_of
 from test_testing_plugin import run
 
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Plc
-from fbvm.record.branches import forks, statements
-from fbvm.record.history import looking
+from fbvm.machine.plc import Plc
+from fbvm.record.trace.branches import forks, statements
+from fbvm.record.trace.history import looking
 from fbvm.testing.coverage import PAST, Coverage, FileCoverage
 from fbvm.testing.coverage_report import cobertura, percent, table, write_pages
 from fbvm.testing.subject import subject

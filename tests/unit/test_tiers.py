@@ -12,7 +12,7 @@ from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.tiers import Tiers, engine_for
-from fbvm.plc import Plc
+from fbvm.machine.plc import Plc
 
 TEXT = """
 PROGRAM Main

@@ -15,17 +15,17 @@ from trace_rig import TEXT, image, press, record, traced
 
 from fbvm.base.types import ArrayType, EnumType, StringType, StructType, SubrangeType
 from fbvm.code.compiler import compile_text
-from fbvm.plc import Phase, Plc
-from fbvm.record import symbols
-from fbvm.record.chart import draw
-from fbvm.record.history import looking
-from fbvm.record.inside import Began, Ended, Event, Frame, Read, Statement, Write
-from fbvm.record.selection import select
-from fbvm.record.table import ScanTable
-from fbvm.record.trace import Trace
-from fbvm.record.trace_format import MAGIC, Cursor, TraceError, put, xor
-from fbvm.record.trace_signals import recording
-from fbvm.record.trace_writer import START, Depth, TraceWriter
+from fbvm.machine.plc import Phase, Plc
+from fbvm.record.draw.chart import draw
+from fbvm.record.draw.table import ScanTable
+from fbvm.record.trace import symbols
+from fbvm.record.trace.events import Began, Ended, Event, Frame, Read, Statement, Write
+from fbvm.record.trace.format import MAGIC, Cursor, TraceError, put, xor
+from fbvm.record.trace.history import looking
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.selection import select
+from fbvm.record.trace.signals import recording
+from fbvm.record.trace.writer import START, Depth, TraceWriter
 from fbvm.watch.names import Names
 from fbvm.watch.paths import UnknownPlace
 
@@ -284,7 +284,7 @@ def test_what_is_no_trace_says_so() -> None:
 
 
 def _with_header(payload: bytes) -> bytes:
-    from fbvm.record.trace_format import HEADER, write_chunk
+    from fbvm.record.trace.format import HEADER, write_chunk
 
     file = io.BytesIO()
     file.write(MAGIC)

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from rows import each_of
 from trace_rig import image, traced
 
-from fbvm.plc import Plc
-from fbvm.record.recorder import Recorder, Recording
-from fbvm.record.rows import write_rows
-from fbvm.record.rows_reader import RowsError, read_rows
-from fbvm.record.trace import Trace
-from fbvm.record.trace_signals import recording
-from fbvm.record.vcd import write_vcd
+from fbvm.machine.plc import Plc
+from fbvm.record.export.vcd import write_vcd
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.recorder import Recorder, Recording
+from fbvm.record.trace.rows import write_rows
+from fbvm.record.trace.rows_reader import RowsError, read_rows
+from fbvm.record.trace.signals import recording
 
 
 def rows(made: Recording) -> str:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import io
 
 from fbvm.code.compiler import compile_text
+from fbvm.machine.plc import Phase, Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
-from fbvm.plc import Phase, Plc
-from fbvm.record.inside import Event, Passing
-from fbvm.record.trace import Moment, Trace
-from fbvm.record.trace_writer import TraceWriter
-from fbvm.record.traffic import Reader, listen
+from fbvm.record.trace.events import Event, Passing
+from fbvm.record.trace.reader import Moment, Trace
+from fbvm.record.trace.traffic import Reader, listen
+from fbvm.record.trace.writer import TraceWriter
 from fbvm.units.etn21 import Etn21
 from fbvm.wire import modbus
 from fbvm.wire.link import Peer

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
-from fbvm.plc import Plc
-from fbvm.record.trace import Trace
-from fbvm.record.trace_writer import Depth, TraceWriter, source_lines
+from fbvm.machine.plc import Plc
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.writer import Depth, TraceWriter, source_lines
 
 TEXT = """\
 TYPE Level : (Low, High) := Low; END_TYPE

@@ -1,0 +1,1 @@
+"""One PLC: memory, program, units and network, one scan at a time."""

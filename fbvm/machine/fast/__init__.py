@@ -1,0 +1,1 @@
+"""The fast paths of a scan: machine code does one or many scans in one call."""

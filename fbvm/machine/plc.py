@@ -1,0 +1,450 @@
+"""The PLC: an image and its memory, the units on its backplane and the network they talk through, one scan at a time.
+
+`plc.scan()` is the scan cycle as W394 draws it.  A PLC is told the time and never waits; what waits is in `run`.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, nullcontext
+
+from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
+from fbvm.base.memory import Memory, Snapshot
+from fbvm.code.image import Image
+from fbvm.engine.clock import Clock
+from fbvm.engine.tiers import Engine, engine_for
+from fbvm.engine.trap import Trap
+from fbvm.machine.breakpoints import Breakpoints, Halt
+from fbvm.machine.clock_words import CLOCKWORK, Flags
+from fbvm.machine.fast.paths import Express, Way
+from fbvm.machine.goal import Goal
+from fbvm.machine.refresh import Attached, Exchange
+from fbvm.machine.scan_times import Lateness, ScanTimes
+from fbvm.machine.state import RUN
+from fbvm.machine.state import Mode as Mode
+from fbvm.machine.state import Phase as Phase
+from fbvm.machine.state import State as State
+from fbvm.machine.state import Stopped as Stopped
+from fbvm.machine.tasks import Schedule, hurried
+from fbvm.net.journal import Journal
+from fbvm.units.unit import Unit
+from fbvm.watch import places
+from fbvm.watch.paths import Place, Span, find, find_place
+from fbvm.watch.values import Value
+from fbvm.wire.link import Network
+
+STEP_BUDGET = 2_000_000
+"""Statements that one scan may execute before the watchdog ends it."""
+
+
+class Plc:
+    """One PLC with a compiled program, in RUN mode at time 0, before its first scan.
+
+    `cycle_ns` is how far a scan advances virtual time; `budget` the statements a scan may execute; `observed` runs the
+    build that reports each statement; `engine` is "auto" (Python first, machine code when that pays), "python" or
+    "native"; `journal` is told every input.  Raises nothing that a program, a file or a peer could cause: look at
+    `trap`."""
+
+    def __init__(
+        self,
+        image: Image,
+        cycle_ns: int = 10_000_000,
+        *,
+        budget: int = STEP_BUDGET,
+        observed: bool = False,
+        engine: str = "auto",
+        journal: Journal | None = None,
+    ) -> None:
+        if cycle_ns <= 0:
+            raise ValueError(f"a cycle takes time; {cycle_ns} ns is not possible")
+        self.image = image
+        self.cycle_ns = cycle_ns
+        self.budget = budget
+        self.memory = Memory(image.layout.size, image.layout.areas)
+        self._choice = engine
+        self.engine: Engine = engine_for(image, self.memory, engine, observed)
+        self._system = self.memory.views["i64"]
+        self._flags = Flags(self.memory)
+        self.units: list[Attached] = []
+        self.watchers: list[Callable[[Plc], None]] = []
+        """Called at the end of each scan, after its I/O refresh: recorders, watches."""
+        self.phases: list[Callable[[Plc, Phase], None]] = []
+        """Called within each scan when a phase is over: what looks inside."""
+        self.now_ns = 0
+        """Time of the last scan; `elapsed_ns` is where the next one begins in virtual time."""
+        self.scans = 0
+        self.warnings = tuple(hurried(image.tasks, cycle_ns))
+        """What the program asks and this PLC does not do, for people: tasks that want to be quicker than the cycle."""
+        self.scan_times = ScanTimes(cycle_ns)
+        """How long scans took, where somebody with a clock measured it (`fbvm.run`)."""
+        self.lateness = Lateness()
+        """How late they began, where time is real."""
+        self.trap: Trap | None = None
+        self._mode = RUN
+        self._first = True
+        self._forces: dict[Place, Value] = {}
+        self._found: dict[str, Place | Span] = {}
+        self._past: deque[State] = deque(maxlen=0)
+        self._due: deque[int] = deque()
+        self.breakpoints = Breakpoints(self)
+        self._schedule = Schedule(image.tasks, lambda path: self.read(path) is True)
+        self._exchange = Exchange(self.units, self.memory)
+        self._express = Express(self._exchange, self._schedule)
+        self._write_initial()
+        self._journal = journal
+        if journal:
+            journal.begin(image.fingerprint, cycle_ns, budget, self.memory)
+
+    # --- one scan -----------------------------------------------------------------------------------------------------
+
+    def scan(self, now_ns: int | None = None) -> Trap | None:
+        """One cycle at time `now_ns`, or in virtual time one cycle after the last.  Returns the trap that stopped it.
+
+        A scan that traps ends there: its outputs do not reach the units.  One that meets a breakpoint stands (`halted`);
+        the next call ends it.  Raises Stopped if a trap was before, and ValueError if time runs backwards or real
+        connections are to live in virtual time."""
+        if self.trap:
+            raise Stopped(self.trap)
+        if not self.breakpoints.halted:
+            now_ns = self._time(now_ns)
+            if way := self._way():
+                self.now_ns = now_ns
+                self.trap = way.once(now_ns, self.budget)
+                self.scans += 1
+                self._tell()
+                return self.trap
+            self._begin(now_ns)
+        if self._mode is RUN:
+            self.trap = self._execute()
+            if self.halted:
+                return None
+            if self._forces:
+                self._apply_forces()
+            if self.phases:
+                self._over(Phase.PROGRAM)
+        self._end()
+        return self.trap
+
+    def _way(self) -> Way | None:
+        """How machine code does the next scan in one piece.  It cannot if somebody has a part in it."""
+        machine = self.engine.machine
+        if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
+            return None
+        return None if self.breakpoints.armed else self._express.way(machine)
+
+    def _begin(self, now_ns: int) -> None:
+        """A scan up to its program."""
+        if self._journal:
+            self._journal.before(self.scans, now_ns, self.budget, self.forces)
+        self._oversee(now_ns)
+        if self._mode is RUN:
+            if self._forces:
+                self._apply_forces()
+            if self.phases:
+                self._over(Phase.INPUTS)
+            self._due.extend(self._schedule.due(now_ns))
+
+    def _end(self) -> None:
+        """A scan from the end of its program on."""
+        if not self.trap:
+            self._express.refresh(self.now_ns, self._journal)
+            if self.phases:
+                self._over(Phase.REFRESH)
+        self.scans += 1
+        self._system[SCANS // 8] = self.scans
+        if self._journal:
+            self._journal.after()
+        self._tell()
+
+    def _tell(self) -> None:
+        """Keep and tell what the scan has left."""
+        if self._past.maxlen:
+            self._past.append(self.snapshot())
+        for watcher in self.watchers:
+            watcher(self)
+
+    @property
+    def halted(self) -> Halt | None:
+        """Where the scan stands at a breakpoint; None if it does not."""
+        return self.breakpoints.halted
+
+    def _time(self, now_ns: int | None) -> int:
+        """When the scan is, told or virtual."""
+        if now_ns is None:
+            if not all(attached.network.virtual_time for attached in self.units):
+                raise ValueError("real connections need real time: run this PLC with fbvm.run, or say scan(now_ns)")
+            return self.elapsed_ns
+        if now_ns < self.now_ns:
+            raise ValueError(f"time runs forward only: {now_ns} ns is before {self.now_ns} ns")
+        return now_ns
+
+    def _oversee(self, now_ns: int) -> None:
+        """Time, first-cycle flag, clock pulses, cycle time of the cycle before, step budget."""
+        cycle_time_ns = 0 if self._first else now_ns - self.now_ns
+        self.now_ns = now_ns
+        system = self._system
+        system[NOW // 8], system[DUE // 8], system[BUDGET // 8] = now_ns, NEVER, self.budget
+        self._flags.update(now_ns, cycle_time_ns, self._first and self._mode is RUN)
+
+    def _over(self, phase: Phase) -> None:
+        for told in self.phases:
+            told(self, phase)
+
+    def _execute(self) -> Trap | None:
+        """Program execution: the tasks that are due, by priority.  One that stands at a breakpoint stays due."""
+        due, breakpoints, fresh = self._due, self.breakpoints, self._schedule.fresh
+        some_are_new = bool(fresh)
+        while due:
+            if some_are_new:
+                self._flags.begin_task(due[0] in fresh)
+            trap = breakpoints.run(due[0], self.engine) if breakpoints.armed else self.engine.run(due[0])
+            if breakpoints.halted:
+                return None
+            fresh.discard(due.popleft())
+            if trap:
+                due.clear()
+                return trap
+        self._first = False
+        return None
+
+    @property
+    def elapsed_ns(self) -> int:
+        """Time from power-on to the end of the last cycle."""
+        return self.now_ns + self.cycle_ns if self.scans else self.now_ns
+
+    @property
+    def due_ns(self) -> int:
+        """When the next scan is worth while, if no network tells anything before: at once if a unit has news for the
+        program, else when a timer of the program, a task's interval or a unit changes something by itself."""
+        return min(self._exchange.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
+
+    def run(
+        self,
+        *,
+        scans: int | None = None,
+        for_ns: int | None = None,
+        until: str | Callable[[Plc], bool] | None = None,
+        max_ns: int | None = None,
+    ) -> str:
+        """Scans in virtual time until the first of these: so many more `scans`, so much more time, a condition.
+
+        `until` is a function of the PLC or an expression such as `Main.done AND D200 > 5`, looked at after each scan;
+        `max_ns` bounds the time.  Returns what ended it: "scans", "time", "until", "max", "trap", or "break" for a scan
+        that stands at a breakpoint; the next run goes on there."""
+        goal = Goal(self, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
+        while not (reason := goal.reached()):
+            if (left := goal.cycles_left) < 2 or not self.scan_many(left):
+                self.scan()
+        return reason
+
+    def scan_many(self, most: int) -> bool:
+        """Several scans in virtual time inside machine code, if nobody has to be told between them and the units have
+        nothing to do; False if there was none."""
+        if self.watchers or self._past.maxlen:
+            return False
+        if self.breakpoints.armed:
+            done, self.trap = self._many_guarded(most)
+        elif all(attached.network.virtual_time for attached in self.units) and (way := self._way()):
+            done, self.trap = way.many(most, self.now_ns, self.cycle_ns, self.budget, STEP_BUDGET)
+        else:
+            return False
+        self.scans += done
+        self.now_ns += done * self.cycle_ns
+        return done > 0
+
+    def scan_at_once(self, most: int, now_ns: int, clock: Clock) -> list[int]:
+        """Scans in the time that `clock` tells, which was `now_ns` before, one upon the other for as long as units have news
+        for the program; when they began.  None if somebody has to be told between them, or has a part in one: use `scan`."""
+        times: list[int] = []
+        if self.watchers or self._past.maxlen or self.trap or not (way := self._way()):
+            return times
+        try:
+            self.trap = way.burst(times, most, now_ns, clock, self.budget)
+        finally:  # Ctrl-C may come between two of them
+            if times:
+                self.scans += len(times)
+                self.now_ns = times[-1]
+        return times
+
+    def _many_guarded(self, most: int) -> tuple[int, Trap | None]:
+        """How many scans there were before one that stops at a breakpoint."""
+        turns = self._schedule.turns()
+        outside = self.units or self.phases or self._forces or self._journal
+        if outside or not turns or self._first or self._mode is not RUN or self.halted:
+            return 0, None
+        self._system[BUDGET // 8] = self.budget
+        guarded = self.breakpoints.guarding(self.engine)
+        return guarded.run_many(turns, most, self.cycle_ns, CLOCKWORK, spend=STEP_BUDGET)
+
+    # --- values -------------------------------------------------------------------------------------------------------
+
+    def find(self, text: str) -> Place | Span:
+        """The place or span of places that `text` names.  Raises UnknownPlace."""
+        found = self._found.get(text)
+        if found is None:
+            found = self._found[text] = find(self.image.symbols, self.memory.areas, text)
+        return found
+
+    def read(self, where: str | Place | Span) -> Value:
+        """The value of a variable, address or range.  Raises UnknownPlace."""
+        found = self.find(where) if isinstance(where, str) else where
+        if isinstance(found, Span):
+            return [places.read(self.memory, place) for place in found.places]
+        return places.read(self.memory, found)
+
+    def write(self, where: str | Place | Span, value: object) -> None:
+        """Writes a variable, an address, or a range (a list).  Raises UnknownPlace, ValueError (range), TypeError."""
+        found = self.find(where) if isinstance(where, str) else where
+        if self._journal:
+            self._journal.remark(f"{found.name} := {value!r}")
+        if isinstance(found, Place):
+            places.write(self.memory, found, value)
+            return
+        if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(found.places):
+            raise ValueError(f"{found.name} takes a list of {len(found.places)} values")
+        for place, item in zip(found.places, value, strict=True):
+            places.write(self.memory, place, item)
+
+    def force(self, where: str, value: object) -> None:
+        """Holds a variable or an address at `value` before and after the program, until `unforce`."""
+        place = find_place(self.image.symbols, self.memory.areas, where)
+        places.write(self.memory, place, value)
+        self._forces[place] = places.read(self.memory, place)
+
+    def unforce(self, where: str | None = None) -> None:
+        """Ends a force, or all forces; the value stays until somebody writes it."""
+        if where is None:
+            self._forces.clear()
+        else:
+            self._forces.pop(find_place(self.image.symbols, self.memory.areas, where), None)
+
+    @property
+    def forces(self) -> dict[str, Value]:
+        """What is forced, by name."""
+        return {place.name: value for place, value in self._forces.items()}
+
+    def _apply_forces(self) -> None:
+        for place, value in self._forces.items():
+            places.write(self.memory, place, value)
+
+    # --- units --------------------------------------------------------------------------------------------------------
+
+    def attach(self, unit: Unit, network: Network) -> None:
+        """Puts a unit on the backplane and connects it to a network.  Raises ValueError if its address is taken."""
+        if any(other.unit.name == unit.name for other in self.units):
+            raise ValueError(f"{unit.name} is on the backplane already")
+        attached = Attached(unit, network.attach(unit.address), network)
+        with self._acting("unit", self._journal.unit(unit) if self._journal else None):
+            self.units.append(attached)
+            attached.link.submit(unit.reset(self.memory), self.now_ns)
+
+    # --- start, stop and travel ---------------------------------------------------------------------------------------
+
+    @property
+    def mode(self) -> Mode:
+        """PROGRAM or RUN.  Setting RUN clears what is not retained, but CIO, W and timers stay if A500.12 is ON."""
+        return self._mode
+
+    @mode.setter
+    def mode(self, mode: Mode) -> None:
+        with self._acting("mode", mode.value):
+            if mode is RUN and self._mode is not RUN:
+                held = ("CIO", "W", "TF", "T") if self._flags.io_memory_held else ()
+                self._restart(self._kept(held))
+            self._mode = mode
+
+    def warm_start(self) -> None:
+        """Power off and on: retained variables and areas keep their values, everything else begins anew."""
+        with self._acting("start", "warm"):
+            self._power_on(self._kept(()))
+
+    def cold_start(self) -> None:
+        """As new: all memory at its initial values."""
+        with self._acting("start", "cold"):
+            self._power_on([])
+
+    def _acting(self, what: str, value: object) -> AbstractContextManager[None]:
+        """Lets the journal know of something that is done between scans."""
+        return self._journal.acting(what, value) if self._journal else nullcontext()
+
+    def _power_on(self, kept: list[tuple[int, bytes]]) -> None:
+        self._restart(kept)
+        self._mode = RUN
+        for attached in self.units:
+            attached.link.submit(attached.unit.reset(self.memory), self.now_ns)
+
+    def _restart(self, kept: list[tuple[int, bytes]]) -> None:
+        self.memory.restore(Snapshot((None,) * (self.memory.size // PAGE_BYTES)))
+        self._write_initial()
+        for offset, data in kept:
+            self.memory.u8[offset : offset + len(data)] = data
+        self._schedule.reset()
+        self._leave()
+        self._first = True
+        self._express.forget()
+        self.trap = None
+
+    def _kept(self, held: Sequence[str]) -> list[tuple[int, bytes]]:
+        """What a restart keeps: retained areas and variables, and the areas named."""
+        areas = [area for area in self.memory.areas.values() if area.retained or area.name in held]
+        extents = [(area.offset, area.size_bytes) for area in areas]
+        extents += [(row.offset, row.size) for row in self.image.retained]
+        return [(offset, bytes(self.memory.u8[offset : offset + size])) for offset, size in extents]
+
+    def _write_initial(self) -> None:
+        for offset, data in self.image.initial:
+            self.memory.u8[offset : offset + len(data)] = data
+
+    def snapshot(self) -> State:
+        """The state of the PLC itself at this moment; pages that did not change are shared, not copied.
+
+        With units attached it can be taken, its memory compared, and `fork` goes on from the same state without units;
+        only `restore` cannot.  Raises ValueError while a scan stands at a breakpoint."""
+        if self.halted:
+            raise ValueError("this scan stands at a breakpoint: end it by another scan() first")
+        return State(
+            self.memory.snapshot(), self.now_ns, self.scans, self._schedule.state(), dict(self._forces),
+            self._mode, self._first, self.trap,
+        )  # fmt: skip
+
+    def restore(self, state: State) -> None:
+        """Back to a snapshot.  Raises ValueError with units attached, whose connections do not travel in time, and with
+        a journal, which goes forward only."""
+        if self.units:
+            raise ValueError("a PLC with units attached cannot go back: their connections do not travel in time")
+        if self._journal:
+            raise ValueError("a PLC that writes a journal cannot go back: fork it")
+        self.memory.restore(state.memory)
+        self.now_ns, self.scans, self.trap = state.now_ns, state.scans, state.trap
+        self._mode, self._first, self._forces = state.mode, state.first, dict(state.forces)
+        self._schedule.restore(state.schedule)
+        self._express.forget()
+        self._leave()
+
+    def _leave(self) -> None:
+        """A scan that stands at a breakpoint does not go on."""
+        self.breakpoints.leave()
+        self._due.clear()
+
+    def fork(self) -> Plc:
+        """A second PLC in the same state, without units, watchers and connections, whether or not this one has them."""
+        twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self._choice)
+        twin.restore(self.snapshot())
+        return twin
+
+    def remember(self, scans: int) -> None:
+        """Keeps the states at the end of the last so many scans from now on, for `at`."""
+        self._past = deque(self._past, maxlen=scans)
+
+    def at(self, scan: int) -> Plc:
+        """A second PLC as this one was at the end of a scan, without units: to be read, or run again with other inputs.
+
+        Raises ValueError if `remember` did not keep that scan."""
+        for state in reversed(self._past):
+            if state.scans == scan + 1:
+                twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self._choice)
+                twin.restore(state)
+                return twin
+        held = f"scans {self._past[0].scans - 1} to {self._past[-1].scans - 1} are" if self._past else "none is"
+        raise ValueError(f"scan {scan} is not remembered; {held}: see Plc.remember")

@@ -1,0 +1,1 @@
+"""Renderings for people: the time chart, the scan table, rungs, charts, causes."""

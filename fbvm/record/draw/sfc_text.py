@@ -1,0 +1,163 @@
+"""Sequential function charts as drawings of characters: steps with their actions, transitions with their conditions, single
+and double lines where ways part and meet, arrows for jumps; with tokens and thick lines where a recorded scan went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import groupby
+
+from fbvm.code.image import SfcPicture
+from fbvm.record.draw import sfc_pieces as pieces
+from fbvm.record.draw.sfc_graph import Graph, Node
+from fbvm.record.draw.sfc_pieces import Piece
+from fbvm.syntax.ladder.drawing.box_lines import Surface
+
+LEAST = 24
+"""Columns that a chart needs for anything to be drawn."""
+WRAPPED = (60, 36, 24, 16)
+"""Columns of a line of a condition; the first is taken with which the chart is narrow enough."""
+TOKEN = "●"
+NAMED = 0
+"""In place of such columns: conditions stand below the chart, and transitions have names."""
+
+
+@dataclass(frozen=True)
+class Sighted:
+    """What was seen of a chart in one scan: the steps that were active at its end, by number, and the conditions that were
+    worked out, by the number of their transition."""
+
+    active: frozenset[int] = frozenset()
+    tested: Mapping[int, bool] = field(default_factory=dict)
+
+
+def sfc_text(picture: SfcPicture, width: int = 80, seen: Sighted | None = None) -> list[str]:
+    """The lines of a chart; without `seen` as it is at rest."""
+    return sfc_surface(picture, width, seen).rows()
+
+
+def sfc_surface(picture: SfcPicture, width: int = 80, seen: Sighted | None = None) -> Surface:
+    """The drawing of a chart.  One that is too wide has its conditions in several lines, then below it, and then branches
+    that stand by themselves."""
+    width = max(width, LEAST)
+    apart: frozenset[int] = frozenset()
+    for wrapped in (*WRAPPED, NAMED):
+        drawing = _Drawing(picture, seen, wrapped, apart)
+        if drawing.width <= width:
+            return drawing.surface()
+    while drawing.width > width:
+        step = drawing.branch_of_the_widest()
+        if step is None:
+            break
+        apart |= {step}
+        drawing = _Drawing(picture, seen, NAMED, apart)
+    return drawing.surface()
+
+
+class _Drawing:
+    """One attempt."""
+
+    def __init__(self, picture: SfcPicture, seen: Sighted | None, wrapped: int, apart: frozenset[int]) -> None:
+        self.picture, self.seen, self.wrapped = picture, seen, wrapped
+        self.graph = Graph(picture, apart)
+        self._pieces: dict[Node, Piece] = {}
+        for node in reversed(self.graph.order):
+            self._pieces[node] = self._piece(node)
+        self.width = max(self._pieces[root].width for root in self.graph.roots)
+
+    def surface(self) -> Surface:
+        """The networks and what stands apart, one below the other, and the conditions that found no place."""
+        surface, row = Surface(), 0
+        for root in self.graph.roots:
+            piece = self._pieces[root]
+            piece.draw(surface, 0, row)
+            row += piece.height + 1
+        if self.wrapped == NAMED:
+            for number in range(len(self.picture.transitions)):
+                surface.write(0, row, f"{self._name(number)}: {self.picture.transitions[number][5]}{self._result(number)}")
+                row += 1
+        return surface
+
+    def branch_of_the_widest(self) -> int | None:
+        """A step that begins a branch of the widest drawing and can stand by itself, the last such one."""
+        widest = max(self.graph.roots, key=lambda root: self._pieces[root].width)
+        inside, left = [], [widest]
+        while left:
+            node = left.pop(0)
+            inside.append(node)
+            left += [other for other in self.graph.order if self.graph.above[other] == node]
+        for node in inside:
+            branches = [follower for follower in self.graph.following[node] if not self.graph.is_jump(node, follower)]
+            if len(branches) > 1:
+                for branch in reversed(branches):
+                    steps = [branch] if branch.is_step else self.graph.following[branch]
+                    for step in steps:
+                        if step.number not in self.graph.apart and step not in self.graph.roots:
+                            return step.number
+        return None
+
+    # --- pieces -----------------------------------------------------------------------------------------------------
+
+    def _piece(self, node: Node) -> Piece:
+        """A node with all that stands below it."""
+        graph = self.graph
+        children: list[Piece] = []
+        for jumps, followers in groupby(graph.following[node], lambda follower: graph.is_jump(node, follower)):
+            group = list(followers)
+            if jumps and not node.is_step:
+                children.append(pieces.jump([self._label(one) for one in group], self._went(node, group[0])))
+                continue
+            for follower in group:
+                thick = self._went(node, follower)
+                if jumps:
+                    children.append(pieces.jump([self._label(follower)], thick))
+                elif len(graph.before[follower]) == 1:
+                    child = self._pieces[follower]
+                    child.thick = thick
+                    children.append(child)
+                else:
+                    children.append(pieces.passing(follower, thick))
+        made = pieces.over(self._own(node), children, double=not node.is_step)
+        for merged in graph.below[node]:
+            if any(end.to == merged for end in made.ends):
+                made = pieces.join(made, merged, self._pieces[merged], not merged.is_step, self._label(merged))
+        return made
+
+    def _own(self, node: Node) -> Piece:
+        if not node.is_step:
+            label = f"{self._priority(node.number)}{self._name(node.number)}" if self.wrapped == NAMED else \
+                self._whole(node.number)
+            piece = pieces.transition(label, self.wrapped or WRAPPED[0], self._tested(node.number) is True)
+            return piece if node not in self.graph.met else pieces.met(piece, self._name(node.number))
+        name, initial, _, rows = self.picture.steps[node.number]
+        active = self.seen is not None and node.number in self.seen.active
+        label = name if self.seen is None else f"{TOKEN if active else ' '} {name}"
+        return pieces.step(label, initial, active, rows)
+
+    def _label(self, node: Node) -> str:
+        return self.picture.steps[node.number][0] if node.is_step else self._name(node.number)
+
+    # --- transitions ------------------------------------------------------------------------------------------------
+
+    def _tested(self, number: int) -> bool | None:
+        return self.seen.tested.get(number) if self.seen is not None else None
+
+    def _went(self, node: Node, follower: Node) -> bool:
+        """Whether the transition of a link fired."""
+        return self._tested(follower.number if node.is_step else node.number) is True
+
+    def _name(self, number: int) -> str:
+        return self.picture.transitions[number][1] or f"t{number + 1}"
+
+    def _priority(self, number: int) -> str:
+        priority = self.picture.transitions[number][2]
+        return f"({priority}) " if priority else ""
+
+    def _whole(self, number: int) -> str:
+        _, name, _, _, _, condition = self.picture.transitions[number]
+        named = f"{name}: " if name and condition != name else ""
+        return f"{self._priority(number)}{named}{condition}{self._result(number)}"
+
+    def _result(self, number: int) -> str:
+        tested = self._tested(number)
+        return "" if tested is None else " → TRUE" if tested else " → FALSE"

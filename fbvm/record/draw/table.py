@@ -1,0 +1,205 @@
+"""The scan table: one column a variable, one row a phase or a statement that changed something, scans as bands.
+
+    scan 4     40 ms   Start   Delay.Q  Running
+      inputs          >TRUE     FALSE    FALSE
+      pump.st:12                         >TRUE
+
+A cell is marked with `>` where it changed.  A statement's row shows what it changed only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Protocol
+
+from fbvm.base.memory import WHOLE_BYTES
+from fbvm.code.image import Site
+from fbvm.machine.plc import Phase
+from fbvm.record.trace.events import Ended, Event, Frame, Read, Statement, Write
+from fbvm.record.trace.recorder import Signal
+from fbvm.watch.names import Names
+from fbvm.watch.paths import Place
+from fbvm.watch.values import Value, show_time
+
+MARK = ">"
+WIDEST_CELL = 24
+MOST_READS = 32
+"""Values of which a value without a name is remembered to have been made."""
+
+
+class Scanned(Protocol):
+    """What is listened to: a PLC, or the moment of a trace."""
+
+    @property
+    def scans(self) -> int: ...
+    @property
+    def now_ns(self) -> int: ...
+    def read(self, where: Place) -> Value: ...
+
+
+@dataclass(frozen=True)
+class Change:
+    """A variable got a new value: by a statement (`site`) of an instance, or from outside the program."""
+
+    scan: int
+    signal: Signal
+    old: Value
+    new: Value
+    site: Site | None
+    instance: str
+    phase: Phase | None = None
+    """In which it was if no statement did it."""
+
+
+@dataclass(frozen=True)
+class Writer:
+    """A statement that wrote a variable, maybe the value that was there, and what it had read."""
+
+    scan: int
+    site: Site | None
+    instance: str
+    reads: tuple[tuple[str, str], ...]
+
+
+@dataclass
+class Row:
+    """One row: what happened, and the values of all variables after it; None where nothing is to be said."""
+
+    label: str
+    values: list[Value]
+    changed: list[bool]
+
+
+@dataclass
+class Band:
+    """The rows of one scan."""
+
+    scan: int
+    now_ns: int
+    rows: list[Row] = field(default_factory=list)
+
+    @property
+    def moved(self) -> bool:
+        return any(any(row.changed) for row in self.rows)
+
+
+class ScanTable:
+    """Listens to scans, of a PLC or of a trace, and writes down what happened to some variables.
+
+    `every` keeps statements that changed none."""
+
+    def __init__(self, sites: Sequence[Site], names: Names, signals: Sequence[Signal], every: bool = False) -> None:
+        self.signals = list(signals)
+        self.bands: list[Band] = []
+        self.changes: list[Change] = []
+        self.writers: dict[Signal, Writer] = {}
+        """Who wrote each variable last."""
+        self._sites, self._names, self._every = sites, names, every
+        self._values: list[Value] | None = None
+        self._statement: Statement | None = None
+        self._reads: dict[Frame, dict[str, str]] = {}
+        self._nameless: dict[int, dict[str, str]] = {}
+        """What was read for the bytes that no name has, such as conditions of rungs."""
+
+    def phase(self, plc: Scanned, phase: Phase) -> None:
+        if phase is Phase.INPUTS or not self.bands or self.bands[-1].scan != plc.scans:
+            self.bands.append(Band(plc.scans, plc.now_ns))
+        self._finish(plc)
+        values, changed = self._look(plc)
+        for signal, before, now, moved in zip(self.signals, self._values or values, values, changed, strict=True):
+            if moved:
+                self.changes.append(Change(plc.scans, signal, before, now, None, "", phase))
+        self._values = values
+        if phase is Phase.INPUTS or any(changed):
+            self.bands[-1].rows.append(Row(phase.value, values, changed))
+
+    def event(self, plc: Scanned, event: Event) -> None:
+        if isinstance(event, Statement):
+            self._finish(plc)
+            self._statement = event
+            self._reads[event.frame] = {}
+        elif isinstance(event, Read):
+            place = self._names.at(event.offset, event.bit if event.bit != WHOLE_BYTES else None)
+            read = self._reads.setdefault(event.frame, {})
+            if place is None:
+                read.update(self._nameless.get(event.offset, {}))
+            elif not place.unwritten:
+                read[place.name] = Signal(place, place.name).text(self._names.read(plc.read, place))
+        elif isinstance(event, Ended):
+            self._reads.pop(event.frame, None)
+        elif isinstance(event, Write) and self._names.at(event.offset) is None:
+            self._nameless[event.offset] = dict(islice(self._reads.get(event.frame, {}).items(), MOST_READS))
+        elif isinstance(event, Write) and (concerned := self._concerned(event)):
+            reads = tuple(self._reads.get(event.frame, {}).items())
+            for signal in concerned:
+                self.writers[signal] = Writer(plc.scans, self._site(event.site), self._names.instance(event.frame.base), reads)
+            if event.old != event.value:
+                self._row(plc, event.site, event.frame)
+
+    def _site(self, number: int) -> Site | None:
+        return self._sites[number] if number >= 0 else None
+
+    def _concerned(self, event: Write) -> list[Signal]:
+        end = event.offset + len(event.value)
+        near = [signal for signal in self.signals if (place := signal.place).hops
+                or place.offset < end and event.offset < place.offset + place.type.size]  # fmt: skip
+        return [signal for signal in near if signal.place.bit is None or event.bit in (signal.place.bit, WHOLE_BYTES)]
+
+    def _finish(self, plc: Scanned) -> None:
+        """The last statement is over; if it changed nothing its row is kept only where every row is."""
+        statement, self._statement = self._statement, None
+        if statement and self._every and self._values is not None:
+            label = _place(self._sites[statement.site])
+            if not self.bands[-1].rows or self.bands[-1].rows[-1].label != label:
+                self.bands[-1].rows.append(Row(label, self._values, [False] * len(self.signals)))
+
+    def _row(self, plc: Scanned, site: int, frame: Frame) -> None:
+        values, changed = self._look(plc)
+        if not any(changed):
+            return
+        place = self._site(site)
+        instance = self._names.instance(frame.base)
+        for signal, old, new, moved in zip(self.signals, self._values or values, values, changed, strict=True):
+            if moved:
+                self.changes.append(Change(plc.scans, signal, old, new, place, instance))
+        self._values = values
+        self.bands[-1].rows.append(Row(_place(place) if place else "stub", values, changed))
+        self._statement = None
+
+    def _look(self, plc: Scanned) -> tuple[list[Value], list[bool]]:
+        values = [self._names.read(plc.read, signal.place) for signal in self.signals]
+        before = self._values
+        return values, [before is not None and now != before[at] for at, now in enumerate(values)]
+
+    def last_change(self, signal: Signal) -> Change | None:
+        """The last change of a variable, None if it kept its value."""
+        return next((change for change in reversed(self.changes) if change.signal == signal), None)
+
+    def draw(self, bands: Iterable[Band] | None = None) -> str:
+        """The table as text."""
+        chosen = list(self.bands if bands is None else bands)
+        headings = [signal.label for signal in self.signals]
+        heads = [f"scan {band.scan}   {show_time(band.now_ns).removeprefix('T#')}" for band in chosen]
+        left = max([len(head) + 2 for head in heads] + [len(row.label) + 4 for band in chosen for row in band.rows])
+        widths = [max([len(heading)] + [len(self._cell(at, row)) for band in chosen for row in band.rows])
+                  for at, heading in enumerate(headings)]  # fmt: skip
+        lines = []
+        for number, (head, band) in enumerate(zip(heads, chosen, strict=True)):
+            names = "  ".join(f" {name:<{width}}" for name, width in zip(headings, widths, strict=True))
+            lines.append(f"{head:<{left}}{names if number == 0 else ''}".rstrip())
+            for row in band.rows:
+                whole = row.label == Phase.INPUTS.value
+                cells = [(MARK if moved else " ") + f"{self._cell(at, row) if whole or moved else '':<{width}}"
+                         for at, (width, moved) in enumerate(zip(widths, row.changed, strict=True))]  # fmt: skip
+                lines.append(f"  {row.label:<{left - 2}}{'  '.join(cells)}".rstrip())
+        return "\n".join(lines)
+
+    def _cell(self, at: int, row: Row) -> str:
+        text = self.signals[at].said(row.values[at])
+        return text if len(text) <= WIDEST_CELL else text[: WIDEST_CELL - 3] + "..."
+
+
+def _place(site: Site) -> str:
+    return f"{site.file.rpartition('/')[2]}:{site.line}"

@@ -1,0 +1,297 @@
+"""All that the page of a run shows, as plain data: signals, words, what happened inside scans, what passed the network.
+
+    {"scans": [first, count], "times": [ns, then differences], "signals": [...], "words": {"D": {"200": [scan, value, ...]}},
+     "rows": {scan: [[where, instance, signal, text, ...], ...]}, "frames": [...], ...}
+
+A value is written when it changes.  Numbers of signals, statements and instances are places in their lists; of a row,
+`where` is a statement, or -1, -2, -3 for the phases of a scan; signal -1 says whether an element of a rung conducts.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from typing import Any
+
+from fbvm.base.areas import FLAG_AREAS
+from fbvm.base.memory import WHOLE_BYTES, Snapshot, compare
+from fbvm.base.types import StructType
+from fbvm.code.image import RungPicture
+from fbvm.machine.plc import Phase
+from fbvm.record.draw.ladder_svg import rung_svg
+from fbvm.record.draw.ladder_text import ladder_surface
+from fbvm.record.draw.power import Power
+from fbvm.record.draw.sfc_seen import Called, Evolutions
+from fbvm.record.draw.sfc_text import sfc_surface
+from fbvm.record.trace.events import Contact, Event, Frame, Passing, Statement, Write
+from fbvm.record.trace.format import PHASES
+from fbvm.record.trace.reader import Moment, Trace
+from fbvm.record.trace.recorder import Signal, signals_at
+from fbvm.record.trace.signals import chosen_signals
+from fbvm.record.trace.traffic import Passed, Reader
+from fbvm.record.trace.writer import Depth
+from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.watch.paths import UnknownPlace
+
+MOST_ROWS = 200_000
+"""Statements and phases that are kept, the latest ones; of earlier scans there are values only."""
+MOST_PICTURES = 5000
+"""Rungs that are drawn, each once for every way in which power went through it."""
+RUNG_WIDTH = 90
+FEW_SIGNALS = 60
+"""If there are more, those that stood still are left out unless somebody asks for them."""
+POWER = -1
+"""In place of a signal: whether an element of a rung conducts."""
+VERSION = 1
+
+
+class Collector:
+    """Follows a trace, or scans that are done again, and collects."""
+
+    def __init__(self, trace: Trace, signals: Sequence[Signal]) -> None:
+        self._trace, self.signals = trace, list(signals)
+        self.times_ns: list[int] = []
+        self.first = 0
+        self.changes: list[list[Any]] = [[] for _ in signals]
+        self.words: dict[str, dict[int, list[int]]] = {}
+        self.rows: OrderedDict[int, list[list[Any]]] = OrderedDict()
+        self.passed: list[tuple[int, Passed]] = []
+        self.instances: dict[str, int] = {}
+        self.drawings: dict[tuple[object, ...], int] = {}
+        self.pictures: list[str] = []
+        self.ladder: dict[int, list[list[int]]] = {}
+        self._power = Power(trace.rungs, lambda scan: True)
+        self._evolutions = Evolutions(trace.charts, lambda scan: True)
+        self._reader = Reader()
+        self._known: list[str] = []
+        self._ended: list[str] = []
+        self._memory: Snapshot | None = None
+        self._whole: Snapshot | None = None
+        self._statement: tuple[int, Frame] | None = None
+        self._row: list[Any] | None = None
+        self._count = 0
+        self._at: dict[int, list[int]] = {}
+        for number, signal in enumerate(signals):
+            for offset in range(signal.place.offset, signal.place.offset + max(1, signal.place.type.size)):
+                self._at.setdefault(offset, []).append(number)
+
+    # --- what is told
+
+    def phase(self, moment: Moment, phase: Phase) -> None:
+        """Notes what a phase changed that no statement did, and at the end of a scan all values."""
+        now = moment.memory.snapshot()
+        if self._memory is None:
+            self.first = moment.scans
+            self._known = [self._text(number, moment) for number in range(len(self.signals))]
+        self._statement = self._row = None
+        moved = self._moved(self._touched(now), moment)
+        self._memory = now
+        if moved or phase is Phase.INPUTS:
+            self._add(moment.scans, [-1 - PHASES.index(phase), -1, *moved])
+        self._power.phase(moment, phase)
+        self._evolutions.phase(moment, phase)
+        if phase is Phase.PROGRAM:
+            self._draw(moment.scans)
+        if phase is Phase.REFRESH:
+            self._end(moment, now)
+
+    def event(self, moment: Moment, event: Event) -> None:
+        """Notes a statement, and what it writes."""
+        self._power.event(moment, event)
+        self._evolutions.event(moment, event)
+        if isinstance(event, Passing):
+            self.passed += [(moment.scans, passed) for passed in self._reader.read(event.now_ns, event.happening)]
+        elif isinstance(event, Contact):
+            self._add(moment.scans, [event.site, self._instance(event.frame), POWER, str(int(event.value))])
+        elif isinstance(event, Statement):
+            self._statement, self._row = (event.site, event.frame), None
+            self._open(moment, event.site, event.frame)
+        elif isinstance(event, Write) and event.old != event.value:
+            if self._statement != (event.site, event.frame) or self._row is None:
+                self._statement = event.site, event.frame
+                self._open(moment, event.site, event.frame)
+            assert self._row is not None
+            self._row += self._moved(self._written(event), moment)
+
+    def _draw(self, scan: int) -> None:
+        """Draws the rungs and charts of a scan as they were seen; what looked the same before is drawn once."""
+        for made in self._power.executed:
+            key = made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items())
+            self._picture(scan, made.base, key, partial(_rung, made.picture, Sight(made.states)))
+        self._power.executed.clear()
+        for called in self._evolutions.called:
+            key = called.picture.site, tuple(sorted(called.tested.items())), called.active
+            self._picture(scan, called.base, key, partial(self._chart, called))
+        self._evolutions.called.clear()
+
+    def _chart(self, called: Called) -> list[str]:
+        name, kind = self._trace.bodies[called.picture.body]
+        return [f"{kind} {name}", rung_svg(sfc_surface(called.picture, RUNG_WIDTH, called.sighted))]
+
+    def _picture(self, scan: int, base: int, key: tuple[object, ...], lines: Callable[[], list[str]]) -> None:
+        if key not in self.drawings and len(self.pictures) < MOST_PICTURES:
+            self.drawings[key] = len(self.pictures)
+            self.pictures.append("\n".join(lines()))
+        if key in self.drawings:
+            instance = self.instances.setdefault(self._trace.names.instance(base), len(self.instances))
+            self.ladder.setdefault(scan, []).append([instance, self.drawings[key]])
+
+    def _open(self, moment: Moment, site: int, frame: Frame) -> None:
+        self._row = [site, self._instance(frame)]
+        self._add(moment.scans, self._row)
+
+    def _instance(self, frame: Frame) -> int:
+        return self.instances.setdefault(self._trace.names.instance(frame.base), len(self.instances))
+
+    def _add(self, scan: int, row: list[Any]) -> None:
+        self.rows.setdefault(scan, []).append(row)
+        self._count += 1
+        while self._count > MOST_ROWS and len(self.rows) > 1:
+            gone, rows = self.rows.popitem(last=False)
+            self._count -= len(rows)
+            self.ladder.pop(gone, None)
+
+    # --- values
+
+    def _text(self, number: int, moment: Moment) -> str:
+        signal = self.signals[number]
+        value = self._trace.names.read(moment.read, signal.place)
+        return str(int(value is True)) if signal.is_bit else signal.said(value)
+
+    def _touched(self, now: Snapshot) -> set[int]:
+        """The signals in bytes that differ from the phase before."""
+        if self._memory is None:
+            return set()
+        runs = compare(self._memory, now)
+        return {number for offset, size in runs for at in range(offset, offset + size) for number in self._at.get(at, ())}
+
+    def _written(self, event: Write) -> list[int]:
+        numbers = {number for at in range(event.offset, event.offset + len(event.value)) for number in self._at.get(at, ())}
+        return [number for number in sorted(numbers) if event.bit == WHOLE_BYTES
+                or self.signals[number].place.bit in (None, event.bit)]  # fmt: skip
+
+    def _moved(self, numbers: Iterable[int], moment: Moment) -> list[Any]:
+        """Signal, text, signal, text ... of those that have another value than they had."""
+        made: list[Any] = []
+        for number in sorted(numbers):
+            text = self._text(number, moment)
+            if text != self._known[number]:
+                self._known[number] = text
+                made += [number, text]
+        return made
+
+    def _end(self, moment: Moment, now: Snapshot) -> None:
+        scan = moment.scans
+        self.times_ns.append(moment.now_ns)
+        for number, text in enumerate(self._known):
+            if not self._ended or text != self._ended[number]:
+                self.changes[number] += [scan, text]
+        self._ended = list(self._known)
+        before = self._whole or Snapshot((None,) * len(now.pages))
+        for area, address in _words(self._trace, compare(before, now)):
+            changes = self.words.setdefault(area, {}).setdefault(address, [] if self._whole is None else [self.first, 0])
+            changes += [scan, moment.memory.words(area)[address]]
+        self._whole = now
+
+
+def _rung(picture: RungPicture, sight: Sight) -> list[str]:
+    """The headline of a rung, and its drawing as SVG."""
+    head, surface = ladder_surface(picture, RUNG_WIDTH, sight)
+    return [head, rung_svg(surface)] if picture.steps else [head]
+
+
+def _words(trace: Trace, runs: list[tuple[int, int]]) -> Iterator[tuple[str, int]]:
+    """The words of areas in some bytes, each once."""
+    areas = [area for area in trace.areas.values() if area.unit_bits == 16 and area.name not in FLAG_AREAS]
+    seen: set[tuple[str, int]] = set()
+    for offset, size in runs:
+        for area in areas:
+            low, high = max(offset, area.offset), min(offset + size, area.offset + area.size_bytes)
+            for address in range((low - area.offset) // 2, (high - area.offset + 1) // 2) if low < high else ():
+                if (area.name, address) not in seen:
+                    seen.add((area.name, address))
+                    yield area.name, address
+
+
+def page_data(trace: Trace, names: Sequence[str] = (), scans: range | None = None, title: str = "", *, prefix: str = "",
+              pinned: Sequence[str] = ()) -> dict[str, Any]:  # fmt: skip
+    """The data of a trace, or of some of its scans and variables.  Raises UnknownPlace, TypeError, TraceError.
+
+    `prefix` is not shown in names; variables that are `pinned` have columns in the scan table, and the last scan is
+    shown first."""
+    signals = chosen_signals(trace, names) if names else _in_order(trace)
+    known = {signal.place.name for signal in signals}
+    signals += [signal for name in pinned if name not in known
+                for signal in signals_at(trace.find(name), trace.described, trace.meanings)]  # fmt: skip
+    made = Collector(trace, signals)
+    trace.follow(made, scans)
+    every = bool(names) or len(made.signals) <= FEW_SIGNALS
+    made.changes = [changes if every or len(changes) > 2 or signal.place.name in pinned else []
+                    for signal, changes in zip(made.signals, made.changes, strict=True)]  # fmt: skip
+    return {"title": title, "pinned": [name.removeprefix(prefix) for name in pinned], **_as_data(trace, made, prefix)}
+
+
+def _in_order(trace: Trace) -> list[Signal]:
+    """All signals; what is of most interest comes first: programs' own variables, what units say, then what lies deeper."""
+    programs = {field.name for field in trace.symbols.values() if isinstance(field.type, StructType) and field.type.block}
+
+    def rank(signal: Signal) -> int:
+        owner, *rest = signal.place.name.split(".")
+        return 1 if signal.place.area else len(rest) - 1 if owner in programs else 2
+
+    return sorted((signal for signal in chosen_signals(trace, ()) if not signal.place.unwritten), key=rank)
+
+
+def _as_data(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
+    """What was collected, as JSON can write it; signals without values are left out."""
+    kept = [number for number, changes in enumerate(made.changes) if changes]
+    new = {number: at for at, number in enumerate(kept)}
+    used = sorted({row[0] for rows in made.rows.values() for row in rows if row[0] >= 0})
+    sites = {number: at for at, number in enumerate(used)}
+    times = made.times_ns
+    return {
+        "version": VERSION, "cycle": trace.cycle_ns, "depth": trace.depth.value,
+        "scans": [made.first, len(times)],
+        "times": [now - before for before, now in zip([0, *times], times, strict=False)],
+        "signals": [_signal(made, number, prefix) for number in kept],
+        "words": {area: {str(at): changes for at, changes in sorted(rows.items())} for area, rows in made.words.items()},
+        "names": dict(reversed(list(_located(trace, made.signals)))), "described": trace.described,
+        "meanings": {address: {str(value): text for value, text in known.items()}
+                     for address, known in trace.meanings.items()},
+        "sites": [[site.file, site.line, trace.line(site)] for site in (trace.sites[number] for number in used)],
+        "instances": [path.removeprefix(prefix.rstrip(".")).lstrip(".") for path in made.instances],
+        "rows": {str(scan): [_renumbered(row, new, sites) for row in rows] for scan, rows in made.rows.items()
+                 if trace.depth is not Depth.SCANS},
+        "frames": frame_rows(made.passed),
+        "pictures": made.pictures, "ladder": {str(scan): rungs for scan, rungs in made.ladder.items()},
+    }  # fmt: skip
+
+
+def frame_rows(rows: Sequence[tuple[int, Passed]]) -> list[list[Any]]:
+    """What passed the network, as the page has it."""
+    return [[scan, passed.now_ns, str(passed.sender), str(passed.receiver), passed.said, passed.data.hex()]
+            for scan, passed in rows]  # fmt: skip
+
+
+def _signal(made: Collector, number: int, prefix: str) -> dict[str, Any]:
+    signal = made.signals[number]
+    return {"name": signal.label.removeprefix(prefix), "bit": int(signal.is_bit), "said": signal.description,
+            "changes": made.changes[number]}  # fmt: skip
+
+
+def _renumbered(row: list[Any], new: dict[int, int], sites: dict[int, int]) -> list[Any]:
+    changed = [item for number, text in zip(row[2::2], row[3::2], strict=True) if number in new or number == POWER
+               for item in (new.get(number, POWER), text)]  # fmt: skip
+    return [sites.get(row[0], row[0]), row[1], *changed]
+
+
+def _located(trace: Trace, signals: Sequence[Signal]) -> Iterator[tuple[str, str]]:
+    """Addresses at which variables lie, and the variables."""
+    for signal in signals:
+        if not signal.place.area:
+            try:
+                if address := trace.names.address(signal.place):
+                    yield address, signal.place.name
+            except UnknownPlace:
+                continue

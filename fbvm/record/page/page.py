@@ -1,0 +1,38 @@
+"""The page of a run: one HTML file that opens offline, with everything in it.
+
+What it shows is `page.data`; how, is written by hand in `page/`: HTML, CSS and JavaScript that are put together here as
+they are.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import zlib
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+FOLDER = Path(__file__).parent
+SCRIPTS = ("model.js", "chart.js", "panels.js", "main.js")
+
+
+def page(data: dict[str, Any]) -> str:
+    """The text of the file."""
+    packed = zlib.compress(json.dumps(data, separators=(",", ":")).encode(), 9)
+    parts = {
+        "title": html.escape(str(data["title"])),
+        "style": _file("page.css"),
+        "script": "\n".join(_file(name) for name in SCRIPTS),
+        "data": base64.b64encode(packed).decode("ascii"),
+    }
+    made = _file("page.html")
+    for name, text in parts.items():
+        made = made.replace("{{" + name + "}}", text)
+    return made
+
+
+@cache
+def _file(name: str) -> str:
+    return (FOLDER / name).read_text(encoding="utf-8")

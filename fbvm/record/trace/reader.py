@@ -1,0 +1,330 @@
+"""Reads a trace: values at the end of any scan, and what happened inside, without the program.
+
+    trace = Trace.open("run.fbtrace")
+    trace.at(41).read("D200")
+
+A file that is still being written is read as far as it is whole; `refresh` looks for more.
+"""
+
+from __future__ import annotations
+
+import json
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol
+
+from fbvm.base.areas import Mailbox
+from fbvm.base.memory import Memory
+from fbvm.code.image import Layout, RungPicture, SfcPicture, Site
+from fbvm.machine.plc import Phase
+from fbvm.record.trace import symbols
+from fbvm.record.trace.events import Began, Contact, Ended, Event, Frame, Passing, Read, Statement, Write
+from fbvm.record.trace.format import (
+    BLOCK,
+    CONTACT,
+    END,
+    FRAME,
+    HEADER,
+    LINE,
+    MAGIC,
+    NETWORK,
+    PHASE,
+    PHASES,
+    READ,
+    SCAN,
+    STATEMENT,
+    WRITE,
+    Chunk,
+    Cursor,
+    TraceError,
+    chunks,
+    read_chunk,
+    xor,
+)
+from fbvm.record.trace.writer import FORMAT, Depth
+from fbvm.watch import places
+from fbvm.watch.names import Names
+from fbvm.watch.paths import Place, Span, find
+from fbvm.watch.values import Value
+from fbvm.wire.link import Peer
+from fbvm.wire.tap import Happening, What
+
+
+class Follower(Protocol):
+    """Who is told what a trace holds; like a `history.Listener`, with a moment in place of a PLC."""
+
+    def phase(self, moment: Moment, phase: Phase) -> None:
+        """A phase of a scan is over; REFRESH is the end of the scan."""
+
+    def event(self, moment: Moment, event: Event) -> None:
+        """Something happened in the program."""
+
+
+@dataclass
+class Moment:
+    """A PLC at some moment of a trace: its memory, the number of the scan and its time."""
+
+    trace: Trace
+    memory: Memory
+    scans: int = 0
+    now_ns: int = 0
+
+    def find(self, text: str) -> Place | Span:
+        """The place or span of places that `text` names.  Raises UnknownPlace."""
+        return self.trace.find(text)
+
+    def read(self, where: str | Place | Span) -> Value:
+        """The value of a variable, address or range.  Raises UnknownPlace."""
+        found = self.find(where) if isinstance(where, str) else where
+        if isinstance(found, Span):
+            return [places.read(self.memory, place) for place in found.places]
+        return places.read(self.memory, found)
+
+
+class Trace:
+    """A trace in a file that is open for reading.  Raises TraceError if it is none."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        if file.read(len(MAGIC)) != MAGIC:
+            raise TraceError("this is no trace of fbvm")
+        header = next(chunks(file), None)
+        if header is None or header.kind != HEADER:
+            raise TraceError("the trace has no header yet")
+        self.header = _header(read_chunk(file, header.at))
+        head = self.header
+        self._take(head)
+        self._blocks: list[Chunk] = []
+        self._end = file.tell()
+        self.refresh()
+
+    def _take(self, head: dict[str, Any]) -> None:
+        try:
+            self.symbols = symbols.from_data(head)
+            self._extents = [(int(start), int(end)) for start, end in head.get("objects", ())]
+            boxes = tuple(Mailbox(str(name), *map(int, sizes)) for name, *sizes in head["mailboxes"])
+            layout = Layout(int(head["slots"]), tuple(head["e_banks"]), boxes)
+            self.areas, self.size = layout.areas, layout.size
+            self.cycle_ns = int(head["cycle_ns"])
+            self.depth = Depth(head["depth"])
+            self.selected: tuple[str, ...] = tuple(head["selected"])
+            self.sites = [Site(head["files"][file], pou, line, column) for file, pou, line, column in head["sites"]]
+            self.outer = [int(number) for number in head["outer"]]
+            self.bodies = [(str(name), str(kind)) for name, kind in head["bodies"]]
+            self.rungs = tuple(_rung(*row) for row in head["rungs"])
+            self.charts = tuple(_chart(*row) for row in head.get("charts", ()))
+            self.rung_sites = frozenset(rung.site for rung in self.rungs)
+            self.described = dict(head["described"])
+            self.meanings: dict[str, dict[int, str]] = {
+                address: {int(value): str(text) for value, text in known.items()}
+                for address, known in head["meanings"].items()}  # fmt: skip
+            self._lines: dict[str, dict[int, str]] = {
+                file: {int(n): str(text) for n, text in rows.items()} for file, rows in head["lines"].items()}
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+            raise TraceError(f"the trace's header is damaged: {error}") from None
+        self.names = Names(self.symbols, self.areas, self._extents)
+
+    @classmethod
+    def open(cls, path: Path | str) -> Trace:
+        """The trace in a file.  Raises OSError, TraceError."""
+        file = Path(path).open("rb")  # noqa: SIM115 - the trace closes it
+        try:
+            return cls(file)
+        except BaseException:
+            file.close()
+            raise
+
+    def close(self) -> None:
+        """Closes the file."""
+        self._file.close()
+
+    def __enter__(self) -> Trace:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def refresh(self) -> None:
+        """Looks for scans that were written since."""
+        self._file.seek(self._end)
+        for chunk in chunks(self._file):
+            if chunk.kind == BLOCK and chunk.scans:
+                while self._blocks and self._blocks[-1].first >= chunk.first:
+                    self._blocks.pop()  # the PLC went back in time; what it did instead counts
+                self._blocks.append(chunk)
+        self._end = self._file.tell()
+
+    # --- what it holds
+
+    @property
+    def scans(self) -> range:
+        """Numbers from the first to the last recorded scan."""
+        if not self._blocks:
+            return range(0)
+        return range(self._blocks[0].first, self._blocks[-1].first + self._blocks[-1].scans)
+
+    def find(self, text: str) -> Place | Span:
+        """The place or span of places that `text` names.  Raises UnknownPlace."""
+        return find(self.symbols, self.areas, text)
+
+    def line(self, site: Site) -> str:
+        """The text of the line on which a statement stands, "" if the trace does not have it."""
+        return self._lines.get(site.file, {}).get(site.line, "")
+
+    def at(self, scan: int) -> Moment:
+        """The PLC at the end of a scan.  Raises ValueError if it is not recorded."""
+        moment = next(self.moments(range(scan, scan + 1)), None)
+        if moment is None:
+            raise ValueError(f"scan {scan} is not in the trace, which has {_shown(self.scans)}")
+        return moment
+
+    def moments(self, scans: range | None = None) -> Iterator[Moment]:
+        """The PLC at the end of each scan; the same object every time."""
+        for phase, moment in self._play(scans, None):
+            if phase is Phase.REFRESH:
+                yield moment
+
+    def follow(self, follower: Follower, scans: range | None = None) -> None:
+        """Tells all that happened in some scans."""
+        for phase, moment in self._play(scans, follower):
+            follower.phase(moment, phase)
+
+    def _play(self, scans: range | None, follower: Follower | None) -> Iterator[tuple[Phase, Moment]]:
+        wanted = self.scans if scans is None else scans
+        if not wanted or not self._blocks:
+            return
+        first = max(0, bisect_right([block.first for block in self._blocks], wanted.start) - 1)
+        memory = Memory(self.size, self.areas)
+        nexts = [block.first for block in self._blocks[1:]] + [wanted.stop]
+        for block, end in zip(self._blocks[first:], nexts[first:], strict=True):
+            if block.first >= wanted.stop:
+                break
+            cursor, part = Cursor(read_chunk(self._file, block.at)), range(wanted.start, min(end, wanted.stop))
+            player = _Player(self, cursor, memory, follower, part)
+            try:
+                yield from player.play()
+            except (IndexError, KeyError) as error:
+                raise TraceError(f"the block of scan {block.first} is damaged: {error}") from None
+
+
+class _Player:
+    """Plays one block."""
+
+    def __init__(self, trace: Trace, cursor: Cursor, memory: Memory, follower: Follower | None, wanted: range) -> None:
+        self._cursor, self._follower, self._wanted = cursor, follower, wanted
+        self._moment = Moment(trace, memory)
+        self._base = bytearray(memory.size)
+        self._touched: list[tuple[int, int]] = []
+        self._frames: list[Frame] = []
+        self._outside = Frame(-1, 0, -1, None)
+
+    def play(self) -> Iterator[tuple[Phase, Moment]]:
+        cursor, moment = self._cursor, self._moment
+        self._lines()
+        moment.memory.u8[:] = self._base
+        while cursor.more:
+            tag = cursor.number()
+            if tag == SCAN:
+                scan = moment.scans + cursor.number()
+                if scan >= self._wanted.stop:
+                    return
+                moment.scans, moment.now_ns = scan, moment.now_ns + cursor.number()
+                self._frames.clear()
+            elif tag == PHASE:
+                phase = PHASES[cursor.number()]
+                self._lines()
+                if moment.scans in self._wanted:
+                    yield phase, moment
+            else:
+                event = self._event(tag)
+                if self._follower and moment.scans in self._wanted:
+                    self._follower.event(moment, event)
+
+    def _lines(self) -> None:
+        """Applies the changes of memory; what recorded writes did is among them."""
+        cursor, base, live = self._cursor, self._base, self._moment.memory.u8
+        for start, end in self._touched:
+            live[start:end] = base[start:end]
+        self._touched.clear()
+        line = 0
+        for _ in range(cursor.number()):
+            line += cursor.number()
+            start, end = line * LINE, line * LINE + LINE
+            base[start:end] = xor(base[start:end], cursor.bytes(LINE))
+            live[start:end] = base[start:end]
+
+    def _event(self, tag: int) -> Event:
+        cursor = self._cursor
+        if tag == NETWORK:
+            return _passing(cursor.bytes(cursor.number()))
+        if tag == FRAME:
+            body, start, site, caller = (cursor.number() for _ in range(4))
+            frame = Frame(body, start, site - 1, self._frames[caller - 1] if caller else self._outside)
+            self._frames.append(frame)
+            return Began(frame)
+        frame = self._frames[cursor.number()]
+        if tag == END:
+            return Ended(frame)
+        if tag == STATEMENT:
+            number = cursor.number()
+            return Statement(number, frame, number in self._moment.trace.rung_sites)
+        if tag == CONTACT:
+            site, value, size = (cursor.number() for _ in range(3))
+            return Contact(site, frame, json.loads(cursor.bytes(size)), bool(value))
+        site, offset, bit, size = (cursor.number() for _ in range(4))
+        if tag == READ:
+            return Read(site - 1, frame, offset, bit, cursor.bytes(size))
+        if tag != WRITE:
+            raise IndexError(f"a record of kind {tag}")
+        event = Write(site - 1, frame, offset, bit, cursor.bytes(size), cursor.bytes(size))
+        self._write(event)
+        return event
+
+    def _write(self, event: Write) -> None:
+        memory, end = self._moment.memory, event.offset + len(event.value)
+        if event.bit < 8:
+            memory.write(event.offset, "b", event.value != b"\0", event.bit)
+        else:
+            memory.u8[event.offset : end] = event.value
+        self._touched.append((event.offset, end))
+
+
+def _rung(body: int, site: int, number: int, comment: str, steps: list[Any]) -> RungPicture:
+    return RungPicture(int(body), int(site), int(number), str(comment),
+                       tuple((int(place), str(prefix), str(mnemonic), tuple(map(str, operands)))
+                             for place, prefix, mnemonic, operands in steps))  # fmt: skip
+
+
+def _chart(body: int, site: int, steps: list[Any], transitions: list[Any]) -> SfcPicture:
+    return SfcPicture(
+        int(body), int(site),
+        tuple((str(name), bool(initial), int(flag), tuple((str(a), str(b), str(c)) for a, b, c in rows))
+              for name, initial, flag, rows in steps),
+        tuple((int(place), str(name), int(priority), tuple(map(int, sources)), tuple(map(int, targets)), str(condition))
+              for place, name, priority, sources, targets, condition in transitions))  # fmt: skip
+
+
+def _passing(text: bytes) -> Passing:
+    try:
+        now_ns, what, host, port, other, other_port, out, mirrored, data = json.loads(text)
+        local, remote = Peer(str(host), int(port)), Peer(str(other), int(other_port))
+        return Passing(int(now_ns), Happening(What(what), local, remote, bool(out), bytes.fromhex(data), bool(mirrored)))
+    except (ValueError, TypeError) as error:
+        raise IndexError(f"what passed the network is not readable: {error}") from None
+
+
+def _header(payload: bytes) -> dict[str, Any]:
+    try:
+        head = json.loads(payload)
+        if head["format"] != FORMAT:
+            raise TraceError(f"a trace of format {head['format']}; this version of fbvm reads format {FORMAT}")
+    except (ValueError, KeyError, TypeError) as error:
+        raise error if isinstance(error, TraceError) else TraceError(f"the trace's header is damaged: {error}") from None
+    made: dict[str, Any] = head
+    return made
+
+
+def _shown(scans: Sequence[int]) -> str:
+    return f"scans {scans[0]} to {scans[-1]}" if scans else "no scans"

@@ -1,0 +1,62 @@
+"""Recordings as CSV: one row a scan, one column a variable.
+
+    scan,time_ms,Main.Start,Main.Delay.ET [ms],D200
+    0,0,FALSE,0,7
+
+BOOL is TRUE or FALSE, times are numbers of milliseconds in a column that says so, dates are literals, enumerations are
+their members' names.
+"""
+
+from __future__ import annotations
+
+import csv
+from decimal import Decimal
+from typing import TextIO
+
+from fbvm.base.arithmetic import shortest
+from fbvm.base.types import REAL, EnumType, base, families
+from fbvm.record.trace.recorder import Recording, Signal
+from fbvm.watch.values import Value, show
+
+SCAN, TIME_MS = "scan", "time_ms"
+MS = " [ms]"
+DURATIONS = frozenset(("TIME", "LTIME"))
+
+
+def write_rows(recording: Recording, file: TextIO) -> None:
+    """Writes a recording; open the file with `newline=""`."""
+    writer = csv.writer(file, lineterminator="\n")
+    signals = [track.signal for track in recording.tracks]
+    writer.writerow([SCAN, TIME_MS, *(_heading(signal) for signal in signals)])
+    columns = [track.values(recording.scans) for track in recording.tracks]
+    for scan, now_ns, *values in zip(recording.scans, recording.times_ns, *columns, strict=True):
+        cells = [_cell(signal, value) for signal, value in zip(signals, values, strict=True)]
+        writer.writerow([scan, _milliseconds(now_ns), *cells])
+
+
+def _is_duration(signal: Signal) -> bool:
+    return base(signal.place.type).name in DURATIONS
+
+
+def _heading(signal: Signal) -> str:
+    return signal.place.name + (MS if _is_duration(signal) else "")
+
+
+def _cell(signal: Signal, value: Value) -> str:
+    if isinstance(value, bool):
+        return "TRUE" if value else "FALSE"
+    if _is_duration(signal) and isinstance(value, int):
+        return _milliseconds(value)
+    kind = base(signal.place.type)
+    if isinstance(kind, EnumType):
+        return signal.text(value)
+    if value is not None and "ANY_DATE" in families(kind):
+        return show(kind, value)
+    if isinstance(value, float):
+        return repr(shortest(value) if kind is REAL else value)
+    return "" if value is None else str(value)
+
+
+def _milliseconds(time_ns: int) -> str:
+    text = f"{Decimal(time_ns).scaleb(-6):f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text

@@ -1,0 +1,171 @@
+"""CSV as a trace: a table as `rows` writes it, or as others do."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import Any, BinaryIO, TextIO, TypeAlias
+
+from fbvm.base.areas import SLOTS_OFFSET, AddressError, parse_address
+from fbvm.base.types import BOOL, LINT, LREAL, TIME, ULINT, Field, StructType, Type, array, fold, string
+from fbvm.check.declarations.size_limits import MAX_SIZE
+from fbvm.code.image import Image, Layout
+from fbvm.machine.plc import Plc
+from fbvm.record.trace.rows import MS, SCAN, TIME_MS
+from fbvm.record.trace.writer import TraceWriter
+
+LONGEST_TEXT = 254
+_PATH = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*|\[-?\d+(, ?-?\d+)*\])*")
+_STEP = re.compile(r"(\w+)|\[([^\]]+)\]")
+_SUBSCRIPTS = re.compile(r"\[[-\d, ]*\]")
+_INTEGER = re.compile(r"[+-]?\d+")
+_NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
+Step = str | tuple[int, ...]
+"""The name of a member, or subscripts."""
+Parts: TypeAlias = "dict[Step, Parts | Type]"
+"""The members or the elements of a variable."""
+
+
+class RowsError(ValueError):
+    """The text is no such table; the message names the line."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A variable of a table: its path or address, its type, and how a cell is read."""
+
+    name: str
+    type: Type
+    read: Callable[[str], Any]
+
+
+def read_rows(file: TextIO, out: BinaryIO) -> int:
+    """Writes a trace of the scans that a table describes; returns how many.  Raises RowsError."""
+    rows = list(csv.reader(file))
+    if not rows or rows[0][:2] != [SCAN, TIME_MS]:
+        raise RowsError(f"line 1: the first two columns are {SCAN} and {TIME_MS}")
+    for number, row in enumerate(rows[1:], 2):
+        if len(row) != len(rows[0]):
+            raise RowsError(f"line {number}: {len(row)} cells, {len(rows[0])} expected")
+    columns = _columns(rows[0], rows[1:])
+    plc = Plc(_image(columns), engine="python")
+    writer = TraceWriter(plc, out, selected=[column.name for column in columns])
+    for number, row in enumerate(rows[1:], 2):
+        try:
+            plc.scans = int(row[0])
+            for column, cell in zip(columns, row[2:], strict=True):
+                if cell:
+                    plc.write(column.name, column.read(cell))
+            plc.scan(_nanoseconds(row[1]))
+        except (ValueError, TypeError, ArithmeticError) as error:
+            raise RowsError(f"line {number}: {error}") from None
+    writer.close()
+    return len(rows) - 1
+
+
+def _nanoseconds(text: str) -> int:
+    return int(Decimal(text).scaleb(6))
+
+
+def _columns(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[Column]:
+    """The variables; elements of one array are of one type."""
+    alike = [_SUBSCRIPTS.sub("[]", heading) for heading in headings[2:]]
+    cells: dict[str, list[str]] = {}
+    for at, name in enumerate(alike, 2):
+        cells.setdefault(name, []).extend(row[at] for row in rows if row[at])
+    kinds = {name: _kind(name, filled) for name, filled in cells.items()}
+    return [Column(heading.removesuffix(MS), *kinds[name]) for heading, name in zip(headings[2:], alike, strict=True)]
+
+
+def _kind(heading: str, cells: Sequence[str]) -> tuple[Type, Callable[[str], Any]]:
+    """The narrowest type that all cells fit, and how they are read."""
+    if heading.endswith(MS):
+        return TIME, _nanoseconds
+    if all(cell in ("TRUE", "FALSE") for cell in cells):
+        return BOOL, lambda cell: cell == "TRUE"
+    if all(_INTEGER.fullmatch(cell) for cell in cells):
+        return (ULINT if any(int(cell) > LINT.high for cell in cells) else LINT), int
+    if all(_NUMBER.fullmatch(cell) or cell in ("nan", "inf", "-inf") for cell in cells):
+        return LREAL, float
+    return string(min(LONGEST_TEXT, max(map(len, cells), default=1))), str
+
+
+def _image(columns: Iterable[Column]) -> Image:
+    """A program without code that has these variables."""
+    tree: Parts = {}
+    for column in columns:
+        if not _is_address(column.name):
+            _plant(tree, column)
+    symbols, at = {}, SLOTS_OFFSET
+    for name, what in tree.items():
+        kind = _type(str(name), what)
+        at += -at % kind.align
+        symbols[fold(str(name))] = Field(str(name), kind, at, absolute=True)
+        at += kind.size
+    return Image(Layout(at - SLOTS_OFFSET), (), (), symbols, (), (), ())
+
+
+def _is_address(name: str) -> bool:
+    try:
+        parse_address(name)
+    except AddressError:
+        return False
+    return True
+
+
+def _plant(tree: Parts, column: Column) -> None:
+    """Adds a variable to the tree of all variables."""
+    if not _PATH.fullmatch(column.name):
+        raise RowsError(f"line 1: {column.name!r} is neither a path of names nor an address")
+    steps: list[Step] = [name or tuple(map(int, subscripts.split(","))) for name, subscripts in _STEP.findall(column.name)]
+    inner, owner = tree, ""
+    for number, step in enumerate(steps):
+        if inner and type(step) is not type(next(iter(inner))):
+            raise RowsError(f"line 1: {owner} has elements and members")
+        owner = step if isinstance(step, str) else owner
+        if number == len(steps) - 1:
+            if step in inner:
+                raise RowsError(f"line 1: {column.name} stands there twice")
+            inner[step] = column.type
+            return
+        below = inner.setdefault(step, {})
+        if isinstance(below, Type):
+            raise RowsError(f"line 1: {owner} is a variable and has members")
+        inner = below
+
+
+def _type(name: str, what: Parts | Type) -> Type:
+    """The type of a variable that has these parts."""
+    if isinstance(what, Type):
+        return what
+    subscripts = [step for step in what if isinstance(step, tuple)]
+    if subscripts:
+        if len({len(one) for one in subscripts}) > 1:
+            raise RowsError(f"line 1: the elements of {name} differ")
+        bounds = tuple((min(along), max(along)) for along in zip(*subscripts, strict=True))
+        kind = array(bounds, _type(name, _united(name, list(what.values()))))
+        if kind.size > MAX_SIZE:
+            raise RowsError(f"line 1: {name} has {kind.count} elements, and no memory holds them")
+        return kind
+    fields, at = {}, 0
+    for inner, part in what.items():
+        kind_of = _type(str(inner), part)
+        at += -at % kind_of.align
+        fields[fold(str(inner))] = Field(str(inner), kind_of, at)
+        at += kind_of.size
+    return StructType(name, at + -at % 8, 8, fields)
+
+
+def _united(name: str, elements: list[Parts | Type]) -> Parts | Type:
+    """What every element of an array has that some of them have."""
+    first, *more = elements
+    for other in more:
+        if isinstance(first, Type) or isinstance(other, Type):
+            if first != other:
+                raise RowsError(f"line 1: the elements of {name} differ")
+            continue
+        first = {step: _united(name, [part[step] for part in (first, other) if step in part]) for step in (*first, *other)}
+    return first
