@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.processor import OwnProcessor, processor
+from fbvm.processor.processor import OwnProcessor, processor
 from fbvm.units import etn21_map as at
 from fbvm.units.etn21_faults import Faults
 from fbvm.units.etn21_mail import RING_BYTES, Mail

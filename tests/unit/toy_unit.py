@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from fbvm.processor import OwnProcessor, processor
+from fbvm.processor.processor import OwnProcessor, processor
 from fbvm.units.unit import AreaMemory, Exchanged
 from fbvm.wire.link import Event, Link, Received, Request, Send, Sent
 
