@@ -42,9 +42,9 @@ if TYPE_CHECKING:
     from fbvm.record.export.pcapng import Capture as Capture
     from fbvm.record.trace.recorder import Recorder as Recorder
     from fbvm.run.replay import Replay as Replay
-    from fbvm.units.etn21 import Etn21 as Etn21
-    from fbvm.units.noc import Noc as Noc
-    from fbvm.units.tianxing import Tianxing as Tianxing
+    from fbvm.units.etn21.unit import Etn21 as Etn21
+    from fbvm.units.port.noc import Noc as Noc
+    from fbvm.units.port.tianxing import Tianxing as Tianxing
     from fbvm.watch.paths import UnknownPlace as UnknownPlace
     from fbvm.wire.link import Peer as Peer
     from fbvm.wire.modbus_server import ModbusServer as ModbusServer
@@ -65,9 +65,9 @@ _HOMES = {
     "record.export.pcapng": ("Capture",),
     "record.trace.recorder": ("Recorder",),
     "run.replay": ("Replay",),
-    "units.etn21": ("Etn21",),
-    "units.noc": ("Noc",),
-    "units.tianxing": ("Tianxing",),
+    "units.etn21.unit": ("Etn21",),
+    "units.port.noc": ("Noc",),
+    "units.port.tianxing": ("Tianxing",),
     "watch.paths": ("UnknownPlace",),
     "wire.link": ("Peer",),
     "wire.modbus_server": ("ModbusServer",),

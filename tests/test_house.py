@@ -76,7 +76,7 @@ def name_of(path: Path) -> str:
 
 
 def room_of(dotted: str) -> str:
-    """The room of `fbvm.units.etn21` is "units", that of `fbvm.machine.plc` "plc"."""
+    """The room of `fbvm.units.etn21.unit` is "units", that of `fbvm.machine.plc` "plc"."""
     parts = dotted.split(".")
     return parts[1] if len(parts) > 1 else ""
 

@@ -36,7 +36,7 @@ from fbvm.record.draw.chart import draw
 from fbvm.record.trace.recorder import Recorder
 from fbvm.run import loop
 from fbvm.units.backplane import ETN21_ADDRESS
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
 SERVER = Peer("192.168.250.1", 502)

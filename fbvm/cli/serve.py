@@ -26,7 +26,7 @@ from fbvm.record.trace.requests import RequestLog
 from fbvm.run import loop
 from fbvm.run.running import EVENT
 from fbvm.units.backplane import ETN21_ADDRESS
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
 CYCLE_NS = 10_000_000

@@ -28,7 +28,7 @@ from fbvm.machine.state import State as State
 from fbvm.machine.state import Stopped as Stopped
 from fbvm.machine.tasks import Schedule, hurried
 from fbvm.net.journal import Journal
-from fbvm.units.unit import Unit
+from fbvm.units.contract import Unit
 from fbvm.watch import places
 from fbvm.watch.paths import Place, Span, find, find_place
 from fbvm.watch.values import Value

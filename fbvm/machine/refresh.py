@@ -8,7 +8,7 @@ from functools import cached_property
 
 from fbvm.base.memory import Memory
 from fbvm.net.journal import Journal
-from fbvm.units.unit import ProcessorUnit, Unit
+from fbvm.units.contract import ProcessorUnit, Unit
 from fbvm.wire.link import Link, Network, Request
 
 

@@ -51,7 +51,7 @@ def _compiled(text: str) -> Image:
 
 
 class OwnProcessor:
-    """A `fbvm.units.unit.Processor`: machine code where that can be had, else Python."""
+    """A `fbvm.units.contract.Processor`: machine code where that can be had, else Python."""
 
     def __init__(self, image: Image, beside_bytes: int, places: dict[str, Place]) -> None:
         self.image = image

@@ -29,8 +29,8 @@ from fbvm.testing.reads import Reads
 from fbvm.testing.report import Report
 from fbvm.testing.subject import Stub, Subject, subject
 from fbvm.testing.values import Values, value_of, write
-from fbvm.units.etn21 import Etn21
-from fbvm.units.unit import Unit
+from fbvm.units.contract import Unit
+from fbvm.units.etn21.unit import Etn21
 from fbvm.watch.conditions import parse_condition
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span, UnknownPlace, find, find_place

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from fbvm.units import noc_map, tianxing
-from fbvm.units.etn21 import Etn21
-from fbvm.units.noc import Noc
-from fbvm.units.tianxing import Tianxing
-from fbvm.units.unit import Unit
+from fbvm.units.contract import Unit
+from fbvm.units.etn21.unit import Etn21
+from fbvm.units.port import noc_map, tianxing
+from fbvm.units.port.noc import Noc
+from fbvm.units.port.tianxing import Tianxing
 
 UNITS: Mapping[str, Callable[..., Unit]] = {"Etn21": Etn21, "Noc": Noc, "Tianxing": Tianxing}
 """What makes a unit, by the name of its class, as journals write it."""

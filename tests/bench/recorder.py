@@ -29,7 +29,7 @@ from fbvm.record.page.page import page  # noqa: E402
 from fbvm.record.trace.reader import Trace  # noqa: E402
 from fbvm.record.trace.recorder import Recorder  # noqa: E402
 from fbvm.record.trace.writer import Depth, TraceWriter  # noqa: E402
-from fbvm.units.etn21 import Etn21  # noqa: E402
+from fbvm.units.etn21.unit import Etn21  # noqa: E402
 from fbvm.wire.link import Peer  # noqa: E402
 
 HERE = Path(__file__).parent

@@ -15,7 +15,7 @@ from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopLink, LoopNetwork
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Broken, Close, Connect, Event, Failed, Grant, Opened, Peer, PeerClosed, Received, Send
 from fbvm.wire.modbus import Adu, Splitter
 from fbvm.wire.modbus_server import ModbusServer

@@ -16,7 +16,7 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.record.draw.chart import chart
-from fbvm.units.tianxing import Tianxing
+from fbvm.units.port.tianxing import Tianxing
 from fbvm.wire.link import Peer
 
 CYCLE_NS = 10_000_000

@@ -19,8 +19,8 @@ from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer, Station
 from fbvm.record.draw.chart import chart
-from fbvm.units import noc_map
-from fbvm.units.noc import Noc
+from fbvm.units.port import noc_map
+from fbvm.units.port.noc import Noc
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus_server import ModbusServer
 

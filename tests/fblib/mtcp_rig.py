@@ -22,9 +22,9 @@ from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import Action, ModbusPeer, Say, Station
 from fbvm.record.draw.chart import chart
-from fbvm.units.etn21 import Etn21
-from fbvm.units.etn21_map import Layout
-from fbvm.units.etn21_names import descriptions
+from fbvm.units.etn21.map import Layout
+from fbvm.units.etn21.names import descriptions
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
 SERVER = Peer("192.168.250.2", 502)

@@ -19,8 +19,8 @@ from fbvm.net.loop import LoopNetwork
 from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS
 from fbvm.net.peers import Action, ModbusPeer, Say, Station
 from fbvm.record.draw.chart import chart
-from fbvm.units.etn21 import Etn21
-from fbvm.units.etn21 import Fault as UnitFault
+from fbvm.units.etn21.unit import Etn21
+from fbvm.units.etn21.unit import Fault as UnitFault
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus import Adu
 

@@ -16,10 +16,10 @@ from fbvm.machine.plc import Mode, Plc
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.record.draw.chart import chart
-from fbvm.units.etn21 import Etn21
-from fbvm.units.etn21 import Fault as UnitFault
-from fbvm.units.etn21_map import Layout
-from fbvm.units.etn21_names import descriptions
+from fbvm.units.etn21.map import Layout
+from fbvm.units.etn21.names import descriptions
+from fbvm.units.etn21.unit import Etn21
+from fbvm.units.etn21.unit import Fault as UnitFault
 from fbvm.wire.link import Connect, Grant, Peer, Send
 from fbvm.wire.modbus import Adu
 

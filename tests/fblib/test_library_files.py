@@ -16,7 +16,7 @@ from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import Leave, ModbusPeer, Say
 from fbvm.record.draw.chart import chart
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 
 FBLIB = data_folder("fblib")
 FILES = sorted(FBLIB.rglob("*.st"))

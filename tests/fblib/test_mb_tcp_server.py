@@ -12,7 +12,7 @@ from rows import each_of, first_quick
 from fbvm.base.data import data_folder
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.units.tianxing import Tianxing
+from fbvm.units.port.tianxing import Tianxing
 from fbvm.wire.link import Close, Connect, Grant, Send
 from fbvm.wire.modbus import Adu
 

@@ -10,7 +10,7 @@ from mstr_rig import SERVER_IP, Rig
 from fbvm.base.data import data_folder
 from fbvm.net.peers import Say, ScriptedPeer
 from fbvm.record.draw.chart import chart
-from fbvm.units import noc_map
+from fbvm.units.port import noc_map
 
 READ = (2, 0, 3, 1, 0x0700, *SERVER_IP)
 WRITE = (1, 0, 3, 1, 0x0700, *SERVER_IP)

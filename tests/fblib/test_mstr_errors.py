@@ -15,8 +15,8 @@ from fbvm.machine.plc import Mode
 from fbvm.net.faults import Fault
 from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS
 from fbvm.net.peers import Action, Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer, Station
-from fbvm.units import noc_map
-from fbvm.units.noc import Noc
+from fbvm.units.port import noc_map
+from fbvm.units.port.noc import Noc
 from fbvm.wire.modbus_server import ModbusServer
 
 READ = (2, 0, 3, 1, 0x0700, *SERVER_IP)

@@ -7,8 +7,8 @@ from mstr_rig import SERVER_IP, Rig
 from rows import each_of, first_quick
 
 from fbvm.net.peers import Leave, ModbusPeer, Say
-from fbvm.units import noc_map
-from fbvm.units.noc import Noc
+from fbvm.units.port import noc_map
+from fbvm.units.port.noc import Noc
 from fbvm.wire.link import Peer
 
 READ, WRITE, READ_WRITE = 2, 1, 23

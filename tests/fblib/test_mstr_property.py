@@ -14,7 +14,7 @@ from fbvm.machine.plc import Plc
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer, Reset, Say
-from fbvm.units.noc import Noc
+from fbvm.units.port.noc import Noc
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus_server import ModbusServer
 

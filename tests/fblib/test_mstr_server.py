@@ -15,8 +15,8 @@ from stream_client import Client
 from fbvm.base.areas import AREAS
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.units import noc_map
-from fbvm.units.noc import Noc
+from fbvm.units.port import noc_map
+from fbvm.units.port.noc import Noc
 from fbvm.wire.link import Close, Connect, Peer, Send
 from fbvm.wire.modbus import Adu
 

@@ -9,8 +9,8 @@ from mtcp_rig import SERVER, Rig, answering, saying
 from rows import each_of
 
 from fbvm.net.peers import Action, Fin, Leave, Reset, Say, ScriptedPeer, Station
-from fbvm.units.etn21_faults import Fault as UnitFault
-from fbvm.units.etn21_map import Switch
+from fbvm.units.etn21.faults import Fault as UnitFault
+from fbvm.units.etn21.map import Switch
 
 READ = "Fn03(Register_Address := 1000, Register_Qty := 3, RespData_DM := 200)"
 WRITE = "Fn10(Register_Address := 1000, Register_Qty := 2, DataAddress_DM := 300)"

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from mtcp_rig import Rig
 
 from fbvm.net.peers import ModbusPeer
-from fbvm.units.etn21_map import Layout, Switch
+from fbvm.units.etn21.map import Layout, Switch
 from fbvm.wire.link import Peer
 
 READ = "Fn03(Register_Address := 1000, Register_Qty := 125, RespData_DM := 200)"

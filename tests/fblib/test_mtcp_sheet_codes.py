@@ -11,8 +11,8 @@ from mtcp_rig import Rig, answering, saying
 from fbvm.base.data import data_folder
 from fbvm.net.faults import Fault
 from fbvm.net.peers import Fin, Reset, Say, ScriptedPeer
-from fbvm.units.etn21_faults import Fault as UnitFault
-from fbvm.units.etn21_map import Switch
+from fbvm.units.etn21.faults import Fault as UnitFault
+from fbvm.units.etn21.map import Switch
 
 README = (data_folder("fblib") / "omron" / "mtcp_etn" / "README.md").read_text(encoding="utf-8")
 READ = "Fn03(Register_Address := 1000, Register_Qty := 3, RespData_DM := 200)"

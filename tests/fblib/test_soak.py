@@ -8,7 +8,7 @@ from soak_plant import BLOCKS, SERVER, UNIT_ADDRESS, check, contents, plant, usa
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 
 MINUTE_NS = 60_000_000_000
 

@@ -17,7 +17,7 @@ from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.export.pcapng import Capture
 from fbvm.run import run
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
 SERVER = Peer("192.168.250.2", 502)

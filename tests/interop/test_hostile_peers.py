@@ -30,7 +30,7 @@ from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
 from fbvm.run import run
 from fbvm.run.replay import Replay
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus_server import ModbusServer
 

@@ -20,7 +20,7 @@ from fbvm.record.page.page import page
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import signals_at
 from fbvm.record.trace.writer import Depth, TraceWriter, source_lines
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 from fbvm.watch.paths import Place
 from fbvm.wire.link import Peer
 

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fbvm.units.unit import Unit
+from fbvm.units.contract import Unit
 from fbvm.wire.link import (
     Broken,
     Close,

@@ -6,8 +6,8 @@ from array import array
 
 from common_unit_tests import FakeMemory
 
-from fbvm.units.etn21 import Etn21
-from fbvm.units.etn21_map import OPEN, Layout, Switch
+from fbvm.units.etn21.map import OPEN, Layout, Switch
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Closed, Event, Opened, Peer, Request
 
 SERVER = Peer("192.168.250.7", 502)

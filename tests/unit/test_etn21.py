@@ -9,9 +9,9 @@ from common_unit_tests import CommonUnitTests, FakeMemory
 from etn21_rig import E2, SERVER, Rig
 from rows import each_of
 
-from fbvm.units.etn21 import Etn21, Fault
-from fbvm.units.etn21_map import LINK_UP, Layout, Switch
-from fbvm.units.unit import Unit
+from fbvm.units.contract import Unit
+from fbvm.units.etn21.map import LINK_UP, Layout, Switch
+from fbvm.units.etn21.unit import Etn21, Fault
 from fbvm.wire.link import Close, Closed, Connect, Grant, Opened, Received, Sent
 
 

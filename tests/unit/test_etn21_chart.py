@@ -6,7 +6,7 @@ from textwrap import dedent
 
 from etn21_rig import SERVER, Rig
 
-from fbvm.units.etn21_map import Switch
+from fbvm.units.etn21.map import Switch
 from fbvm.wire.link import Closed, Opened, Peer, PeerClosed, Received, Sent
 
 

@@ -6,9 +6,9 @@ import pytest
 from etn21_rig import CIO, E2, SERVER, A, D, H, Rig, W
 from rows import each_of
 
-from fbvm.units.etn21 import Etn21, Fault
-from fbvm.units.etn21_codes import ERRNO, code_of, meaning_of
-from fbvm.units.etn21_map import Switch
+from fbvm.units.etn21.codes import ERRNO, code_of, meaning_of
+from fbvm.units.etn21.map import Switch
+from fbvm.units.etn21.unit import Etn21, Fault
 from fbvm.wire.link import Broken, Closed, Failed, Opened, Peer, Received, Sent
 
 OPENS = [Switch.UDP_OPEN, Switch.PASSIVE_OPEN, Switch.ACTIVE_OPEN]

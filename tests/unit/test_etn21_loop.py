@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import Leave, ModbusPeer, Reset, Say, ScriptedPeer
-from fbvm.units.etn21 import Etn21
-from fbvm.units.etn21_map import Switch
+from fbvm.units.etn21.map import Switch
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
 SERVER = Peer("192.168.250.7", 502)

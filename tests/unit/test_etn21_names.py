@@ -10,7 +10,7 @@ from fbvm.base.areas import parse_address
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.record.draw.chart import chart
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 
 
 @each_of(("number", "address", "name"), [

@@ -8,8 +8,8 @@ from etn21_rig import CIO, D, Rig
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fbvm.units.etn21 import Etn21, Fault
-from fbvm.units.etn21_map import Switch
+from fbvm.units.etn21.map import Switch
+from fbvm.units.etn21.unit import Etn21, Fault
 from fbvm.wire.link import Close, Closed, Event, Peer, Request
 
 n, m = 1500, 30000

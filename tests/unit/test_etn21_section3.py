@@ -7,8 +7,8 @@ from collections.abc import Callable
 import pytest
 from etn21_rig import SERVER, Rig
 
-from fbvm.units.etn21 import Etn21
-from fbvm.units.etn21_map import Switch
+from fbvm.units.etn21.map import Switch
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Closed, Event, Failed, Opened, Peer
 
 Prepare = Callable[[Rig], None]

@@ -6,8 +6,8 @@ import pytest
 from etn21_rig import Rig
 from rows import each_of
 
-from fbvm.units.etn21 import Etn21
-from fbvm.units.etn21_map import Switch
+from fbvm.units.etn21.map import Switch
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Bind, Broken, Closed, Failed, Grant, Opened, Peer, PeerClosed, Received, Send, SendTo, Sent
 
 

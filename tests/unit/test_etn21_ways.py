@@ -18,8 +18,8 @@ from fbvm.machine.plc import Mode
 from fbvm.net.faults import Fault as NetFault
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer
-from fbvm.units.etn21 import Etn21, Fault
-from fbvm.units.etn21_map import Switch
+from fbvm.units.etn21.map import Switch
+from fbvm.units.etn21.unit import Etn21, Fault
 from fbvm.wire.link import Peer
 
 if not native.available():

@@ -8,7 +8,7 @@ from fbvm.code.compiler import compile_files
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
 EXAMPLES = Path(__file__).resolve().parent.parent.parent / "examples"

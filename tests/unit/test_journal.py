@@ -22,9 +22,9 @@ from fbvm.net.journal import Act, End, Entry, Header, Journal, JournalError, Sca
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.run.replay import Replay
-from fbvm.units.etn21 import Etn21
-from fbvm.units.etn21 import Fault as UnitFault
-from fbvm.units.etn21_map import Switch
+from fbvm.units.etn21.map import Switch
+from fbvm.units.etn21.unit import Etn21
+from fbvm.units.etn21.unit import Fault as UnitFault
 from fbvm.wire.link import Peer
 
 SERVER = Peer("192.168.250.2", 502)

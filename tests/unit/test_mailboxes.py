@@ -16,7 +16,7 @@ from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.writer import TraceWriter
-from fbvm.units.unit import AreaMemory
+from fbvm.units.contract import AreaMemory
 from fbvm.watch.paths import UnknownPlace
 from fbvm.wire.link import Event, Request
 

@@ -14,10 +14,11 @@ from rows import each_of
 from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopLink, LoopNetwork
 from fbvm.net.peers import Fin, Reset, Say, ScriptedPeer
-from fbvm.units import noc_map, port_map
-from fbvm.units.noc import RESTART_NS, Noc
-from fbvm.units.port_map import State, Wish
-from fbvm.units.unit import Unit
+from fbvm.units.contract import Unit
+from fbvm.units.port import map as port_map
+from fbvm.units.port import noc_map
+from fbvm.units.port.map import State, Wish
+from fbvm.units.port.noc import RESTART_NS, Noc
 from fbvm.wire.link import (
     Broken,
     Close,

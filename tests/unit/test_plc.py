@@ -9,7 +9,7 @@ from images import D200, counter_image, task
 
 from fbvm.base.areas import DUE
 from fbvm.machine.plc import Mode, Plc, Stopped
-from fbvm.units.unit import AreaMemory
+from fbvm.units.contract import AreaMemory
 from fbvm.watch.conditions import ConditionError
 from fbvm.watch.paths import UnknownPlace
 from fbvm.wire.link import Event, Link, Request, Send, Sent

@@ -9,7 +9,7 @@ import pytest
 from fbvm.base.areas import AREAS
 from fbvm.engine.native import engine as native
 from fbvm.processor.processor import OwnProcessor, processor
-from fbvm.units.unit import Processor
+from fbvm.units.contract import Processor
 from fbvm.watch.paths import UnknownPlace
 
 TEXT = """

@@ -14,7 +14,7 @@ from fbvm.record.draw.why import Cause, told, why
 from fbvm.record.trace.outline import outer_statements
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.writer import Depth, TraceWriter
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 from fbvm.watch.paths import Place
 
 

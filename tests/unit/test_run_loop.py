@@ -15,7 +15,7 @@ from images import counter_image, task
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.run import Running, TimedWrite, loop, run, run_all
-from fbvm.units.unit import AreaMemory
+from fbvm.units.contract import AreaMemory
 from fbvm.wire.link import Event, Link, Request
 
 MS = 1_000_000

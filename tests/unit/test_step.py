@@ -19,7 +19,7 @@ from fbvm.net.peers import ModbusPeer
 from fbvm.step.commands import COMMANDS, CommandError, Commands, ExpectationError
 from fbvm.step.session import Position, Session
 from fbvm.step.words import Words
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
 HOUSE = Path(__file__).resolve().parents[2]

@@ -8,10 +8,11 @@ import pytest
 from common_unit_tests import CommonUnitTests, FakeMemory
 
 from fbvm.base.data import data_folder
-from fbvm.units import port_map, tianxing
-from fbvm.units.port_map import State, Wish
-from fbvm.units.tianxing import Tianxing
-from fbvm.units.unit import Unit
+from fbvm.units.contract import Unit
+from fbvm.units.port import map as port_map
+from fbvm.units.port import tianxing
+from fbvm.units.port.map import State, Wish
+from fbvm.units.port.tianxing import Tianxing
 from fbvm.wire.link import Connect, Failed, Peer
 
 

@@ -12,7 +12,7 @@ from fbvm.record.trace.events import Event, Passing
 from fbvm.record.trace.reader import Moment, Trace
 from fbvm.record.trace.traffic import Reader, listen
 from fbvm.record.trace.writer import TraceWriter
-from fbvm.units.etn21 import Etn21
+from fbvm.units.etn21.unit import Etn21
 from fbvm.wire import modbus
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import Happening, What

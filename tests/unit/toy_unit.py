@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fbvm.processor.processor import OwnProcessor, processor
-from fbvm.units.unit import AreaMemory, Exchanged
+from fbvm.units.contract import AreaMemory, Exchanged
 from fbvm.wire.link import Event, Link, Received, Request, Send, Sent
 
 PROGRAM = """

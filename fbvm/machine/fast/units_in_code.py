@@ -33,7 +33,7 @@ from fbvm.engine.trap import Trap
 from fbvm.machine.clock_words import CLOCKWORK
 from fbvm.machine.refresh import Exchange
 from fbvm.net.journal import Journal
-from fbvm.units.unit import Exchanged, ProcessorUnit, Unit
+from fbvm.units.contract import Exchanged, ProcessorUnit, Unit
 
 
 def can_accompany(exchange: Exchange) -> bool:

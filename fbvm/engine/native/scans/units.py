@@ -19,7 +19,7 @@ Shape = tuple[tuple[int, ...], int, int, int]
 """Bytes of each copy, how many groups are watched, in how many places something may be left, bytes of a ring or 0: what its
 machine code is made for."""
 MOVE_BYTES = 20
-"""Of a row of what is to be moved (`fbvm.units.unit.Moves`)."""
+"""Of a row of what is to be moved (`fbvm.units.contract.Moves`)."""
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from collections.abc import Iterable, MutableSequence
 from dataclasses import dataclass
 from typing import Any, overload
 
-from fbvm.units.etn21_map import Switch
-from fbvm.units.unit import Processor
+from fbvm.units.contract import Processor
+from fbvm.units.etn21.map import Switch
 
 ANY_SWITCH, ANY_SOCKET = 255, 65535
 ROW = 3

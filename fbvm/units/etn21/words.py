@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from fbvm.units import etn21_map as at
-from fbvm.units.unit import AreaMemory
+from fbvm.units.contract import AreaMemory
+from fbvm.units.etn21 import map as at
 
 
 def numbers(n: memoryview) -> tuple[memoryview, memoryview]:

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from fbvm.units import port_map as at
-from fbvm.units.port_line import Line
-from fbvm.units.unit import AreaMemory
+from fbvm.units.contract import AreaMemory
+from fbvm.units.port import map as at
+from fbvm.units.port.line import Line
 from fbvm.wire.link import Event, Request
 
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from fbvm.units.port import Port, mailbox
-from fbvm.units.unit import AreaMemory
+from fbvm.units.contract import AreaMemory
+from fbvm.units.port.port import Port, mailbox
 from fbvm.wire.link import Event, Request
 
 AREA = "TXP"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 
-from fbvm.units import port_map as at
-from fbvm.units.port_map import State, Wish
+from fbvm.units.port import map as at
+from fbvm.units.port.map import State, Wish
 from fbvm.wire.link import (
     Broken,
     Close,

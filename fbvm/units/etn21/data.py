@@ -9,7 +9,7 @@ from __future__ import annotations
 from array import array
 from sys import byteorder
 
-from fbvm.units.unit import AreaMemory
+from fbvm.units.contract import AreaMemory
 
 LOW, HIGH = (0, 1) if byteorder == "little" else (1, 0)
 """Where the bytes of a word lie in the host's memory."""

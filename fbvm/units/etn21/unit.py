@@ -12,15 +12,15 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any
 
-from fbvm.units import etn21_map as at
-from fbvm.units.etn21_data import AREA_OF_CODE, lengths
-from fbvm.units.etn21_faults import Fault, Faults
-from fbvm.units.etn21_inside import Inside, power_on
-from fbvm.units.etn21_mail import RING_BYTES
-from fbvm.units.etn21_map import Layout
-from fbvm.units.etn21_names import descriptions, meanings
-from fbvm.units.etn21_words import Words
-from fbvm.units.unit import AreaMemory, Exchanged, Moves
+from fbvm.units.contract import AreaMemory, Exchanged, Moves
+from fbvm.units.etn21 import map as at
+from fbvm.units.etn21.data import AREA_OF_CODE, lengths
+from fbvm.units.etn21.faults import Fault, Faults
+from fbvm.units.etn21.inside import Inside, power_on
+from fbvm.units.etn21.mail import RING_BYTES
+from fbvm.units.etn21.map import Layout
+from fbvm.units.etn21.names import descriptions, meanings
+from fbvm.units.etn21.words import Words
 from fbvm.wire.link import Event, Request
 
 __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]

@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from struct import Struct
 
-from fbvm.units import etn21_map as at
-from fbvm.units.etn21_codes import code_of
-from fbvm.units.etn21_data import fetch, store
-from fbvm.units.unit import AreaMemory, Processor
+from fbvm.units.contract import AreaMemory, Processor
+from fbvm.units.etn21 import map as at
+from fbvm.units.etn21.codes import code_of
+from fbvm.units.etn21.data import fetch, store
 from fbvm.wire.link import (
     Bind,
     Broken,

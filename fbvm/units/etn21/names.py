@@ -5,9 +5,9 @@ From W420 4-1 p80-85, 4-2 p88 and W421 6-6, 6-7.
 
 from __future__ import annotations
 
-from fbvm.units import etn21_map as at
-from fbvm.units.etn21_codes import ERRNO, MEANING
-from fbvm.units.etn21_map import Layout, Switch
+from fbvm.units.etn21 import map as at
+from fbvm.units.etn21.codes import ERRNO, MEANING
+from fbvm.units.etn21.map import Layout, Switch
 
 SWITCH_NAMES = {
     Switch.UDP_OPEN: "UDP Open Request Switch",

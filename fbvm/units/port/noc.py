@@ -11,9 +11,9 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from fbvm.units import noc_map as at
-from fbvm.units.port import Port, mailbox
-from fbvm.units.unit import AreaMemory
+from fbvm.units.contract import AreaMemory
+from fbvm.units.port import noc_map as at
+from fbvm.units.port.port import Port, mailbox
 from fbvm.wire.link import Broken, Close, Connect, Event, Failed, Opened, PeerClosed, Received, Request, Send
 
 NEVER_NS = 1 << 63

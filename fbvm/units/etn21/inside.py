@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from fbvm.processor.processor import OwnProcessor, processor
-from fbvm.units import etn21_map as at
-from fbvm.units.etn21_faults import Faults
-from fbvm.units.etn21_mail import RING_BYTES, Mail
-from fbvm.units.etn21_words import Words, numbers
+from fbvm.units.etn21 import map as at
+from fbvm.units.etn21.faults import Faults
+from fbvm.units.etn21.mail import RING_BYTES, Mail
+from fbvm.units.etn21.words import Words, numbers
 
 PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
 

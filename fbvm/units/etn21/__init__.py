@@ -1,0 +1,1 @@
+"""The Omron ETN21 Ethernet unit."""

@@ -1,0 +1,1 @@
+"""Units that a program meets through a mailbox: Schneider NOC, Tianxing."""
