@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from fbvm.code.compiler import compile_text as compile_text
     from fbvm.code.image import Image as Image
     from fbvm.engine.trap import Trap as Trap
+    from fbvm.interchange.plcopen.read.importing import Imported as Imported
+    from fbvm.interchange.plcopen.read.importing import import_xml as import_xml
+    from fbvm.interchange.plcopen.write.exporting import Exported as Exported
+    from fbvm.interchange.plcopen.write.exporting import export_xml as export_xml
     from fbvm.machine.plc import Mode as Mode
     from fbvm.machine.plc import Plc as Plc
     from fbvm.machine.plc import Stopped as Stopped
@@ -33,10 +37,6 @@ if TYPE_CHECKING:
     from fbvm.net.loop import LoopNetwork as LoopNetwork
     from fbvm.net.peers import ModbusPeer as ModbusPeer
     from fbvm.net.tcp import TcpNetwork as TcpNetwork
-    from fbvm.plcopen.exporting import Exported as Exported
-    from fbvm.plcopen.exporting import export_xml as export_xml
-    from fbvm.plcopen.importing import Imported as Imported
-    from fbvm.plcopen.importing import import_xml as import_xml
     from fbvm.record.draw.chart import chart as chart
     from fbvm.record.draw.chart import draw as draw
     from fbvm.record.export.pcapng import Capture as Capture
@@ -59,8 +59,8 @@ _HOMES = {
     "net.peers": ("ModbusPeer",),
     "net.tcp": ("TcpNetwork",),
     "plc": ("Mode", "Plc", "Stopped"),
-    "plcopen.exporting": ("Exported", "export_xml"),
-    "plcopen.importing": ("Imported", "import_xml"),
+    "interchange.plcopen.write.exporting": ("Exported", "export_xml"),
+    "interchange.plcopen.read.importing": ("Imported", "import_xml"),
     "record.draw.chart": ("chart", "draw"),
     "record.export.pcapng": ("Capture",),
     "record.trace.recorder": ("Recorder",),

@@ -11,7 +11,7 @@ import click
 from fbvm.cli import status
 from fbvm.cli.files import writing
 from fbvm.cli.sources import report
-from fbvm.plcopen.exporting import export_xml
+from fbvm.interchange.plcopen.write.exporting import export_xml
 
 
 @click.command("export")

@@ -10,7 +10,7 @@ import click
 from fbvm.cli import status
 from fbvm.cli.files import writing
 from fbvm.cli.sources import report
-from fbvm.plcopen.importing import import_xml
+from fbvm.interchange.plcopen.read.importing import import_xml
 
 
 @click.command("import")

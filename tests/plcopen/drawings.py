@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_sources
+from fbvm.interchange.plcopen.read.importing import Imported, import_xml
 from fbvm.machine.plc import Plc
-from fbvm.plcopen.importing import Imported, import_xml
 
 NAMESPACE = "http://www.plcopen.org/xml/tc6_0201"
 XHTML = "http://www.w3.org/1999/xhtml"

@@ -6,7 +6,7 @@ import pytest
 from drawings import RAIL, block, codes, contact, imported, pou, states, value, variable, wires
 from rows import each_of
 
-from fbvm.plcopen.importing import Imported
+from fbvm.interchange.plcopen.read.importing import Imported
 
 
 def step(number: int, name: str, sources: str = "", first: bool = False) -> str:

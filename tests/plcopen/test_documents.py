@@ -9,8 +9,8 @@ from click.testing import CliRunner
 from fbvm.base.diagnostics import Source
 from fbvm.cli.main import main
 from fbvm.code.compiler import compile_files, compile_sources
+from fbvm.interchange.plcopen.read.importing import import_xml
 from fbvm.machine.plc import Plc
-from fbvm.plcopen.importing import import_xml
 
 DOCUMENTS = Path(__file__).parent / "documents"
 

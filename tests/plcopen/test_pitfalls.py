@@ -20,7 +20,7 @@ from drawings import (
 )
 from rows import each_of
 
-from fbvm.plcopen.importing import import_xml
+from fbvm.interchange.plcopen.read.importing import import_xml
 
 BRANCH = RAIL + contact(2, "1", "a") + contact(3, "1", "b")
 

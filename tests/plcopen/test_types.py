@@ -6,9 +6,9 @@ from drawings import document, pou
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
-from fbvm.plcopen.exporting import export_xml
-from fbvm.plcopen.importing import import_xml
-from fbvm.plcopen.read_types import duration
+from fbvm.interchange.plcopen.read.importing import import_xml
+from fbvm.interchange.plcopen.read.types import duration
+from fbvm.interchange.plcopen.write.exporting import export_xml
 
 
 @each_of(("written", "meant"), [

@@ -15,9 +15,9 @@ from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.pages import UnknownCode, near, page
 from fbvm.code.compiler import Compilation, compile_sources
+from fbvm.interchange.plcopen.read.importing import import_xml
+from fbvm.interchange.plcopen.write.exporting import export_xml
 from fbvm.machine.plc import Plc
-from fbvm.plcopen.exporting import export_xml
-from fbvm.plcopen.importing import import_xml
 from fbvm.run.project import Project, read_project
 from fbvm.syntax.text import decode
 

@@ -10,14 +10,14 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from fbvm.plcopen.diagram import Diagram, Object, placed, read_diagram
-from fbvm.plcopen.document import Body, Pou, Reading
-from fbvm.plcopen.markup import Element
-from fbvm.plcopen.networks import LARGEST, Network, networks
-from fbvm.plcopen.read_types import duration
-from fbvm.plcopen.scope import Scope
-from fbvm.plcopen.statements import Statements
-from fbvm.plcopen.values import Unexecutable
+from fbvm.interchange.plcopen.read.diagram import Diagram, Object, placed, read_diagram
+from fbvm.interchange.plcopen.read.document import Body, Pou, Reading
+from fbvm.interchange.plcopen.read.markup import Element
+from fbvm.interchange.plcopen.read.networks import LARGEST, Network, networks
+from fbvm.interchange.plcopen.read.scope import Scope
+from fbvm.interchange.plcopen.read.statements import Statements
+from fbvm.interchange.plcopen.read.types import duration
+from fbvm.interchange.plcopen.read.values import Unexecutable
 from fbvm.syntax.tree.sfc import QUALIFIERS
 
 PASSING = ("selectionDivergence", "selectionConvergence", "simultaneousDivergence", "simultaneousConvergence")

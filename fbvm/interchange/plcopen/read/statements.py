@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 
-from fbvm.plcopen.calls import Calls
-from fbvm.plcopen.diagram import Object, Pin, Wire
-from fbvm.plcopen.document import Reading
-from fbvm.plcopen.networks import Network
-from fbvm.plcopen.scope import SHARED, Scope
-from fbvm.plcopen.values import ATOM, FALSE, TRUE, UNARY, Unexecutable, Value, both, either, negation, written
+from fbvm.interchange.plcopen.read.calls import Calls
+from fbvm.interchange.plcopen.read.diagram import Object, Pin, Wire
+from fbvm.interchange.plcopen.read.document import Reading
+from fbvm.interchange.plcopen.read.networks import Network
+from fbvm.interchange.plcopen.read.scope import SHARED, Scope
+from fbvm.interchange.plcopen.read.values import ATOM, FALSE, TRUE, UNARY, Unexecutable, Value, both, either, negation, written
 
 LONGEST = 500
 """Characters of the longest expression that is written several times."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from fbvm.plcopen.layout import End, wired
-from fbvm.plcopen.markup import Element, element
-from fbvm.plcopen.write_types import Types
+from fbvm.interchange.plcopen.read.markup import Element, element
+from fbvm.interchange.plcopen.write.layout import End, wired
+from fbvm.interchange.plcopen.write.types import Types
 from fbvm.syntax import tree
 from fbvm.syntax.tree.sfc import Sfc, Step, Transition
 

@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
-from fbvm.plcopen.layout import own_data
-from fbvm.plcopen.markup import Element, element
-from fbvm.plcopen.read_project import QUALIFIERS, SECTIONS
-from fbvm.plcopen.read_types import ELEMENTARY, LOCATION
+from fbvm.interchange.plcopen.read.markup import Element, element
+from fbvm.interchange.plcopen.read.project import QUALIFIERS, SECTIONS
+from fbvm.interchange.plcopen.read.types import ELEMENTARY, LOCATION
+from fbvm.interchange.plcopen.write.layout import own_data
 from fbvm.syntax import tree
 
 LONG = {"DATE_AND_TIME": "DT", "TIME_OF_DAY": "TOD"}

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import re
 
-from fbvm.plcopen.document import Reading
-from fbvm.plcopen.markup import Element
+from fbvm.interchange.plcopen.read.document import Reading
+from fbvm.interchange.plcopen.read.markup import Element
 
 _NAMES = ("BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD "
           "ANY ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE")

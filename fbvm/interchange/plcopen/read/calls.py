@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.check.calls.functions import is_standard
-from fbvm.plcopen.diagram import Object, Pin, Wire
-from fbvm.plcopen.rung_parts import instruction
-from fbvm.plcopen.scope import SHARED
-from fbvm.plcopen.values import ATOM, CHAINED, INFIX, TRUE, Unexecutable, Value, joined, negation
+from fbvm.interchange.plcopen.read.diagram import Object, Pin, Wire
+from fbvm.interchange.plcopen.read.rung_parts import instruction
+from fbvm.interchange.plcopen.read.scope import SHARED
+from fbvm.interchange.plcopen.read.values import ATOM, CHAINED, INFIX, TRUE, Unexecutable, Value, joined, negation
 
 if TYPE_CHECKING:
-    from fbvm.plcopen.statements import Statements
+    from fbvm.interchange.plcopen.read.statements import Statements
 
 
 class Calls:

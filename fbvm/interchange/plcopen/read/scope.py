@@ -13,8 +13,8 @@ from pathlib import Path
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source
 from fbvm.check.calls.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversion, typed_name
-from fbvm.plcopen.diagram import Object, Wire
-from fbvm.plcopen.document import Document, Pou, Variable
+from fbvm.interchange.plcopen.read.diagram import Object, Wire
+from fbvm.interchange.plcopen.read.document import Document, Pou, Variable
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.operands import Operands, Wrong
 from fbvm.syntax.st.parser import parse

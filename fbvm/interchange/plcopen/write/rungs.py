@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from fbvm.base.areas import parse_address
-from fbvm.plcopen.layout import Drawing, End, Ends, own_data
-from fbvm.plcopen.markup import Element, element
-from fbvm.plcopen.read_types import LOCATION
-from fbvm.plcopen.write_types import Types, Unsayable
+from fbvm.interchange.plcopen.read.markup import Element, element
+from fbvm.interchange.plcopen.read.types import LOCATION
+from fbvm.interchange.plcopen.write.layout import Drawing, End, Ends, own_data
+from fbvm.interchange.plcopen.write.types import Types, Unsayable
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.drawing.diagram import WIRE
 from fbvm.syntax.ladder.instruction_set import JOINS, Instruction, instruction_set

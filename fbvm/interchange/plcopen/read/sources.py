@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
-from fbvm.plcopen.bodies import Bodies
-from fbvm.plcopen.document import Configuration, DataType, Document, Pou, Reading, Resource, Variable, VarList
-from fbvm.plcopen.read_types import remark
+from fbvm.interchange.plcopen.read.bodies import Bodies
+from fbvm.interchange.plcopen.read.document import Configuration, DataType, Document, Pou, Reading, Resource, Variable, VarList
+from fbvm.interchange.plcopen.read.types import remark
 from fbvm.syntax.formatter.formatter import formatted
 
 GLOBALS = "globals"

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from fbvm.plcopen.document import (
+from fbvm.interchange.plcopen.read.document import (
     Body,
     Configuration,
     DataType,
@@ -22,8 +22,8 @@ from fbvm.plcopen.document import (
     Variable,
     VarList,
 )
-from fbvm.plcopen.markup import Element
-from fbvm.plcopen.read_types import LOCATION, MNEMONIC, duration, location, note, type_text, value_text
+from fbvm.interchange.plcopen.read.markup import Element
+from fbvm.interchange.plcopen.read.types import LOCATION, MNEMONIC, duration, location, note, type_text, value_text
 
 TC6 = "http://www.plcopen.org/xml/tc6"
 IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"

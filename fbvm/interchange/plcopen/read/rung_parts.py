@@ -5,9 +5,9 @@ from __future__ import annotations
 
 import re
 
-from fbvm.plcopen.diagram import Object, Pin, Wire
-from fbvm.plcopen.networks import Network
-from fbvm.plcopen.scope import Scope
+from fbvm.interchange.plcopen.read.diagram import Object, Pin, Wire
+from fbvm.interchange.plcopen.read.networks import Network
+from fbvm.interchange.plcopen.read.scope import Scope
 from fbvm.syntax.ladder.instruction_set import Instruction, instruction_set
 from fbvm.syntax.ladder.operands import Operands, Wrong
 from fbvm.syntax.ladder.text import instruction_text

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from fbvm.plcopen.diagram import Object, Wire
-from fbvm.plcopen.networks import Network
-from fbvm.plcopen.rung_parts import Inexact, Parts
-from fbvm.plcopen.scope import Scope
+from fbvm.interchange.plcopen.read.diagram import Object, Wire
+from fbvm.interchange.plcopen.read.networks import Network
+from fbvm.interchange.plcopen.read.rung_parts import Inexact, Parts
+from fbvm.interchange.plcopen.read.scope import Scope
 from fbvm.syntax.ladder.text import instruction_text
 
 BRANCHES = 16

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, errors
-from fbvm.plcopen.document import Reading
-from fbvm.plcopen.markup import parse_markup, read_markup
-from fbvm.plcopen.read_project import read_project
-from fbvm.plcopen.sources import sources
+from fbvm.interchange.plcopen.read.document import Reading
+from fbvm.interchange.plcopen.read.markup import parse_markup, read_markup
+from fbvm.interchange.plcopen.read.project import read_project
+from fbvm.interchange.plcopen.read.sources import sources
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
-from fbvm.plcopen.markup import Element, element, written
-from fbvm.plcopen.write_pous import pou
-from fbvm.plcopen.write_types import Types, Unsayable
+from fbvm.interchange.plcopen.read.markup import Element, element, written
+from fbvm.interchange.plcopen.write.pous import pou
+from fbvm.interchange.plcopen.write.types import Types, Unsayable
 from fbvm.syntax import tree
 from fbvm.syntax.st.parser import parse
 from fbvm.syntax.st.pragmas import harmless

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from math import inf
 
-from fbvm.plcopen.diagram import Diagram, Object, Wire
+from fbvm.interchange.plcopen.read.diagram import Diagram, Object, Wire
 
 LARGEST, MOST_LOOPS = 5_000, 200
 """Objects and loops of the largest network that is taken over; drawings of people have far fewer."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 
-from fbvm.plcopen.layout import Drawing
-from fbvm.plcopen.markup import Element, element
-from fbvm.plcopen.write_charts import ChartWriter
-from fbvm.plcopen.write_rungs import RungWriter
-from fbvm.plcopen.write_statements import StatementWriter
-from fbvm.plcopen.write_types import Types, Unsayable
+from fbvm.interchange.plcopen.read.markup import Element, element
+from fbvm.interchange.plcopen.write.charts import ChartWriter
+from fbvm.interchange.plcopen.write.layout import Drawing
+from fbvm.interchange.plcopen.write.rungs import RungWriter
+from fbvm.interchange.plcopen.write.statements import StatementWriter
+from fbvm.interchange.plcopen.write.types import Types, Unsayable
 from fbvm.syntax import tree
 from fbvm.syntax.tree.ladder import Ladder
 from fbvm.syntax.tree.sfc import Sfc

@@ -3,14 +3,14 @@ statements."""
 
 from __future__ import annotations
 
-from fbvm.plcopen.charts import Chart, Incomplete
-from fbvm.plcopen.diagram import read_diagram
-from fbvm.plcopen.document import Body, Document, Pou, Reading
-from fbvm.plcopen.networks import Network, networks
-from fbvm.plcopen.rung_steps import rung_steps
-from fbvm.plcopen.scope import Scope
-from fbvm.plcopen.statements import Statements
-from fbvm.plcopen.values import Unexecutable
+from fbvm.interchange.plcopen.read.charts import Chart, Incomplete
+from fbvm.interchange.plcopen.read.diagram import read_diagram
+from fbvm.interchange.plcopen.read.document import Body, Document, Pou, Reading
+from fbvm.interchange.plcopen.read.networks import Network, networks
+from fbvm.interchange.plcopen.read.rung_steps import rung_steps
+from fbvm.interchange.plcopen.read.scope import Scope
+from fbvm.interchange.plcopen.read.statements import Statements
+from fbvm.interchange.plcopen.read.values import Unexecutable
 
 NOTE = "//"
 SPANS = {"IL", "ILC", "JMP", "CJP", "CJPN", "JME", "JMP0", "JME0", "FOR", "NEXT", "BREAK", "SBN", "RET", "END"}

@@ -5,8 +5,8 @@ Expressions stay as they are, in boxes of variables, which take expressions too.
 
 from __future__ import annotations
 
-from fbvm.plcopen.layout import Drawing, Ends
-from fbvm.plcopen.write_types import Types, Unsayable
+from fbvm.interchange.plcopen.write.layout import Drawing, Ends
+from fbvm.interchange.plcopen.write.types import Types, Unsayable
 from fbvm.syntax import tree
 
 COLUMN = 3

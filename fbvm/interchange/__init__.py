@@ -1,0 +1,1 @@
+"""Project files of other tools, to sources of ours and back."""

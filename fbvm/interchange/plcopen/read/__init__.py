@@ -1,0 +1,1 @@
+"""PLCopen XML to source files."""
