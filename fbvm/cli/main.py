@@ -12,32 +12,42 @@ import sys
 import click
 
 import fbvm
-from fbvm.cli import status
+from fbvm.cli.shared import status
 
-VERBS = {
-    "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
-    "new": "Make a project with a block and its test.",
-    "test": "Run the tests of a project.",
-    "learn": "Learn in twelve lessons what a scan cycle really does.",
-    "run": "Run a program, in virtual time or over real TCP.",
-    "step": "Step through the scans of a program, forth and back.",
-    "replay": "Do a run again from its journal.",
-    "chart": "Draw variables of a trace, a column a scan.",
-    "table": "Show which statement changed variables of a trace.",
-    "why": "Say why a variable has its value, back through scans.",
-    "convert": "Write a trace as a page, a picture, CSV or VCD, or a CSV as a trace.",
-    "check": "Say what is wrong with a program; silent when nothing is.",
-    "fmt": "Rewrite a program in canonical Structured Text.",
-    "ladder": "Draw the rungs of a program.",
-    "sfc": "Draw the sequential function charts of a program.",
-    "import": "Make sources of a project in PLCopen XML.",
-    "export": "Write programs as a project in PLCopen XML.",
-    "list": "Print the compiled program, readable.",
-    "explain": "Print the page of a diagnostic.",
-    "serve": "Serve the memory of a PLC by Modbus TCP, through its server program.",
-    "map": "Print under which addresses Modbus clients find words and bits.",
-    "peer": "Start a Modbus TCP server to talk to.",
-}
+ROOMS = {
+    "running": ("Run PLCs", {
+        "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
+        "run": "Run a program, in virtual time or over real TCP.",
+        "step": "Step through the scans of a program, forth and back.",
+        "replay": "Do a run again from its journal.",
+        "serve": "Serve the memory of a PLC by Modbus TCP, through its server program.",
+        "map": "Print under which addresses Modbus clients find words and bits.",
+        "peer": "Start a Modbus TCP server to talk to.",
+    }),
+    "projects": ("Projects and lessons", {
+        "new": "Make a project with a block and its test.",
+        "test": "Run the tests of a project.",
+        "learn": "Learn in twelve lessons what a scan cycle really does.",
+    }),
+    "programs": ("Look at programs", {
+        "check": "Say what is wrong with a program; silent when nothing is.",
+        "fmt": "Rewrite a program in canonical Structured Text.",
+        "list": "Print the compiled program, readable.",
+        "explain": "Print the page of a diagnostic.",
+        "ladder": "Draw the rungs of a program.",
+        "sfc": "Draw the sequential function charts of a program.",
+        "import": "Make sources of a project in PLCopen XML.",
+        "export": "Write programs as a project in PLCopen XML.",
+    }),
+    "recordings": ("Look at recordings", {
+        "chart": "Draw variables of a trace, a column a scan.",
+        "table": "Show which statement changed variables of a trace.",
+        "why": "Say why a variable has its value, back through scans.",
+        "convert": "Write a trace as a page, a picture, CSV or VCD, or a CSV as a trace.",
+    }),
+}  # fmt: skip
+"""The rooms of verbs: what heads each in `fbvm --help`, and its verbs.  The module of a verb has its name."""
+HOMES = {verb: room for room, (_, verbs) in ROOMS.items() for verb in verbs}
 
 
 class _Verbs(click.Group):
@@ -52,17 +62,18 @@ class _Verbs(click.Group):
             sys.exit(status.INTERRUPTED)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(VERBS)
+        return list(HOMES)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in VERBS:
+        if cmd_name not in HOMES:
             return None
-        command: click.Command = importlib.import_module(f"fbvm.cli.{cmd_name}").command
+        command: click.Command = importlib.import_module(f"fbvm.cli.{HOMES[cmd_name]}.{cmd_name}").command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl(list(VERBS.items()))
+        for heading, verbs in ROOMS.values():
+            with formatter.section(heading):
+                formatter.write_dl(list(verbs.items()))
 
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})

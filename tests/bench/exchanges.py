@@ -35,7 +35,7 @@ HOUSE = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(HOUSE))
 
 from fbvm import Etn21, Peer, Plc, TcpNetwork, compile_files  # noqa: E402
-from fbvm.cli.demo import modbus_server  # noqa: E402
+from fbvm.cli.running.demo import modbus_server  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
 from fbvm.run import run  # noqa: E402
 

@@ -18,7 +18,7 @@ from pathlib import Path
 HOUSE = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(HOUSE))
 
-from fbvm.cli.demo import SIGNALS  # noqa: E402
+from fbvm.cli.running.demo import SIGNALS  # noqa: E402
 from fbvm.code.compiler import compile_files  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
 from fbvm.machine.plc import Plc  # noqa: E402

@@ -18,7 +18,7 @@ sys.path[:0] = [str(HOUSE), str(HOUSE / "tests" / "fblib")]
 from soak_plant import BLOCKS, SERVER, UNIT_ADDRESS, Usage, check, contents, plant, usage  # noqa: E402
 
 from fbvm import Etn21, LoopNetwork, ModbusPeer, Plc, TcpNetwork  # noqa: E402
-from fbvm.cli.demo import modbus_server  # noqa: E402
+from fbvm.cli.running.demo import modbus_server  # noqa: E402
 from fbvm.net.faults import Fault  # noqa: E402
 from fbvm.run import run  # noqa: E402
 

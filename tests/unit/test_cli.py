@@ -11,9 +11,9 @@ from click.testing import CliRunner, Result
 from rows import each_of
 
 from fbvm.base.codes import CODES
-from fbvm.cli.demo import called
-from fbvm.cli.main import VERBS, main
-from fbvm.cli.options import split_names
+from fbvm.cli.main import HOMES, main
+from fbvm.cli.running.demo import called
+from fbvm.cli.shared.options import split_names
 from fbvm.record.draw.chart import Chart
 
 HOUSE = Path(__file__).resolve().parents[2]
@@ -347,7 +347,7 @@ def test_explain_prints_the_page() -> None:
 # --- the command itself -----------------------------------------------------------------------------------------------
 
 
-@each_of("verb", VERBS)
+@each_of("verb", HOMES)
 def test_every_verb_has_help(verb: str) -> None:
     result = fbvm(verb, "--help")
     assert result.exit_code == 0
@@ -356,7 +356,7 @@ def test_every_verb_has_help(verb: str) -> None:
 
 def test_help_names_every_verb() -> None:
     output = fbvm("--help").stdout
-    assert all(verb in output for verb in VERBS)
+    assert all(verb in output for verb in HOMES)
 
 
 def test_an_unknown_verb_is_wrong_usage() -> None:
@@ -519,6 +519,6 @@ def test_a_host_that_is_not_known_is_named(counter: str, monkeypatch: pytest.Mon
 def test_the_demo_names_the_command_as_it_can_be_called(
     found: str | None, argument: str, called_so: str, counter: str, monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr("fbvm.cli.demo.shutil.which", lambda name: found)
+    monkeypatch.setattr("fbvm.cli.running.demo.shutil.which", lambda name: found)
     monkeypatch.setattr(sys, "argv", [argument.format(here=Path.cwd())])
     assert called() == called_so

@@ -5,7 +5,7 @@ from __future__ import annotations
 from click.testing import CliRunner
 from rows import each_of
 
-from fbvm.cli.map import command
+from fbvm.cli.running.map import command
 
 
 def mapped(*arguments: str) -> list[list[str]]:

@@ -9,7 +9,7 @@ from itertools import groupby
 from rich.console import Console
 
 from fbvm import Source, compile_sources
-from fbvm.cli.patience import PER_SECOND, QUICK_S, patience
+from fbvm.cli.shared.progress import PER_SECOND, QUICK_S, patience
 
 
 def said(terminal: bool, seconds: float) -> str:

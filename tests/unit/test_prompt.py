@@ -11,7 +11,7 @@ from prompt_toolkit.document import Document
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 
-from fbvm.cli.prompt import HISTORY, Completions, prompted
+from fbvm.cli.shared.prompt import HISTORY, Completions, prompted
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.step.commands import Commands

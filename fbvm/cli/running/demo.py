@@ -26,9 +26,9 @@ from rich.table import Table
 from rich.text import Text
 
 from fbvm.base.data import data_folder
-from fbvm.cli import status
-from fbvm.cli.outcome import chart_width
-from fbvm.cli.peer import LISTENING
+from fbvm.cli.running.peer import LISTENING
+from fbvm.cli.shared import status
+from fbvm.cli.shared.outcome import chart_width
 from fbvm.code.compiler import compile_files
 from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork

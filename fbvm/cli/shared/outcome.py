@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from fbvm.cli import status
+from fbvm.cli.shared import status
 from fbvm.engine.trap import Trap
 from fbvm.machine.breakpoints import Halt
 from fbvm.machine.plc import Plc

@@ -7,10 +7,10 @@ from pathlib import Path
 import click
 
 from fbvm.base.diagnostics import Diagnostic, errors
-from fbvm.cli import status
-from fbvm.cli.options import Mapping
-from fbvm.cli.run import build_network, mailboxes
-from fbvm.cli.sources import report
+from fbvm.cli.running.run import build_network, mailboxes
+from fbvm.cli.shared import status
+from fbvm.cli.shared.options import Mapping
+from fbvm.cli.shared.sources import report
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork

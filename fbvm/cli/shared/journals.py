@@ -12,10 +12,10 @@ import click
 
 import fbvm
 from fbvm.base.diagnostics import Source
-from fbvm.cli import status
-from fbvm.cli.banks import with_banks
-from fbvm.cli.files import writing
-from fbvm.cli.sources import chosen, report
+from fbvm.cli.shared import status
+from fbvm.cli.shared.banks import with_banks
+from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.sources import chosen, report
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
 from fbvm.net.journal import Entry, Header, Journal, JournalError, open_journal

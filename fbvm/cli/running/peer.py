@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from fbvm.cli import status
+from fbvm.cli.shared import status
 from fbvm.wire import registers
 
 LISTENING = "listening on "

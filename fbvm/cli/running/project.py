@@ -11,10 +11,10 @@ import click
 from click.core import ParameterSource
 
 from fbvm.base.diagnostics import Diagnostic, errors
-from fbvm.cli import status
-from fbvm.cli.beside import check_options
-from fbvm.cli.outcome import EXIT_STATUS, Progress, for_scripts, shown, trap_for_scripts
-from fbvm.cli.sources import report, show
+from fbvm.cli.shared import status
+from fbvm.cli.shared.beside import check_options
+from fbvm.cli.shared.outcome import EXIT_STATUS, Progress, for_scripts, shown, trap_for_scripts
+from fbvm.cli.shared.sources import report, show
 from fbvm.machine.scan_times import Lateness, ScanTimes
 from fbvm.run import run_all
 from fbvm.run.plant import Kind, Plant

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli import status
-from fbvm.cli.bench import Bench, ProjectBench
-from fbvm.cli.beside import project_named
-from fbvm.cli.options import Mapping, Setting, mapping, setting, time_ns
-from fbvm.cli.prompt import prompted
-from fbvm.cli.run import CYCLE_NS
-from fbvm.cli.sources import compiled, source_options
+from fbvm.cli.running.run import CYCLE_NS
+from fbvm.cli.shared import status
+from fbvm.cli.shared.beside import project_named
+from fbvm.cli.shared.options import Mapping, Setting, mapping, setting, time_ns
+from fbvm.cli.shared.prompt import prompted
+from fbvm.cli.shared.sources import compiled, source_options
+from fbvm.cli.shared.stepped import Bench, ProjectBench
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.session import Session

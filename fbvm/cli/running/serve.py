@@ -14,10 +14,10 @@ from typing import IO, NoReturn
 import click
 
 from fbvm.base.data import data_folder
-from fbvm.cli import status
-from fbvm.cli.files import writing
-from fbvm.cli.options import time_ns
-from fbvm.cli.peer import LISTENING
+from fbvm.cli.running.peer import LISTENING
+from fbvm.cli.shared import status
+from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.options import time_ns
 from fbvm.code.compiler import compile_files
 from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli.files import writing
-from fbvm.cli.options import split_names
-from fbvm.cli.traces import SUFFIX, opened, recorded, scans_option
+from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.options import split_names
+from fbvm.cli.shared.traces import SUFFIX, opened, recorded, scans_option
 from fbvm.record.draw.svg import Drawing
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.export.vcd import write_vcd

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli.traces import SUFFIX, opened
+from fbvm.cli.shared.traces import SUFFIX, opened
 from fbvm.record.draw.why import DEEPEST, told, why
 from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import Place

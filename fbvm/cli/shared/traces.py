@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from fbvm.cli.files import writing
+from fbvm.cli.shared.files import writing
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.record.page.data import page_data

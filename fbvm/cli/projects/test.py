@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 import click
 
-from fbvm.cli import status
+from fbvm.cli.shared import status
 
 STATUS = {0: status.GOOD, 4: status.USAGE, 5: status.USAGE}
 """Statuses by pytest's own, the others are failures: 1 of a test, 2 of what could not even be collected (Ctrl-C ends both

@@ -16,9 +16,9 @@ from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source, whole_lines
 from fbvm.base.types import fold
 from fbvm.check.calls.standard import is_known
-from fbvm.cli import status
-from fbvm.cli.files import writing
-from fbvm.cli.sources import show
+from fbvm.cli.shared import status
+from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.sources import show
 from fbvm.syntax.formatter.formatter import formatted
 from fbvm.syntax.formatter.names import Outside
 from fbvm.syntax.st.parser import parse

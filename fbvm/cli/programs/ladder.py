@@ -10,9 +10,9 @@ from pathlib import Path
 import click
 
 from fbvm.base.types import StructType, fold
-from fbvm.cli.files import writing
-from fbvm.cli.outcome import chart_width
-from fbvm.cli.sources import compiled, source_arguments
+from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.outcome import chart_width
+from fbvm.cli.shared.sources import compiled, source_arguments
 from fbvm.code.image import Image, RungPicture
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.ladder_svg import ladder_svg

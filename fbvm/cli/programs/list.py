@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli.sources import compiled, source_arguments
+from fbvm.cli.shared.sources import compiled, source_arguments
 from fbvm.code.listing import listing
 from fbvm.engine.native.module import translate
 

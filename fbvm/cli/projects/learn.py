@@ -8,8 +8,8 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli import status
-from fbvm.cli.files import writing
+from fbvm.cli.shared import status
+from fbvm.cli.shared.files import writing
 
 FOLDER = "lessons"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from fbvm.base.data import data_folder
-from fbvm.cli.files import writing
+from fbvm.cli.shared.files import writing
 
 EXAMPLE = "project"
 """The folder in `examples/` that is copied."""

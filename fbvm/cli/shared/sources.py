@@ -13,7 +13,7 @@ import click
 from fbvm.base import cache
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.dialects import DIALECTS
-from fbvm.cli import status
+from fbvm.cli.shared import status
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 

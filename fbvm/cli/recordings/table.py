@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli import status
-from fbvm.cli.options import split_names
-from fbvm.cli.traces import opened, scans_option, trace_argument
+from fbvm.cli.shared import status
+from fbvm.cli.shared.options import split_names
+from fbvm.cli.shared.traces import opened, scans_option, trace_argument
 from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace.recorder import signals_at
 from fbvm.record.trace.writer import Depth

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli import status
-from fbvm.cli.files import writing
-from fbvm.cli.sources import report
+from fbvm.cli.shared import status
+from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.sources import report
 from fbvm.interchange.plcopen.write.exporting import export_xml
 
 

@@ -9,18 +9,19 @@ from typing import Any
 
 import click
 
-from fbvm.cli import sfc, status
-from fbvm.cli.banks import banks_in, with_banks
-from fbvm.cli.beside import project_named
-from fbvm.cli.breakpoints import breakpoint_options, halt_lines, set_breakpoints
-from fbvm.cli.files import writing
-from fbvm.cli.journals import start_journal
-from fbvm.cli.ladder import drawing
-from fbvm.cli.options import Mapping, Setting, charted_names, mapping, setting, show_option, time_ns
-from fbvm.cli.outcome import Outcome, Progress
-from fbvm.cli.project import run_project
-from fbvm.cli.sources import compiled, source_options
-from fbvm.cli.traces import paging, statement_lines, tracing
+from fbvm.cli.programs import sfc
+from fbvm.cli.programs.ladder import drawing
+from fbvm.cli.running.project import run_project
+from fbvm.cli.shared import status
+from fbvm.cli.shared.banks import banks_in, with_banks
+from fbvm.cli.shared.beside import project_named
+from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
+from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.journals import start_journal
+from fbvm.cli.shared.options import Mapping, Setting, charted_names, mapping, setting, show_option, time_ns
+from fbvm.cli.shared.outcome import Outcome, Progress
+from fbvm.cli.shared.sources import compiled, source_options
+from fbvm.cli.shared.traces import paging, statement_lines, tracing
 from fbvm.code.image import Image
 from fbvm.engine.tiers import CHOICES
 from fbvm.machine.plc import Plc

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli.files import writing
-from fbvm.cli.ladder import SVG_WIDTH, scans_named, tell_nothing_drawn
-from fbvm.cli.outcome import chart_width
-from fbvm.cli.sources import compiled, source_arguments
+from fbvm.cli.programs.ladder import SVG_WIDTH, scans_named, tell_nothing_drawn
+from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.outcome import chart_width
+from fbvm.cli.shared.sources import compiled, source_arguments
 from fbvm.code.image import Image, SfcPicture
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.ladder_svg import ladder_svg

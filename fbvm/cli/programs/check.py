@@ -12,9 +12,9 @@ import click
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.check.lint.suppression import Wanted
-from fbvm.cli import status
-from fbvm.cli.beside import check_options, project_named
-from fbvm.cli.sources import chosen, report, source_options
+from fbvm.cli.shared import status
+from fbvm.cli.shared.beside import check_options, project_named
+from fbvm.cli.shared.sources import chosen, report, source_options
 from fbvm.code.compiler import LONG, compile_files
 
 BESIDE_PROJECTS = {"no_warn": "--no-warn", "warnings_as_errors": "--warnings-as-errors", "as_json": "--json"}
@@ -58,7 +58,7 @@ def _patience(files: tuple[Path, ...]) -> AbstractContextManager[Callable[[str, 
     """Who says on a terminal how far a long check is; for a short one nothing is loaded."""
     if not sys.stderr.isatty() or all(path.is_file() for path in files) and sum(path.stat().st_size for path in files) < LONG:
         return nullcontext(lambda what, done, known: None)
-    from fbvm.cli.patience import patience
+    from fbvm.cli.shared.progress import patience
 
     return patience(f"checking {', '.join(path.name for path in files)}")
 

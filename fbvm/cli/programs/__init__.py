@@ -1,0 +1,1 @@
+"""Verbs about sources: check, fmt, list, ladder, sfc, explain, import, export."""

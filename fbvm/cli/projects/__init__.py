@@ -1,0 +1,1 @@
+"""Verbs about projects and lessons: new, test, learn."""

@@ -1,0 +1,1 @@
+"""Verbs that run PLCs: run, demo, serve, map, peer, step, replay."""
