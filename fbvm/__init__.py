@@ -58,7 +58,7 @@ _HOMES = {
     "net.loop": ("LoopNetwork",),
     "net.peers": ("ModbusPeer",),
     "net.tcp": ("TcpNetwork",),
-    "plc": ("Mode", "Plc", "Stopped"),
+    "machine.plc": ("Mode", "Plc", "Stopped"),
     "interchange.plcopen.write.exporting": ("Exported", "export_xml"),
     "interchange.plcopen.read.importing": ("Imported", "import_xml"),
     "record.draw.chart": ("chart", "draw"),

@@ -34,7 +34,7 @@ def test_a_wheel_runs_in_a_fresh_environment(tmp_path: Path) -> None:
     assert not [name for name in names if name.startswith("tests")]
     assert {"fbvm/record/page/chart.js", "fbvm/_data/examples/project/.github/workflows/test.yml",
             "fbvm/_data/examples/project/.gitignore",
-            "fbvm/_data/lessons/12-two-plcs-one-wire/solution/program.st"} <= set(names)  # fmt: skip
+            "fbvm/_data/examples/lessons/12-two-plcs-one-wire/solution/program.st"} <= set(names)  # fmt: skip
     call(sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv", cwd=tmp_path)
     [packages] = (tmp_path / "venv").rglob("site-packages")
     python = tmp_path / "venv" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")

@@ -1,6 +1,6 @@
 """The lessons that `fbvm learn` gives, what a learner makes of them, and a teacher's run over many learners.
 
-A lesson is a folder of `lessons/`: `lesson.md` is its text, `given.st` a program, `answers.toml` asks for a prediction,
+A lesson is a folder of `examples/lessons/`: `lesson.md` is its text, `given.st` a program, `answers.toml` asks for a prediction,
 `test_lesson.py` checks it and the learner's `program.st`; `solution/` is kept apart.
 """
 
@@ -81,7 +81,7 @@ class Lesson:
 @cache
 def lessons() -> tuple[Lesson, ...]:
     """All lessons in order."""
-    folders = sorted(path for path in data_folder("lessons").iterdir() if (path / TEXT).is_file())
+    folders = sorted(path for path in (data_folder("examples") / "lessons").iterdir() if (path / TEXT).is_file())
     return tuple(Lesson(int(path.name.partition("-")[0]), path.name, path) for path in folders)
 
 

@@ -366,7 +366,7 @@ address = "192.168.250.2"
 @pytest.mark.slow
 def test_one_plc_of_a_project_while_the_others_scan_along(tmp_path: Path) -> None:
     for name in ("server.st", "given.st"):
-        text = (HOUSE / "lessons" / "12-two-plcs-one-wire" / name).read_text(encoding="utf-8")
+        text = (HOUSE / "examples" / "lessons" / "12-two-plcs-one-wire" / name).read_text(encoding="utf-8")
         (tmp_path / name).write_text(text, encoding="utf-8")
     (tmp_path / "fbvm.toml").write_text(TWO, encoding="utf-8")
     script = ("run Main.Beat > 60\nexpect Main.Beat < 100\nexpect D500 = 7\ngoto 1\nexpect D500 = 0\nexpect Main.Beat = 0\n"
