@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections import Counter
 from pathlib import Path
 from random import Random
@@ -11,6 +10,8 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lang_check import _at, _place, _value
+from lang_corpus import Program, programs
 from random_rungs import random_ladder
 from schema_rules import breaches, wires_lead_somewhere
 
@@ -23,10 +24,7 @@ from fbvm.machine.plc import Plc
 from fbvm.syntax.text import read
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "tests" / "lang"))
 
-from lang_check import _at, _place, _value  # noqa: E402
-from lang_corpus import Program, programs  # noqa: E402
 
 BUDGET = 100_000
 

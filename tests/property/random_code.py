@@ -11,7 +11,7 @@ from random import Random
 from typing import Any
 
 if __name__ == "__main__":
-    sys.path[:0] = [str(Path(__file__).parent.parent / "unit"), str(Path(__file__).parent.parent.parent)]
+    sys.path[:0] = [str(Path(__file__).parents[1] / "unit" / "rigs"), str(Path(__file__).parents[2])]
 
 from hand_image import at, const, image, power_on
 

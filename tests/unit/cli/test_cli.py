@@ -16,7 +16,7 @@ from fbvm.cli.running.demo import called
 from fbvm.cli.shared.options import split_names
 from fbvm.record.draw.chart import Chart
 
-HOUSE = Path(__file__).resolve().parents[2]
+HOUSE = Path(__file__).resolve().parents[3]
 DEMO = str(HOUSE / "examples" / "demo.st")
 COUNTER = """
 TYPE Colour : (Red, Green); END_TYPE

@@ -6,6 +6,7 @@ import math
 import struct
 from typing import Any
 
+from expression_rows import NUMBERS, RUNS, STRINGS
 from hand_image import at, behind, const, execute, load, operations_in, store, yields
 from rows import each_of
 
@@ -26,42 +27,6 @@ def slot(machine: str, value: Any, second: bool = False) -> tuple[Node, dict[int
     return load(machine, offset), {offset: STRUCTS[machine].pack(value)}
 
 
-# operation, type, operands (constants, and sites where the row has one), what it yields or the code of its trap
-NUMBERS = [
-    ("add", "i8", 127, 1, -128), ("add", "u8", 255, 1, 0), ("add", "i16", 32767, 1, -32768),
-    ("add", "u16", 65535, 2, 1), ("add", "i32", 2**31 - 1, 1, -(2**31)), ("add", "u32", 2**32 - 1, 1, 0),
-    ("add", "i64", 2**63 - 1, 1, -(2**63)), ("add", "u64", 2**64 - 1, 1, 0), ("add", "i16", 2, 3, 5),
-    ("add", "f32", 16777216.0, 1.0, 16777216.0), ("add", "f64", 0.1, 0.2, 0.1 + 0.2), ("add", "f64", INF, -INF, NAN),
-    ("add", "f32", 3e38, 3e38, INF),
-    ("sub", "i8", -128, 1, 127), ("sub", "u16", 0, 1, 65535), ("sub", "u64", 0, 1, 2**64 - 1),
-    ("sub", "i64", -(2**63), 1, 2**63 - 1), ("sub", "f32", 1.5, 0.25, 1.25),
-    ("mul", "i16", 300, 300, 90000 - 65536), ("mul", "u8", 16, 16, 0), ("mul", "i64", 2**62, 2, -(2**63)),
-    ("mul", "u64", 2**63, 3, 2**63), ("mul", "i32", 65536, 65536, 0), ("mul", "f32", 1e30, 1e30, INF),
-    ("mul", "f32", 1e-30, 1e-30, 0.0), ("mul", "f64", INF, 0.0, NAN),
-    ("div", "i16", 7, 2, 3), ("div", "i16", -7, 2, -3), ("div", "i16", 7, -2, -3), ("div", "i16", -7, -2, 3),
-    ("div", "i8", -128, -1, -128), ("div", "i64", -(2**63), -1, -(2**63)), ("div", "u16", 65535, 2, 32767),
-    ("div", "i16", 1, 0, "R0101"), ("div", "u64", 0, 0, "R0101"), ("div", "f64", 1.0, 0.0, INF),
-    ("div", "f64", 1.0, -0.0, -INF), ("div", "f64", -1.0, 0.0, -INF), ("div", "f64", 0.0, 0.0, NAN),
-    ("div", "f64", NAN, 0.0, NAN), ("div", "f32", 1.0, 3.0, struct.unpack("f", struct.pack("f", 1 / 3))[0]),
-    ("mod", "i16", 7, 3, 1), ("mod", "i16", -7, 3, -1), ("mod", "i16", 7, -3, 1), ("mod", "i16", -7, -3, -1),
-    ("mod", "i8", -128, -1, 0), ("mod", "u8", 255, 16, 15), ("mod", "i32", 5, 0, "R0101"),
-    ("pow", "f64", 2.0, 10.0, 1024.0), ("pow", "f64", NAN, 0.0, 1.0), ("pow", "f64", 0.0, 0.0, 1.0),
-    ("pow", "f64", 0.0, -1.0, INF), ("pow", "f64", -0.0, -3.0, -INF), ("pow", "f64", -8.0, 0.5, NAN),
-    ("pow", "f64", -10.0, 400.0, INF), ("pow", "f64", -10.0, 401.0, -INF), ("pow", "f32", 10.0, 30.0, None),
-    ("pow", "f32", 10.0, 60.0, INF), ("pow", "f64", -2.0, 3.0, -8.0), ("pow", "f64", 1.0, NAN, 1.0),
-    ("and", "u16", 0xFF0F, 0x0FFF, 0x0F0F), ("or", "u8", 0xA0, 0x05, 0xA5), ("xor", "u32", 0xFFFFFFFF, 1, 0xFFFFFFFE),
-    ("and", "b", True, False, False), ("and", "b", True, True, True), ("or", "b", False, False, False),
-    ("or", "b", False, True, True), ("xor", "b", True, True, False), ("xor", "b", True, False, True),
-    ("and_then", "b", True, True, True), ("and_then", "b", False, True, False), ("or_else", "b", False, True, True),
-    ("or_else", "b", False, False, False),
-    ("min", "i16", -1, 1, -1), ("min", "u16", 65535, 1, 1), ("max", "i64", -5, -6, -5), ("max", "u8", 3, 3, 3),
-    ("min", "f64", 1.0, NAN, NAN), ("min", "f64", NAN, 1.0, NAN), ("max", "f32", NAN, 1.0, NAN),
-    ("max", "f64", 2.0, 3.0, 3.0),
-    ("min", "f64", 2.0, 1.0, 1.0), ("max", "f64", 0.0, -0.0, 0.0), ("min", "f64", -0.0, 0.0, -0.0),
-    ("min", "b", True, False, False),
-    ("atan2", "f64", 0.0, -1.0, math.pi), ("atan2", "f64", 0.0, -0.0, 0.0), ("atan2", "f64", -0.0, 0.0, 0.0),
-    ("atan2", "f64", 1.0, 0.0, math.pi / 2), ("atan2", "f32", 1.0, 1.0, None),
-]
 COMPARISONS = [
     ("eq", "i16", -1, -1, True), ("eq", "u16", 1, 2, False), ("eq", "f64", NAN, NAN, False),
     ("ne", "f64", NAN, NAN, True),
@@ -200,116 +165,10 @@ def test_math(function: str, a: float, wanted: float) -> None:
     assert same(yields("f32", ("math", "f32", function, operand), before), rounded)
 
 
-RUNS: list[tuple[str, Node, dict[int, bytes], Any]] = [
-    ("i16", ("load_raw", "i16", at(3)), {3: b"\xfe\xff"}, -2),
-    ("f32", ("load_raw", "f32", at(3)), {3: struct.pack("<f", 2.5)}, 2.5),
-    ("b", ("load_raw", "b", at(3)), {3: b"\2"}, True),
-    ("b", ("load", "b", at(3)), {3: b"\x80"}, True),
-    ("f32", ("load", "f32", at(0)), {0: b"\1\0\xc0\xff"}, NAN),
-    ("b", ("load_bit", "b", at(2), 7), {2: b"\x80"}, True),
-    ("b", ("load_bit", "b", at(2), 0), {2: b"\xfe"}, False),
-    ("b", ("not", "b", ("load_bit", "b", at(2), 3)), {2: b"\x08"}, False),
-    ("s8", ("load_text", "s8", at(0), 4), {0: b"abcdef"}, b"abcd"),
-    ("s8", ("load_text", "s8", at(0), 9), {0: b"ab\0cdef"}, b"ab"),
-    ("i16", ("load", "i16", at(2, (4, load("i16", 60)), (2, const("i16", -1)))), {60: b"\2\0", 8: b"\x39\5"}, 1337),
-    ("u8", ("load", "u8", at(-5, (1, load("u8", 60)))), {60: b"\x0a", 5: b"\x77"}, 0x77),
-    ("i32", ("select", "i32", load("b", 0), const("i32", 5), const("i32", 6)), {0: b"\1"}, 6),
-    ("i32", ("select", "i32", load("b", 0), const("i32", 5), const("i32", 6)), {}, 5),
-    ("i32", ("select", "i32", load("b", 0), const("i32", 5), ("div", "i32", const("i32", 1), load("i32", 4), 3)), {},
-     "R0101"),
-    ("i32", ("select", "i32", load("b", 0), const("i32", 5), ("div", "i32", const("i32", 8), load("i32", 4), 3)),
-     {0: b"\1", 4: b"\2"}, 4),
-    ("i16", ("mux", "i16", load("i64", 0), (const("i16", 5), const("i16", 6)), 3), {0: b"\1"}, 6),
-    ("i16", ("mux", "i16", load("i64", 0), (const("i16", 5),), 3), {0: b"\1"}, "R0107"),
-    ("i16", ("mux", "i16", const("i64", -1), (const("i16", 5),), 3), {}, "R0107"),
-    ("i64", ("check", "i64", load("i64", 0), 0, 9, "R0102", 3), {0: b"\x09"}, 9),
-    ("i64", ("check", "i64", load("i64", 0), 0, 9, "R0102", 3), {0: b"\x0a"}, "R0102"),
-    ("i16", ("check", "i16", load("i16", 0), -5, 5, "R0103", 3), {0: b"\xfa\xff"}, "R0103"),
-    ("i16", ("check", "i16", const("i16", 4), -5, 5, "R0103", 3), {}, 4),
-    ("i64", ("within", "i64", load("i64", 0), const("i64", -1), load("i64", 8), "R0102", 3), {0: b"\x02", 8: b"\x02"}, 2),
-    ("i64", ("within", "i64", load("i64", 0), const("i64", 1), load("i64", 8), "R0102", 3), {8: b"\x02"}, "R0102"),
-    ("i64", ("within", "i64", load("i64", 0), const("i64", 1), load("i64", 8), "R0102", 3), {0: b"\3", 8: b"\2"}, "R0102"),
-    ("i64", ("floor_div", "i64", const("i64", -1), const("i64", 1000)), {}, -1),
-    ("i64", ("floor_div", "i64", load("i64", 0), const("i64", 1000)), {0: b"\xd0\x07"}, 2),
-    ("i64", ("now", "i64"), {}, 5_000_000),
-    ("i16", ("length", "i16", ("load_text", "s8", at(0), 9)), {0: b"four"}, 4),
-    ("i16", ("find", "i16", const("s8", b"abcabc"), const("s8", b"ca")), {}, 3),
-    ("i16", ("find", "i16", const("s8", b"abc"), const("s8", b"x")), {}, 0),
-    ("i16", ("find", "i16", const("s8", b"abc"), const("s8", b"")), {}, 0),
-    ("ref", ("reference", "ref", at(8), 255), {}, 1 << 40 | SLOTS_OFFSET + 8 << 8 | 255),
-    ("ref", ("reference", "ref", at(8, (2, load("u8", 0))), 3), {0: b"\2"}, 1 << 40 | SLOTS_OFFSET + 12 << 8 | 3),
-    ("ref", ("reference", "ref", behind(const("ref", 1 << 40 | 80 << 8 | 255), 4), 255), {}, 1 << 40 | 84 << 8 | 255),
-    ("ref", ("reference", "ref", behind(load("ref", 0)), 255), {}, "R0110"),
-    ("ref", ("bit_behind", "ref", load("ref", 0), const("i64", 13)), {0: STRUCTS["ref"].pack(1 << 40 | 80 << 8 | 255)},
-     1 << 40 | 81 << 8 | 5),
-    ("ref", ("bit_behind", "ref", const("ref", 3 << 40 | 80 << 8 | 6), load("i64", 0)), {0: b"\4"}, 3 << 40 | 81 << 8 | 2),
-    ("ref", ("bit_behind", "ref", const("ref", 3 << 40 | 255), const("i64", -1)), {}, 3 << 40 | 0xFFFFFFFF << 8 | 7),
-    ("i64", ("from_text", "i64", "LINT", const("s8", b" 16#ff "), 3), {}, 255),
-    ("f32", ("from_text", "f32", "REAL", const("s8", b"0.1"), 3), {}, struct.unpack("f", struct.pack("f", 0.1))[0]),
-    ("b", ("from_text", "b", "BOOL", const("s8", b"true"), 3), {}, True),
-    ("i16", ("from_text", "i16", "INT", const("s8", b"32768"), 3), {}, "R0105"),
-    ("i16", ("from_text", "i16", "INT", const("s8", b"one"), 3), {}, "R0111"),
-    ("i64", ("from_leading", "i64", "LINT", 0, const("s8", b" -12.5 pcs")), {}, -12),
-    ("i16", ("from_leading", "i16", "INT", 1, const("s8", b"12 pcs")), {}, 0),
-    ("i16", ("from_leading", "i16", "INT", 1, const("s8", b" 16#7f ")), {}, 127),
-    ("f64", ("from_leading", "f64", "LREAL", 0, const("s8", b"2.5e1e")), {}, 25.0),
-    ("b", ("from_leading", "b", "BOOL", 0, const("s8", b"no")), {}, False),
-    ("s8", ("to_text", "s8", "INT", const("i16", -5)), {}, b"-5"),
-    ("s8", ("to_text", "s8", "BOOL", load("b", 0)), {0: b"\1"}, b"TRUE"),
-    ("s8", ("to_text", "s8", "USINT", ("convert", "u8", "b", load("b", 0))), {0: b"\1"}, b"1"),
-    ("s8", ("enum_text", "s8", ((1, "Red"), (2, "Green")), load("i16", 0)), {0: b"\2"}, b"Green"),
-    ("s8", ("enum_text", "s8", ((1, "Red"), (2, "Green")), load("i16", 0)), {0: b"\3"}, b"3"),
-    ("b", ("lt", "b", "s8", const("s8", b"ab"), const("s8", b"abc")), {}, True),
-    ("b", ("gt", "b", "s8", const("s8", b"\xe4"), const("s8", b"z")), {}, True),
-    ("s8", ("min", "s8", const("s8", b"b"), const("s8", b"a")), {}, b"a"),
-    ("s8", ("select", "s8", const("b", 1), const("s8", b"b"), const("s8", b"a")), {}, b"a"),
-    ("s16", ("load_text", "s16", at(1), 2), {1: b"a\0\xac\x20c\0"}, "a\u20ac"),
-    ("s16", ("load_text", "s16", at(0), 9), {0: b"a\0b\1\0\0c\0"}, "a\u0162"),
-    ("i16", ("length", "i16", ("load_text", "s16", at(0), 9)), {0: b"\0\1\1\0"}, 2),
-    ("i16", ("find", "i16", const("s16", "abcab\u0163"), const("s16", "b\u0163")), {}, 5),
-    ("i16", ("find", "i16", const("s16", "\u6161b"), const("s16", "ab")), {}, 0),
-    ("b", ("lt", "b", "s16", const("s16", "\u00ff"), const("s16", "\u0100")), {}, True),
-    ("b", ("eq", "b", "s16", ("load_text", "s16", at(0), 3), const("s16", "\u1234")), {0: b"\x34\x12"}, True),
-    ("s16", ("max", "s16", const("s16", "\uff00"), const("s16", "\ud83d")), {}, "\uff00"),
-    ("s8", ("character", "s8", load("u8", 0)), {0: b"\xe4"}, b"\xe4"), ("s8", ("character", "s8", load("u8", 0)), {}, b""),
-    ("s16", ("character", "s16", load("u16", 0)), {0: b"\xac\x20"}, "\u20ac"),
-    ("s16", ("character", "s16", load("u16", 0)), {}, ""),
-    ("u8", ("first", "u8", ("load_text", "s8", at(0), 3)), {0: b"xyz"}, ord("x")),
-    ("u8", ("first", "u8", ("load_text", "s8", at(0), 3)), {}, 0), ("u8", ("first", "u8", const("s8", b"")), {}, 0),
-    ("u16", ("first", "u16", ("load_text", "s16", at(0), 3)), {0: b"\xac\x20x\0"}, 0x20AC),
-    ("u16", ("first", "u16", ("mid", "s16", const("s16", "ab"), const("i64", 1), const("i64", 3), 3)), {}, 0),
-    ("s16", ("recode", "s16", ("load_text", "s8", at(0), 9)), {0: b"\xe4b"}, "\u00e4b"),
-    ("s8", ("recode", "s8", ("load_text", "s16", at(0), 9)), {0: b"\xe4\0\xac\x20b\0"}, b"\xe4?b"),
-]
-TEXT = const("s8", b"ABCDE")
 
 
-def n(value: int) -> Node:
-    return const("i64", value)
 
 
-STRINGS: list[tuple[Node, Any]] = [
-    (("left", "s8", TEXT, n(2), 3), b"AB"), (("left", "s8", TEXT, n(9), 3), b"ABCDE"),
-    (("left", "s8", TEXT, n(0), 3), b""),
-    (("left", "s8", TEXT, n(-1), 3), "R0108"), (("right", "s8", TEXT, n(2), 3), b"DE"),
-    (("right", "s8", TEXT, n(9), 3), b"ABCDE"),
-    (("right", "s8", TEXT, n(0), 3), b""), (("right", "s8", TEXT, n(-1), 3), "R0108"),
-    (("mid", "s8", TEXT, n(2), n(3), 3), b"CD"), (("mid", "s8", TEXT, n(9), n(3), 3), b"CDE"),
-    (("mid", "s8", TEXT, n(2), n(6), 3), b""),
-    (("mid", "s8", TEXT, n(2), n(0), 3), "R0108"), (("mid", "s8", TEXT, n(-1), n(1), 3), "R0108"),
-    (("concat", "s8", TEXT, TEXT), b"ABCDEABCDE"),
-    (("insert", "s8", TEXT, const("s8", b"xy"), n(2), 3), b"ABxyCDE"),
-    (("insert", "s8", TEXT, const("s8", b"xy"), n(0), 3), b"xyABCDE"),
-    (("insert", "s8", TEXT, const("s8", b"xy"), n(7), 3), b"ABCDExy"),
-    (("insert", "s8", TEXT, TEXT, n(-1), 3), "R0108"),
-    (("delete", "s8", TEXT, n(2), n(3), 3), b"ABE"), (("delete", "s8", TEXT, n(2), n(6), 3), b"ABCDE"),
-    (("delete", "s8", TEXT, n(99), n(2), 3), b"A"), (("delete", "s8", TEXT, n(2), n(0), 3), "R0108"),
-    (("delete", "s8", TEXT, n(-2), n(1), 3), "R0108"),
-    (("replace", "s8", TEXT, const("s8", b"xyz"), n(2), n(2), 3), b"AxyzDE"),
-    (("replace", "s8", TEXT, const("s8", b"xyz"), n(0), n(2), 3), b"AxyzBCDE"),
-    (("replace", "s8", TEXT, const("s8", b"xyz"), n(2), n(9), 3), b"ABCDExyz"),
-    (("replace", "s8", TEXT, TEXT, n(1), n(0), 3), "R0108"),
-]
 
 
 @each_of(("machine", "expression", "before", "wanted"), RUNS)

@@ -11,7 +11,7 @@ from rows import first_quick
 
 from fbvm.cli.main import main
 
-DEMO = str(Path(__file__).resolve().parents[2] / "examples" / "demo.st")
+DEMO = str(Path(__file__).resolve().parents[3] / "examples" / "demo.st")
 PEER = ["--map", "192.168.250.1:502=peer"]
 COUNTER = "PROGRAM Main VAR n : INT; d : INT := 3; END_VAR n := n + 6 / d; END_PROGRAM\n"
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from fbvm.code.compiler import compile_files
 from fbvm.machine.plc import Plc
 
-EXAMPLE = Path(__file__).resolve().parent.parent.parent / "examples" / "sfc.st"
+EXAMPLE = Path(__file__).resolve().parent.parent.parent.parent / "examples" / "sfc.st"
 SECOND_NS = 10**9
 
 

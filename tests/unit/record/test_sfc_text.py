@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import random
 import re
-import sys
-from pathlib import Path
 
 import pytest
+from sfc_model import Chart, random_chart, text
 
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import SfcPicture
@@ -15,9 +14,6 @@ from fbvm.record.draw import sfc_text as drawing
 from fbvm.record.draw.ladder_svg import ladder_svg
 from fbvm.record.draw.sfc_text import Sighted, sfc_surface, sfc_text
 from fbvm.syntax.ladder.drawing.box_lines import Surface
-
-sys.path.append(str(Path(__file__).parent.parent / "property"))
-from sfc_model import Chart, random_chart, text
 
 BATCH = """
 PROGRAM Main

@@ -218,7 +218,7 @@ def test_nonsense_lists_nothing(nonsense: str) -> None:
 def test_the_wheel_holds_every_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from hatchling.build import build_wheel
 
-    monkeypatch.chdir(Path(__file__).resolve().parents[2])
+    monkeypatch.chdir(Path(__file__).resolve().parents[3])
     with ZipFile(tmp_path / build_wheel(str(tmp_path))) as wheel:
         held = {name for name in wheel.namelist() if name.startswith("fbvm/base/pages/")}
     assert held == {f"fbvm/base/pages/{code}.md" for code in CODES}

@@ -31,7 +31,7 @@ def test_a_verb_loads_what_it_needs(
         words: list[str], needed: set[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     text = "PROGRAM Main\nVAR\n    d : TON;\nEND_VAR\n    d(IN := TRUE, PT := T#1s);\nEND_PROGRAM\n"
     (tmp_path / "main.st").write_text(text, encoding="utf-8")
-    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[2]))
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parents[3]))
     ran = [subprocess.run([sys.executable, "-c", LOADED, *words], cwd=tmp_path, capture_output=True, text=True) for _ in range(2)]
     assert [one.returncode for one in ran] == [0, 0], ran[0].stderr
     assert set(ran[1].stdout.splitlines()[-1].split()) == needed

@@ -13,7 +13,7 @@ from fbvm.syntax.st.parser import parse
 from fbvm.syntax.tree import Binary, Literal, Name, NamedType, NameRef, Node
 from fbvm.syntax.tree.node import names_of
 
-GOLDEN = Path(__file__).resolve().parent.parent / "golden" / "syntax"
+GOLDEN = Path(__file__).resolve().parent.parent.parent / "golden" / "syntax"
 
 
 def children(value: Any) -> Iterator[Node]:

@@ -17,7 +17,7 @@ from fbvm.code.compiler import Compilation, compile_text
 from fbvm.code.store import object_code
 from fbvm.code.store.encoding import encode
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
+EXAMPLES = Path(__file__).parents[3] / "examples"
 SHIPPED = sorted({path.stem: path for path in data_folder("fblib").rglob("*.st")
                   if "FUNCTION_BLOCK" in path.read_text(encoding="utf-8")})
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from textwrap import dedent
 
+from expression_rows import NUMBERS, RUNS, STRINGS
 from hand_image import at, behind, const, image, load, own, store
 from images import counter_image, task
 from rows import each_of
-from test_engine_expressions import NUMBERS, RUNS, STRINGS
-from test_engine_statements import OBSERVED, PROGRAMS
+from statement_rows import OBSERVED, PROGRAMS
 
 from fbvm.base.areas import AREAS
 from fbvm.code.compiler import compile_text

@@ -40,7 +40,7 @@ END_VAR
     END_IF
 END_FUNCTION_BLOCK
 """
-README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+README = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -594,7 +594,7 @@ def test_a_failure_with_a_unit_shows_the_network_and_the_units_words(project: py
 
 @pytest.mark.slow
 def test_a_plc_hears_what_another_one_answers(project: pytest.Pytester) -> None:
-    lesson = Path(__file__).resolve().parents[2] / "examples" / "lessons" / "12-two-plcs-one-wire"
+    lesson = Path(__file__).resolve().parents[3] / "examples" / "lessons" / "12-two-plcs-one-wire"
     for name in ("server.st", "given.st", "given.toml"):
         (project.path / name).write_text((lesson / name).read_text(encoding="utf-8"), encoding="utf-8")
     project.makepyfile("""

@@ -22,7 +22,7 @@ from fbvm.step.words import Words
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
-HOUSE = Path(__file__).resolve().parents[2]
+HOUSE = Path(__file__).resolve().parents[3]
 TEXT = """\
 FUNCTION_BLOCK Twice
 VAR_INPUT A : INT; END_VAR

@@ -18,7 +18,7 @@ from fbvm.testing.class_report import report, summary
 from fbvm.testing.lesson import predicted
 from fbvm.testing.lessons import ANSWERS, GIVEN, PROGRAM, Lesson, check_class, lessons, run_pytest
 
-HOUSE = Path(__file__).resolve().parents[2]
+HOUSE = Path(__file__).resolve().parents[3]
 LINES, COLUMNS = 25, 79
 every_lesson = pytest.mark.parametrize("lesson", lessons(), ids=lambda lesson: lesson.slug)
 

@@ -57,7 +57,7 @@ def test_a_page_and_a_picture_of_a_trace(fbvm: Fbvm) -> None:
 
 
 def test_a_capture_of_a_trace(fbvm: Fbvm, tmp_path: Path) -> None:
-    demo = str(Path(__file__).parents[2] / "examples" / "demo.st")
+    demo = str(Path(__file__).parents[3] / "examples" / "demo.st")
     assert fbvm("run", demo, "--until", "Main.Done", "--map", "192.168.250.1:502=peer", "--trace", "demo.fbtrace",
                 "--pcap", "run.pcapng").exit_code == 0  # fmt: skip
     assert fbvm("convert", "demo.fbtrace", "trace.pcapng").exit_code == 0
@@ -66,7 +66,7 @@ def test_a_capture_of_a_trace(fbvm: Fbvm, tmp_path: Path) -> None:
 
 
 def test_states_of_sockets_have_names(fbvm: Fbvm) -> None:
-    demo = str(Path(__file__).parents[2] / "examples" / "demo.st")
+    demo = str(Path(__file__).parents[3] / "examples" / "demo.st")
     assert fbvm("run", demo, "--until", "Main.Done", "--map", "192.168.250.1:502=peer", "--trace", "demo.fbtrace").exit_code == 0
     assert "= CLOSED, SYN_SENT, ESTABLISHED   TCP Connection State" in fbvm("chart", "demo.fbtrace", "D30009").output
     assert fbvm("convert", "demo.fbtrace", "demo.csv", "D30009").exit_code == 0
@@ -190,7 +190,7 @@ def test_why_wants_one_trace_and_one_place(fbvm: Fbvm) -> None:
 
 
 def test_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    readme = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
     blocks = re.findall(r"^```(\w+)\n(.*?)^```", readme, re.M | re.S)
     monkeypatch.chdir(tmp_path)
     Path("pump.st").write_text(next(text for kind, text in blocks if kind == "iecst"), encoding="utf-8")

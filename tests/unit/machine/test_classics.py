@@ -16,7 +16,7 @@ from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 
-FOLDER = Path(__file__).resolve().parents[2] / "examples" / "classics"
+FOLDER = Path(__file__).resolve().parents[3] / "examples" / "classics"
 NAMES = sorted(path.stem.removesuffix("_ladder") for path in FOLDER.glob("*_ladder.st"))
 WORDS = {"CIO": range(200), "W": range(8), "H": range(8), "D": range(32)}
 ACTIVE = {"seal_in": "Motor", "double_coil": "Between", "interlock": "Left", "edge_counting": "Full", "shift_register": "Ejector",

@@ -11,7 +11,7 @@ from fbvm.net.peers import ModbusPeer
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
-EXAMPLES = Path(__file__).resolve().parent.parent.parent / "examples"
+EXAMPLES = Path(__file__).resolve().parent.parent.parent.parent / "examples"
 SECOND_NS = 10**9
 
 

@@ -63,7 +63,7 @@ def test_libraries_are_not_looked_at(tmp_path: Path) -> None:
     assert [d.code for d in own.diagnostics] == ["S0290"] and errors(own.diagnostics) == []
 
 
-HOUSE = Path(__file__).resolve().parents[2]
+HOUSE = Path(__file__).resolve().parents[3]
 
 
 OWN = [*(sorted(path.parent.rglob("*.st")) for path in sorted((HOUSE / "fblib").rglob("library.toml"))),

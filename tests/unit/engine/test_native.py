@@ -332,9 +332,10 @@ def _bounds(e: NativeEngine, operation: str, machine: str, source: str) -> None:
 def test_crc_bit_by_bit_shows_the_fault_that_is_switched_off() -> None:
     program = ("from fbvm.engine.native import compiler; compiler.FAULTS.clear(); from fbvm.base import cache\n"
                "cache.switch(False); import test_native; test_native.test_crc_bit_by_bit(2)")
-    folder = Path(__file__).parent
+    house = Path(__file__).parents[3]
+    folders = (Path(__file__).parent, house / "tests", house / "tests" / "unit" / "rigs", house)
     ran = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True,
-                         env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, (folder, *folder.parents[:2])))})
+                         env={**os.environ, "PYTHONPATH": os.pathsep.join(map(str, folders))})
     assert ran.returncode == 1 and "AssertionError" in ran.stderr
 
 

@@ -1,6 +1,0 @@
-"""The tables are written and run as the language corpus is."""
-
-import sys
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "lang"))
