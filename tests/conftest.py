@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from depth import SWITCH
+from hypothesis import settings
 
 if TYPE_CHECKING:
     from xdist.scheduler import Scheduling
@@ -25,6 +27,20 @@ if sys.dont_write_bytecode:
     sys.pycache_prefix = str(Path(__file__).parents[1] / ".pytest_cache" / "bytecode")
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     del os.environ["PYTHONDONTWRITEBYTECODE"]
+
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--deep", action="store_true", help="Try many times as many examples, seeds and scans (hours).")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Before any test module is read: the numbers stand in decorators."""
+    if config.getoption("deep"):
+        os.environ[SWITCH] = "1"
+        settings.register_profile("deep", max_examples=2000)
+        settings.load_profile("deep")
+
 
 gc.set_threshold(100_000, 20, 50)  # what tests leave behind dies together: it is looked for seldom
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from depth import times
 from etn_modbus_rig import SECOND_NS, image_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -291,7 +292,7 @@ HAPPENINGS = st.lists(st.tuples(st.sampled_from(NAMES_OF_HAPPENINGS), st.integer
 
 @pytest.mark.slow
 @given(st.sampled_from(["exact", "real"]), st.integers(0, 10**6), HAPPENINGS)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=times(50), deadline=None)
 def test_any_life(timing: str, seed: int, happenings: list[tuple[str, int]]) -> None:
     rig = Rig(ModbusPeer(), timing=timing, seed=seed)
     for what, scans in happenings:

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
+from depth import times
 from etn_modbus_rig import SECOND_NS, SERVER, Client, Rig, image_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -487,7 +488,7 @@ def happen(rig: Rig, client: Client, what: str) -> None:
 
 @pytest.mark.slow
 @given(st.sampled_from(["exact", "real"]), st.integers(0, 10**6), st.sampled_from(["", ", Sockets := 2"]), HAPPENINGS)
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=times(80), deadline=None)
 def test_any_life(timing: str, seed: int, pins: str, happenings: list[tuple[str, int]]) -> None:
     rig = Rig(f"Idle_Time := T#2s{pins}", timing=timing, seed=seed)
     clients = [rig.client(connected=False), rig.client(connected=False)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from depth import times
 from etn_modbus_rig import Client, Model, Rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -65,7 +66,7 @@ HARMLESS = requests().filter(harmless)
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.booleans(), st.booleans(), st.lists(HARMLESS, min_size=1, max_size=20))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=times(50), deadline=None)
 def test_it_answers_as_the_model_does(timing: str, seed: int, fn0f: bool, full_dm: bool, asked: list[bytes]) -> None:
     rig = Rig(f"Fn0F := {fn0f}, Full_DM := {full_dm}", timing=timing, seed=seed)
     rig.fill(seed)
@@ -82,7 +83,7 @@ def test_it_answers_as_the_model_does(timing: str, seed: int, fn0f: bool, full_d
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.lists(HARMLESS, min_size=1, max_size=30), st.integers(1, 300), st.booleans(),
        st.integers(0, 30_000_000))  # fmt: skip
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 def test_any_cut_of_a_pipeline(
     timing: str, seed: int, asked: list[bytes], segment_bytes: int, random_cut: bool, gap_ns: int
 ) -> None:
@@ -106,7 +107,7 @@ def still_serves(rig: Rig) -> None:
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.lists(st.binary(min_size=1, max_size=600), min_size=1, max_size=5), st.sampled_from("flr"))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=times(50), deadline=None)
 def test_trash_neither_stops_it_nor_writes_anything(timing: str, seed: int, trash: list[bytes], end: str) -> None:
     rig = Rig("Idle_Time := T#3s", timing=timing, seed=seed)
     rig.fill(seed)
@@ -141,7 +142,7 @@ def damaged_streams(draw: st.DrawFn) -> list[tuple[bytes, bytes]]:
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, damaged_streams(), st.sampled_from([0, 1, 255, 256, 0xFFFF]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 def test_what_has_a_wrong_protocol_or_length_is_never_executed(
     timing: str, seed: int, stream: list[tuple[bytes, bytes]], length: int
 ) -> None:
@@ -165,7 +166,7 @@ CONVERSATION = st.lists(st.tuples(st.integers(0, 7), HARMLESS, st.integers(0, 6)
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.integers(2, 8), CONVERSATION, st.integers(1, 300), st.integers(0, 20_000_000))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 def test_several_clients_at_once(
     timing: str, seed: int, sockets: int, said: list[tuple[int, bytes, int]], segment_bytes: int, gap_ns: int
 ) -> None:

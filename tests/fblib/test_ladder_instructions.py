@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import first_quick
@@ -112,7 +113,7 @@ def signed(word: int, bits: int = 16) -> int:
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(WORD, WORD, st.booleans())
 def test_sums_and_differences(a: int, b: int, carry: bool) -> None:
     for sign, extra in (("+", 0), ("-", 0), ("+C", carry), ("-C", carry)):
@@ -125,7 +126,7 @@ def test_sums_and_differences(a: int, b: int, carry: bool) -> None:
         assert (after.get(2, 0), flags) == (result, wanted), sign
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(WORD, WORD)
 def test_products_and_quotients(a: int, b: int) -> None:
     after, _ = execute("* D0 D1 D2", {0: a, 1: b})
@@ -134,7 +135,7 @@ def test_products_and_quotients(a: int, b: int) -> None:
     assert (after.get(2, 0), after.get(3, 0)) == (divmod(a, b) if b else (0, 0)) and ("ER" in flags) == (not b)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(st.integers(0, 9999), st.integers(0, 9999))
 def test_bcd(a: int, b: int) -> None:
     before = {0: int(f"{a}", 16), 1: int(f"{b}", 16)}

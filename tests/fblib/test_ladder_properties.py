@@ -7,6 +7,7 @@ from functools import cache
 from math import isqrt
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_ladder_instructions import plc_of
@@ -135,7 +136,7 @@ def compare(table: dict[str, tuple[int, Model]], form: str, carry: bool, a: int,
         assert seen_carry == (int(carry) if out is None else out), (name, hex(a), hex(b), "carry")
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 @given(TWO, st.booleans())
 def test_what_works_on_a_word_in_its_place(a: int, carry: bool) -> None:
     compare(IN_PLACE, "MOVL D2 {r}\n{name} {r}", carry, a, 0) if a >> 16 == 0 else None
@@ -143,27 +144,27 @@ def test_what_works_on_a_word_in_its_place(a: int, carry: bool) -> None:
     compare(wide, "MOVL D2 {r}\n{name} {r}", carry, a, 0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(TWO, st.integers(0, 16), st.booleans())
 def test_shifts_by_a_number_of_bits(a: int, count: int, fills: bool) -> None:
     compare({n: row for n, row in COUNTED.items() if row[0] == 32}, "MOVL D2 {r}\n{name} {r} D6", False, a, count | fills << 15)
     compare({n: row for n, row in COUNTED.items() if row[0] == 16}, "MOV D0 {r}\n{name} {r} D4", False, a, count | fills << 15)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(TWO, TWO, st.booleans())
 def test_two_operands(a: int, b: int, carry: bool) -> None:
     b = b if b & 0xFFFF else b | 1
     compare(TWO_OPERANDS, "{name} {a} {b} {r}", carry, a, b)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(TWO)
 def test_one_operand(a: int) -> None:
     compare(ONE_OPERAND, "{name} {a} {r}", False, a, 0)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(st.integers(0, 99_999_999), st.integers(0, 99_999_999))
 def test_bcd_of_eight_digits(a: int, b: int) -> None:
     rungs = ["BINL D0 D100", "BCDL D100 D108", "+BL D0 D2 D116", "-BL D0 D2 D124", "*BL D0 D2 D132", "ROOT D0 D140",
@@ -179,7 +180,7 @@ def test_bcd_of_eight_digits(a: int, b: int) -> None:
 RANGES = [(-999, 999), (-7999, 7999), (-999, 9999), (-1999, 9999)]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(st.integers(-8100, 10100), st.integers(-80_000_100, 100_000_100))
 def test_signed_bcd_and_back(word: int, two: int) -> None:
     rungs = []
@@ -195,7 +196,7 @@ def test_signed_bcd_and_back(word: int, two: int) -> None:
         assert wide == (two if fits else 0), form
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 @given(WORD, st.integers(0, 3))
 def test_decoding_and_encoding_undo_each_other(word: int, first: int) -> None:
     rungs = [f"MLPX D0 #003{first} D100\nDMPX D100 D110 #003{first}", "MLPX D0 #1010 D120\nDMPX D120 D160 #1010",
@@ -205,7 +206,7 @@ def test_decoding_and_encoding_undo_each_other(word: int, first: int) -> None:
     assert [words[100 + at].bit_count() for at in range(4)] == [1] * 4
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 @given(st.lists(WORD, min_size=3, max_size=3), st.integers(0, 15), st.integers(0, 30), st.booleans())
 def test_shifts_over_several_words(given_words: list[int], first: int, count: int, bit: bool) -> None:
     whole = sum(word << 16 * at for at, word in enumerate(given_words))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from random import Random
 
 import pytest
+from depth import times
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mb_tcp_rig import Rig
@@ -15,7 +16,7 @@ from fbvm.wire.modbus_server import ModbusServer
 
 COILS, INPUTS, HOLDING, REGISTERS = 100, 80, 200, 200
 SERVED = (1, 2, 3, 4, 5, 6, 15, 16)
-COMMON = settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+COMMON = settings(max_examples=times(15), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 
 
 def request(dice: Random) -> bytes:

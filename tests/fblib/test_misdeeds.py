@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 
 import pytest
+from depth import times
 from mtcp_rig import SECOND_NS, SERVER, Rig
 
 from fbvm.base.data import data_folder
@@ -225,7 +226,7 @@ def test_there_are_enough_of_them() -> None:
 
 @pytest.mark.slow
 @TIMINGS
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(times(12)))
 def test_all_of_them_by_chance(seed: int, timing: str) -> None:
     """Dozens of commands, each of which may meet anything."""
     rig = rig_with(timing=timing, seed=seed).connect()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from random import Random
 
 import pytest
+from depth import times
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mstr_rig import CYCLE_NS, SERVER_IP, Rig, image_of, program
@@ -26,7 +27,7 @@ OPERATIONS = st.sampled_from([1, 2, 3, 4, 7, 8, 10, 23, 0xFFF0])
 
 
 @pytest.mark.slow
-@settings(COMMON, max_examples=25)
+@settings(COMMON, max_examples=times(25))
 @given(st.lists(st.tuples(OPERATIONS, st.lists(WORDS, min_size=10, max_size=10), st.booleans()), min_size=1, max_size=4))
 def test_any_control_ends_with_a_documented_code(operations: list[tuple[int, list[int], bool]]) -> None:
     rig = Rig(options=FAST, databuf="ARRAY[1..60] OF WORD")
@@ -39,7 +40,7 @@ def test_any_control_ends_with_a_documented_code(operations: list[tuple[int, lis
 
 
 @pytest.mark.slow
-@settings(COMMON, max_examples=25)
+@settings(COMMON, max_examples=times(25))
 @given(st.integers(0, 2**32), st.integers(1, 30), st.sampled_from([1, 2, 23]), st.booleans())
 def test_registers_arrive_right_however_frames_are_cut(seed: int, cut: int, operation: int, random_cut: bool) -> None:
     dice = Random(seed)
@@ -61,7 +62,7 @@ def test_registers_arrive_right_however_frames_are_cut(seed: int, cut: int, oper
 
 
 @pytest.mark.slow
-@settings(COMMON, max_examples=30)
+@settings(COMMON, max_examples=times(30))
 @given(st.binary(max_size=300), st.sampled_from([(2, 0, 3, 1), (1, 0, 3, 1), (7, 0, 38, 0), (8, 0, 0, 0)]), st.booleans())
 def test_any_bytes_for_an_answer(data: bytes, control: tuple[int, ...], has_header: bool) -> None:
     """Never data that were not asked for, never stuck, and the next operation works."""
@@ -79,7 +80,7 @@ def test_any_bytes_for_an_answer(data: bytes, control: tuple[int, ...], has_head
 
 
 @pytest.mark.slow
-@settings(COMMON, max_examples=15)
+@settings(COMMON, max_examples=times(15))
 @given(st.integers(0, 2**32), st.sampled_from(["good", "late", "silent", "refused", "resets"]))
 def test_pins_at_any_time_and_no_path_is_lost(seed: int, kind: str) -> None:
     """Blocks that are switched about as it comes: at most one output is TRUE; in the end nobody has a line."""

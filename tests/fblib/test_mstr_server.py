@@ -6,6 +6,7 @@ from __future__ import annotations
 from random import Random
 
 import pytest
+from depth import times
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mstr_rig import CYCLE_NS, SERVER_IP, Rig, image_of
@@ -110,7 +111,7 @@ def test_the_last_registers(pdu: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=15, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=times(15), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.integers(0, 2**32), st.integers(1, 40), st.booleans())
 def test_reads_and_writes_agree_with_a_model_however_they_are_cut(seed: int, cut: int, is_joined: bool) -> None:
     dice = Random(seed)

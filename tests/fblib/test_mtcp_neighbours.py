@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mtcp_rig import Rig
@@ -49,7 +50,7 @@ OURS = st.sampled_from([(1, 1), (1, 1), (2, 1), (2, 2), (3, 1)])
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.lists(st.tuples(services(OURS), st.integers(1, 8)), max_size=10), st.booleans())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 def test_whatever_the_last_program_left_on_the_socket(
     timing: str, seed: int, left: list[tuple[tuple[tuple[int, int], Switch, list[int]], int]], mode_changed: bool
 ) -> None:
@@ -74,7 +75,7 @@ THEIRS = st.tuples(st.integers(2, 8), st.integers(2, 8))
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.lists(st.tuples(services(THEIRS), st.integers(1, 6)), min_size=20, max_size=60))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=times(20), deadline=None)
 def test_a_program_that_uses_the_other_sockets(
     timing: str, seed: int, asked: list[tuple[tuple[tuple[int, int], Switch, list[int]], int]]
 ) -> None:

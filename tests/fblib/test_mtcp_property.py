@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mtcp_rig import SERVER, Rig
@@ -72,7 +73,7 @@ def works_by_itself(rig: Rig) -> None:
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.integers(1, 40), st.integers(0, 30_000_000))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=times(12), deadline=None)
 def test_any_cut_of_the_stream(timing: str, seed: int, segment_bytes: int, gap_ns: int) -> None:
     rig = prepared(timing, seed)
     for name in READS:
@@ -89,7 +90,7 @@ ENDS = st.sampled_from([[], [], [Fin()], [Leave()], [Reset()]])
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.lists(st.tuples(st.binary(max_size=20), st.integers(0, 20), ENDS), min_size=1, max_size=6))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 def test_a_server_that_says_anything(timing: str, seed: int, says: list[tuple[bytes, int, list[Action]]]) -> None:
     """Some bytes of its own, a part of the right reply, and perhaps the end of the connection."""
     rig = prepared(timing, seed)
@@ -121,7 +122,7 @@ CHANGES = st.lists(st.tuples(st.integers(0, 12), st.sampled_from(PINS)), min_siz
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.booleans(), CHANGES)
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=times(50), deadline=None)
 def test_any_play_on_the_pins(timing: str, seed: int, wired: bool, changes: list[tuple[int, str]]) -> None:
     rig = prepared(timing, seed, wired)
     rig.connect()
@@ -139,7 +140,7 @@ EVENTS = st.lists(st.tuples(st.integers(1, 60), st.sampled_from(["gone", "back",
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, EVENTS)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 def test_a_network_that_fails_at_any_scan(timing: str, seed: int, events: list[tuple[int, str]]) -> None:
     rig = prepared(timing, seed)
     rig.connect()
@@ -164,7 +165,7 @@ def test_a_network_that_fails_at_any_scan(timing: str, seed: int, events: list[t
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.integers(0, 60), st.sampled_from(["mode", "unit", "power", "force-close"]))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 def test_a_restart_of_anything_at_any_scan(timing: str, seed: int, after: int, what: str) -> None:
     rig = prepared(timing, seed)
     if after % 2:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mtcp_rig import SERVER, Rig
@@ -122,7 +123,7 @@ class Nine(Rig):
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, ORDERS, st.integers(1, 60), st.integers(0, 12_000_000))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=times(8), deadline=None)
 def test_any_order_of_calls_and_any_cut(
     timing: str, seed: int, order: list[str], segment_bytes: int, gap_ns: int
 ) -> None:
@@ -143,7 +144,7 @@ COMMANDS = st.lists(st.tuples(st.integers(0, 25), st.sets(st.sampled_from(list(J
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, ORDERS, COMMANDS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=times(20), deadline=None)
 def test_any_order_of_commands(
     timing: str, seed: int, order: list[str], commands: list[tuple[int, set[str]]]
 ) -> None:
@@ -168,7 +169,7 @@ FAULTS = st.lists(
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, FAULTS)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=times(20), deadline=None)
 def test_any_fault_at_any_scan(timing: str, seed: int, faults: list[tuple[int, int, str]]) -> None:
     rig = Nine(timing, seed)
     for scan, length, kind in faults:
@@ -183,7 +184,7 @@ def test_any_fault_at_any_scan(timing: str, seed: int, faults: list[tuple[int, i
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS, st.floats(0.1, 1))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=times(20), deadline=None)
 def test_any_misdeed_at_any_request(timing: str, seed: int, chance: float) -> None:
     rig = Nine(timing, seed)
     rig.misdeed = misdeeds(seed, chance)
@@ -197,7 +198,7 @@ def test_any_misdeed_at_any_request(timing: str, seed: int, chance: float) -> No
 
 @pytest.mark.slow
 @given(TIMINGS, SEEDS)
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=times(15), deadline=None)
 def test_everything_together(timing: str, seed: int) -> None:
     """Faults of the network and misdeeds of the server by one seed, for 20 s of the PLC's time."""
     rig = Nine(timing, seed)

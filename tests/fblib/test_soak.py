@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from depth import times
 from soak_plant import BLOCKS, SERVER, UNIT_ADDRESS, check, contents, plant, usage
 
 from fbvm.net.faults import Fault
@@ -26,7 +27,7 @@ def test_minutes_with_all_blocks_busy(timing: str, minutes: int) -> None:
     plc.run(for_ns=MINUTE_NS // 2)
     before = usage()
     ended = check(plc)
-    for _ in range(2 * minutes - 2):
+    for _ in range(2 * times(minutes, 12) - 2):
         peer.heard.clear()
         assert plc.run(for_ns=MINUTE_NS // 2) == "time"
         now = check(plc)

@@ -16,6 +16,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from depth import times
 from real_station import black_hole, closed_port, real
 
 import fbvm.net.switchboard
@@ -250,7 +251,7 @@ def never(name: str) -> Callable[..., None]:
     return call
 
 
-SCANS = 700
+SCANS = times(700)
 
 
 @pytest.mark.slow

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from depth import times
 from foreign_clients import BOUND_S, CLIENTS, expected
 from received import heard
 from wireshark import TSHARK
@@ -208,7 +209,7 @@ def test_twenty_thousand_random_frames(kind: str, tmp_path: Path) -> None:
     with serving(kind, tmp_path, engine="python") as server:  # machine code takes its memory when it comes
         sizes = []
         sent = 0
-        while sent < 20_000:
+        while sent < times(20_000, 5):
             sock = connected(kind, server.port)
             burst = dice.choice((1, 3, 40, 400))
             data = b"".join(random_frame(dice, KINDS[kind].functions) for _ in range(burst))
@@ -296,7 +297,7 @@ def test_a_crowd(kind: str, tmp_path: Path) -> None:
         assert len(heard(first, 11)) == 11
         for sock in (*crowd, first):
             sock.close()
-        for _ in range(1000):
+        for _ in range(times(1000, 5)):
             with socket.socket() as sock:
                 sock.connect_ex(("127.0.0.1", server.port))
         settled(kind, server.port)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from depth import times
 from drawings import RAIL, block, coil, contact, imported, pou, result, value
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -158,7 +159,7 @@ def test_a_network_that_is_too_large_is_refused() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(data=st.data())
 def test_documents_that_were_spoiled_raise_nothing(data: st.DataObject) -> None:
     text = (Path(__file__).parent / "documents" / data.draw(st.sampled_from(["beremiz.xml", "codesys.xml"]))).read_bytes()

@@ -8,6 +8,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lang_check import _at, _place, _value
@@ -268,7 +269,7 @@ def test_coordinates_of_networks_go_down_and_elements_do_not_lie_on_each_other()
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=times(25), deadline=None)
 @given(seed=st.integers(0, 10**6))
 def test_random_ladder_there_and_back_means_the_same(seed: int) -> None:
     random = Random(seed)

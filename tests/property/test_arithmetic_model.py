@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 import pytest
+from depth import times
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rows import first_quick
@@ -86,7 +87,7 @@ def test_integers(kind: str) -> None:
     body = f"""sum := a + b; dif := a - b; pro := a * b; IF b <> 0 THEN quo := a / b; rem := a MOD b; END_IF
         mag := ABS(a); lim := LIMIT(b, a, sum); neg := -a; {COMPARED}"""
 
-    @settings(max_examples=120, deadline=None)
+    @settings(max_examples=times(120), deadline=None)
     @given(whole(kind), whole(kind))
     def check(a: int, b: int) -> None:
         total = wrapped(kind, a + b)
@@ -107,7 +108,7 @@ def test_bit_strings(kind: str) -> None:
            f"rl := ROL(a, n); rr := ROR(a, n); {COMPARED}"
     width, full = BITS[kind], (1 << BITS[kind]) - 1
 
-    @settings(max_examples=120, deadline=None)
+    @settings(max_examples=times(120), deadline=None)
     @given(whole(kind), whole(kind), st.integers(0, 70))
     def check(a: int, b: int, n: int) -> None:
         turn = n % width
@@ -145,7 +146,7 @@ def test_reals(kind: str) -> None:
     rounded = single if kind == "REAL" else float
     numbers = st.floats(width=32 if kind == "REAL" else 64)
 
-    @settings(max_examples=200, deadline=None)
+    @settings(max_examples=times(200), deadline=None)
     @given(numbers, numbers)
     @example(0.0, -0.0)
     @example(math.inf, math.inf)
@@ -167,7 +168,7 @@ def test_durations(kind: str) -> None:
     declared = f"a, b, sum, dif, pro, quo, neg, mx, mn : {kind}; n : INT; lt, le, gt, ge, eq, ne : BOOL;"
     body = f"sum := a + b; dif := a - b; pro := a * n; IF n <> 0 THEN quo := a / n; END_IF neg := -a; {COMPARED}"
 
-    @settings(max_examples=120, deadline=None)
+    @settings(max_examples=times(120), deadline=None)
     @given(whole("LINT"), whole("LINT"), whole("INT"))
     def check(a: int, b: int, n: int) -> None:
         wanted = {"sum": wrapped("LINT", a + b), "dif": wrapped("LINT", a - b), "pro": wrapped("LINT", a * n),
@@ -186,7 +187,7 @@ DAY_NS = 86_400_000_000_000
 def test_times_of_day(clock: str, duration: str) -> None:
     declared = f"a, c, later, sooner : {clock}; d, apart : {duration};"
 
-    @settings(max_examples=80, deadline=None)
+    @settings(max_examples=times(80), deadline=None)
     @given(st.integers(0, DAY_NS - 1), st.integers(0, DAY_NS - 1), st.integers(-3 * DAY_NS, 3 * DAY_NS))
     def check(a: int, c: int, d: int) -> None:
         compare(declared, "later := a + d; sooner := a - d; apart := a - c;", {"a": a, "c": c, "d": d},
@@ -201,7 +202,7 @@ def test_conversions_between_integers_and_bits(source: str) -> None:
     declared = f"a : {source}; " + " ".join(f"to_{target} : {target};" for target in targets)
     body = " ".join(f"to_{target} := {source}_TO_{target}(a);" for target in targets)
 
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=times(60), deadline=None)
     @given(whole(source))
     def check(a: int) -> None:
         compare(declared, body, {"a": a}, {f"to_{target}": wrapped(target, a) for target in targets})
@@ -215,7 +216,7 @@ def test_decimal_digits_in_nibbles(kind: str) -> None:
     declared = f"a, back : {kind}; digits : {word}; ok : BOOL;"
     body = f"digits := {kind}_TO_BCD_{word}(a); back := {word}_BCD_TO_{kind}(digits); ok := IS_VALID_BCD(digits);"
 
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=times(60), deadline=None)
     @given(st.integers(0, 10 ** (UNSIGNED[kind] // 4) - 1))
     def check(a: int) -> None:
         compare(declared, body, {"a": a}, {"digits": int(str(a), 16), "back": a, "ok": True})

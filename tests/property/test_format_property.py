@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from depth import times
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -189,7 +190,7 @@ def test_names_are_written_as_they_are_declared(number: int, chance: random.Rand
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=100)
+@settings(deadline=None, max_examples=times(100))
 @given(PROGRAM_NUMBERS, st.randoms(use_true_random=False))
 def test_comments_may_stand_anywhere(number: int, chance: random.Random) -> None:
     text = commented(corpus()[number], chance)

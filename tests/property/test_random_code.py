@@ -5,6 +5,7 @@ from __future__ import annotations
 from random import Random
 
 import pytest
+from depth import times
 
 from fbvm.code.operations import EXPRESSIONS, STATEMENTS
 from fbvm.engine.native import engine as native
@@ -18,7 +19,7 @@ from random_code import Maker, differing
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize("seed", range(16))
+@pytest.mark.parametrize("seed", range(times(16, 50)))
 def test_every_engine_agrees(seed: int) -> None:
     assert differing(Random(seed)) is None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from random import Random
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -105,7 +106,7 @@ def read(lines: list[str]) -> tuple[list[StepText], list[str]]:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=times(60))
 @given(st.integers(0, 2**32), st.integers(24, 160), st.booleans())
 def test_what_is_drawn_is_read_back(seed: int, width: int, with_places: bool) -> None:
     said = texts(Maker(Random(seed)).bar())
@@ -117,7 +118,7 @@ def test_what_is_drawn_is_read_back(seed: int, width: int, with_places: bool) ->
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=times(60))
 @given(st.integers(0, 2**32), st.integers(24, 160))
 def test_power_in_a_drawing_is_not_read(seed: int, width: int) -> None:
     random = Random(seed)
@@ -128,7 +129,7 @@ def test_power_in_a_drawing_is_not_read(seed: int, width: int) -> None:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=times(60))
 @given(st.integers(0, 2**32), st.integers(24, 160))
 def test_lines_meet_and_rails_are_straight(seed: int, width: int) -> None:
     surface = drawn(Maker(Random(seed)).bar(), width)
@@ -142,7 +143,7 @@ def test_lines_meet_and_rails_are_straight(seed: int, width: int) -> None:
                 assert beside is not None and beside[back], f"{x} {y}\n" + "\n".join(rows)
 
 
-@settings(deadline=None, max_examples=60)
+@settings(deadline=None, max_examples=times(60))
 @given(st.integers(0, 2**32))
 def test_a_diagram_is_what_its_instructions_say(seed: int) -> None:
     said = texts(Maker(Random(seed)).bar())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from depth import times
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
@@ -135,7 +136,7 @@ UNSHRUNK = {"deadline": None, "suppress_health_check": list(HealthCheck), "phase
 
 
 @pytest.mark.slow
-@settings(max_examples=25, **UNSHRUNK)  # type: ignore[arg-type]
+@settings(max_examples=times(25), **UNSHRUNK)  # type: ignore[arg-type]
 @given(program())
 def test_reading_and_printing_change_nothing(text: str) -> None:
     printed, problems = formatted(Source("rungs.st", text))
@@ -147,7 +148,7 @@ def test_reading_and_printing_change_nothing(text: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=3, **UNSHRUNK)  # type: ignore[arg-type]
+@settings(max_examples=times(3), **UNSHRUNK)  # type: ignore[arg-type]
 @given(program())
 def test_what_is_printed_does_the_same_on_every_engine(text: str) -> None:
     printed, _ = formatted(Source("rungs.st", text))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from random import Random
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from sfc_model import CODED, INPUTS, VARIABLES, Chart, Control, Model, random_chart, text
@@ -60,7 +61,7 @@ def _check(plc: Plc, model: Model, scan: int) -> None:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=times(150))
 @given(random=st.randoms(use_true_random=False), dialect=st.sampled_from(("standard", "matiec")))
 def test_charts_do_what_the_model_does(random: Random, dialect: str) -> None:
     chart = random_chart(random)
@@ -69,7 +70,7 @@ def test_charts_do_what_the_model_does(random: Random, dialect: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
-@settings(deadline=None, max_examples=150)
+@settings(deadline=None, max_examples=times(150))
 @given(random=st.randoms(use_true_random=False))
 def test_machine_code_keeps_the_same_memory(random: Random) -> None:
     chart = random_chart(random)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 import st_oracle
 import st_programs
+from depth import times
 from hand_image import operations_in
 from st_kinds import Pou, Program, Variable
 from st_programs import difference, made, report
@@ -32,7 +33,7 @@ WITH_MOD = Program((), (Pou("PROGRAM", "Main", "", VARIABLES, BODY),))
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(times(10, 100)))
 def test_every_engine_and_the_tree_walker_agree(seed: int) -> None:
     assert report(seed) == ""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from depth import times
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from test_arithmetic_model import compare
@@ -25,7 +26,7 @@ def test_functions(kind: str) -> None:
     letters = st.one_of(st.sampled_from(PLAIN), LETTERS[kind])
     texts = st.text(letters, max_size=CAPACITY)
 
-    @settings(max_examples=250, deadline=None)
+    @settings(max_examples=times(250), deadline=None)
     @given(texts, st.one_of(texts, st.text(st.sampled_from(PLAIN), max_size=2)), COUNTS, POSITIONS)
     @example("abab", "", 0, 1)
     @example("", "", 5, 5)
@@ -40,7 +41,7 @@ def test_functions(kind: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=times(150), deadline=None)
 @given(st.text(LETTERS["WSTRING"], max_size=CAPACITY), st.text(LETTERS["STRING"], max_size=CAPACITY))
 def test_conversions(wide: str, narrow: str) -> None:
     compare(f"w, wide : WSTRING[{CAPACITY}]; s, narrow, there : STRING[{CAPACITY}]; c : CHAR; d : WCHAR;",

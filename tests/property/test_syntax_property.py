@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -73,7 +74,7 @@ def test_any_change_of_a_program(data: st.DataObject) -> None:
 
 
 @pytest.mark.slow
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=times(30))
 @given(st.sampled_from(sorted((GOLDEN / "syntax").glob("*.st"))), st.sampled_from([str.upper, str.lower, str.swapcase]))
 def test_case_does_not_matter_to_the_structure(path: Path, change: Any) -> None:
     text = path.read_text(encoding="utf-8")

@@ -8,6 +8,7 @@ from typing import Any
 
 import hand_image
 import pytest
+from depth import times
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from rows import each_of
@@ -93,7 +94,7 @@ def test_every_seed_is_read(data_type: str) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=1500, deadline=None)
+@settings(max_examples=times(1500), deadline=None)
 @given(st.sampled_from(sorted(TYPES)), st.sampled_from(SEEDS), EDITS)
 def test_any_text_is_read(data_type: str, seed: str, edits: list[tuple[int, int, str]]) -> None:
     text = edited(seed, edits)
@@ -101,7 +102,7 @@ def test_any_text_is_read(data_type: str, seed: str, edits: list[tuple[int, int,
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=times(300), deadline=None)
 @given(st.sampled_from(("REAL", "LREAL", "DINT", "TIME")),
        st.from_regex(r"[+-]?[0-9]{1,20}(\.[0-9]{1,30})?([eE][+-]?[0-9]{1,3})?", fullmatch=True))
 @example("LREAL", "1" * 400)
@@ -121,7 +122,7 @@ VALUES = {
 
 
 @pytest.mark.slow
-@settings(max_examples=2000, deadline=None)
+@settings(max_examples=times(2000), deadline=None)
 @given(st.sampled_from(sorted(TYPES)), st.data())
 def test_any_value_is_written(data_type: str, data: st.DataObject) -> None:
     engine, machine = writer(data_type)

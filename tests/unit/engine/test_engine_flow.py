@@ -5,6 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 import pytest
+from depth import times
 from hand_image import at, const, execute, load
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -167,7 +168,7 @@ def deep_bodies(node: Node, levels: int) -> Node:
 
 @pytest.mark.slow
 @given(code=blocks(3, False), levels=st.sampled_from((0, 0, 59, 75)))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 def test_random_programs(code: Block, levels: int) -> None:
     code = (("let", 0, "u8", const("u8", 3)), *deepened(tuple(deep_bodies(node, levels) for node in code), levels))
     walker = Walker(200)

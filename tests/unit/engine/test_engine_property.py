@@ -9,6 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
+from depth import times
 from hand_image import const, image, load, power_on, store
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -109,7 +110,7 @@ def trees(draw: st.DrawFn, machine: str, depth: int, slots: dict[int, bytes]) ->
 
 @pytest.mark.slow
 @given(data=st.data(), machine=integer_types)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=times(300), deadline=None)
 def test_trees_of_integer_operations(data: st.DataObject, machine: str) -> None:
     slots: dict[int, bytes] = {}
     expression, second_way = data.draw(trees(machine, 4, slots))
@@ -122,7 +123,7 @@ def test_trees_of_integer_operations(data: st.DataObject, machine: str) -> None:
 
 @pytest.mark.slow
 @given(machine=integer_types, data=st.data())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=times(150), deadline=None)
 def test_rotation(machine: str, data: st.DataObject) -> None:
     value, count = data.draw(numbers(machine)), data.draw(st.integers(0, 200))
     bits = 8 * STRUCTS[machine].size
@@ -160,7 +161,7 @@ def rounded(value: Fraction) -> float:
 
 @pytest.mark.slow
 @given(a=reals, b=reals, name=st.sampled_from(("add", "sub", "mul", "div")))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=times(300), deadline=None)
 def test_real_is_rounded_once(a: float, b: float, name: str) -> None:
     before = {0: STRUCTS["f32"].pack(a), 4: STRUCTS["f32"].pack(b)}
     site = (3,) if name == "div" else ()
@@ -177,14 +178,14 @@ def test_real_is_rounded_once(a: float, b: float, name: str) -> None:
 
 @pytest.mark.slow
 @given(value=st.integers(-(2**63), 2**64 - 1))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=times(300), deadline=None)
 def test_an_integer_becomes_the_nearest_real(value: int) -> None:
     assert arithmetic.single_of_integer(value) == rounded(Fraction(value))
 
 
 @pytest.mark.slow
 @given(value=long_reals, machine=integer_types)
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=times(300), deadline=None)
 def test_a_float_becomes_an_integer_or_traps(value: float, machine: str) -> None:
     low, high = limits(machine)
     for name in ("nearest", "truncate"):
@@ -201,7 +202,7 @@ def test_a_float_becomes_an_integer_or_traps(value: float, machine: str) -> None
 
 @pytest.mark.slow
 @given(raw=st.integers(0, 2**32 - 1), long=st.integers(0, 2**64 - 1))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=times(200), deadline=None)
 def test_bits_go_there_and_back_but_for_nan(raw: int, long: int) -> None:
     for machine, bits, value, nan in (("f32", "u32", raw, 0x7FC00000), ("f64", "u64", long, 0x7FF8 << 48)):
         back = evaluated(bits, ("bits", bits, machine, ("bits", machine, bits, load(bits, 0))),

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import first_quick
@@ -77,7 +78,7 @@ def state(plc: Plc) -> tuple[Any, ...]:
 
 
 @pytest.mark.slow
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=times(25), deadline=None)
 @given(st.sampled_from([1, 99_999, 1_000_000, 3_333_333, 10_000_000, 60_000_000, 1_000_000_000, 10**15]),
        st.lists(st.integers(0, 400), min_size=1, max_size=4))
 def test_many_scans_are_as_many_single_ones(cycle_ns: int, parts: list[int]) -> None:

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any, cast
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import first_quick
@@ -214,7 +215,7 @@ def test_scans_in_one_piece_and_others_take_turns() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(st.data())
 def test_any_order_of_happenings(data: st.DataObject) -> None:
     every, interval = data.draw(st.integers(1, 9)), data.draw(st.sampled_from(["", "INTERVAL := T#7ms, "]))

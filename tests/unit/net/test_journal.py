@@ -9,6 +9,7 @@ from functools import cache
 from typing import Any
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from images import counter_image
@@ -197,7 +198,7 @@ def test_whatever_is_done_from_outside_is_done_again(deed: Callable[[Plc], None]
     st.lists(st.sampled_from(DEEDS), max_size=8),
     st.integers(0, 9),
 )
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=times(15), deadline=None)
 def test_any_order_of_anything(timing: str, seed: int, deeds: list[Callable[[Plc], None]], cut: int) -> None:
     run = Run(timing, seed)
     run.network.faults.append(Fault(segment_bytes=cut, random_cut=True))
@@ -404,7 +405,7 @@ def test_a_changed_value_is_found_out(good: str, old: str, new: str, scan: int) 
 
 @pytest.mark.slow
 @given(st.data())
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=times(80), deadline=None)
 def test_any_damage_gives_a_clear_error_or_is_found_out(good: str, data: st.DataObject) -> None:
     at = data.draw(st.integers(0, len(good) - 1))
     size = data.draw(st.integers(0, 9))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import pytest
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -154,7 +155,7 @@ def play(script: list[list[Action]], table: list[Fault], steps: list[tuple[str, 
 
 
 @pytest.mark.slow
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=times(300), deadline=None)
 @given(scripts, faults, st.lists(wishes, max_size=40))
 def test_every_order_of_requests(
     script: list[list[Action]], table: list[Fault], steps: list[tuple[str, int, int, bytes, int]]
@@ -163,7 +164,7 @@ def test_every_order_of_requests(
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=times(100), deadline=None)
 @given(st.lists(st.binary(max_size=50), max_size=8), st.integers(1, 9), st.integers(0, 5), st.integers(1, 40))
 def test_a_stream_arrives_whole_and_in_order(parts: list[bytes], segment: int, gap_ns: int, grant: int) -> None:
     fault = Fault(segment_bytes=segment, random_cut=True, gap_ns=gap_ns, latency_ns=3)

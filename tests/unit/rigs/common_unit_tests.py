@@ -7,6 +7,7 @@ from array import array
 from collections.abc import Iterator, Sequence
 
 import pytest
+from depth import times
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -90,7 +91,7 @@ class CommonUnitTests:
     """What a unit owes to the machine, whatever it is."""
 
     inherited = settings(
-        max_examples=40, deadline=None, suppress_health_check=[HealthCheck.differing_executors, HealthCheck.too_slow]
+        max_examples=times(40), deadline=None, suppress_health_check=[HealthCheck.differing_executors, HealthCheck.too_slow]
     )
 
     # --- what a unit's tests say of it -------------------------------------------------------------------------------

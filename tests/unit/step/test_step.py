@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import each_of
@@ -93,7 +94,7 @@ def test_what_changed_is_said() -> None:
 @pytest.mark.slow
 @given(moves=st.lists(st.sampled_from(["step", "next", "out", "scan", "back", "back scan", "goto 2", "run 14"]), max_size=12),
        button=st.integers(0, 12))  # fmt: skip
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 def test_a_place_is_the_same_however_one_got_there(moves: list[str], button: int) -> None:
     commands = made()
     for number, move in enumerate(moves):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from depth import times
 from etn21_rig import CIO, D, Rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -167,7 +168,7 @@ def test_udp_between_two_units() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=times(60), deadline=None)
 @given(st.binary(min_size=1, max_size=6000), st.integers(1, 1984), st.integers(1, 700), timings)
 def test_the_stream_arrives_whole_however_it_is_cut(data: bytes, count: int, cut: int, timing: str) -> None:
     network = LoopNetwork(faults=[Fault(segment_bytes=cut, random_cut=True, gap_ns=1000)])
@@ -203,7 +204,7 @@ turns = st.tuples(
 
 
 @pytest.mark.slow
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=times(100), deadline=None)
 @given(st.lists(st.lists(turns, max_size=3), max_size=30), timings, st.sampled_from([10, 90]))
 def test_any_program_on_a_network_opens_a_channel_only_when_it_is_free(
     script: list[list[tuple[int, Switch, dict[str, object]]]], timing: str, cycle_ms: int

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from common_unit_tests import answer, events
+from depth import times
 from etn21_rig import CIO, D, Rig
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -47,7 +48,7 @@ def has_only_cleared_switches(rig: Rig, before: dict[str, bytes]) -> bool:
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=times(150), deadline=None)
 @given(st.lists(cycles, max_size=25), timings, st.integers(0, 9))
 def test_any_order_of_switches_and_events(
     script: list[tuple[list[tuple[int, Switch, dict[str, object]]], list[Event], bool, bool, int]],
@@ -76,7 +77,7 @@ def test_any_order_of_switches_and_events(
 
 
 @pytest.mark.slow
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=times(60), deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(cycles, max_size=25), timings)
 def test_the_unit_does_the_same_without_machine_code(
     monkeypatch: pytest.MonkeyPatch,

@@ -9,6 +9,7 @@ from random import Random
 from typing import Any
 
 import pytest
+from depth import times
 from rows import first_quick
 
 from fbvm import Plc, compile_text
@@ -141,7 +142,7 @@ def act(plc: Plc, dice: Random) -> None:
     plc.run(scans=dice.choice([1, 2, 30, 200]))
 
 
-@pytest.mark.parametrize("seed", first_quick(range(16)))
+@pytest.mark.parametrize("seed", first_quick(range(times(16))))
 @pytest.mark.parametrize("address", ADDRESSES)
 def test_all_ways_are_the_same(seed: int, address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     dice = Random(seed)

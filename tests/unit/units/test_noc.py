@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import pytest
 from common_unit_tests import CYCLE_NS, CommonUnitTests, FakeMemory
+from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from rows import each_of
@@ -381,7 +382,7 @@ def test_a_restart_breaks_connections_and_restores_the_configuration() -> None:
     assert Noc().configuration["restart_ns"] == RESTART_NS
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=times(40), deadline=None)
 @given(st.lists(st.integers(0, 0xFFFF), min_size=16, max_size=16), st.lists(st.sampled_from(list(Wish)), max_size=8))
 def test_any_words_in_a_slot_are_survived(content: list[int], wishes: list[Wish]) -> None:
     rig = Rig()
