@@ -35,11 +35,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Before any test module is read: the numbers stand in decorators."""
+    """Before any test module is read: the numbers stand in decorators.  No example has a deadline: machines are noisy."""
+    settings.register_profile("quick", deadline=None)
+    settings.register_profile("deep", deadline=None, max_examples=2000)
+    settings.load_profile("deep" if config.getoption("deep") else "quick")
     if config.getoption("deep"):
         os.environ[SWITCH] = "1"
-        settings.register_profile("deep", max_examples=2000)
-        settings.load_profile("deep")
 
 
 gc.set_threshold(100_000, 20, 50)  # what tests leave behind dies together: it is looked for seldom
