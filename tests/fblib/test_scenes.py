@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 
@@ -18,16 +19,23 @@ SECOND_NS = 1_000_000_000
 TANK = Peer("192.168.250.23", 502)
 
 
-def scene(name: str, net: str = "loop", fault: Fault | None = None, max_s: int = 30) -> dict[str, dict[str, object]]:
+def scene(name: str, net: str = "loop", fault: Fault | None = None, max_s: int = 30,
+          folder: Path = SCENES) -> dict[str, dict[str, object]]:
     """What is watched of each PLC when the scene has ended."""
-    project = read_project(SCENES / name / "fbvm.toml")
+    project = read_project(folder / name / "fbvm.toml")
     assert isinstance(project, Project)
     plant = Plant(project, net=net, for_ns=max_s * SECOND_NS)
     assert not errors(plant.diagnostics)
     if fault:
         plant.network.faults.append(fault)  # type: ignore[union-attr]
     panel = next(kind for kind in plant.kinds if kind.row.name == "panel").runs[0]
-    run_all(plant.runs)
+
+    def end() -> None:
+        """As Ctrl-C does, once the panel has what it waits for: the other PLCs would go on to the end of the time."""
+        if panel.reason:
+            raise KeyboardInterrupt
+
+    run_all(plant.runs, end)
     assert panel.reason == "until"
     values = {kind.row.name: dict(kind.values(kind.runs[0])) for kind in plant.kinds}
     plant.close()
@@ -64,8 +72,15 @@ def test_the_row_when_the_tank_is_away_for_two_seconds() -> None:
 
 
 @pytest.mark.slow
-def test_the_row_over_real_tcp() -> None:
-    values = scene("row", net="tcp", max_s=15)
+def test_the_row_over_real_tcp(tmp_path: Path) -> None:
+    """The tank scans five times as often, and so fills in two seconds."""
+    for name in ("row", "tank"):
+        copytree(SCENES / name, tmp_path / name)
+    project = tmp_path / "row" / "fbvm.toml"
+    text = project.read_text(encoding="utf-8")
+    assert text.count('cycle = "100ms"') == 1
+    project.write_text(text.replace('cycle = "100ms"', 'cycle = "20ms"'), encoding="utf-8")
+    values = scene("row", net="tcp", max_s=15, folder=tmp_path)
     assert values["panel"] == {"Main.Level": 704}
     assert values["gateway"]["Main.Failures"] == 0
 
