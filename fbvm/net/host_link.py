@@ -1,25 +1,41 @@
-"""A unit's place on the host's network: what of its connections waits to be fetched, and what it has been told."""
+"""A unit's link on the host's network: which of its channels have data to fetch, and the events that the unit has not fetched."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Protocol
 
 from fbvm.net.channels import Channel, ChannelLink
-from fbvm.net.switchboard import Switchboard
 from fbvm.wire.link import Event
 
 
+class Host(Protocol):
+    """What a link needs of its network (`Switchboard` has it)."""
+
+    unheard: set[HostLink]
+    """Links with events that `wait` has to return for."""
+    watched: int
+    """Sockets that are registered with the selector."""
+
+    @property
+    def driven(self) -> bool:
+        """True if the caller of `serve` calls it for all links at once."""
+
+    def serve(self, now_ns: int) -> Sequence[HostLink]:
+        """Handle every socket that is ready; returns the links of these sockets."""
+
+
 class HostLink(ChannelLink):
-    """Looks only at connections for which the host has something."""
+    """A link that reads a socket only after the selector has reported it ready."""
 
     is_quiet = False
-    """Everything has been fetched, and nothing can have happened since, as far as is known to whoever asks the host."""
+    """True if all events are fetched and the selector has reported nothing since."""
 
-    def __init__(self, network: Switchboard, address: str) -> None:
+    def __init__(self, network: Host, address: str) -> None:
         super().__init__(address)
         self._network = network
         self.waiting: dict[Channel, None] = {}
-        """Those that may have something to fetch, in order."""
+        """Channels whose sockets may have data, in the order in which they became ready."""
 
     def events(self, now_ns: int) -> Sequence[Event]:
         if self.is_quiet:

@@ -11,14 +11,12 @@ import selectors
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from fbvm.net.addresses import AddressMap
+from fbvm.net.host_link import HostLink
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import Happening, Tap, What
-
-if TYPE_CHECKING:
-    from fbvm.net.host_link import HostLink
 
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 TCP, UDP = "tcp", "udp"
