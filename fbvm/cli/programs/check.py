@@ -13,7 +13,7 @@ import click
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.check.lint.suppression import Wanted
 from fbvm.cli.shared import status
-from fbvm.cli.shared.beside import check_options, project_named
+from fbvm.cli.shared.project_arguments import check_options, project_argument
 from fbvm.cli.shared.sources import chosen, report, source_options
 from fbvm.code.compiler import LONG, compile_files
 
@@ -41,7 +41,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--no-warn") from None
     with _patience(files) as progress:
-        if project := project_named(files):
+        if project := project_argument(files):
             check_options(click.get_current_context(), BESIDE_PROJECTS)
             diagnostics = _of_project(project, wanted)
         else:

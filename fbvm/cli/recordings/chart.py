@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from fbvm.cli.shared.options import split_names
-from fbvm.cli.shared.outcome import chart_width
+from fbvm.cli.shared.run_result import chart_width
 from fbvm.cli.shared.traces import opened, recorded, scans_option, trace_argument
 from fbvm.record.draw.chart import draw
 

@@ -28,7 +28,7 @@ from rich.text import Text
 from fbvm.base.data import data_folder
 from fbvm.cli.running.peer import LISTENING
 from fbvm.cli.shared import status
-from fbvm.cli.shared.outcome import chart_width
+from fbvm.cli.shared.run_result import chart_width
 from fbvm.code.compiler import compile_files
 from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork

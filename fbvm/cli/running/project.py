@@ -12,8 +12,8 @@ from click.core import ParameterSource
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared import status
-from fbvm.cli.shared.beside import check_options
-from fbvm.cli.shared.outcome import EXIT_STATUS, Progress, for_scripts, shown, trap_for_scripts
+from fbvm.cli.shared.project_arguments import check_options
+from fbvm.cli.shared.run_result import EXIT_STATUS, Progress, for_scripts, shown, trap_for_scripts
 from fbvm.cli.shared.sources import report, show
 from fbvm.machine.scan_times import Lateness, ScanTimes
 from fbvm.run import run_all

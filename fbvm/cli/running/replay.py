@@ -9,7 +9,7 @@ import click
 
 from fbvm.cli.shared import journals
 from fbvm.cli.shared.options import charted_names, show_option
-from fbvm.cli.shared.outcome import Outcome
+from fbvm.cli.shared.run_result import Outcome
 from fbvm.net.journal import JournalError
 from fbvm.record.trace.recorder import Recorder
 from fbvm.run.replay import Replay

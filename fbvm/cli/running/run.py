@@ -9,17 +9,17 @@ from typing import Any
 
 import click
 
-from fbvm.cli.programs import sfc
-from fbvm.cli.programs.ladder import drawing
 from fbvm.cli.running.project import run_project
 from fbvm.cli.shared import status
-from fbvm.cli.shared.banks import banks_in, with_banks
-from fbvm.cli.shared.beside import project_named
 from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
+from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
+from fbvm.cli.shared.e_banks import e_banks_in, with_e_banks
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.journals import start_journal
-from fbvm.cli.shared.options import Mapping, Setting, charted_names, mapping, setting, show_option, time_ns
-from fbvm.cli.shared.outcome import Outcome, Progress
+from fbvm.cli.shared.networks import build_network, mailbox_names
+from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, charted_names, mapping, setting, show_option, time_ns
+from fbvm.cli.shared.project_arguments import project_argument
+from fbvm.cli.shared.run_result import Outcome, Progress
 from fbvm.cli.shared.sources import compiled, source_options
 from fbvm.cli.shared.traces import paging, statement_lines, tracing
 from fbvm.code.image import Image
@@ -27,7 +27,6 @@ from fbvm.engine.tiers import CHOICES
 from fbvm.machine.plc import Plc
 from fbvm.net.journal import Journal
 from fbvm.net.loop import LoopNetwork
-from fbvm.net.peers import ModbusPeer
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.trace.recorder import Recorder
@@ -36,10 +35,6 @@ from fbvm.run import loop
 from fbvm.run.running import EVENT, PACES, TimedWrite
 from fbvm.units.backplane import usual_units
 from fbvm.watch.places import parsed
-from fbvm.wire import registers
-
-CYCLE_NS = 10_000_000
-"""Cycle of programs without a TASK, unless somebody says another."""
 
 
 @click.command("run")
@@ -97,15 +92,15 @@ def command(
 
     End by one of --scans, --for and --until; before that, --break, --watch and --break-if end it inside a scan.  Status 1
     if --max ended --until, 3 if the program has errors, 4 if a trap stopped it, 5 if the network could not be used."""
-    if project := project_named(files):
+    if project := project_argument(files):
         sys.exit(run_project(project, click.get_current_context()))
     _check_usage(**options)
     drawn = bool(options["rungs"]) and not options["journal"]  # who replays a journal compiles as it was recorded
     image = compiled(files, program, libraries, runnable=True, as_json=as_json, drawn=drawn)
     named = [given.name for given in options["settings"]]
-    banks = banks_in([*named, *options["shown"], *options["charted"], options["until"] or "", *options["watched"],
+    banks = e_banks_in([*named, *options["shown"], *options["charted"], options["until"] or "", *options["watched"],
                       *options["conditions"], *options["lines"]])
-    image = with_banks(image, banks)
+    image = with_e_banks(image, banks)
     with ExitStack() as stack:
         network = build_network(options["net"], options["mappings"], options["seed"])
         stack.callback(network.close)
@@ -115,12 +110,12 @@ def command(
         plc = _plc(image, cycle_ns, options["engine"], journal)
         if options["pcap"]:
             network.tap = _capture(stack, options["pcap"], network, plc).tap
-        for unit in usual_units(mailboxes(image), options["timing"], options["seed"]):
+        for unit in usual_units(mailbox_names(image), options["timing"], options["seed"]):
             plc.attach(unit, network)
         _tell_doors(plc, network, options["mappings"])
         with tracing(plc, options["trace"], options["depth"], options["selected"], files, libraries), \
-                paging(plc, options["html"], files, libraries), drawing(plc, options["rungs"]), \
-                sfc.drawing(plc, options["charts"]):  # fmt: skip
+                paging(plc, options["html"], files, libraries), \
+                draw_executed_rungs(plc, options["rungs"]), draw_executed_charts(plc, options["charts"]):  # fmt: skip
             outcome = _run(plc, as_json, **options)
         outcome.print()
         _tell_unused(plc, network)
@@ -169,28 +164,6 @@ def _write(plc: Plc, given: Setting) -> TimedWrite:
     """A setting with its value read for the type of its place; a range takes values parted by commas."""
     found = plc.find(given.name)
     return TimedWrite(found, parsed(found, given.value), given.at_ns)
-
-
-def build_network(net: str, mappings: tuple[Mapping, ...], seed: int = 0) -> LoopNetwork | TcpNetwork:
-    """The network that the options describe.  Ends with status 5 if the host does not let it be."""
-    if net == "loop":
-        network = LoopNetwork(seed)
-        for row in mappings:
-            network.place(row.said, ModbusPeer(registers.server()))
-        return network
-    for row in mappings:
-        try:
-            TcpNetwork({row.said: (row.host or "", row.port)}).close()
-        except (OSError, UnicodeError) as error:  # a host without an address, or a name that cannot be one
-            reason = getattr(error, "strerror", "no name of a host")
-            click.echo(f"the network cannot be used: {row.host}: {reason}", err=True)
-            sys.exit(status.NETWORK)
-    return TcpNetwork({row.said: (row.host or "", row.port) for row in mappings})
-
-
-def mailboxes(image: Image) -> list[str]:
-    """The names of those that a program uses."""
-    return [box.name for box in image.layout.mailboxes]
 
 
 def _tell_doors(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...]) -> None:

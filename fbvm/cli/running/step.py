@@ -7,13 +7,12 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli.running.run import CYCLE_NS
+from fbvm.cli.running.debug_targets import DebugTarget, ProjectTarget
 from fbvm.cli.shared import status
-from fbvm.cli.shared.beside import project_named
-from fbvm.cli.shared.options import Mapping, Setting, mapping, setting, time_ns
+from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, mapping, setting, time_ns
+from fbvm.cli.shared.project_arguments import project_argument
 from fbvm.cli.shared.prompt import prompted
 from fbvm.cli.shared.sources import compiled, source_options
-from fbvm.cli.shared.stepped import Bench, ProjectBench
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.session import Session
@@ -46,16 +45,16 @@ def command(
     for row in mappings:
         if row.host is not None:
             raise click.UsageError(f"stepping stays in memory: --map {row.said}=peer")
-    bench: Bench
-    if project := project_named(files):
-        bench = ProjectBench(project, name)
-        texts = source_texts(bench.image, bench.files, bench.libraries)
+    debugged: DebugTarget
+    if project := project_argument(files):
+        debugged = ProjectTarget(project, name)
+        texts = source_texts(debugged.image, debugged.files, debugged.libraries)
     else:
         image = compiled(files, program, libraries, runnable=True, drawn=True)
-        bench = Bench(image, cycle_ns, mappings, timing, seed)
+        debugged = DebugTarget(image, cycle_ns, mappings, timing, seed)
         texts = source_texts(image, {str(path): path for path in files}, libraries)
-    session = Session(bench.make)
-    commands = Commands(session, Words(session, texts), lambda: bench.passed)
+    session = Session(debugged.make)
+    commands = Commands(session, Words(session, texts), lambda: debugged.passed)
     try:
         for given in settings:
             _write(session, given)

@@ -13,7 +13,7 @@ import click
 import fbvm
 from fbvm.base.diagnostics import Source
 from fbvm.cli.shared import status
-from fbvm.cli.shared.banks import with_banks
+from fbvm.cli.shared.e_banks import with_e_banks
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.sources import chosen, report
 from fbvm.code.compiler import compile_sources
@@ -83,4 +83,4 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
     if compilation.image is None:
         report(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)
-    return with_banks(compilation.image, banks)
+    return with_e_banks(compilation.image, banks)

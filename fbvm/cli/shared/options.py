@@ -10,6 +10,9 @@ from click import BadParameter, Context, Parameter, option
 from fbvm.watch.values import parse_time_ns, split_list
 from fbvm.wire.link import Peer
 
+CYCLE_NS = 10_000_000
+"""Cycle of programs without a TASK if --cycle is not given."""
+
 
 def time_ns(value: str | int) -> int:
     """`10ms`, `1.5s`, `T#10ms`: nanoseconds."""

@@ -12,13 +12,13 @@ from fbvm.code.image import Image
 _BANK = re.compile(r"(?<!\w)(E[0-9A-F])\s*[_:]\s*\d", re.I)
 
 
-def banks_in(texts: Iterable[str]) -> list[str]:
+def e_banks_in(texts: Iterable[str]) -> list[str]:
     """The E banks that names or conditions write, `E3_100` or `E3:100`, in the order of writing."""
     found = [match[1].upper() for text in texts for match in _BANK.finditer(text)]
     return [name for name in dict.fromkeys(found) if name in E_NAMES]
 
 
-def with_banks(image: Image, banks: Iterable[str]) -> Image:
+def with_e_banks(image: Image, banks: Iterable[str]) -> Image:
     """The same program for a PLC that has these E banks, too.  They come behind its own: nothing else moves."""
     missing = tuple(name for name in banks if name not in image.layout.e_banks)
     if not missing:

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from fbvm.base.diagnostics import Diagnostic, errors
-from fbvm.cli.running.run import build_network, mailboxes
 from fbvm.cli.shared import status
+from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import Mapping
 from fbvm.cli.shared.sources import report
 from fbvm.code.image import Image
@@ -22,7 +22,7 @@ from fbvm.units.backplane import usual_units
 from fbvm.wire.tap import Happening
 
 
-class Bench:
+class DebugTarget:
     """Makes the PLC with its unit and network, each time the same, and notes what passes the network."""
 
     def __init__(self, image: Image, cycle_ns: int, mappings: tuple[Mapping, ...], timing: str, seed: int) -> None:
@@ -36,7 +36,7 @@ class Bench:
         network = build_network("loop", self._mappings, self._seed)
         assert isinstance(network, LoopNetwork)
         self._listen(network)
-        for unit in usual_units(mailboxes(self._image), self._timing, self._seed):
+        for unit in usual_units(mailbox_names(self._image), self._timing, self._seed):
             plc.attach(unit, network)
         return plc
 
@@ -49,7 +49,7 @@ class Bench:
         network.tap = tap
 
 
-class ProjectBench(Bench):
+class ProjectTarget(DebugTarget):
     """Makes all PLCs of a project; one is stepped through, the others scan along in its time.
 
     Ends with status 3 if something is wrong with the project, and as a mistake of usage if `name` is none of its PLCs."""

@@ -9,7 +9,7 @@ import click
 from click.core import ParameterSource
 
 
-def project_named(files: tuple[Path, ...]) -> Path | None:
+def project_argument(files: tuple[Path, ...]) -> Path | None:
     """The project file that the arguments of `fbvm run` mean: a .toml file, a folder that has one, or nothing at all,
     which is the folder where one is.  None if they are sources, for which nothing of projects is loaded."""
     if len(files) > 1 or (files and not files[0].is_dir() and files[0].suffix != ".toml"):

@@ -1,0 +1,118 @@
+"""Rungs and charts as text on the terminal: at rest for `fbvm ladder` and `fbvm sfc`, as executed for `fbvm run`."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+
+import click
+
+from fbvm.base.types import StructType, fold
+from fbvm.cli.shared.run_result import chart_width
+from fbvm.code.image import Image, RungPicture
+from fbvm.machine.plc import Plc
+from fbvm.record.draw.ladder_text import ladder_text
+from fbvm.record.draw.power import Power
+from fbvm.record.draw.rung_values import Values
+from fbvm.record.draw.sfc_seen import Evolutions
+from fbvm.record.draw.sfc_text import sfc_text
+from fbvm.record.trace.history import looking
+from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.watch.names import Names
+from fbvm.watch.paths import Place
+
+SVG_WIDTH = 120
+"""Columns of an SVG file."""
+_SCANS = re.compile(r"([0-9]{1,18})(?:\.\.([0-9]{1,18}))?")
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    """Prints a drawing and an empty line behind it."""
+    for line in lines:
+        click.echo(line)
+    click.echo()
+
+
+def symbol_addresses(image: Image, body: int) -> Callable[[str], str]:
+    """A function from the name of a variable to its address, "" without one.
+
+    Knows the variables that the POU of body number `body` declares with AT, and global variables."""
+    own = image.types.get(fold(image.bodies[body].name))
+    names = Names.of(image, image.layout.areas)
+
+    def address(symbol: str) -> str:
+        name = fold(symbol)
+        field = own.fields.get(name) if isinstance(own, StructType) else None
+        field = field or image.symbols.get(name)
+        if field is None or not field.absolute:
+            return ""
+        return names.address(Place(field.name, field.type, field.offset, field.bit)).removeprefix("CIO ")
+
+    return address
+
+
+def rung_lines(image: Image, rung: RungPicture, width: int) -> list[str]:
+    """The lines of a rung that is not executed, at most `width` columns wide, with addresses of its variables."""
+    return ladder_text(rung, width, Sight(None, symbol_addresses(image, rung.body)))
+
+
+def scan_filter(text: str) -> Callable[[int], bool]:
+    """The scans that an option such as `3,5..7` names, as a predicate of scan numbers.  Raises UsageError for other texts."""
+    ranges: list[range] = []
+    for part in text.split(","):
+        match = _SCANS.fullmatch(part.strip())
+        if not match or not (scans := range(int(match[1]), int(match[2] or match[1]) + 1)):
+            raise click.UsageError(f"{text!r} names no scans; write 3 or 3,5..7")
+        ranges.append(scans)
+    return lambda scan: any(scan in scans for scans in ranges)
+
+
+@contextmanager
+def draw_executed_rungs(plc: Plc, scans: str | None) -> Iterator[None]:
+    """Records the rungs that `plc` executes inside the `with` block and prints them, with their power, at its end.
+
+    `scans` is the text of --ladder; without it nothing is recorded."""
+    if not scans:
+        yield
+        return
+    values = Values(plc.image, plc.memory.areas)
+    power = Power(plc.image.rungs, scan_filter(scans), values.keep)
+    with looking(plc, power):
+        yield
+    if not power.executed:
+        _warn_nothing_drawn(plc, f"--ladder {scans}", "rung", bool(plc.image.rungs))
+    names = Names.of(plc.image, plc.memory.areas)
+    before: tuple[int, int] | None = None
+    for made in power.executed:
+        if before != (made.scan, made.base):
+            before = made.scan, made.base
+            click.echo(f"scan {made.scan}, {names.instance(made.base)}")
+        sight = Sight(made.states, symbol_addresses(plc.image, made.picture.body), values.of(made))
+        print_lines(ladder_text(made.picture, chart_width(), sight))
+
+
+@contextmanager
+def draw_executed_charts(plc: Plc, scans: str | None) -> Iterator[None]:
+    """Records the charts that `plc` executes inside the `with` block and prints them, with their active steps, at its end.
+
+    `scans` is the text of --sfc; without it nothing is recorded."""
+    if not scans:
+        yield
+        return
+    seen = Evolutions(plc.image.charts, scan_filter(scans))
+    with looking(plc, seen):
+        yield
+    if not seen.called:
+        _warn_nothing_drawn(plc, f"--sfc {scans}", "chart", bool(plc.image.charts))
+    names = Names.of(plc.image, plc.memory.areas)
+    for called in seen.called:
+        click.echo(f"scan {called.scan}, {names.instance(called.base)}")
+        print_lines(sfc_text(called.picture, chart_width(), called.sighted))
+
+
+def _warn_nothing_drawn(plc: Plc, option: str, part: str, declared: bool) -> None:
+    """Says why an option drew nothing: the program has no such `part`, or none was executed in the scans of the option."""
+    why = f"no {part} was executed in these scans; the run had scans 0 to {plc.scans - 1}" if declared and plc.scans else \
+        f"no {part} was executed" if declared else f"there is no {part} in this program"  # fmt: skip
+    click.secho(f"{option}: {why}", fg="yellow", err=True)
