@@ -11,36 +11,28 @@ Files are looked for beside the test, then in the folders above it, up to that w
 from __future__ import annotations
 
 import ast
-import os
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Generator, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import pytest
 
 from fbvm.base.data import PACKAGE
+from fbvm.testing.session import MOST_PAGES, count_coverage, failure_page, library_folders, search_folders
 from fbvm.testing.warned import NAME as WARNED
 from fbvm.testing.warned import Warned, add_options, warned_of
 
 if TYPE_CHECKING:
-    from fbvm.machine.plc import Plc
     from fbvm.net.loop import LoopNetwork
-    from fbvm.testing.coverage_plugin import CoveragePlugin
     from fbvm.testing.plant_rig import PlantRig
     from fbvm.testing.recorded import Recorded
     from fbvm.testing.rig import Rig
     from fbvm.testing.st_items import StFile
-    from fbvm.testing.subject import Stub, Subject
+    from fbvm.testing.subject import Stub
 
 RIGS: pytest.StashKey[list[Rig]] = pytest.StashKey()
 """The rigs that a test has made."""
-PAGES: pytest.StashKey[list[Path]] = pytest.StashKey()
-"""The pages that were written for failed tests."""
-MOST_PAGES = 20
-"""Pages of failed tests that one session writes."""
-SOURCE_FOLDER = "src"
-"""Where a project keeps its blocks, below the folder of its pytest.ini or pyproject.toml."""
 
 
 class RigMaker(Protocol):
@@ -86,19 +78,6 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(CoveragePlugin(config), NAME)
 
 
-@contextmanager
-def counted(config: pytest.Config, plc: Plc, subject: Subject) -> Iterator[None]:
-    """Counts what a PLC executes meanwhile, if coverage is wanted."""
-    counting: CoveragePlugin | None = config.pluginmanager.get_plugin("fbvm_coverage")
-    if counting is None:
-        yield
-        return
-    from fbvm.record.trace.history import looking
-
-    with looking(plc, counting.coverage.listener(subject)):
-        yield
-
-
 @pytest.fixture
 def fb(request: pytest.FixtureRequest) -> RigMaker:
     """One function block, function or program on a test rig: `fb("src/pump.st::Pump", cycle="10ms")`, `fb("TON")`.
@@ -128,7 +107,7 @@ def plant(request: pytest.FixtureRequest) -> Iterator[PlantMaker]:
 
     def make(project: str = "fbvm.toml") -> PlantRig:
         __tracebackhide__ = True
-        made.append(PlantRig(project_near(folders_of(request.path, request.config.rootpath), project)))
+        made.append(PlantRig(project_near(search_folders(request.path, request.config.rootpath), project)))
         _rigs(request.node).extend(made[-1].rigs.values())
         for rig in made[-1].rigs.values():
             _attend(request, rig)
@@ -178,7 +157,7 @@ def _rigs(node: pytest.Item) -> list[Rig]:
 
 def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
     rigs = _rigs(request.node)
-    folders = folders_of(request.path, request.config.rootpath)
+    folders = search_folders(request.path, request.config.rootpath)
 
     def make(what: str, cycle: str | int = "10ms", *, libraries: Sequence[str] = (), dialect: str = "", **given: Any) -> Rig:
         from fbvm.testing.rig import Rig
@@ -200,7 +179,7 @@ def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
 def _attend(request: pytest.FixtureRequest, rig: Rig) -> None:
     """Counts what a rig executes and records it, if somebody wants that, until the test is over."""
     attending = ExitStack()
-    attending.enter_context(counted(request.config, rig.plc, rig.subject))
+    attending.enter_context(count_coverage(request.config, rig.plc, rig.subject))
     if folder := request.config.getoption("fbvm_traces"):
         from fbvm.testing.pages import file_name
         from fbvm.testing.recorded import Recorded
@@ -209,17 +188,6 @@ def _attend(request: pytest.FixtureRequest, rig: Rig) -> None:
         name = f"{file_name(request.node.nodeid)}.{_rigs(request.node).index(rig)}.fbtrace"
         attending.callback(Recorded(rig, Path(folder) / name).close)
     request.addfinalizer(attending.close)
-
-
-def folders_of(path: Path, root: Path) -> list[Path]:
-    """Where the files that a test names are looked for: beside it, then above it, up to pytest's root."""
-    return [folder for folder in path.parents if folder.is_relative_to(root)] or [path.parent]
-
-
-def library_folders(config: pytest.Config, path: Path) -> list[Path]:
-    """Folders in which a test finds blocks by the names of their files: those of pytest's ini, and `src` near it."""
-    sources = [folder / SOURCE_FOLDER for folder in folders_of(path, config.rootpath)]
-    return list(dict.fromkeys([*config.getini("fbvm_libraries"), *(folder for folder in sources if folder.is_dir())]))
 
 
 # --- failures ---------------------------------------------------------------------------------------------------------
@@ -268,22 +236,7 @@ def _shorten(error: BaseException) -> None:
 def _page(item: pytest.Item, rig: Rig, lines: tuple[str, range] | None) -> str:
     """Writes the page of one of the rigs of a failed test, and says where it is; "" without one."""
     number = "" if len(_rigs(item)) == 1 else f".{_rigs(item).index(rig)}"
-    return page_of(item, number, lambda path: rig.write_page(path, item.nodeid, lines))
-
-
-def page_of(item: pytest.Item, number: str, write: Callable[[Path], bool]) -> str:
-    """Has the page of a failed test written, and says where it is; "" if none was."""
-    from fbvm.testing.pages import page_path
-
-    written, most = item.config.stash.setdefault(PAGES, []), item.config.getoption("fbvm_pages")
-    path = page_path(item.config.rootpath, f"{item.nodeid}{number}")
-    try:
-        if len(written) >= most or not write(path):
-            return ""
-    except OSError as error:
-        return f"the page could not be written: {error}"
-    written.append(path)
-    return f"every scan, in a browser: {os.path.relpath(path, item.config.invocation_params.dir)}"
+    return failure_page(item, number, lambda path: rig.write_page(path, item.nodeid, lines))
 
 
 def _asking(excinfo: pytest.ExceptionInfo[BaseException], rigs: Sequence[Rig]) -> list[tuple[Rig, tuple[str, range] | None]]:

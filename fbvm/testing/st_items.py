@@ -22,8 +22,8 @@ from fbvm.record.trace.history import History, looking
 from fbvm.record.trace.recorder import Signal
 from fbvm.syntax.text import read
 from fbvm.testing.pages import write_page
-from fbvm.testing.plugin import counted, library_folders, page_of
 from fbvm.testing.rig import Trapped
+from fbvm.testing.session import count_coverage, failure_page, library_folders
 from fbvm.testing.subject import LIBRARY, Subject, SubjectError, pous, subject
 from fbvm.testing.warned import warned_of
 from fbvm.watch.names import Names, is_single
@@ -78,14 +78,14 @@ class StItem(pytest.Item):
         watch = Assertions(plc, made.prefix)
         history = History(plc)
         try:
-            with counted(self.config, plc, made), looking(plc, watch):
+            with count_coverage(self.config, plc, made), looking(plc, watch):
                 _run(plc, history, f"{made.prefix}Done")
         except AssertFailed as failed:
             table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])
             history.again(range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1), table)
             failed.table = table.draw([band for band in table.bands if band.moved][-BANDS:]) if failed.values else ""
             asked = [signal.place for signal, _ in failed.values]
-            failed.page = page_of(self, "", lambda path: write_page(path, self.nodeid, history, made, plc, asked,
+            failed.page = failure_page(self, "", lambda path: write_page(path, self.nodeid, history, made, plc, asked,
                                                                     unfinished=True))  # fmt: skip
             raise
         if not watch.asserted:

@@ -1,0 +1,64 @@
+"""What the fixtures and the tests in ST take from a pytest session: folders of sources, coverage, pages of failed tests."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from fbvm.machine.plc import Plc
+    from fbvm.testing.coverage_plugin import CoveragePlugin
+    from fbvm.testing.subject import Subject
+
+PAGES: pytest.StashKey[list[Path]] = pytest.StashKey()
+"""The pages that the session has written for failed tests."""
+MOST_PAGES = 20
+"""Pages that one session writes unless --fbvm-pages says another number."""
+SOURCE_FOLDER = "src"
+"""The folder of a project's blocks, beside its pytest.ini or pyproject.toml."""
+
+
+def search_folders(path: Path, root: Path) -> list[Path]:
+    """The folders in which the files that a test names are looked for: that of the test, then those above it up to `root`."""
+    return [folder for folder in path.parents if folder.is_relative_to(root)] or [path.parent]
+
+
+def library_folders(config: pytest.Config, path: Path) -> list[Path]:
+    """The folders in which a test finds blocks by the names of their files: the ini option fbvm_libraries, and `src` near it."""
+    sources = [folder / SOURCE_FOLDER for folder in search_folders(path, config.rootpath)]
+    return list(dict.fromkeys([*config.getini("fbvm_libraries"), *(folder for folder in sources if folder.is_dir())]))
+
+
+@contextmanager
+def count_coverage(config: pytest.Config, plc: Plc, subject: Subject) -> Iterator[None]:
+    """Counts the statements that `plc` executes inside the `with` block, if the session measures coverage."""
+    counting: CoveragePlugin | None = config.pluginmanager.get_plugin("fbvm_coverage")
+    if counting is None:
+        yield
+        return
+    from fbvm.record.trace.history import looking
+
+    with looking(plc, counting.coverage.listener(subject)):
+        yield
+
+
+def failure_page(item: pytest.Item, suffix: str, write: Callable[[Path], bool]) -> str:
+    """Calls `write` with the path of the HTML page of a failed test; returns the line of the report that names the page.
+
+    `suffix` tells several pages of one test apart.  "" if `write` returned False, or if the session has written enough."""
+    from fbvm.testing.pages import page_path
+
+    written, most = item.config.stash.setdefault(PAGES, []), item.config.getoption("fbvm_pages")
+    path = page_path(item.config.rootpath, f"{item.nodeid}{suffix}")
+    try:
+        if len(written) >= most or not write(path):
+            return ""
+    except OSError as error:
+        return f"the page could not be written: {error}"
+    written.append(path)
+    return f"every scan, in a browser: {os.path.relpath(path, item.config.invocation_params.dir)}"
