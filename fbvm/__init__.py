@@ -5,7 +5,7 @@
     plc.write("Main.start", True)
     plc.run(until="Main.running", max_ns=5_000_000_000)
 
-Names are loaded when they are asked for.  `fbvm.run.run` runs a PLC in real time.
+A name is imported when it is first used, so `import fbvm` is fast.  `fbvm.run.run` runs a PLC in real time.
 """
 
 from __future__ import annotations
@@ -40,7 +40,10 @@ if TYPE_CHECKING:
     from fbvm.record.draw.chart import chart as chart
     from fbvm.record.draw.chart import draw as draw
     from fbvm.record.export.pcapng import Capture as Capture
+    from fbvm.record.trace.reader import Trace as Trace
     from fbvm.record.trace.recorder import Recorder as Recorder
+    from fbvm.record.trace.writer import Depth as Depth
+    from fbvm.record.trace.writer import TraceWriter as TraceWriter
     from fbvm.run.replay import Replay as Replay
     from fbvm.units.etn21.unit import Etn21 as Etn21
     from fbvm.units.port.noc import Noc as Noc
@@ -63,7 +66,9 @@ _HOMES = {
     "interchange.plcopen.read.importing": ("Imported", "import_xml"),
     "record.draw.chart": ("chart", "draw"),
     "record.export.pcapng": ("Capture",),
+    "record.trace.reader": ("Trace",),
     "record.trace.recorder": ("Recorder",),
+    "record.trace.writer": ("Depth", "TraceWriter"),
     "run.replay": ("Replay",),
     "units.etn21.unit": ("Etn21",),
     "units.port.noc": ("Noc",),
@@ -72,7 +77,7 @@ _HOMES = {
     "wire.link": ("Peer",),
     "wire.modbus_server": ("ModbusServer",),
 }
-"""Where the public names live."""
+"""The public names by the module that defines them; a name is imported when it is first used."""
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = sorted([*_HOME_OF, "__version__"])
 

@@ -82,23 +82,27 @@ class Report:
         return f"{now}{last}, by {self._by(writer)}"
 
     def _blocks(self, table: ScanTable, signals: list[Signal]) -> list[str]:
-        """`Delay: TON with IN = TRUE, PT = 50ms, Q = FALSE, ET = 20ms`, for blocks whose variables were read."""
+        """The pins of the blocks whose variables the last scan's statements read, a line each."""
         asked = {signal.place.name for signal in signals}
         writers = [table.writers[signal] for signal in signals if signal in table.writers]
-        named = dict.fromkeys(name.rpartition(".")[0] for writer in writers if writer.scan == self._plc.scans - 1
+        paths = dict.fromkeys(name.rpartition(".")[0] for writer in writers if writer.scan == self._plc.scans - 1
                               for name, _ in writer.reads if name not in asked)  # fmt: skip
-        lines = []
-        for name in named:
-            block = self._plc.find(name) if name else None
-            if not isinstance(block, Place) or not isinstance(block.type, StructType) or f"{name}." == self._subject.prefix:
-                continue
-            pins = [field.name for field in block.type.fields.values() if field.kind in ("VAR_INPUT", "VAR_OUTPUT")]
-            places = [place for pin in pins if isinstance(place := self._plc.find(f"{name}.{pin}"), Place) and is_single(place)]
-            texts = [Signal(place, place.name).text(self.names.read(self._plc.read, place)) for place in places[:MOST_COLUMNS]]
-            said = ", ".join(f"{place.name.rpartition('.')[2]} = {text}" for place, text in zip(places, texts, strict=False))
-            if said:
-                lines.append(f"{name.removeprefix(self._subject.prefix)}: {block.type.name} with {said}")
-        return lines
+        lines = (self._block(path) for path in paths if path and f"{path}." != self._subject.prefix)
+        return [line for line in lines if line]
+
+    def _block(self, path: str) -> str:
+        """`Delay: TON with IN = TRUE, PT = 50ms, Q = FALSE, ET = 20ms`; "" for what is no instance or has no pins."""
+        block = self._plc.find(path)
+        if not isinstance(block, Place) or not isinstance(block.type, StructType):
+            return ""
+        pins = [field.name for field in block.type.fields.values() if field.kind in ("VAR_INPUT", "VAR_OUTPUT")]
+        found = [self._plc.find(f"{path}.{pin}") for pin in pins]
+        places = [place for place in found if isinstance(place, Place) and is_single(place)][:MOST_COLUMNS]
+        values = ", ".join(f"{place.name.rpartition('.')[2]} = {self._value(place)}" for place in places)
+        return f"{path.removeprefix(self._subject.prefix)}: {block.type.name} with {values}" if values else ""
+
+    def _value(self, place: Place) -> str:
+        return Signal(place, place.name).text(self.names.read(self._plc.read, place))
 
     def _by(self, writer: Writer) -> str:
         if writer.site is None:

@@ -227,7 +227,13 @@ _BITS = {"TRUE": True, "FALSE": False, "ON": True, "OFF": False}
 def parse_value(kind: Type, text: str, name: str) -> Value:
     """The value of type `kind` that `text` writes; of an array a list, `1,2,3` or `[1, 2, 3]`.
 
-    Raises ValueError or TypeError with `name` in the message."""
+    `name` is the variable that messages are about.  Raises ValueError (out of range, no literal) or TypeError (a literal of
+    another kind).
+
+    >>> from fbvm.base.types import TIME, WORD
+    >>> parse_value(TIME, "10ms", "Main.t"), parse_value(WORD, "16#FF", "D200")
+    (10000000, 255)
+    """
     plain = base(kind)
     text = text.strip()
     if isinstance(plain, ArrayType):
@@ -240,17 +246,22 @@ def parse_value(kind: Type, text: str, name: str) -> Value:
         return conform(kind, member if dot and fold(front) == fold(kind.name) else text, name)
     if sort_of(kind) == "text" and not _QUOTED.match(text):
         return conform(kind, text, name)
+    return conform(kind, _literal_of(kind, text, name), name)
+
+
+def _literal_of(kind: Type, text: str, name: str) -> Value:
+    """The value of a literal whose kind fits a variable of type `kind`; a date may lack the name of its type."""
+    wanted = sort_of(kind)
     try:
-        value, shown = literal(text if sort_of(kind) not in DATES or "#" in text else f"{plain.name}#{text}")
+        value, shown = literal(text if wanted not in DATES or "#" in text else f"{base(kind).name}#{text}")
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from None
     sort = sort_of(shown) if shown else "text" if isinstance(value, str) else "number"
-    wanted = sort_of(kind)
-    if wanted and sort != wanted and (wanted, value) not in (("BOOL", 0), ("BOOL", 1), ("enumeration", value)):
+    fits = sort == wanted or not wanted or wanted == "enumeration" or wanted == "BOOL" and value in (0, 1)
+    truncated = wanted == "number" and isinstance(value, float) and "ANY_REAL" not in families(kind)
+    if not fits or truncated:
         raise refusal(kind, name, text)
-    if wanted == "number" and isinstance(value, float) and "ANY_REAL" not in families(kind):
-        raise refusal(kind, name, text)
-    return conform(kind, value, name)
+    return value
 
 
 def split_list(text: str) -> list[str]:
@@ -320,11 +331,31 @@ def _member(field: Field, value: Value, hexadecimal: bool) -> str:
 
 
 def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
-    """A value for people: TRUE, 12, 16#00FF, T#1s500ms, 'text', [1, 2], (a := 1); of an instance the pins first, and not what
-    nobody has written."""
+    """A value as a literal of a program: TRUE, 12, T#1s500ms, 'text', [1, 2], (a := 1).
+
+    `kind` is the declared type.  `hexadecimal` writes bit strings as 16#00FF.  Of an instance the inputs and outputs come
+    first; constants and variables that the compiler has added are left out.
+
+    >>> from fbvm.base.types import TIME, WORD
+    >>> show(TIME, 1_500_000_000), show(WORD, 255, hexadecimal=True)
+    ('T#1s500ms', '16#00FF')
+    """
     plain = base(as_read(kind))
     if value is None:
         return "NULL"
+    if isinstance(value, bool):
+        return "TRUE" if value else "FALSE"
+    if isinstance(value, list | dict):
+        return _show_aggregate(plain, value, hexadecimal)
+    if isinstance(value, str):
+        return value if isinstance(plain, RefType) else _quoted(plain, value)
+    if isinstance(value, float):
+        return str(shortest(value) if plain is REAL else value)
+    return _show_integer(plain, value, hexadecimal)
+
+
+def _show_aggregate(plain: Type, value: list[Value] | dict[str, Value], hexadecimal: bool) -> str:
+    """The elements of an array in brackets, the members of a structure or an instance in parentheses."""
     if isinstance(plain, ArrayType) and isinstance(value, list):
         return "[" + ", ".join(show(plain.element, item, hexadecimal) for item in value) + "]"
     if isinstance(plain, StructType) and isinstance(value, dict):
@@ -332,20 +363,16 @@ def show(kind: Type, value: Value, hexadecimal: bool = False) -> str:
                    if f.name in value and "$" not in f.name and not (plain.block and f.constant)]
         members.sort(key=lambda f: _PINS.get(f.kind, len(_PINS)))
         return "(" + ", ".join(f"{f.name} := {_member(f, value[f.name], hexadecimal)}" for f in members) + ")"
-    if isinstance(value, bool):
-        return "TRUE" if value else "FALSE"
-    if isinstance(plain, EnumType) and isinstance(value, int):
-        return f"{plain.shown.get(value, '?')} ({value})"
-    if isinstance(plain, RefType):
-        return str(value)
-    if isinstance(value, str):
-        return _quoted(plain, value)
-    if isinstance(value, float) and plain is REAL:
-        return str(shortest(value))
-    if isinstance(value, int) and plain.name in ("TIME", "LTIME"):
-        return show_time(value)
-    if isinstance(value, int) and isinstance(plain, Elementary) and "ANY_DATE" in plain.families:
-        return to_text(plain.name, value).decode("ascii")
-    if hexadecimal and isinstance(value, int) and isinstance(plain, Elementary) and "ANY_BIT" in plain.families:
-        return in_hexadecimal(plain, value)
     return str(value)
+
+
+def _show_integer(plain: Type, value: int, hexadecimal: bool) -> str:
+    """An integer as its type is written: the member of an enumeration, a duration, a date, a bit string, else a number."""
+    if isinstance(plain, EnumType):
+        return f"{plain.shown.get(value, '?')} ({value})"
+    if plain.name in ("TIME", "LTIME"):
+        return show_time(value)
+    found = plain.families if isinstance(plain, Elementary) else ()
+    if "ANY_DATE" in found:
+        return to_text(plain.name, value).decode("ascii")
+    return in_hexadecimal(plain, value) if hexadecimal and "ANY_BIT" in found else str(value)

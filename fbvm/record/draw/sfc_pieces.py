@@ -197,43 +197,51 @@ def _hang(piece: Piece, child: Piece, x: int, y: int, line: int) -> None:
 
 
 def join(piece: Piece, merged: Node, below: Piece, double: bool, name: str) -> Piece:
-    """What stands above, and below it the node of this name at which some of its ends meet again.
+    """A piece with the node below it at which branches converge.
 
-    Only neighbours meet; the others end with an arrow and the name."""
-    mine, lost = _neighbours(piece.ends, merged)
+    `piece` is the drawing above, `below` that of the node `merged`, whose `name` is written at arrows.  Only ends without
+    another end between them are joined; the others to `merged` end with an arrow.  `double` draws the line of a
+    simultaneous convergence (6.7.4)."""
+    joined, cut_off = _neighbours(piece.ends, merged)
     made = Piece(piece.width, piece.height, piece.entry, thick=piece.thick)
     made.place(piece, 0, 0)
     row = piece.height
-    for end in lost:
+    for end in cut_off:
         _close(made, end, row, f"► {name}")
-    others = [end for end in piece.ends if end not in mine and end not in lost]
-    at = piece.ends.index(mine[0])
-    left = [end for end in others if piece.ends.index(end) < at]
-    right = [end for end in others if end not in left]
-    wing = WING if double else 0
-    least = max((end.x + 2 for end in left), default=0)
-    centre = (mine[0].x + mine[-1].x) // 2
-    entry = max(centre, least + below.entry)
-    row += bool(lost)
-    row, moved = _aside(made, right, entry - below.entry + below.width + 1, piece.height, row)
-    for end in (*left, *mine, *(end for end in right if end not in moved)):
+    left, right = _beside(piece.ends, joined, cut_off)
+    entry = max((joined[0].x + joined[-1].x) // 2, max((end.x + 2 for end in left), default=0) + below.entry)
+    row, moved = _aside(made, right, entry - below.entry + below.width + 1, piece.height, row + bool(cut_off))
+    for end in (*left, *joined, *(end for end in right if end not in moved)):
         made.line_down(end.x, piece.height - 1, row, end.thick)
-    first, last = min(entry, mine[0].x) - wing, max(entry, mine[-1].x) + wing
-    shift = max(0, -first)
-    if len(mine) > 1 or entry != mine[0].x or double:
-        made.line_across(first, last, row, double=double)
-        for end in mine:
-            if end.thick and not double:
-                made.line_across(min(end.x, entry), max(end.x, entry), row, True)
-    if double and lost:
+    first, last = _converge(made, joined, entry, row, double)
+    if double and cut_off:
         made.text(last + 2, row, f"◄ {name}")
-    below.thick = any(end.thick for end in mine)
+    below.thick = any(end.thick for end in joined)
     made.ends = [End(end.x, end.to, end.thick) for end in (*left, *right)]
     made.height = row + 1
     made.width = max(made.width, last + 1)
     _hang(made, below, entry - below.entry, row + 1, row)
     made.ends.sort(key=lambda end: end.x)
-    return _shifted(made, max(shift, below.entry - entry, 0))
+    return _shifted(made, max(-first, below.entry - entry, 0))
+
+
+def _beside(ends: Sequence[End], joined: Sequence[End], cut_off: Sequence[End]) -> tuple[list[End], list[End]]:
+    """The ends that go on, at the left and at the right of those that are joined."""
+    at = ends.index(joined[0])
+    others = [(number, end) for number, end in enumerate(ends) if end not in joined and end not in cut_off]
+    return [end for number, end in others if number < at], [end for number, end in others if number > at]
+
+
+def _converge(piece: Piece, joined: Sequence[End], entry: int, row: int, double: bool) -> tuple[int, int]:
+    """Draws the line across in which ends meet above column `entry`; returns its first and last column."""
+    wing = WING if double else 0
+    first, last = min(entry, joined[0].x) - wing, max(entry, joined[-1].x) + wing
+    if len(joined) > 1 or entry != joined[0].x or double:
+        piece.line_across(first, last, row, double=double)
+        for end in joined if not double else ():
+            if end.thick:
+                piece.line_across(min(end.x, entry), max(end.x, entry), row, True)
+    return first, last
 
 
 def _neighbours(ends: Sequence[End], merged: Node) -> tuple[list[End], list[End]]:

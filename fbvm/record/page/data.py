@@ -245,27 +245,34 @@ def _in_order(trace: Trace) -> list[Signal]:
 
 def _as_data(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
     """What was collected, as JSON can write it; signals without values are left out."""
-    kept = [number for number, changes in enumerate(made.changes) if changes]
-    new = {number: at for at, number in enumerate(kept)}
-    used = sorted({row[0] for rows in made.rows.values() for row in rows if row[0] >= 0})
-    sites = {number: at for at, number in enumerate(used)}
     times = made.times_ns
     return {
         "version": VERSION, "cycle": trace.cycle_ns, "depth": trace.depth.value,
         "scans": [made.first, len(times)],
         "times": [now - before for before, now in zip([0, *times], times, strict=False)],
-        "signals": [_signal(made, number, prefix) for number in kept],
         "words": {area: {str(at): changes for at, changes in sorted(rows.items())} for area, rows in made.words.items()},
         "names": dict(reversed(list(_located(trace, made.signals)))), "described": trace.described,
         "meanings": {address: {str(value): text for value, text in known.items()}
                      for address, known in trace.meanings.items()},
-        "sites": [[site.file, site.line, trace.line(site)] for site in (trace.sites[number] for number in used)],
         "instances": [path.removeprefix(prefix.rstrip(".")).lstrip(".") for path in made.instances],
-        "rows": {str(scan): [_renumbered(row, new, sites) for row in rows] for scan, rows in made.rows.items()
-                 if trace.depth is not Depth.SCANS},
+        **_numbered(trace, made, prefix),
         "frames": frame_rows(made.passed),
         "pictures": made.pictures, "ladder": {str(scan): rungs for scan, rungs in made.ladder.items()},
     }  # fmt: skip
+
+
+def _numbered(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
+    """The signals that have values, the statements that occur, and the rows, which name both by their places in these lists."""
+    kept = [number for number, changes in enumerate(made.changes) if changes]
+    signals = {number: at for at, number in enumerate(kept)}
+    used = sorted({row[0] for rows in made.rows.values() for row in rows if row[0] >= 0})
+    sites = {number: at for at, number in enumerate(used)}
+    rows = made.rows if trace.depth is not Depth.SCANS else {}
+    return {
+        "signals": [_signal(made, number, prefix) for number in kept],
+        "sites": [[site.file, site.line, trace.line(site)] for site in (trace.sites[number] for number in used)],
+        "rows": {str(scan): [_renumbered(row, signals, sites) for row in found] for scan, found in rows.items()},
+    }
 
 
 def frame_rows(rows: Sequence[tuple[int, Passed]]) -> list[list[Any]]:
@@ -280,9 +287,9 @@ def _signal(made: Collector, number: int, prefix: str) -> dict[str, Any]:
             "changes": made.changes[number]}  # fmt: skip
 
 
-def _renumbered(row: list[Any], new: dict[int, int], sites: dict[int, int]) -> list[Any]:
-    changed = [item for number, text in zip(row[2::2], row[3::2], strict=True) if number in new or number == POWER
-               for item in (new.get(number, POWER), text)]  # fmt: skip
+def _renumbered(row: list[Any], signals: dict[int, int], sites: dict[int, int]) -> list[Any]:
+    changed = [item for number, text in zip(row[2::2], row[3::2], strict=True) if number in signals or number == POWER
+               for item in (signals.get(number, POWER), text)]  # fmt: skip
     return [sites.get(row[0], row[0]), row[1], *changed]
 
 

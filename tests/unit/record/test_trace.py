@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from rows import each_of
 from trace_rig import TEXT, image, press, record, traced
 
+from fbvm import Depth, Trace, TraceWriter
 from fbvm.base.types import ArrayType, EnumType, StringType, StructType, SubrangeType
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Phase, Plc
@@ -22,10 +23,9 @@ from fbvm.record.trace import symbols
 from fbvm.record.trace.events import Began, Ended, Event, Frame, Read, Statement, Write
 from fbvm.record.trace.format import MAGIC, Cursor, TraceError, put, xor
 from fbvm.record.trace.history import looking
-from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.selection import select
 from fbvm.record.trace.signals import recording
-from fbvm.record.trace.writer import START, Depth, TraceWriter
+from fbvm.record.trace.writer import START
 from fbvm.watch.names import Names
 from fbvm.watch.paths import UnknownPlace
 
