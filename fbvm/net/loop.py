@@ -17,7 +17,7 @@ from fbvm.net.loop_channels import Bound, Door, Line, MemoryLink
 from fbvm.net.peers import Action, Actions, Conversation, Fin, Leave, Reset, Say, Station, Wake
 from fbvm.net.stream import End
 from fbvm.wire.link import Bind, Connect, Event, Failed, Listen, Peer, Request
-from fbvm.wire.tap import Happening, Tap, What
+from fbvm.wire.tap import Tap, TapEvent, TapKind
 
 CONNECT_TIMEOUT_NS = 75_000_000_000
 """When opening towards a silent host gives up, as BSD stacks do.  The unit's own limit is not known: assumed."""
@@ -96,22 +96,22 @@ class LoopNetwork:
         """Data in the pieces in which they arrive."""
         return list(fault.pieces(data, self._dice))
 
-    def tell(self, end: End, what: What, out: bool, data: bytes = b"") -> None:
+    def tell(self, end: End, what: TapKind, out: bool, data: bytes = b"") -> None:
         """Pass a happening at a unit's end on to the tap; a scripted peer has none."""
         if end.unit is not None:
             self.tell_unit(end.unit, what, end.local, end.remote, out, data)
 
-    def tell_unit(self, unit: str, what: What, local: Peer, remote: Peer, out: bool, data: bytes = b"") -> None:
+    def tell_unit(self, unit: str, what: TapKind, local: Peer, remote: Peer, out: bool, data: bytes = b"") -> None:
         """Pass a happening at a unit on to the tap."""
         if self.tap:
-            self.tap(self.now_ns, unit, Happening(what, local, remote, out, data, remote.host in self._links))
+            self.tap(self.now_ns, unit, TapEvent(what, local, remote, out, data, remote.host in self._links))
 
     # Opening, and datagrams.
 
     def dial(self, line: Line, local: Peer, remote: Peer) -> None:
         """Begin an active open for a unit's channel."""
         fault = self.fault(local, remote)
-        self.tell_unit(local.host, What.SYN, local, remote, True)
+        self.tell_unit(local.host, TapKind.SYN, local, remote, True)
         station = self._stations.get(remote)
         if fault.silent or (station and station.deaf):
             self.at(self.now_ns + CONNECT_TIMEOUT_NS, partial(line.refused, "ETIMEDOUT"))
@@ -139,7 +139,7 @@ class LoopNetwork:
 
     def post(self, sender: Peer, receiver: Peer, data: bytes) -> None:
         """Carry a datagram from a unit to whoever is there."""
-        self.tell_unit(sender.host, What.UDP, sender, receiver, True, data)
+        self.tell_unit(sender.host, TapKind.UDP, sender, receiver, True, data)
         self._carry(sender, receiver, data)
 
     def _carry(self, sender: Peer, receiver: Peer, data: bytes) -> None:
@@ -220,7 +220,7 @@ class LoopLink(MemoryLink):
                 line = self.channels[channel] = Line(self, channel, there.port)
                 line.granted = there.granted
                 end = End(self.network, caller.remote, caller.local, self.address, line)
-                self.tell(end, What.SYN, False)
+                self.tell(end, TapKind.SYN, False)
                 line.answered(end, "", False, now_ns)
                 return end
         return None
@@ -230,12 +230,12 @@ class LoopLink(MemoryLink):
         for there in self.channels.values():
             if isinstance(there, Bound) and there.port == port:
                 there.take_in(sender, data)
-                self.network.tell_unit(self.address, What.UDP, Peer(self.address, port), sender, False, data)
+                self.network.tell_unit(self.address, TapKind.UDP, Peer(self.address, port), sender, False, data)
 
     def remember(self, end: End) -> None:
         self._ends[end.local.port, end.remote] = end
 
-    def tell(self, end: End, what: What, out: bool) -> None:
+    def tell(self, end: End, what: TapKind, out: bool) -> None:
         self.network.tell(end, what, out)
 
     def post(self, port: int, receiver: Peer, data: bytes) -> None:

@@ -8,7 +8,7 @@ from collections import deque
 from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, ChannelLink, undeliverable
 from fbvm.net.stream import End
 from fbvm.wire.link import Broken, Failed, Opened, Peer, PeerClosed, Received, Sent
-from fbvm.wire.tap import What
+from fbvm.wire.tap import TapKind
 
 
 class MemoryLink(ChannelLink):
@@ -19,7 +19,7 @@ class MemoryLink(ChannelLink):
         """Keep an end, so that its pair of endpoints is not used twice."""
 
     @abstractmethod
-    def tell(self, end: End, what: What, out: bool) -> None:
+    def tell(self, end: End, what: TapKind, out: bool) -> None:
         """Pass a happening at an end on to the tap."""
 
     @abstractmethod
@@ -61,10 +61,10 @@ class Line(_Here):
     def answered(self, end: End, error: str, active: bool, now_ns: int) -> None:
         """The other side has answered; without an `error` the connection is open."""
         if error:
-            self.link.tell(end, What.RST, False)
+            self.link.tell(end, TapKind.RST, False)
             self.refused(error, now_ns)
             return
-        self.link.tell(end, What.OPEN, active)
+        self.link.tell(end, TapKind.OPEN, active)
         if self._closed:
             (end.reset if self._closed == "rst" else end.leave)(now_ns)
             return

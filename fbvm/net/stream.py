@@ -10,7 +10,7 @@ from typing import Protocol
 
 from fbvm.net.faults import Fault
 from fbvm.wire.link import Peer
-from fbvm.wire.tap import What
+from fbvm.wire.tap import TapKind
 
 WINDOW_BYTES = 65_536
 """What an end takes in before its owner has fetched anything."""
@@ -34,7 +34,7 @@ class Way(Protocol):
     def cut(self, fault: Fault, data: bytes) -> list[bytes]:
         """Data in the pieces in which they arrive."""
 
-    def tell(self, end: End, what: What, out: bool, data: bytes) -> None:
+    def tell(self, end: End, what: TapKind, out: bool, data: bytes) -> None:
         """Pass a happening at an end on to the tap."""
 
 
@@ -70,7 +70,7 @@ class End:
         self.fin_arrived = False
         self._waiting: deque[bytes] = deque()
         self._taken = 0
-        self._flight: deque[tuple[int, int, What, bytes]] = deque()
+        self._flight: deque[tuple[int, int, TapKind, bytes]] = deque()
         self._flying_bytes = 0
         self._last_arrival_ns = 0
         self._fin_asked = self._fin_sent = False
@@ -121,7 +121,7 @@ class End:
         if not self.error:
             self.error = "ECONNABORTED"
             self._waiting.clear()
-            self._fly(What.RST, b"", now_ns)
+            self._fly(TapKind.RST, b"", now_ns)
 
     # What the way does.
 
@@ -129,7 +129,7 @@ class End:
         """Something between the two ends resets both of them."""
         for end in (self, self.other):
             if not end.error:
-                self.way.tell(end, What.RST, False, b"")
+                self.way.tell(end, TapKind.RST, False, b"")
                 end._break("ECONNRESET", now_ns)
 
     def _push(self, now_ns: int) -> None:
@@ -141,7 +141,7 @@ class End:
             part = head[self._taken : self._taken + room]
             self._taken += len(part)
             for piece in self.way.cut(self.way.fault(self.local, self.remote), part):
-                self._fly(What.DATA, piece, now_ns)
+                self._fly(TapKind.DATA, piece, now_ns)
             if self._taken == len(head):
                 self._waiting.popleft()
                 self._taken = 0
@@ -149,13 +149,13 @@ class End:
                     self.owner.sent(len(head))
         if self._fin_asked and not self._fin_sent and not self.error:
             self._fin_sent = True
-            self._fly(What.FIN, b"", now_ns)
+            self._fly(TapKind.FIN, b"", now_ns)
 
-    def _fly(self, what: What, data: bytes, now_ns: int) -> None:
+    def _fly(self, what: TapKind, data: bytes, now_ns: int) -> None:
         fault = self.way.fault(self.local, self.remote)
-        gap_ns = fault.gap_ns if fault.segment_bytes and what is What.DATA else 0
+        gap_ns = fault.gap_ns if fault.segment_bytes and what is TapKind.DATA else 0
         arrival_ns = max(now_ns + self.way.latency_ns(fault), self._last_arrival_ns + gap_ns)
-        if fault.join_ns and what is What.DATA:
+        if fault.join_ns and what is TapKind.DATA:
             arrival_ns = -(-arrival_ns // fault.join_ns) * fault.join_ns
         self._last_arrival_ns = arrival_ns
         self._flying_bytes += len(data)
@@ -177,13 +177,13 @@ class End:
             self._flying_bytes -= len(data)
             self.other._arrive(what, data, now_ns)
 
-    def _arrive(self, what: What, data: bytes, now_ns: int) -> None:
+    def _arrive(self, what: TapKind, data: bytes, now_ns: int) -> None:
         if self.error:
             return
         self.way.tell(self, what, False, data)
-        if what is What.RST:
+        if what is TapKind.RST:
             self._break("ECONNRESET", now_ns)
-        elif what is What.FIN:
+        elif what is TapKind.FIN:
             self.fin_arrived = True
             if self.owner:
                 self.owner.finished(now_ns)

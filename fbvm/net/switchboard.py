@@ -16,7 +16,7 @@ from typing import Protocol
 from fbvm.net.addresses import AddressMap
 from fbvm.net.host_link import HostLink
 from fbvm.wire.link import Peer
-from fbvm.wire.tap import Happening, Tap, What
+from fbvm.wire.tap import Tap, TapEvent, TapKind
 
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 TCP, UDP = "tcp", "udp"
@@ -207,7 +207,7 @@ class Switchboard(ABC):
         """What the program calls a peer that came by itself."""
         return self._own.get((transport, real)) or self.map.inward(real, self.links)
 
-    def tell(self, now_ns: int, what: What, local: Peer, remote: Peer, out: bool, data: bytes = b"") -> None:
+    def tell(self, now_ns: int, what: TapKind, local: Peer, remote: Peer, out: bool, data: bytes = b"") -> None:
         """Pass a happening on to the tap."""
         if self.tap:
-            self.tap(now_ns, local.host, Happening(what, local, remote, out, data, remote.host in self.links))
+            self.tap(now_ns, local.host, TapEvent(what, local, remote, out, data, remote.host in self.links))

@@ -20,7 +20,7 @@ from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel
 from fbvm.net.host_link import HostLink
 from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, UDP, WRITE, Switchboard, Watcher, errno_name
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
-from fbvm.wire.tap import DATA, What
+from fbvm.wire.tap import DATA, TapKind
 
 BUFFER_BYTES = 65_536
 """Of the host for each connection: small, so that who grants or reads nothing soon closes the TCP window."""
@@ -228,7 +228,7 @@ class _Line(_OnHost):
         self.real = Peer(*sock.getsockname())
         self.local = Peer(self.local.host, self.local.port or self.real.port)
         self.network.own(TCP, self.real, self.local)
-        self._tap(now_ns, What.SYN, True)
+        self._tap(now_ns, TapKind.SYN, True)
         if code in (0, errno.EINPROGRESS, errno.EWOULDBLOCK):
             self._watch()
         else:
@@ -239,7 +239,7 @@ class _Line(_OnHost):
         self.sock = conn
         conn.setblocking(False)
         self._tune(conn)
-        self._tap(now_ns, What.SYN, False)
+        self._tap(now_ns, TapKind.SYN, False)
         self._opened(now_ns, False)
 
     def _tune(self, sock: socket.socket) -> None:
@@ -249,12 +249,12 @@ class _Line(_OnHost):
 
     def _refused(self, code: int, now_ns: int) -> None:
         if code == errno.ECONNREFUSED:
-            self._tap(now_ns, What.RST, False)
+            self._tap(now_ns, TapKind.RST, False)
         self.failed(errno_name(code))
 
     def _opened(self, now_ns: int, active: bool) -> None:
         self._connected = True
-        self._tap(now_ns, What.OPEN, active)
+        self._tap(now_ns, TapKind.OPEN, active)
         self._report(Opened(self.channel, self.local.port, self.remote))
         self._watch()
 
@@ -323,7 +323,7 @@ class _Line(_OnHost):
     def give_up(self, now_ns: int) -> None:
         """End by RST."""
         if self.sock:
-            self._tap(now_ns, What.RST, True)
+            self._tap(now_ns, TapKind.RST, True)
             with suppress(OSError):
                 self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
             self.end()
@@ -340,7 +340,7 @@ class _Line(_OnHost):
             return
         if not data:
             self._fin_seen = True
-            self._tap(now_ns, What.FIN, False)
+            self._tap(now_ns, TapKind.FIN, False)
             self._report(PeerClosed(self.channel))
             self._finish(sock, now_ns)
             self._watch()
@@ -378,7 +378,7 @@ class _Line(_OnHost):
         """Do the next step of an orphan's end."""
         if self._orphan and not self._outbox and not self._fin_sent:
             self._fin_sent = True
-            self._tap(now_ns, What.FIN, True)
+            self._tap(now_ns, TapKind.FIN, True)
             with suppress(OSError):
                 sock.shutdown(socket.SHUT_WR)
         if self._fin_sent and self._fin_seen:
@@ -387,7 +387,7 @@ class _Line(_OnHost):
     def _broke(self, error: OSError | int, now_ns: int) -> None:
         name = errno_name(error)
         if name in ("ECONNRESET", "EPIPE"):
-            self._tap(now_ns, What.RST, False)
+            self._tap(now_ns, TapKind.RST, False)
         for _ in self._outbox:
             self._report(Failed(self.channel, "send", name))
         self._outbox.clear()
@@ -403,7 +403,7 @@ class _Line(_OnHost):
         if not self._orphan:
             self.link.told.append(event)
 
-    def _tap(self, now_ns: int, what: What, out: bool, data: bytes = b"") -> None:
+    def _tap(self, now_ns: int, what: TapKind, out: bool, data: bytes = b"") -> None:
         if self.network.tap:
             self.network.tell(now_ns, what, self.local, self.remote, out, data)
 
@@ -429,7 +429,7 @@ class _Bound(_OnHost):
             except OSError:
                 return
             remote = self.network.inward(UDP, Peer(*name))
-            self.network.tell(now_ns, What.UDP, self.local, remote, False, data)
+            self.network.tell(now_ns, TapKind.UDP, self.local, remote, False, data)
             self.link.told.append(Received(self.channel, data, remote))
 
     def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
@@ -442,7 +442,7 @@ class _Bound(_OnHost):
             return "ENOBUFS"
         except OSError as error:
             return errno_name(error)
-        self.network.tell(now_ns, What.UDP, self.local, remote, True, data)
+        self.network.tell(now_ns, TapKind.UDP, self.local, remote, True, data)
         self.link.told.append(Sent(self.channel, len(data)))
         return ""
 

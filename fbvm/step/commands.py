@@ -13,9 +13,9 @@ from functools import partial
 from fbvm.base.types import fold
 from fbvm.machine.plc import Mode, Plc
 from fbvm.record.draw.table import ScanTable
-from fbvm.record.draw.why import told, why
+from fbvm.record.draw.why import cause_text, why
+from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.recorder import signals_at
-from fbvm.record.trace.traffic import Passed
 from fbvm.step.past import Past
 from fbvm.step.session import Session
 from fbvm.step.targets import Target, target
@@ -90,12 +90,12 @@ WORDS = {word: command for command in COMMANDS for word in (command.name, comman
 class Commands:
     """Understands lines about a session.  `run` gives what is to be said; raises CommandError."""
 
-    def __init__(self, session: Session, words: Words, passed: Callable[[], list[Passed]] = list) -> None:
+    def __init__(self, session: Session, words: Words, packets: Callable[[], list[Packet]] = list) -> None:
         self.session, self.words = session, words
         self.watches: list[str] = []
         self.breakpoints: list[Target] = []
         self.ended = False
-        self._passed = passed
+        self._packets = packets
         self._last = "step"
 
     def run(self, line: str) -> Iterator[str]:
@@ -269,7 +269,7 @@ class Commands:
 
     def _why(self, rest: str) -> Iterator[str]:
         past = Past(self.session, self.words)
-        yield told(past, why(past, _place(self.session, rest), self.session.here.scan))
+        yield cause_text(past, why(past, _place(self.session, rest), self.session.here.scan))
 
     def _list(self, rest: str) -> Iterator[str]:
         return self.words.around(_count(rest) if rest else 10)
@@ -286,7 +286,7 @@ class Commands:
     def _net(self, rest: str) -> Iterator[str]:
         end_ns, cycle_ns = self.session.now_ns, self.session.plc.cycle_ns
         start_ns = end_ns - _count(rest) * cycle_ns
-        for row in self._passed():
+        for row in self._packets():
             if start_ns <= row.now_ns < end_ns:
                 yield f"  {row}"
 

@@ -15,11 +15,11 @@ from functools import partial
 from fbvm.base.memory import compare
 from fbvm.engine.trap import Trap
 from fbvm.machine.plc import Phase, Plc, State
-from fbvm.record.draw.power import Executed
-from fbvm.record.draw.rung_values import Values
-from fbvm.record.draw.sfc_seen import Called
+from fbvm.record.draw.power import RungExecution
+from fbvm.record.draw.rung_values import RungValues
+from fbvm.record.draw.sfc_recorder import ChartCall
 from fbvm.record.trace.events import Statement
-from fbvm.record.trace.history import looking
+from fbvm.record.trace.history import observing
 from fbvm.record.trace.recorder import HEXADECIMAL_AREAS, Signal
 from fbvm.step.twin import END, Act, Injector, Seen, Stop, Told, Twin, depth
 from fbvm.watch import places
@@ -87,17 +87,17 @@ class Session:
         return self._twin.trap
 
     @property
-    def rungs(self) -> list[Executed]:
+    def rungs(self) -> list[RungExecution]:
         """The rungs that were executed in this scan, in order, and what was seen in them."""
         return self._twin.power.executed
 
     @property
-    def values(self) -> Values:
+    def values(self) -> RungValues:
         """The values in those rungs."""
         return self._twin.values
 
     @property
-    def charts(self) -> list[Called]:
+    def charts(self) -> list[ChartCall]:
         """The charts that were called in this scan, in order, and what was seen of them."""
         return self._twin.evolutions.called
 
@@ -243,7 +243,7 @@ class Session:
         acts = self._acts_in(plc.scans)
         for act in acts.get(0, ()):
             act(plc)
-        with looking(plc, Injector(acts)) if any(acts) else nullcontext():
+        with observing(plc, Injector(acts)) if any(acts) else nullcontext():
             plc.scan()
         self._states[plc.scans] = plc.snapshot()
         if (old := plc.scans - KEPT) > 0 and old % EVERY:
@@ -296,7 +296,7 @@ class Session:
         seen: set[Place] = set()
         for offset, size in compare(self._mark.snapshot(), self.plc.memory.snapshot()):
             for place in self._places(offset, size):
-                if place in seen or place.unwritten or place.area in QUIET_AREAS:
+                if place in seen or place.is_generated or place.area in QUIET_AREAS:
                     continue
                 seen.add(place)
                 signal = Signal(place, place.name)

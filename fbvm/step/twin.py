@@ -14,10 +14,10 @@ from typing import Protocol
 from fbvm.base.memory import Memory
 from fbvm.engine.trap import Trap
 from fbvm.machine.plc import Phase, Plc, State
-from fbvm.record.draw.power import Power
-from fbvm.record.draw.rung_values import Values
-from fbvm.record.draw.sfc_seen import Evolutions
-from fbvm.record.trace.events import Event, Frame, Inside, Statement
+from fbvm.record.draw.power import PowerFlow
+from fbvm.record.draw.rung_values import RungValues
+from fbvm.record.draw.sfc_recorder import ChartRecorder
+from fbvm.record.trace.events import Event, Frame, ObservedEngine, Statement
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value
 
@@ -62,15 +62,15 @@ class Twin:
 
     def __init__(self, plc: Plc) -> None:
         self.plc = Plc(plc.image, plc.cycle_ns, budget=plc.budget)
-        self.plc.engine = Inside(plc.image, self.plc.memory, self._event, self.plc.engine)
+        self.plc.engine = ObservedEngine(plc.image, self.plc.memory, self._event, self.plc.engine)
         self.plc.phases.append(self._phase)
         self.statement: Statement | None = None
         self.count = 0
         """Statements of the scan that are done."""
-        self.values = Values(plc.image, self.plc.memory.areas)
-        self.power = Power(plc.image.rungs, lambda scan: True, self.values.keep)
+        self.values = RungValues(plc.image, self.plc.memory.areas)
+        self.power = PowerFlow(plc.image.rungs, lambda scan: True, self.values.keep)
         """What was seen in the rungs of this scan."""
-        self.evolutions = Evolutions(plc.image.charts, lambda scan: True)
+        self.evolutions = ChartRecorder(plc.image.charts, lambda scan: True)
         """What was seen of charts in this scan."""
         self._stop: Stop = lambda number, statement: False
         self._acts: Mapping[int, Sequence[Act]] = {}
@@ -82,8 +82,8 @@ class Twin:
         `acts` happen before the statements of their numbers, 0 before the scan."""
         self.plc.restore(state)
         self.statement, self.count = None, 0
-        self.power = Power(self.plc.image.rungs, lambda scan: True, self.values.keep)
-        self.evolutions = Evolutions(self.plc.image.charts, lambda scan: True)
+        self.power = PowerFlow(self.plc.image.rungs, lambda scan: True, self.values.keep)
+        self.evolutions = ChartRecorder(self.plc.image.charts, lambda scan: True)
         self._stop, self._acts, self._told = stop, acts, told
         if self.plc.trap:
             return False

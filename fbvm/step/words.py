@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping
 from fbvm.base.types import StructType, base
 from fbvm.code.image import Site
 from fbvm.record.draw.ladder_text import ladder_text
-from fbvm.record.draw.sfc_seen import active_steps
-from fbvm.record.draw.sfc_text import Sighted, sfc_text
+from fbvm.record.draw.sfc_recorder import active_steps
+from fbvm.record.draw.sfc_text import ChartState, sfc_text
 from fbvm.record.trace.events import Frame
 from fbvm.step.session import Session
 from fbvm.syntax.ladder.drawing.widths import Sight
@@ -103,7 +103,7 @@ class Words:
                 base = statement.frame.base
                 tested = [made.tested for made in self._session.charts if made.picture is chart and made.base == base]
                 active = active_steps(chart, base, self._session.plc)
-                yield from sfc_text(chart, WIDEST_RUNG, Sighted(active, tested[-1] if tested else {}))
+                yield from sfc_text(chart, WIDEST_RUNG, ChartState(active, tested[-1] if tested else {}))
                 return
         raise ValueError("there is no chart here")
 

@@ -13,8 +13,8 @@ from typing import Any
 from fbvm.base.data import data_folder
 from fbvm.code.image import Site
 from fbvm.machine.plc import Phase, Plc
-from fbvm.record.trace.branches import Fork, forks, statements
-from fbvm.record.trace.events import Ended, Event, Frame, Statement
+from fbvm.record.trace.branches import Branch, branches, statements
+from fbvm.record.trace.events import Event, Frame, Return, Statement
 from fbvm.testing.subject import LIBRARY, Subject
 
 Spot = tuple[int, int]
@@ -105,7 +105,7 @@ class Counter:
     def __init__(self, coverage: Coverage, subject: Subject) -> None:
         image = subject.image
         self._statements: dict[int, tuple[FileCoverage, Spot]] = {}
-        self._forks: dict[int, tuple[FileCoverage, Spot, Fork]] = {}
+        self._forks: dict[int, tuple[FileCoverage, Spot, Branch]] = {}
         self._sites = image.sites
         self._open: dict[Frame, int] = {}
         paths = {name: _path(name, subject) for name in {site.file for site in image.sites}}
@@ -115,7 +115,7 @@ class Counter:
                 each = coverage.files.setdefault(path, FileCoverage())
                 self._statements[number] = each, _spot(site)
                 each.statements.setdefault(_spot(site), 0)
-        for fork in forks(image):
+        for fork in branches(image):
             if fork.site in self._statements:
                 each, spot = self._statements[fork.site]
                 self._forks[fork.site] = each, spot, fork
@@ -134,7 +134,7 @@ class Counter:
                 each.statements[spot] += 1
             if event.site in self._forks:
                 self._open[event.frame] = event.site
-        elif isinstance(event, Ended):
+        elif isinstance(event, Return):
             self._decide(event.frame, -1)
 
     def _decide(self, frame: Frame, site: int) -> None:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from fbvm.machine.plc import Plc
 from fbvm.record.trace.history import History
+from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.reader import Trace
-from fbvm.record.trace.traffic import Passed
 from fbvm.record.trace.writer import Depth, TraceWriter, descriptions, meanings, source_lines
 from fbvm.testing.subject import Subject
 from fbvm.watch.paths import Place
@@ -33,7 +33,7 @@ def file_name(test: str) -> str:
 
 
 def write_page(path: Path, title: str, history: History, subject: Subject, units: Plc, asked: Sequence[Place],
-               passed: Sequence[tuple[int, Passed]] = (), unfinished: bool = False) -> bool:  # fmt: skip
+               packets: Sequence[tuple[int, Packet]] = (), unfinished: bool = False) -> bool:  # fmt: skip
     """Writes the page of a run of a PLC with units; False if there was no scan.  Raises OSError.
 
     `unfinished` if the last scan was not done to its end; the page shows it as it would have gone on."""
@@ -57,7 +57,7 @@ def write_page(path: Path, title: str, history: History, subject: Subject, units
     trace = Trace(io.BytesIO(file.getvalue()))
     trace.described, trace.meanings = descriptions(units), meanings(units)  # those that did it again had no units
     data = page_data(trace, title=title, prefix=subject.prefix, pinned=[place.name for place in asked])
-    data["frames"] = frame_rows([row for row in passed if row[0] in trace.scans])
+    data["frames"] = frame_rows([row for row in packets if row[0] in trace.scans])
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(page(data), encoding="utf-8")
     return True

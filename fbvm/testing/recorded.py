@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fbvm.record.draw.chart import Chart, draw
 from fbvm.record.draw.table import ScanTable
-from fbvm.record.draw.why import told, why
+from fbvm.record.draw.why import cause_text, why
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import Recording
 from fbvm.record.trace.signals import recording
@@ -69,7 +69,7 @@ class Recorded:
         if not isinstance(place, Place):
             raise ValueError(f"{name} is a range; name one place")
         with self.open() as trace:
-            text = told(trace, why(trace, place, trace.scans[-1] if scan is None else scan))
+            text = cause_text(trace, why(trace, place, trace.scans[-1] if scan is None else scan))
         return self._rig.subject.plain(text)
 
     def _recording(self, trace: Trace, names: Sequence[str]) -> Recording:

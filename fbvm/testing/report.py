@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fbvm.base.types import StructType
 from fbvm.machine.plc import Phase, Plc
-from fbvm.record.draw.table import ScanTable, Writer
+from fbvm.record.draw.table import LastWrite, ScanTable
 from fbvm.record.trace.history import History
 from fbvm.record.trace.recorder import Signal
 from fbvm.testing.reads import Reads
@@ -104,7 +104,7 @@ class Report:
     def _value(self, place: Place) -> str:
         return Signal(place, place.name).text(self.names.read(self._plc.read, place))
 
-    def _by(self, writer: Writer) -> str:
+    def _by(self, writer: LastWrite) -> str:
         if writer.site is None:
             return "a stub"
         site, prefix = writer.site, self._subject.prefix

@@ -22,8 +22,8 @@ from fbvm.machine.plc import Mode, Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.record.draw.chart import Chart, draw
 from fbvm.record.trace.history import History
+from fbvm.record.trace.packets import Dissector, Packet, add_tap
 from fbvm.record.trace.recorder import Recorder
-from fbvm.record.trace.traffic import Passed, Reader, listen
 from fbvm.testing.pages import write_page
 from fbvm.testing.reads import Reads
 from fbvm.testing.report import Report
@@ -35,11 +35,12 @@ from fbvm.watch.conditions import parse_condition
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span, UnknownPlace, find, find_place
 from fbvm.watch.values import Value, parse_time_ns, show_time
-from fbvm.wire.tap import Happening
+from fbvm.wire.tap import TapEvent
 
-MOST_PASSED = 10_000
-"""Frames that are kept for the page of a failure."""
-MOST_SAID = 6
+MOST_PACKETS = 10_000
+"""Packets that are kept for the page of a failure."""
+MOST_SHOWN = 6
+"""Packets that the report of a failure lists."""
 PATIENCE = "1m"
 """How long `until` waits if nobody says, in virtual time."""
 
@@ -96,7 +97,7 @@ class Rig:
     _reads: Reads
     _timed: list[tuple[int, str, object]]
     _report: Report
-    _passed: deque[tuple[int, Passed]]
+    _packets: deque[tuple[int, Packet]]
 
     def __init__(self, what: Subject, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
                  units: Sequence[Unit] = (), etn21: str = "", network: LoopNetwork | None = None,
@@ -113,9 +114,9 @@ class Rig:
         for name, stub in (stubs or {}).items():
             if callable(stub):
                 self._stub(name, stub)
-        set_(self, "_passed", deque(maxlen=MOST_PASSED))
+        set_(self, "_packets", deque(maxlen=MOST_PACKETS))
         if units or etn21 or plc.units:
-            listen(self.network, partial(self._hear, Reader()))
+            add_tap(self.network, partial(self._tap, Dissector()))
         for unit in (*units, *([Etn21(0, etn21)] if etn21 else ())):
             plc.attach(unit, self.network)
         for name in self._report.names_in(what.prefix):
@@ -142,10 +143,10 @@ class Rig:
         made = subject(files, name if name or block else None, [*libraries, *dict.fromkeys(near)], stubs, text, wanted, dialect)
         return cls(made, cycle, stubs=stubs, **given)
 
-    def _hear(self, reader: Reader, now_ns: int, unit: str, told: Happening) -> None:
-        """Keeps what passes the network at a unit of this PLC."""
+    def _tap(self, dissector: Dissector, now_ns: int, unit: str, event: TapEvent) -> None:
+        """Keeps the packets of the units of this PLC."""
         if any(attached.unit.address == unit for attached in self.plc.units):
-            self._passed.extend((self.plc.scans, passed) for passed in reader.read(now_ns, told))
+            self._packets.extend((self.plc.scans, packet) for packet in dissector.dissect(now_ns, event))
 
     def _stub(self, name: str, stub: Callable[[Any], None]) -> None:
         numbers = [number for number, body in enumerate(self.plc.image.bodies) if fold(body.name) == fold(name)]
@@ -350,14 +351,15 @@ class Rig:
 
         `lines` are a file and the lines in it that asked; without, all that was asked for since the last scan."""
         said = self._report.text(lines)
-        if said and self._passed:
-            rows = [f"  scan {scan:<4} {passed}" for scan, passed in list(self._passed)[-MOST_SAID:]]
+        if said and self._packets:
+            rows = [f"  scan {scan:<4} {packet}" for scan, packet in list(self._packets)[-MOST_SHOWN:]]
             said += "\n\n" + "\n".join(["what passed the network last:", *rows])
         return said
 
     def write_page(self, path: Path, title: str, lines: tuple[str, range] | None = None) -> bool:
         """Writes the last scans as one HTML file, which shows what `lines` asked for; False if there was no scan."""
-        return write_page(path, title, self._history, self.subject, self.plc, self._reads.places(*(lines or ())), self._passed)
+        return write_page(path, title, self._history, self.subject, self.plc, self._reads.places(*(lines or ())),
+                          self._packets)
 
 
 def _file(path: str, folders: Sequence[Path]) -> Path:

@@ -41,9 +41,9 @@ def count_coverage(config: pytest.Config, plc: Plc, subject: Subject) -> Iterato
     if counting is None:
         yield
         return
-    from fbvm.record.trace.history import looking
+    from fbvm.record.trace.history import observing
 
-    with looking(plc, counting.coverage.listener(subject)):
+    with observing(plc, counting.coverage.listener(subject)):
         yield
 
 

@@ -17,8 +17,8 @@ from fbvm.base.types import BOOL, fold
 from fbvm.code.image import Site
 from fbvm.machine.plc import Phase, Plc
 from fbvm.record.draw.table import ScanTable
-from fbvm.record.trace.events import Began, Event, Frame, Read, Statement, Write
-from fbvm.record.trace.history import History, looking
+from fbvm.record.trace.events import Call, Event, Frame, Read, Statement, Write
+from fbvm.record.trace.history import History, observing
 from fbvm.record.trace.recorder import Signal
 from fbvm.syntax.text import read
 from fbvm.testing.pages import write_page
@@ -78,7 +78,7 @@ class StItem(pytest.Item):
         watch = Assertions(plc, made.prefix)
         history = History(plc)
         try:
-            with count_coverage(self.config, plc, made), looking(plc, watch):
+            with count_coverage(self.config, plc, made), observing(plc, watch):
                 _run(plc, history, f"{made.prefix}Done")
         except AssertFailed as failed:
             table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])
@@ -148,7 +148,7 @@ class Assertions:
                 self._reads.setdefault(event.frame, []).append(place)
         elif isinstance(event, Write):
             self._last = event
-        elif isinstance(event, Began) and event.frame.body in self._bodies:
+        elif isinstance(event, Call) and event.frame.body in self._bodies:
             self.asserted += 1
             assert self._last is not None and event.frame.caller is not None
             if self._last.value == b"\0":

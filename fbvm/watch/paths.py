@@ -51,7 +51,7 @@ class Place:
     """Declared to be read so."""
 
     @property
-    def unwritten(self) -> bool:
+    def is_generated(self) -> bool:
         """True for what rungs remember: nobody has written its name, and nobody can."""
         return "$" in self.name
 

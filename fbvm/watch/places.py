@@ -42,7 +42,7 @@ def write(memory: Memory, place: Place, value: object) -> None:
             memory.write(offset, "b", data != b"\0", bit)
 
 
-def settled(memory: Memory, place: Place) -> Place | None:
+def dereferenced(memory: Memory, place: Place) -> Place | None:
     """Where a place lies now, without references on the way to it; None if one of them is null."""
     at = _follow(memory, place)
     return None if at is None else replace(place, offset=at[0], bit=at[1], hops=())

@@ -1,4 +1,4 @@
-"""What a network tells whoever listens in: every happening on a connection, as the PLC program sees its endpoints.
+"""What a network tells whoever listens in: every event on a connection, as the PLC program sees its endpoints.
 
 Both networks use these words, so a capture or a trace does not care whether bytes stayed in memory or left the host.
 """
@@ -12,8 +12,8 @@ from enum import Enum
 from fbvm.wire.link import Peer
 
 
-class What(Enum):
-    """The kinds of happenings."""
+class TapKind(Enum):
+    """The kinds of events."""
 
     SYN = "syn"
     """Somebody asks for a connection; nothing is open yet."""
@@ -27,18 +27,18 @@ class What(Enum):
     """One datagram."""
 
 
-DATA = What.DATA
+DATA = TapKind.DATA
 
 
 @dataclass(frozen=True, slots=True)
-class Happening:
-    """One happening at one unit.  `local` is the unit's endpoint, `remote` its peer's, with the program's addresses.
+class TapEvent:
+    """One event at one unit.  `local` is the unit's endpoint, `remote` its peer's, with the program's addresses.
 
     `out` says who did it: the unit (for SYN and OPEN: the unit opens actively) or its peer.  `mirrored`: the peer is a
     unit of the same network, which tells the same from its side; who wants each frame once takes those that are `out`
     or not `mirrored`."""
 
-    what: What
+    kind: TapKind
     local: Peer
     remote: Peer
     out: bool
@@ -46,9 +46,9 @@ class Happening:
     mirrored: bool = False
 
     def __str__(self) -> str:
-        text = f"{self.what.value} {self.local} {'->' if self.out else '<-'} {self.remote}"
+        text = f"{self.kind.value} {self.local} {'->' if self.out else '<-'} {self.remote}"
         return f"{text} {self.data.hex(' ').upper()}" if self.data else text
 
 
-Tap = Callable[[int, str, Happening], None]
-"""Called with (now_ns, address of the unit's link, happening)."""
+Tap = Callable[[int, str, TapEvent], None]
+"""Called with (now_ns, address of the unit's link, event)."""

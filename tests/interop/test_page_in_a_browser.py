@@ -127,7 +127,7 @@ def test_values_are_those_of_the_trace(shown: Any, trace: Trace) -> None:
             place = trace.find(title.partition(": ")[0])
             assert isinstance(place, Place)
             [signal], value = signals_at(place, {}, trace.meanings), moment.read(place)
-            assert text == (str(value).upper() if isinstance(value, bool) else signal.said(value)), title
+            assert text == (str(value).upper() if isinstance(value, bool) else signal.display(value)), title
 
 
 def test_steps_inside_a_scan(shown: Any) -> None:

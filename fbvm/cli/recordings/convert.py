@@ -12,15 +12,15 @@ import click
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.traces import SUFFIX, opened, recorded, scans_option
-from fbvm.record.draw.svg import Drawing
+from fbvm.record.draw.svg import SvgChart
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.export.vcd import write_vcd
 from fbvm.record.page.data import page_data
 from fbvm.record.page.page import page
+from fbvm.record.trace.csv_reader import CsvError, read_csv
+from fbvm.record.trace.csv_writer import write_csv
 from fbvm.record.trace.reader import Trace
-from fbvm.record.trace.rows import write_rows
-from fbvm.record.trace.rows_reader import RowsError, read_rows
-from fbvm.record.trace.signals import happenings, traffic
+from fbvm.record.trace.signals import network_events, packets
 
 CSV = ".csv"
 Names = Sequence[str]
@@ -29,7 +29,7 @@ Names = Sequence[str]
 def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     made = recorded(trace, names, scans)
     with path.open("w", encoding="utf-8", newline="") as file:
-        write_rows(made, file)
+        write_csv(made, file)
 
 
 def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
@@ -43,7 +43,7 @@ def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
 
 def _svg(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     made = recorded(trace, names, scans)
-    path.write_text(Drawing(made, traffic(trace, made.scans), path.stem).text(), encoding="utf-8")
+    path.write_text(SvgChart(made, packets(trace, made.scans), path.stem).text(), encoding="utf-8")
 
 
 def _html(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
@@ -57,9 +57,9 @@ def _pcapng(trace: Trace, names: Names, scans: range | None, path: Path) -> None
     with path.open("wb") as file:
         said = ""
         capture = Capture(file, comment=lambda address: said)
-        for scan, event in happenings(trace, scans):
+        for scan, event in network_events(trace, scans):
             said = f"scan {scan}"
-            capture.tap(event.now_ns, event.happening.local.host, replace(event.happening, mirrored=False))
+            capture.tap(event.now_ns, event.tap_event.local.host, replace(event.tap_event, mirrored=False))
 
 
 FORMATS: dict[str, Callable[[Trace, Names, range | None, Path], None]] = {
@@ -100,7 +100,7 @@ def _to_trace(source: Path, target: Path) -> None:
     made = BytesIO()
     try:
         with source.open(encoding="utf-8-sig", newline="") as file:
-            read_rows(file, made)
-    except (RowsError, UnicodeDecodeError) as error:
+            read_csv(file, made)
+    except (CsvError, UnicodeDecodeError) as error:
         raise click.UsageError(f"{source}: {error}") from None
     target.write_bytes(made.getvalue())

@@ -1,4 +1,4 @@
-"""What `fbvm step` steps through: a program with its unit, or one PLC of a project, made anew as often as it takes."""
+"""The targets of `fbvm step`: a program with its unit, or one PLC of a project.  Stepping back builds the PLC anew."""
 
 from __future__ import annotations
 
@@ -14,24 +14,27 @@ from fbvm.cli.shared.sources import report
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.record.trace.traffic import Passed, Reader
+from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import Project, read_project
 from fbvm.run.running import Running
 from fbvm.units.backplane import usual_units
-from fbvm.wire.tap import Happening
+from fbvm.wire.tap import TapEvent
 
 
 class DebugTarget:
-    """Makes the PLC with its unit and network, each time the same, and notes what passes the network."""
+    """A program on a PLC with its units and a network in memory.
+
+    `cycle_ns` is the cycle of programs without a TASK, `mappings` are the Modbus servers on the network, `timing` ("exact",
+    "real") and `seed` those of the units.  `packets` are those of the PLC that was made last."""
 
     def __init__(self, image: Image, cycle_ns: int, mappings: tuple[Mapping, ...], timing: str, seed: int) -> None:
         self._image, self._cycle_ns, self._mappings = image, cycle_ns, mappings
         self._timing, self._seed = timing, seed
-        self.passed: list[Passed] = []
+        self.packets: list[Packet] = []
 
     def make(self) -> Plc:
-        """A PLC at power-on."""
+        """A new PLC at power-on, equal to all others that this method makes."""
         plc = Plc(self._image, self._cycle_ns)
         network = build_network("loop", self._mappings, self._seed)
         assert isinstance(network, LoopNetwork)
@@ -41,21 +44,22 @@ class DebugTarget:
         return plc
 
     def _listen(self, network: LoopNetwork) -> None:
-        self.passed, reader = [], Reader(once=True)
+        self.packets, dissector = [], Dissector(once=True)
 
-        def tap(now_ns: int, unit: str, happening: Happening) -> None:
-            self.passed.extend(reader.read(now_ns, happening))
+        def tap(now_ns: int, unit: str, event: TapEvent) -> None:
+            self.packets.extend(dissector.dissect(now_ns, event))
 
         network.tap = tap
 
 
 class ProjectTarget(DebugTarget):
-    """Makes all PLCs of a project; one is stepped through, the others scan along in its time.
+    """One PLC of a project; the others scan in its time.
 
-    Ends with status 3 if something is wrong with the project, and as a mistake of usage if `name` is none of its PLCs."""
+    `file` is the project file, `name` that of the PLC; it may be None if the project has one PLC.  Ends with status 3 if
+    the project has errors.  Raises UsageError if it has no PLC of that name."""
 
     def __init__(self, file: Path, name: str | None) -> None:
-        self.passed = []
+        self.packets = []
         project = read_project(file)
         if not isinstance(project, Project):
             raise _refused(project)
@@ -71,22 +75,22 @@ class ProjectTarget(DebugTarget):
         self.image = plant.runs[self._number].plc.image
 
     def make(self) -> Plc:
-        """The PLC at power-on."""
+        """A new PLC at power-on, with new PLCs of all others beside it."""
         plant = self._plant()
         assert isinstance(plant.network, LoopNetwork)
         self._listen(plant.network)
         chosen = plant.runs[self._number]
         others = [run for run in plant.runs if run is not chosen]
-        sets = list(chosen.writes)
+        writes = list(chosen.writes)
 
-        def along(plc: Plc) -> None:
-            while sets and sets[0].at_ns <= plc.elapsed_ns:
-                write = sets.pop(0)
+        def before_scan(plc: Plc) -> None:
+            while writes and writes[0].at_ns <= plc.elapsed_ns:
+                write = writes.pop(0)
                 plc.write(write.where, write.value)
             _catch_up(others, plc.now_ns if plc.scans else -1)
 
-        along(chosen.plc)
-        chosen.plc.watchers.append(along)
+        before_scan(chosen.plc)
+        chosen.plc.watchers.append(before_scan)
         return chosen.plc
 
     def _plant(self) -> Plant:
@@ -97,7 +101,7 @@ class ProjectTarget(DebugTarget):
 
 
 def _catch_up(others: list[Running], now_ns: int) -> None:
-    """Everybody else scans until a time, the earliest first."""
+    """Runs the scans of the other PLCs that are due at `now_ns`, the earliest first."""
     while due := [run for run in others if run.due_ns <= now_ns and not run.plc.trap]:
         first = min(due, key=lambda run: run.due_ns)
         first.scan(first.due_ns)

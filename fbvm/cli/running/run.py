@@ -173,8 +173,8 @@ def _tell_doors(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Map
     own = {attached.unit.address for attached in plc.units}
     try:
         for row in mappings:
-            if row.said.host in own and row.said.port:
-                click.echo(f"{row.said} is {network.host_endpoint(row.said)}", err=True)
+            if row.endpoint.host in own and row.endpoint.port:
+                click.echo(f"{row.endpoint} is {network.host_endpoint(row.endpoint)}", err=True)
     except OSError as error:
         click.echo(f"the network cannot be used: {error}", err=True)
         sys.exit(status.NETWORK)
@@ -206,8 +206,8 @@ def _check_usage(
         raise click.UsageError("--max bounds --until, which is not given")
     for row in mappings:
         if net == "loop" and row.host is not None:
-            raise click.UsageError(f"--map {row.said}={row.host}:{row.port} leaves memory: add --net tcp")
+            raise click.UsageError(f"--map {row.endpoint}={row.host}:{row.port} leaves memory: add --net tcp")
         if net == "tcp" and row.host is None:
-            raise click.UsageError(f"--map {row.said}=peer is in memory: leave out --net tcp, or use `fbvm peer`")
+            raise click.UsageError(f"--map {row.endpoint}=peer is in memory: leave out --net tcp, or use `fbvm peer`")
     if pace == EVENT and net == "loop":
         raise click.UsageError("--pace event is for real time: add --net tcp")

@@ -21,7 +21,7 @@ from fbvm.cli.shared.options import time_ns
 from fbvm.code.compiler import compile_files
 from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork
-from fbvm.record.trace import images
+from fbvm.record.trace import memory_images
 from fbvm.record.trace.requests import RequestLog
 from fbvm.run import loop
 from fbvm.run.running import EVENT
@@ -89,8 +89,8 @@ def _plc(settings: dict[str, int], image: Path | None) -> Plc:
         plc.write(f"Main.Server.{name}", value)
     if image and image.exists():
         try:
-            images.load(plc.memory, image)
-        except (OSError, images.ImageError) as error:
+            memory_images.load(plc.memory, image)
+        except (OSError, memory_images.ImageError) as error:
             raise click.UsageError(str(error)) from None
     return plc
 
@@ -166,6 +166,6 @@ class Signals:
 def _save(plc: Plc, image: Path | None) -> None:
     if image:
         try:
-            images.save(plc.memory, image, SERVED)
+            memory_images.save(plc.memory, image, SERVED)
         except OSError as error:
             click.echo(f"{image} cannot be written: {error.strerror}", err=True)

@@ -44,7 +44,7 @@ def command(
     From a pipe, each line is a command; the first that fails ends it with status 1 (`expect`) or 2."""
     for row in mappings:
         if row.host is not None:
-            raise click.UsageError(f"stepping stays in memory: --map {row.said}=peer")
+            raise click.UsageError(f"stepping stays in memory: --map {row.endpoint}=peer")
     debugged: DebugTarget
     if project := project_argument(files):
         debugged = ProjectTarget(project, name)
@@ -54,7 +54,7 @@ def command(
         debugged = DebugTarget(image, cycle_ns, mappings, timing, seed)
         texts = source_texts(image, {str(path): path for path in files}, libraries)
     session = Session(debugged.make)
-    commands = Commands(session, Words(session, texts), lambda: debugged.passed)
+    commands = Commands(session, Words(session, texts), lambda: debugged.packets)
     try:
         for given in settings:
             _write(session, given)

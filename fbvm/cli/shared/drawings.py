@@ -13,11 +13,11 @@ from fbvm.cli.shared.run_result import chart_width
 from fbvm.code.image import Image, RungPicture
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.ladder_text import ladder_text
-from fbvm.record.draw.power import Power
-from fbvm.record.draw.rung_values import Values
-from fbvm.record.draw.sfc_seen import Evolutions
+from fbvm.record.draw.power import PowerFlow
+from fbvm.record.draw.rung_values import RungValues
+from fbvm.record.draw.sfc_recorder import ChartRecorder
 from fbvm.record.draw.sfc_text import sfc_text
-from fbvm.record.trace.history import looking
+from fbvm.record.trace.history import observing
 from fbvm.syntax.ladder.drawing.widths import Sight
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
@@ -76,9 +76,9 @@ def draw_executed_rungs(plc: Plc, scans: str | None) -> Iterator[None]:
     if not scans:
         yield
         return
-    values = Values(plc.image, plc.memory.areas)
-    power = Power(plc.image.rungs, scan_filter(scans), values.keep)
-    with looking(plc, power):
+    values = RungValues(plc.image, plc.memory.areas)
+    power = PowerFlow(plc.image.rungs, scan_filter(scans), values.keep)
+    with observing(plc, power):
         yield
     if not power.executed:
         _warn_nothing_drawn(plc, f"--ladder {scans}", "rung", bool(plc.image.rungs))
@@ -100,8 +100,8 @@ def draw_executed_charts(plc: Plc, scans: str | None) -> Iterator[None]:
     if not scans:
         yield
         return
-    seen = Evolutions(plc.image.charts, scan_filter(scans))
-    with looking(plc, seen):
+    seen = ChartRecorder(plc.image.charts, scan_filter(scans))
+    with observing(plc, seen):
         yield
     if not seen.called:
         _warn_nothing_drawn(plc, f"--sfc {scans}", "chart", bool(plc.image.charts))

@@ -22,16 +22,16 @@ def build_network(net: str, mappings: tuple[Mapping, ...], seed: int = 0) -> Loo
     if net == "loop":
         network = LoopNetwork(seed)
         for row in mappings:
-            network.place(row.said, ModbusPeer(registers.server()))
+            network.place(row.endpoint, ModbusPeer(registers.server()))
         return network
     for row in mappings:
         try:
-            TcpNetwork({row.said: (row.host or "", row.port)}).close()
+            TcpNetwork({row.endpoint: (row.host or "", row.port)}).close()
         except (OSError, UnicodeError) as error:  # a host without an address, or a name that cannot be one
             reason = getattr(error, "strerror", "no name of a host")
             click.echo(f"the network cannot be used: {row.host}: {reason}", err=True)
             sys.exit(status.NETWORK)
-    return TcpNetwork({row.said: (row.host or "", row.port) for row in mappings})
+    return TcpNetwork({row.endpoint: (row.host or "", row.port) for row in mappings})
 
 
 def mailbox_names(image: Image) -> list[str]:

@@ -62,7 +62,7 @@ def setting(value: str) -> Setting:
 class Mapping:
     """IP:PORT=HOST:PORT, or IP:PORT=peer (`host` None)."""
 
-    said: Peer
+    endpoint: Peer
     host: str | None
     port: int
 

@@ -129,7 +129,7 @@ def _row(track: Track, values: Sequence[Value], first: int, piece: Sequence[int 
     if signal.is_bit:
         cells = "".join(GAP if scan is None else "#" if values[scan - first] else "." for scan in piece)
     else:
-        texts = [None if scan is None else signal.said(values[scan - first]) for scan in piece]
+        texts = [None if scan is None else signal.display(values[scan - first]) for scan in piece]
         cells, complete = _numbers(texts)
         if not complete:
             note = f"{_sequence(track, piece)}   {note}".rstrip()
@@ -162,7 +162,7 @@ def _sequence(track: Track, piece: Sequence[int | None]) -> str:
     began, ended = (bisect_right(track.changes, scan, key=lambda change: change[0]) for scan in (drawn[0], drawn[-1]))
     changes = track.changes[max(0, began - 1) : ended]
     more = f", ... ({len(changes)} values)" if len(changes) > MOST_VALUES else ""
-    return "= " + ", ".join(track.signal.said(value) for _, value in changes[:MOST_VALUES]) + more
+    return "= " + ", ".join(track.signal.display(value) for _, value in changes[:MOST_VALUES]) + more
 
 
 def _ruler(piece: Sequence[int | None]) -> str:

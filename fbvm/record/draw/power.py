@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 from fbvm.code.image import RungPicture
 from fbvm.machine.plc import Phase
-from fbvm.record.draw.table import Scanned
+from fbvm.record.draw.table import ScanState
 from fbvm.record.trace.events import Contact, Event, Read, Statement, Write
 
 
 @dataclass(eq=False)
-class Executed:
+class RungExecution:
     """One execution of a rung: where its instance begins, and what was seen at each step, in the order of time."""
 
     scan: int
@@ -23,32 +23,32 @@ class Executed:
     """What was read and written, as text, if somebody wanted that: by statement, offset and bit."""
 
 
-Keep = Callable[[Scanned, Executed, Read | Write], None]
+Keep = Callable[[ScanState, RungExecution, Read | Write], None]
 """Notes what an execution of a rung reads and writes."""
 
 
-class Power:
+class PowerFlow:
     """A listener that keeps the executions of rungs in the scans that `wanted` names, in order."""
 
     def __init__(self, rungs: Sequence[RungPicture], wanted: Callable[[int], bool], keep: Keep | None = None) -> None:
-        self.executed: list[Executed] = []
+        self.executed: list[RungExecution] = []
         self._wanted, self._keep = wanted, keep
         self._rungs = {rung.site: rung for rung in rungs}
         self._owners = {place: rung.site for rung in rungs for place, _, _, _ in rung.steps} | {
             rung.site: rung.site for rung in rungs}  # fmt: skip
-        self._latest: dict[tuple[int, int], Executed] = {}
+        self._latest: dict[tuple[int, int], RungExecution] = {}
 
-    def phase(self, plc: Scanned, phase: Phase) -> None:
+    def phase(self, plc: ScanState, phase: Phase) -> None:
         """Nothing is left from the scan before."""
         if phase is Phase.INPUTS:
             self._latest.clear()
 
-    def event(self, plc: Scanned, event: Event) -> None:
+    def event(self, plc: ScanState, event: Event) -> None:
         """Follow rungs and their contacts."""
         if not self._wanted(plc.scans):
             return
         if isinstance(event, Statement) and event.is_rung:
-            made = Executed(plc.scans, event.frame.base, self._rungs[event.site])
+            made = RungExecution(plc.scans, event.frame.base, self._rungs[event.site])
             self._latest[event.frame.base, event.site] = made
             self.executed.append(made)
         elif isinstance(event, Contact) and isinstance(event.element, int):
@@ -57,6 +57,6 @@ class Power:
         elif self._keep and isinstance(event, Read | Write) and (here := self._rung(event)):
             self._keep(plc, here, event)
 
-    def _rung(self, event: Contact | Read | Write) -> Executed | None:
+    def _rung(self, event: Contact | Read | Write) -> RungExecution | None:
         """The latest execution of the rung that an event belongs to."""
         return self._latest.get((event.frame.base, self._owners.get(event.site, -1)))

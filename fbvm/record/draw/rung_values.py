@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from fbvm.base.areas import Area
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.image import Image
-from fbvm.record.draw.power import Executed
-from fbvm.record.draw.table import Scanned
+from fbvm.record.draw.power import RungExecution
+from fbvm.record.draw.table import ScanState
 from fbvm.record.trace.events import Read, Write
 from fbvm.record.trace.recorder import Signal
 from fbvm.syntax.ladder.drawing.diagram import joined
@@ -16,14 +16,14 @@ from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, UnknownPlace, find_place
 
 
-class Values:
+class RungValues:
     """Makes texts of what a rung reads and writes, and finds them again by its operands."""
 
     def __init__(self, image: Image, areas: Mapping[str, Area]) -> None:
         self._symbols, self._areas = image.symbols, areas
         self._names = Names.of(image, areas)
 
-    def keep(self, plc: Scanned, made: Executed, event: Read | Write) -> None:
+    def keep(self, plc: ScanState, made: RungExecution, event: Read | Write) -> None:
         """Note the value of what was read or written in a rung."""
         bit = event.bit if event.bit != WHOLE_BYTES else None
         place = self._names.at(event.offset, bit)
@@ -31,7 +31,7 @@ class Values:
             text = Signal(place, place.name).text(self._names.read(plc.read, place))
             made.values[event.site, event.offset, bit] = text.replace(" ", "")
 
-    def of(self, made: Executed) -> Callable[[int, str], str]:
+    def of(self, made: RungExecution) -> Callable[[int, str], str]:
         """The values of the operands of a rung as it was executed, "" of those that nobody has seen."""
         instance = self._names.instance(made.base)
 

@@ -23,7 +23,7 @@ NAMED = 0
 
 
 @dataclass(frozen=True)
-class Sighted:
+class ChartState:
     """What was seen of a chart in one scan: the steps that were active at its end, by number, and the conditions that were
     worked out, by the number of their transition."""
 
@@ -31,12 +31,12 @@ class Sighted:
     tested: Mapping[int, bool] = field(default_factory=dict)
 
 
-def sfc_text(picture: SfcPicture, width: int = 80, seen: Sighted | None = None) -> list[str]:
+def sfc_text(picture: SfcPicture, width: int = 80, seen: ChartState | None = None) -> list[str]:
     """The lines of a chart; without `seen` as it is at rest."""
     return sfc_surface(picture, width, seen).rows()
 
 
-def sfc_surface(picture: SfcPicture, width: int = 80, seen: Sighted | None = None) -> Surface:
+def sfc_surface(picture: SfcPicture, width: int = 80, seen: ChartState | None = None) -> Surface:
     """The drawing of a chart.  One that is too wide has its conditions in several lines, then below it, and then branches
     that stand by themselves."""
     width = max(width, LEAST)
@@ -57,7 +57,7 @@ def sfc_surface(picture: SfcPicture, width: int = 80, seen: Sighted | None = Non
 class _Drawing:
     """One attempt."""
 
-    def __init__(self, picture: SfcPicture, seen: Sighted | None, wrapped: int, apart: frozenset[int]) -> None:
+    def __init__(self, picture: SfcPicture, seen: ChartState | None, wrapped: int, apart: frozenset[int]) -> None:
         self.picture, self.seen, self.wrapped = picture, seen, wrapped
         self.graph = Graph(picture, apart)
         self._pieces: dict[Node, Piece] = {}

@@ -9,8 +9,8 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from fbvm.base.types import EnumType, base
+from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.recorder import Recording, Track
-from fbvm.record.trace.traffic import Passed
 from fbvm.watch.values import Value, show_time
 
 ROW, LETTER, MARGIN = 26, 7.3, 8
@@ -33,18 +33,18 @@ text { fill: #e6e8ec; stroke: #14161a } .dim { fill: #9aa2ae } .ground { fill: #
 """
 
 
-class Drawing:
+class SvgChart:
     """Draws one recording."""
 
-    def __init__(self, recording: Recording, passed: Sequence[tuple[int, Passed]] = (), title: str = "") -> None:
+    def __init__(self, recording: Recording, packets: Sequence[tuple[int, Packet]] = (), title: str = "") -> None:
         self._recording, self._title = recording, title
         self._scans = recording.scans
-        self._passed = [row for row in passed if row[0] in self._scans]
-        self._unit = str(self._passed[0][1].sender.host) if self._passed else ""
+        self._packets = [row for row in packets if row[0] in self._scans]
+        self._unit = str(self._packets[0][1].source.host) if self._packets else ""
         self._step = min(WIDEST, max(NARROWEST, WANTED / max(1, len(self._scans))))
         names = [track.signal.label for track in recording.tracks]
         self._left = MARGIN * 2 + LETTER * max([len(name) for name in names] + [8])
-        self._top = MARGIN + RULERS + (LANE if self._passed else 0)
+        self._top = MARGIN + RULERS + (LANE if self._packets else 0)
 
     def text(self) -> str:
         """The file."""
@@ -76,17 +76,17 @@ class Drawing:
 
     def _arrows(self) -> Iterator[str]:
         """Up for what the unit sends, down for what comes to it."""
-        if not self._passed:
+        if not self._packets:
             return
         top = MARGIN + RULERS
         yield f'<text class="dim" x="{MARGIN}" y="{top + 13}">network</text>'
         beside: dict[int, int] = {}
-        for scan, passed in self._passed:
+        for scan, packet in self._packets:
             number = beside[scan] = beside.get(scan, -1) + 1
-            x, out = self._x(scan + 0.5) + 8 * number, passed.sender.host == self._unit
+            x, out = self._x(scan + 0.5) + 8 * number, packet.source.host == self._unit
             shape = "l-4,7 h3 v9 h2 v-9 h3 z" if out else "l-4,-7 h3 v-9 h2 v9 h3 z"
             yield (f'<path class="{"out" if out else "in"}" d="M{x},{top + (0 if out else 16)} {shape}">'
-                   f"<title>scan {scan}: {escape(str(passed))}</title></path>")  # fmt: skip
+                   f"<title>scan {scan}: {escape(str(packet))}</title></path>")  # fmt: skip
 
     def _row(self, track: Track, y: int) -> Iterator[str]:
         label = escape(track.signal.label)
@@ -103,7 +103,7 @@ class Drawing:
                 continue
             height = y + ROW - 6 - level * (ROW - 12)
             yield f'<path class="word" d="M{left},{y + 4} V{y + ROW - 4} M{left},{height:.1f} H{right}"/>'
-            if text := _fitting(track.signal.said(value), right - left - 6):
+            if text := _fitting(track.signal.display(value), right - left - 6):
                 yield f'<text x="{left + 4}" y="{y + 16}">{escape(text)}</text>'
 
 

@@ -17,7 +17,7 @@ from typing import Protocol
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.image import Site
 from fbvm.machine.plc import Phase
-from fbvm.record.trace.events import Ended, Event, Frame, Read, Statement, Write
+from fbvm.record.trace.events import Event, Frame, Read, Return, Statement, Write
 from fbvm.record.trace.recorder import Signal
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
@@ -29,7 +29,7 @@ MOST_READS = 32
 """Values of which a value without a name is remembered to have been made."""
 
 
-class Scanned(Protocol):
+class ScanState(Protocol):
     """What is listened to: a PLC, or the moment of a trace."""
 
     @property
@@ -54,7 +54,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Writer:
+class LastWrite:
     """A statement that wrote a variable, maybe the value that was there, and what it had read."""
 
     scan: int
@@ -94,7 +94,7 @@ class ScanTable:
         self.signals = list(signals)
         self.bands: list[Band] = []
         self.changes: list[Change] = []
-        self.writers: dict[Signal, Writer] = {}
+        self.writers: dict[Signal, LastWrite] = {}
         """Who wrote each variable last."""
         self._sites, self._names, self._every = sites, names, every
         self._values: list[Value] | None = None
@@ -103,7 +103,7 @@ class ScanTable:
         self._nameless: dict[int, dict[str, str]] = {}
         """What was read for the bytes that no name has, such as conditions of rungs."""
 
-    def phase(self, plc: Scanned, phase: Phase) -> None:
+    def phase(self, plc: ScanState, phase: Phase) -> None:
         if phase is Phase.INPUTS or not self.bands or self.bands[-1].scan != plc.scans:
             self.bands.append(Band(plc.scans, plc.now_ns))
         self._finish(plc)
@@ -115,7 +115,7 @@ class ScanTable:
         if phase is Phase.INPUTS or any(changed):
             self.bands[-1].rows.append(Row(phase.value, values, changed))
 
-    def event(self, plc: Scanned, event: Event) -> None:
+    def event(self, plc: ScanState, event: Event) -> None:
         if isinstance(event, Statement):
             self._finish(plc)
             self._statement = event
@@ -125,16 +125,16 @@ class ScanTable:
             read = self._reads.setdefault(event.frame, {})
             if place is None:
                 read.update(self._nameless.get(event.offset, {}))
-            elif not place.unwritten:
+            elif not place.is_generated:
                 read[place.name] = Signal(place, place.name).text(self._names.read(plc.read, place))
-        elif isinstance(event, Ended):
+        elif isinstance(event, Return):
             self._reads.pop(event.frame, None)
         elif isinstance(event, Write) and self._names.at(event.offset) is None:
             self._nameless[event.offset] = dict(islice(self._reads.get(event.frame, {}).items(), MOST_READS))
         elif isinstance(event, Write) and (concerned := self._concerned(event)):
             reads = tuple(self._reads.get(event.frame, {}).items())
             for signal in concerned:
-                self.writers[signal] = Writer(plc.scans, self._site(event.site), self._names.instance(event.frame.base), reads)
+                self.writers[signal] = LastWrite(plc.scans, self._site(event.site), self._names.instance(event.frame.base), reads)
             if event.old != event.value:
                 self._row(plc, event.site, event.frame)
 
@@ -147,7 +147,7 @@ class ScanTable:
                 or place.offset < end and event.offset < place.offset + place.type.size]  # fmt: skip
         return [signal for signal in near if signal.place.bit is None or event.bit in (signal.place.bit, WHOLE_BYTES)]
 
-    def _finish(self, plc: Scanned) -> None:
+    def _finish(self, plc: ScanState) -> None:
         """The last statement is over; if it changed nothing its row is kept only where every row is."""
         statement, self._statement = self._statement, None
         if statement and self._every and self._values is not None:
@@ -155,7 +155,7 @@ class ScanTable:
             if not self.bands[-1].rows or self.bands[-1].rows[-1].label != label:
                 self.bands[-1].rows.append(Row(label, self._values, [False] * len(self.signals)))
 
-    def _row(self, plc: Scanned, site: int, frame: Frame) -> None:
+    def _row(self, plc: ScanState, site: int, frame: Frame) -> None:
         values, changed = self._look(plc)
         if not any(changed):
             return
@@ -168,7 +168,7 @@ class ScanTable:
         self.bands[-1].rows.append(Row(_place(place) if place else "stub", values, changed))
         self._statement = None
 
-    def _look(self, plc: Scanned) -> tuple[list[Value], list[bool]]:
+    def _look(self, plc: ScanState) -> tuple[list[Value], list[bool]]:
         values = [self._names.read(plc.read, signal.place) for signal in self.signals]
         before = self._values
         return values, [before is not None and now != before[at] for at, now in enumerate(values)]
@@ -197,7 +197,7 @@ class ScanTable:
         return "\n".join(lines)
 
     def _cell(self, at: int, row: Row) -> str:
-        text = self.signals[at].said(row.values[at])
+        text = self.signals[at].display(row.values[at])
         return text if len(text) <= WIDEST_CELL else text[: WIDEST_CELL - 3] + "..."
 
 

@@ -16,7 +16,7 @@ from fbvm.record.trace.events import Event, Frame, Read, Statement, Write
 from fbvm.record.trace.recorder import Signal
 from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place
-from fbvm.watch.places import settled
+from fbvm.watch.places import dereferenced
 from fbvm.watch.values import Value, show_time
 
 DEEPEST = 6
@@ -205,7 +205,7 @@ def why(trace: Past, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
 
 def _settled(names: Names, memory: Memory, place: Place) -> Place:
     """Where what is asked for lies; behind a reference it has the name of its owner, too."""
-    found = settled(memory, place) if place.hops else None
+    found = dereferenced(memory, place) if place.hops else None
     if found is None:
         return place
     owner = names.at(found.offset, found.bit) if is_single(found) else None
@@ -243,7 +243,7 @@ def _open(cause: Cause) -> bool:
 # --- as text ----------------------------------------------------------------------------------------------------------
 
 
-def told(trace: Past, cause: Cause) -> str:
+def cause_text(trace: Past, cause: Cause) -> str:
     """The answer as a tree of lines."""
     return "\n".join(_lines(trace, cause, "", ""))
 

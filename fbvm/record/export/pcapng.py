@@ -17,7 +17,7 @@ from typing import BinaryIO
 from fbvm.record.export import frames
 from fbvm.record.export.frames import ACK, FIN, MAX_SEGMENT_BYTES, PSH, RST, SYN
 from fbvm.wire.link import Peer
-from fbvm.wire.tap import Happening, What
+from fbvm.wire.tap import TapEvent, TapKind
 
 SECTION_HEADER, INTERFACE, ENHANCED_PACKET = 0x0A0D0D0A, 1, 6
 BYTE_ORDER_MAGIC = 0x1A2B3C4D
@@ -55,36 +55,36 @@ class Capture:
         section = struct.pack("<IHHq", BYTE_ORDER_MAGIC, 1, 0, -1)
         self._block(SECTION_HEADER, section + _option(SHB_USERAPPL, b"fbvm") + _option(OPTION_END, b""))
 
-    def tap(self, now_ns: int, address: str, happening: Happening) -> None:
-        """Write one happening, if it has not been written from the peer's side."""
-        if happening.mirrored and not happening.out:
+    def tap(self, now_ns: int, address: str, event: TapEvent) -> None:
+        """Write one event, if it has not been written from the peer's side."""
+        if event.mirrored and not event.out:
             return
-        pair = happening.local, happening.remote
-        sender, receiver = pair if happening.out else pair[::-1]
-        for frame in self._frames(happening.what, sender, receiver, happening.data):
+        pair = event.local, event.remote
+        sender, receiver = pair if event.out else pair[::-1]
+        for frame in self._frames(event.kind, sender, receiver, event.data):
             self._packet(now_ns, address, frame)
 
-    # From happenings to frames.
+    # From events to frames.
 
-    def _frames(self, what: What, sender: Peer, receiver: Peer, data: bytes) -> list[bytes]:
+    def _frames(self, what: TapKind, sender: Peer, receiver: Peer, data: bytes) -> list[bytes]:
         key = frozenset((sender, receiver))
-        if what is What.UDP:
+        if what is TapKind.UDP:
             return frames.udp(sender, receiver, self._number(sender.host), data)
         flow = self._flows.get(key)
-        if what is What.SYN or flow is None:
-            flow = self._flows[key] = self._new_flow(sender, receiver, what is not What.SYN)
+        if what is TapKind.SYN or flow is None:
+            flow = self._flows[key] = self._new_flow(sender, receiver, what is not TapKind.SYN)
         if flow.reset:
             return []
-        if what is What.SYN:
+        if what is TapKind.SYN:
             return [self._segment(flow, sender, receiver, SYN)]
-        if what is What.OPEN:
+        if what is TapKind.OPEN:
             return self._opened(flow, sender, receiver)
-        if what is What.RST:
+        if what is TapKind.RST:
             flow.reset = True
             return [self._segment(flow, sender, receiver, RST | ACK)]
         if sender in flow.finished:
             return []
-        if what is What.FIN:
+        if what is TapKind.FIN:
             flow.finished.add(sender)
             segments = [self._segment(flow, sender, receiver, FIN | ACK)]
         else:

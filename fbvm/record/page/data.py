@@ -21,15 +21,15 @@ from fbvm.code.image import RungPicture
 from fbvm.machine.plc import Phase
 from fbvm.record.draw.ladder_svg import rung_svg
 from fbvm.record.draw.ladder_text import ladder_surface
-from fbvm.record.draw.power import Power
-from fbvm.record.draw.sfc_seen import Called, Evolutions
+from fbvm.record.draw.power import PowerFlow
+from fbvm.record.draw.sfc_recorder import ChartCall, ChartRecorder
 from fbvm.record.draw.sfc_text import sfc_surface
-from fbvm.record.trace.events import Contact, Event, Frame, Passing, Statement, Write
+from fbvm.record.trace.events import Contact, Event, Frame, NetworkEvent, Statement, Write
 from fbvm.record.trace.format import PHASES
+from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.record.trace.reader import Moment, Trace
 from fbvm.record.trace.recorder import Signal, signals_at
 from fbvm.record.trace.signals import chosen_signals
-from fbvm.record.trace.traffic import Passed, Reader
 from fbvm.record.trace.writer import Depth
 from fbvm.syntax.ladder.drawing.widths import Sight
 from fbvm.watch.paths import UnknownPlace
@@ -56,14 +56,14 @@ class Collector:
         self.changes: list[list[Any]] = [[] for _ in signals]
         self.words: dict[str, dict[int, list[int]]] = {}
         self.rows: OrderedDict[int, list[list[Any]]] = OrderedDict()
-        self.passed: list[tuple[int, Passed]] = []
+        self.packets: list[tuple[int, Packet]] = []
         self.instances: dict[str, int] = {}
         self.drawings: dict[tuple[object, ...], int] = {}
         self.pictures: list[str] = []
         self.ladder: dict[int, list[list[int]]] = {}
-        self._power = Power(trace.rungs, lambda scan: True)
-        self._evolutions = Evolutions(trace.charts, lambda scan: True)
-        self._reader = Reader()
+        self._power = PowerFlow(trace.rungs, lambda scan: True)
+        self._evolutions = ChartRecorder(trace.charts, lambda scan: True)
+        self._dissector = Dissector()
         self._known: list[str] = []
         self._ended: list[str] = []
         self._memory: Snapshot | None = None
@@ -100,8 +100,8 @@ class Collector:
         """Notes a statement, and what it writes."""
         self._power.event(moment, event)
         self._evolutions.event(moment, event)
-        if isinstance(event, Passing):
-            self.passed += [(moment.scans, passed) for passed in self._reader.read(event.now_ns, event.happening)]
+        if isinstance(event, NetworkEvent):
+            self.packets += [(moment.scans, packet) for packet in self._dissector.dissect(event.now_ns, event.tap_event)]
         elif isinstance(event, Contact):
             self._add(moment.scans, [event.site, self._instance(event.frame), POWER, str(int(event.value))])
         elif isinstance(event, Statement):
@@ -125,7 +125,7 @@ class Collector:
             self._picture(scan, called.base, key, partial(self._chart, called))
         self._evolutions.called.clear()
 
-    def _chart(self, called: Called) -> list[str]:
+    def _chart(self, called: ChartCall) -> list[str]:
         name, kind = self._trace.bodies[called.picture.body]
         return [f"{kind} {name}", rung_svg(sfc_surface(called.picture, RUNG_WIDTH, called.sighted))]
 
@@ -157,7 +157,7 @@ class Collector:
     def _text(self, number: int, moment: Moment) -> str:
         signal = self.signals[number]
         value = self._trace.names.read(moment.read, signal.place)
-        return str(int(value is True)) if signal.is_bit else signal.said(value)
+        return str(int(value is True)) if signal.is_bit else signal.display(value)
 
     def _touched(self, now: Snapshot) -> set[int]:
         """The signals in bytes that differ from the phase before."""
@@ -240,7 +240,7 @@ def _in_order(trace: Trace) -> list[Signal]:
         owner, *rest = signal.place.name.split(".")
         return 1 if signal.place.area else len(rest) - 1 if owner in programs else 2
 
-    return sorted((signal for signal in chosen_signals(trace, ()) if not signal.place.unwritten), key=rank)
+    return sorted((signal for signal in chosen_signals(trace, ()) if not signal.place.is_generated), key=rank)
 
 
 def _as_data(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
@@ -256,7 +256,7 @@ def _as_data(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
                      for address, known in trace.meanings.items()},
         "instances": [path.removeprefix(prefix.rstrip(".")).lstrip(".") for path in made.instances],
         **_numbered(trace, made, prefix),
-        "frames": frame_rows(made.passed),
+        "frames": frame_rows(made.packets),
         "pictures": made.pictures, "ladder": {str(scan): rungs for scan, rungs in made.ladder.items()},
     }  # fmt: skip
 
@@ -275,10 +275,10 @@ def _numbered(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
     }
 
 
-def frame_rows(rows: Sequence[tuple[int, Passed]]) -> list[list[Any]]:
-    """What passed the network, as the page has it."""
-    return [[scan, passed.now_ns, str(passed.sender), str(passed.receiver), passed.said, passed.data.hex()]
-            for scan, passed in rows]  # fmt: skip
+def frame_rows(rows: Sequence[tuple[int, Packet]]) -> list[list[Any]]:
+    """The rows of the page's list of packets: scan, time, source, destination, info and the bytes in hexadecimal."""
+    return [[scan, packet.now_ns, str(packet.source), str(packet.destination), packet.info, packet.data.hex()]
+            for scan, packet in rows]  # fmt: skip
 
 
 def _signal(made: Collector, number: int, prefix: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from fbvm.code.shapes import blocks
 
 
 @dataclass(frozen=True)
-class Fork:
+class Branch:
     """A statement that chooses: `ways` are the sites of the first statement of each way it has.
 
     Besides, it may go past all of them if `past`."""
@@ -29,12 +29,12 @@ def statements(image: Image) -> list[int]:
     return sorted({site for body in image.bodies for site in _sites(body.code)})
 
 
-def forks(image: Image) -> list[Fork]:
+def branches(image: Image) -> list[Branch]:
     """All statements that choose."""
     found: dict[int, tuple[list[int], bool]] = {}
     for body in image.bodies:
         _walk(body.code, -1, found)
-    return [Fork(site, tuple(dict.fromkeys(ways)), past) for site, (ways, past) in sorted(found.items()) if ways]
+    return [Branch(site, tuple(dict.fromkeys(ways)), past) for site, (ways, past) in sorted(found.items()) if ways]
 
 
 def _sites(block: Block) -> Iterator[int]:

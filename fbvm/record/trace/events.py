@@ -1,6 +1,6 @@
 """What happens inside a scan: every statement, call, read and write, with the instance that did it and the values.
 
-`Inside` takes the place of a PLC's engine while somebody looks and gives it back afterwards.  It tells what happened
+`ObservedEngine` takes the place of a PLC's engine while somebody looks and gives it back afterwards.  It tells what happened
 and keeps nothing.
 """
 
@@ -18,7 +18,7 @@ from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.python.runtime import NO_SITE, Observation
 from fbvm.engine.tiers import substitutes_of
 from fbvm.engine.trap import Trap
-from fbvm.wire.tap import Happening
+from fbvm.wire.tap import TapEvent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,13 +37,13 @@ OUTSIDE = Frame(NO_SITE, 0, NO_SITE, None)
 """Who calls programs."""
 
 
-class Began(NamedTuple):
+class Call(NamedTuple):
     """A body began."""
 
     frame: Frame
 
 
-class Ended(NamedTuple):
+class Return(NamedTuple):
     """A body ended."""
 
     frame: Frame
@@ -87,17 +87,17 @@ class Contact(NamedTuple):
     value: bool
 
 
-class Passing(NamedTuple):
+class NetworkEvent(NamedTuple):
     """Something passed the network at a unit of the PLC, in the I/O refresh."""
 
     now_ns: int
-    happening: Happening
+    tap_event: TapEvent
 
 
-Event: TypeAlias = Began | Ended | Statement | Read | Write | Contact | Passing
+Event: TypeAlias = Call | Return | Statement | Read | Write | Contact | NetworkEvent
 
 
-class Inside:
+class ObservedEngine:
     """An engine that tells every event of a run.  `program` is the engine in whose place it stands."""
 
     machine = None
@@ -108,7 +108,7 @@ class Inside:
         self.tell = tell
         self.program = program
         self._engine = PythonEngine(image, memory, observed=True)
-        known = program._engine if isinstance(program, Inside) else program
+        known = program._engine if isinstance(program, ObservedEngine) else program
         for body, function in substitutes_of(known).items():
             self._engine.substitute(body, function)
         self._shadow = bytearray(memory.size)
@@ -166,12 +166,12 @@ class Inside:
             body, base = detail
             self._frame = Frame(body, base, site, frame)
             self._unwritten += bool(self._unwritten) or frame is not OUTSIDE and site == NO_SITE
-            return Began(self._frame)
+            return Call(self._frame)
         if kind == "return":
             assert frame.caller is not None
             self._frame = frame.caller
             self._unwritten -= bool(self._unwritten)
-            return Ended(frame)
+            return Return(frame)
         return Contact(site, frame, *detail)
 
 

@@ -15,7 +15,7 @@ from typing import Protocol
 from fbvm.base.memory import Snapshot
 from fbvm.engine.tiers import python_of
 from fbvm.machine.plc import Phase, Plc, State
-from fbvm.record.trace.events import Event, Inside
+from fbvm.record.trace.events import Event, ObservedEngine
 
 
 class Listener(Protocol):
@@ -29,13 +29,13 @@ class Listener(Protocol):
 
 
 @contextmanager
-def looking(plc: Plc, listener: Listener) -> Iterator[None]:
+def observing(plc: Plc, listener: Listener) -> Iterator[None]:
     """Tells a listener all that happens inside the scans of `plc` meanwhile."""
     program = plc.engine
     tell = partial(listener.event, plc)
-    if isinstance(program, Inside):
+    if isinstance(program, ObservedEngine):
         tell = partial(_both, program.tell, tell)
-    plc.engine = Inside(plc.image, plc.memory, tell, program)
+    plc.engine = ObservedEngine(plc.image, plc.memory, tell, program)
     plc.phases.append(listener.phase)
     try:
         yield
@@ -102,7 +102,7 @@ class History:
 
     def again(self, scans: range, listener: Listener) -> None:
         """Does scans again; the listener looks inside.  Beyond the last one it goes on as if nobody did anything."""
-        self.redo(scans, lambda twin: looking(twin, listener))
+        self.redo(scans, lambda twin: observing(twin, listener))
 
     def redo(self, scans: range, attached: Callable[[Plc], AbstractContextManager[object]]) -> None:
         """Does scans again on a PLC to which something is attached meanwhile."""

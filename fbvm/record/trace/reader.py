@@ -20,7 +20,7 @@ from fbvm.base.memory import Memory
 from fbvm.code.image import Layout, RungPicture, SfcPicture, Site
 from fbvm.machine.plc import Phase
 from fbvm.record.trace import symbols
-from fbvm.record.trace.events import Began, Contact, Ended, Event, Frame, Passing, Read, Statement, Write
+from fbvm.record.trace.events import Call, Contact, Event, Frame, NetworkEvent, Read, Return, Statement, Write
 from fbvm.record.trace.format import (
     BLOCK,
     CONTACT,
@@ -49,7 +49,7 @@ from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span, find
 from fbvm.watch.values import Value
 from fbvm.wire.link import Peer
-from fbvm.wire.tap import Happening, What
+from fbvm.wire.tap import TapEvent, TapKind
 
 
 class Follower(Protocol):
@@ -263,10 +263,10 @@ class _Player:
             body, start, site, caller = (cursor.number() for _ in range(4))
             frame = Frame(body, start, site - 1, self._frames[caller - 1] if caller else self._outside)
             self._frames.append(frame)
-            return Began(frame)
+            return Call(frame)
         frame = self._frames[cursor.number()]
         if tag == END:
-            return Ended(frame)
+            return Return(frame)
         if tag == STATEMENT:
             number = cursor.number()
             return Statement(number, frame, number in self._moment.trace.rung_sites)
@@ -306,11 +306,11 @@ def _chart(body: int, site: int, steps: list[Any], transitions: list[Any]) -> Sf
               for place, name, priority, sources, targets, condition in transitions))  # fmt: skip
 
 
-def _passing(text: bytes) -> Passing:
+def _passing(text: bytes) -> NetworkEvent:
     try:
         now_ns, what, host, port, other, other_port, out, mirrored, data = json.loads(text)
         local, remote = Peer(str(host), int(port)), Peer(str(other), int(other_port))
-        return Passing(int(now_ns), Happening(What(what), local, remote, bool(out), bytes.fromhex(data), bool(mirrored)))
+        return NetworkEvent(int(now_ns), TapEvent(TapKind(what), local, remote, bool(out), bytes.fromhex(data), bool(mirrored)))
     except (ValueError, TypeError) as error:
         raise IndexError(f"what passed the network is not readable: {error}") from None
 

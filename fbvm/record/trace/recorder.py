@@ -42,7 +42,7 @@ class Signal:
             return kind.shown.get(value, str(value))
         return show(self.place.type, value).removeprefix("T#")
 
-    def said(self, value: Value) -> str:
+    def display(self, value: Value) -> str:
         """The same, or what the value means if somebody knows it; for people only."""
         return next((text for known, text in self.meanings if known == value), None) or self.text(value)
 
@@ -117,7 +117,7 @@ def signals_of(plc: Plc, given: str | tuple[str, str] | Signal) -> list[Signal]:
     text, description = given if isinstance(given, tuple) else (given, "")
     found = plc.find(text)
     places = found.places if isinstance(found, Span) else (found,)
-    return [signal(place, description or described(plc, place)) for place in places]
+    return [signal(place, description or description_of(plc, place)) for place in places]
 
 
 def signals_at(found: Place | Span, descriptions: Mapping[str, str], meanings: Mapping[str, Mapping[int, str]] | None = None,
@@ -141,7 +141,7 @@ def is_charted(place: Place) -> bool:
     return isinstance(base(place.type), Elementary | StringType | EnumType)
 
 
-def described(plc: Plc, place: Place) -> str:
+def description_of(plc: Plc, place: Place) -> str:
     """What an attached unit says of an address, "" if nobody knows it."""
     for attached in plc.units:
         descriptions: dict[str, str] = getattr(attached.unit, "descriptions", {})

@@ -1,4 +1,4 @@
-"""Who asked a Modbus server what, and what came of it: a network's tap as JSON lines, one a reply."""
+"""The log of a Modbus server: a JSON line for each request that it has answered, made of the events of a network's tap."""
 
 from __future__ import annotations
 
@@ -9,57 +9,58 @@ from typing import IO
 
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus import Adu, Splitter, decode_request
-from fbvm.wire.tap import Happening, What
+from fbvm.wire.tap import TapEvent, TapKind
 
 SECOND_NS = 1_000_000_000
 
 
-class _Conversation:
-    """One connection: its two streams, and the requests that have no reply yet."""
+class _Connection:
+    """The two streams of a connection, and the requests that have no reply yet."""
 
     def __init__(self) -> None:
-        self.asked = Splitter()
-        self.answered = Splitter()
-        self.open: deque[Adu] = deque()
+        self.requests = Splitter()
+        self.replies = Splitter()
+        self.pending: deque[Adu] = deque()
 
 
 class RequestLog:
-    """Writes a line for each request when it is answered: time (seconds since 1970), peer, function, address, count,
-    result (0 or the exception code) and scan; null where a request has none.
+    """Writes a line for each reply of the server to `file`: time (seconds since 1970), peer, function, address, count,
+    result (0 or the exception code) and scan; null where a request has no such number.
 
-    `epoch_ns` is the date of the PLC's time 0, `scan` tells the number of the scan.  Knows only what passed the tap."""
+    `epoch_ns` is the date of the PLC's time 0 in nanoseconds since 1970, `scan` returns the number of the current scan.
+    Set `network.tap` to `tap`; requests that came before are not in the log."""
 
     def __init__(self, file: IO[str], epoch_ns: int, scan: Callable[[], int]) -> None:
         self._file = file
         self._epoch_ns = epoch_ns
         self._scan = scan
-        self._conversations: dict[tuple[Peer, Peer], _Conversation] = {}
+        self._connections: dict[tuple[Peer, Peer], _Connection] = {}
 
-    def tap(self, now_ns: int, unit: str, happening: Happening) -> None:
-        """What a network calls."""
-        key = happening.local, happening.remote
-        if happening.what is What.DATA:
-            self._data(now_ns, self._conversations.setdefault(key, _Conversation()), happening)
-        elif happening.what in (What.OPEN, What.RST):
-            self._conversations.pop(key, None)
+    def tap(self, now_ns: int, unit: str, event: TapEvent) -> None:
+        """Called by the network for each event at a unit."""
+        key = event.local, event.remote
+        if event.kind is TapKind.DATA:
+            self._data(now_ns, self._connections.setdefault(key, _Connection()), event)
+        elif event.kind in (TapKind.OPEN, TapKind.RST):
+            self._connections.pop(key, None)
 
-    def _data(self, now_ns: int, there: _Conversation, happening: Happening) -> None:
-        if not happening.out:
-            there.open += [found for found in there.asked.feed(happening.data) if isinstance(found, Adu)]
+    def _data(self, now_ns: int, connection: _Connection, event: TapEvent) -> None:
+        if not event.out:
+            connection.pending += [found for found in connection.requests.feed(event.data) if isinstance(found, Adu)]
             return
-        for found in there.answered.feed(happening.data):
-            if isinstance(found, Adu) and there.open:
-                self._write(now_ns, happening.remote, there.open.popleft(), found)
+        for found in connection.replies.feed(event.data):
+            if isinstance(found, Adu) and connection.pending:
+                self._write(now_ns, event.remote, connection.pending.popleft(), found)
         self._file.flush()
 
     def _write(self, now_ns: int, peer: Peer, request: Adu, reply: Adu) -> None:
-        asked = decode_request(request.pdu)
+        fields = decode_request(request.pdu).fields
         row = {
             "time": round((self._epoch_ns + now_ns) / SECOND_NS, 6),
             "peer": str(peer),
             "function": request.pdu[0],
-            "address": asked.fields.get("address"),
-            "count": asked.fields.get("quantity", 1 if "value" in asked.fields else None),
+            "address": fields.get("address"),
+            "count": fields.get("quantity", 1 if "value" in fields else None),
             "result": reply.pdu[1] if reply.pdu[0] & 0x80 else 0,
             "scan": self._scan(),
         }

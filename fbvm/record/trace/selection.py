@@ -63,7 +63,7 @@ def _fitting(symbols: Mapping[str, Field], areas: Mapping[str, Area], pattern: s
         yield from found.places if isinstance(found, Span) else (found,)
         return
     fits = re.compile(".*".join(re.escape(part.strip()) for part in pattern.split("*")), re.I).fullmatch
-    chosen = [place for top in tops(symbols) for place in _matching(top, fits)]
+    chosen = [place for top in symbol_places(symbols) for place in _matching(top, fits)]
     if not chosen:
         raise UnknownPlace(f"no variable is called like {pattern}")
     yield from chosen
@@ -87,7 +87,7 @@ def _matching(place: Place, fits: object) -> Iterator[Place]:
             yield from _matching(element, fits)
 
 
-def tops(symbols: Mapping[str, Field]) -> Iterator[Place]:
+def symbol_places(symbols: Mapping[str, Field]) -> Iterator[Place]:
     """The places of all symbols; those behind references are places of others."""
     return (Place(field.name, field.type, field.offset, field.bit) for field in symbols.values()
             if not field.reference and followed(field.type) is field.type)
@@ -101,16 +101,16 @@ def _members(place: Place) -> Iterator[Place]:
             yield inner
 
 
-def singles(place: Place) -> Iterator[Place]:
+def single_places(place: Place) -> Iterator[Place]:
     """All single values in a place; of arrays only those that have few elements."""
     if isinstance(place.type, StructType):
         for inner in _members(place):
-            yield from singles(inner)
+            yield from single_places(inner)
     elif isinstance(place.type, ArrayType):
         if len(place.type.bounds) == 1 and place.type.count <= FEW_ELEMENTS:
             low, size = place.type.bounds[0][0], place.type.element.size
             for number in range(place.type.count):
-                yield from singles(place.inner(f"{place.name}[{low + number}]", place.type.element, number * size))
+                yield from single_places(place.inner(f"{place.name}[{low + number}]", place.type.element, number * size))
     else:
         yield place
 

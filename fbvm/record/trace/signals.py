@@ -1,22 +1,23 @@
-"""Signals out of a trace, for charts and for other formats."""
+"""Recordings of signals, and packets, read from a trace for charts and other formats."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from fbvm.machine.plc import Phase
-from fbvm.record.trace.events import Event, Passing
+from fbvm.record.trace.events import Event, NetworkEvent
+from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.record.trace.reader import Moment, Trace
 from fbvm.record.trace.recorder import Recording, Signal, Track, is_charted, signals_at
-from fbvm.record.trace.selection import select, singles, tops
-from fbvm.record.trace.traffic import Passed, Reader
+from fbvm.record.trace.selection import select, single_places, symbol_places
 from fbvm.watch.paths import Place
 
 
 def recording(trace: Trace, names: Sequence[str] = (), scans: range | None = None) -> Recording:
-    """What some variables did, for charts; without names, those that were selected or all single ones that changed.
+    """The values of some variables in some scans, for charts and other formats.
 
-    Raises UnknownPlace; TypeError for an array or a structure."""
+    `names` are paths, addresses and ranges; without names the variables that the trace selects, else all single values that
+    change.  Without `scans` all of them.  Raises UnknownPlace, and TypeError for an array or a structure."""
     wanted = range(max(trace.scans.start, scans.start), min(trace.scans.stop, scans.stop)) if scans else trace.scans
     made = Recording([Track(signal) for signal in chosen_signals(trace, names)], wanted.start)
     for moment in trace.moments(wanted):
@@ -24,50 +25,51 @@ def recording(trace: Trace, names: Sequence[str] = (), scans: range | None = Non
             track.add(moment.scans, trace.names.read(moment.read, track.signal.place))
         made.times_ns.append(moment.now_ns)
     if not names:
-        written = [track for track in made.tracks if not track.signal.place.unwritten]
+        written = [track for track in made.tracks if not track.signal.place.is_generated]
         made.tracks = [track for track in written if len(track.changes) > 1] or written
     return made
 
 
-def traffic(trace: Trace, scans: range | None = None) -> list[tuple[int, Passed]]:
-    """What passed the network in some scans, with their numbers."""
-    reader = Reader()
-    return [(scan, passed) for scan, event in happenings(trace, scans) for passed in reader.read(event.now_ns, event.happening)]
+def packets(trace: Trace, scans: range | None = None) -> list[tuple[int, Packet]]:
+    """The packets of some scans, or of all, each with the number of its scan."""
+    dissector = Dissector()
+    return [(scan, packet) for scan, event in network_events(trace, scans)
+            for packet in dissector.dissect(event.now_ns, event.tap_event)]  # fmt: skip
 
 
-def happenings(trace: Trace, scans: range | None = None) -> list[tuple[int, Passing]]:
-    """The same as the network told it."""
-    heard = _Heard()
-    trace.follow(heard, scans)
-    return heard.rows
+def network_events(trace: Trace, scans: range | None = None) -> list[tuple[int, NetworkEvent]]:
+    """The network events of some scans, or of all, each with the number of its scan."""
+    listener = _NetworkEvents()
+    trace.follow(listener, scans)
+    return listener.rows
 
 
-class _Heard:
-    """Follows a trace and keeps what the network told."""
+class _NetworkEvents:
+    """Follows a trace and keeps its network events."""
 
     def __init__(self) -> None:
-        self.rows: list[tuple[int, Passing]] = []
+        self.rows: list[tuple[int, NetworkEvent]] = []
 
     def phase(self, moment: Moment, phase: Phase) -> None:
-        """Nothing passes between phases."""
+        """The end of a phase is no network event."""
 
     def event(self, moment: Moment, event: Event) -> None:
-        if isinstance(event, Passing):
+        if isinstance(event, NetworkEvent):
             self.rows.append((moment.scans, event))
 
 
 def chosen_signals(trace: Trace, names: Sequence[str]) -> list[Signal]:
-    """The signals of some names; without names, those that were selected or all single ones.  Raises as `recording`."""
+    """The signals of some names; without names those that the trace selects, else all single values.  Raises as `recording`."""
     return [signal for name in names for signal in signals_at(trace.find(name), trace.described, trace.meanings)] or _every(trace)
 
 
 def _every(trace: Trace) -> list[Signal]:
-    """All single values in the program that were selected, and what units describe; references only where they are named."""
+    """The single values that the trace selects, else those of the program and what units describe; no references."""
     selection = select(trace.symbols, trace.areas, trace.selected)
-    chosen = selection.places if trace.selected else tuple(tops(trace.symbols))
+    chosen = selection.places if trace.selected else tuple(symbol_places(trace.symbols))
     found: dict[Place, None] = {}
     for place in chosen:
-        for single in singles(place):
+        for single in single_places(place):
             found[single] = None
     if not trace.selected:
         described = [trace.find(name) for name in trace.described]

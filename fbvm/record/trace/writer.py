@@ -14,7 +14,7 @@ from fbvm.base.areas import AREAS
 from fbvm.code.image import Image
 from fbvm.machine.plc import Phase, Plc
 from fbvm.record.trace import symbols
-from fbvm.record.trace.events import Began, Contact, Ended, Event, Frame, Read, Statement, Write
+from fbvm.record.trace.events import Call, Contact, Event, Frame, Read, Return, Statement, Write
 from fbvm.record.trace.format import (
     BLOCK,
     CONTACT,
@@ -34,11 +34,11 @@ from fbvm.record.trace.format import (
     write_chunk,
     xor,
 )
-from fbvm.record.trace.history import looking
+from fbvm.record.trace.history import observing
 from fbvm.record.trace.outline import outer_statements
+from fbvm.record.trace.packets import add_tap
 from fbvm.record.trace.selection import select
-from fbvm.record.trace.traffic import listen
-from fbvm.wire.tap import Happening
+from fbvm.wire.tap import TapEvent
 
 FORMAT = 1
 BLOCK_SCANS = 100
@@ -83,8 +83,8 @@ class TraceWriter:
         self._heads: dict[tuple[int, int, tuple[int, ...]], bytes] = {}
         self._notes: dict[type, Callable[[Any], None]] = {Write: self._note_write}
         if depth is Depth.STATEMENTS:
-            self._notes |= {Statement: self._note_statement, Read: self._note_read, Began: self._note_began,
-                            Ended: self._note_ended, Contact: self._note_contact}  # fmt: skip
+            self._notes |= {Statement: self._note_statement, Read: self._note_read, Call: self._note_began,
+                            Return: self._note_ended, Contact: self._note_contact}  # fmt: skip
         self.size_bytes = len(MAGIC)
         file.write(MAGIC)
         head = json.dumps(_header(plc, depth, selected, lines or {}), separators=(",", ":"))
@@ -92,12 +92,12 @@ class TraceWriter:
         deque(self._changed(), 0)
         self._attached = ExitStack()
         if depth is not Depth.SCANS:
-            self._attached.enter_context(looking(plc, self))
+            self._attached.enter_context(observing(plc, self))
         plc.watchers.append(self._scan_ended)
         self._attached.callback(plc.watchers.remove, self._scan_ended)
-        self._passed: list[tuple[int, Happening]] = []
+        self._tapped: list[tuple[int, TapEvent]] = []
         for network in {id(attached.network): attached.network for attached in plc.units}.values():
-            self._attached.callback(setattr, network, "tap", listen(network, self._pass))
+            self._attached.callback(setattr, network, "tap", add_tap(network, self._tap))
 
     def close(self) -> None:
         """Ends the recording and writes what is left; the file stays open."""
@@ -119,18 +119,18 @@ class TraceWriter:
             self._begin(plc.scans)
             self._changes(phase)
 
-    def _pass(self, now_ns: int, unit: str, happening: Happening) -> None:
-        """What a network tells of the units of this PLC."""
+    def _tap(self, now_ns: int, unit: str, event: TapEvent) -> None:
+        """Keeps an event of the network at a unit of this PLC until the end of the scan."""
         if any(attached.unit.address == unit for attached in self._plc.units):
-            self._passed.append((now_ns, happening))
+            self._tapped.append((now_ns, event))
 
     def _scan_ended(self, plc: Plc) -> None:
         self._begin(plc.scans - 1)
-        for passed in self._passed:
-            text = json.dumps(_row(*passed), separators=(",", ":")).encode()
+        for tapped in self._tapped:
+            text = json.dumps(_row(*tapped), separators=(",", ":")).encode()
             put(self._out, NETWORK, len(text))
             self._out += text
-        self._passed.clear()
+        self._tapped.clear()
         self._changes(Phase.REFRESH)
         self._open = False
         if self._scans >= BLOCK_SCANS or len(self._out) > BLOCK_BYTES:
@@ -188,10 +188,10 @@ class TraceWriter:
     def _note_statement(self, event: Statement) -> None:
         self._head(STATEMENT, event.frame, event.site)
 
-    def _note_began(self, event: Began) -> None:
+    def _note_began(self, event: Call) -> None:
         self._frame(event.frame)
 
-    def _note_ended(self, event: Ended) -> None:
+    def _note_ended(self, event: Return) -> None:
         self._head(END, event.frame)
 
     def _note_read(self, event: Read) -> None:
@@ -233,10 +233,10 @@ class TraceWriter:
         return number
 
 
-def _row(now_ns: int, told: Happening) -> list[object]:
-    local, remote = told.local, told.remote
-    return [now_ns, told.what.value, local.host, local.port, remote.host, remote.port, int(told.out), int(told.mirrored),
-            told.data.hex()]  # fmt: skip
+def _row(now_ns: int, event: TapEvent) -> list[object]:
+    local, remote = event.local, event.remote
+    return [now_ns, event.kind.value, local.host, local.port, remote.host, remote.port, int(event.out), int(event.mirrored),
+            event.data.hex()]  # fmt: skip
 
 
 def _different(start: int, now: bytes, old: bytes) -> Iterator[tuple[int, bytes]]:

@@ -16,11 +16,11 @@ from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.chart import draw
 from fbvm.record.draw.table import ScanTable
-from fbvm.record.draw.why import told, why
+from fbvm.record.draw.why import cause_text, why
 from fbvm.record.export.vcd import write_vcd
 from fbvm.record.page.data import page_data
+from fbvm.record.trace.csv_writer import write_csv
 from fbvm.record.trace.reader import Trace
-from fbvm.record.trace.rows import write_rows
 from fbvm.record.trace.signals import chosen_signals, recording
 from fbvm.record.trace.writer import Depth
 from fbvm.step.session import Session
@@ -108,7 +108,7 @@ def test_each_lead_is_looked_up_once(ran: Plc, monkeypatch: pytest.MonkeyPatch) 
 def test_why_and_stepping_say_it(trace: Trace) -> None:
     place = trace.find("Main.element")
     assert isinstance(place, Place)
-    assert told(trace, why(trace, place, 2)).startswith("Main.element = -> Main.a[2] since scan 2")
+    assert cause_text(trace, why(trace, place, 2)).startswith("Main.element = -> Main.a[2] since scan 2")
     session = Session(made)
     words = Words(session, {})
     session.scan()
@@ -126,7 +126,7 @@ def test_charts_and_rows_show_references_that_are_named(trace: Trace) -> None:
     ]  # fmt: skip
     assert "= -> Main.a[0], -> Main.a[1], -> Main.a[2]" in draw(wanted)
     assert "Main.element" not in [track.signal.label for track in recording(trace).tracks]
-    write_rows(wanted, rows)
+    write_csv(wanted, rows)
     assert rows.getvalue().splitlines()[2] == "1,10,-> Main.a[1],"
 
 

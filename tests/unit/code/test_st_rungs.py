@@ -10,8 +10,8 @@ from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.ladder_text import ladder_text
-from fbvm.record.draw.power import Executed, Power
-from fbvm.record.trace.history import looking
+from fbvm.record.draw.power import PowerFlow, RungExecution
+from fbvm.record.trace.history import observing
 from fbvm.syntax.ladder.drawing.widths import Sight
 
 DECLARED = """a, b, c, d, e, f : BOOL; n, m : INT; r : REAL; w : WORD; t : TON; k : CTUD; s : SR; list : ARRAY[0..3] OF BOOL;
@@ -70,12 +70,12 @@ def test_what_is_no_rung_is_named_with_its_line_and_the_rest_is_drawn(body: str)
     assert steps(f"{body}\na := b;") == [REFUSED[body], "LD b; OUT a"]
 
 
-def executed(body: str, on: dict[str, object]) -> list[Executed]:
+def executed(body: str, on: dict[str, object]) -> list[RungExecution]:
     plc = Plc(image(body))
-    power = Power(plc.image.rungs, lambda scan: True)
+    power = PowerFlow(plc.image.rungs, lambda scan: True)
     for name, value in on.items():
         plc.write(f"Main.{name}", value)
-    with looking(plc, power):
+    with observing(plc, power):
         plc.scan()
     return power.executed
 

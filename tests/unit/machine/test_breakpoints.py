@@ -335,10 +335,10 @@ def test_a_block_in_python_stands_in_with_breakpoints_too() -> None:
 
 
 def test_a_recorder_of_every_statement_excludes_breakpoints() -> None:
-    from fbvm.record.trace.events import Inside
+    from fbvm.record.trace.events import ObservedEngine
 
     plc = Plc(image())
-    plc.engine = Inside(plc.image, plc.memory, lambda event: None, plc.engine)
+    plc.engine = ObservedEngine(plc.image, plc.memory, lambda event: None, plc.engine)
     with pytest.raises(ValueError, match="looks into every scan already"):
         plc.breakpoints.line("text.st:18")
 

@@ -12,7 +12,7 @@ from fbvm.net.peers import ModbusPeer
 from fbvm.wire import modbus
 from fbvm.wire.link import Broken, Connect, Event, Failed, Grant, Opened, Peer, Received, Send, Sent
 from fbvm.wire.modbus import Adu
-from fbvm.wire.tap import What
+from fbvm.wire.tap import TapKind
 
 SERVER = Peer("10.0.0.1", 502)
 REQUEST = Adu(1, 1, modbus.read(3, 0, 2)).to_bytes()
@@ -76,12 +76,12 @@ def line_peer(line: Line) -> Peer:
 
 def test_what_is_open_breaks_in_the_scan_of_a_reset() -> None:
     line = Line(Fault(reset=True, from_scan=5, until_scan=6))
-    taps: list[What] = []
-    line.network.tap = lambda now_ns, unit, happening: taps.append(happening.what)
+    taps: list[TapKind] = []
+    line.network.tap = lambda now_ns, unit, event: taps.append(event.kind)
     line.open()
     told = [line.scan() for _ in range(5)]
     assert told == [[], [], [], [Broken(1, "ECONNRESET")], []]
-    assert taps == [What.SYN, What.OPEN, What.RST]
+    assert taps == [TapKind.SYN, TapKind.OPEN, TapKind.RST]
     assert line.scan(Connect(2, SERVER)) == []
     assert [type(event) for event in line.scan()] == [Opened]
     assert line.scan() == []

@@ -31,7 +31,7 @@ from fbvm.wire.link import (
     Sent,
 )
 from fbvm.wire.modbus import Adu
-from fbvm.wire.tap import Happening, What
+from fbvm.wire.tap import TapEvent, TapKind
 
 SERVER = Peer("192.168.250.1", 502)
 UNIT = "192.168.250.2"
@@ -358,7 +358,7 @@ def test_a_modbus_peer_hangs_up_on_a_stream_out_of_step() -> None:
 def test_the_tap_hears_everything_with_the_programs_addresses() -> None:
     heard: list[tuple[int, str, str]] = []
     network = LoopNetwork(latency_ns=1)
-    network.tap = lambda now_ns, address, happening: heard.append((now_ns, address, str(happening)))
+    network.tap = lambda now_ns, address, event: heard.append((now_ns, address, str(event)))
     network.place(SERVER, ScriptedPeer([Say(b"\xca\xfe")]))
     link = network.attach(UNIT)
     link.submit([Connect(1, SERVER), Grant(1, 10)], 0)
@@ -382,18 +382,18 @@ def test_the_tap_hears_everything_with_the_programs_addresses() -> None:
 
 
 def test_two_units_are_heard_twice_and_marked() -> None:
-    heard: list[Happening] = []
+    heard: list[TapEvent] = []
     network = LoopNetwork()
-    network.tap = lambda now_ns, address, happening: heard.append(happening)
+    network.tap = lambda now_ns, address, event: heard.append(event)
     server, client = network.attach("10.0.0.1"), network.attach("10.0.0.2")
     server.submit([Listen(1, 502)], 0)
     client.submit([Connect(1, Peer("10.0.0.1", 502))], 0)
     client.events(0)
     client.submit([Send(1, b"x")], 1)
     client.events(1)
-    assert all(happening.mirrored for happening in heard)
-    assert [happening.what for happening in heard if happening.out] == [What.SYN, What.OPEN, What.DATA]
-    assert [happening.what for happening in heard if not happening.out] == [What.SYN, What.OPEN, What.DATA]
+    assert all(event.mirrored for event in heard)
+    assert [event.kind for event in heard if event.out] == [TapKind.SYN, TapKind.OPEN, TapKind.DATA]
+    assert [event.kind for event in heard if not event.out] == [TapKind.SYN, TapKind.OPEN, TapKind.DATA]
 
 
 def test_closing_the_network_forgets_everything() -> None:

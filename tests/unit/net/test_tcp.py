@@ -30,7 +30,7 @@ from fbvm.wire.link import (
     SendTo,
     Sent,
 )
-from fbvm.wire.tap import Happening, What
+from fbvm.wire.tap import TapEvent, TapKind
 
 BOUND_S = 10.0
 """Nothing here takes so long; a test that waits in vain ends after it."""
@@ -391,8 +391,8 @@ def test_a_stranger_is_reset_and_the_door_stays_open(device: Device) -> None:
 
 def test_two_units_of_one_network(network: TcpNetwork) -> None:
     server, client = network.attach(UNIT), network.attach("192.168.250.3")
-    heard: list[Happening] = []
-    network.tap = lambda now_ns, address, happening: heard.append(happening)
+    heard: list[TapEvent] = []
+    network.tap = lambda now_ns, address, event: heard.append(event)
     client.submit([Connect(1, Peer(UNIT, 502))], now_ns())
     assert until(client, bool) == [Failed(1, "open", "ECONNREFUSED")]
     server.submit([Listen(1, 502, Peer("192.168.250.3", 0))], now_ns())
@@ -400,8 +400,8 @@ def test_two_units_of_one_network(network: TcpNetwork) -> None:
     [event] = until(client, bool)
     assert isinstance(event, Opened)
     assert until(server, bool) == [Opened(1, 502, Peer("192.168.250.3", event.local_port))]
-    assert all(happening.mirrored for happening in heard)
-    assert [happening.what for happening in heard if happening.out][-2:] == [What.SYN, What.OPEN]
+    assert all(event.mirrored for event in heard)
+    assert [event.kind for event in heard if event.out][-2:] == [TapKind.SYN, TapKind.OPEN]
 
 
 def test_a_local_port_of_the_clients_own(network: TcpNetwork, device: Device) -> None:
@@ -489,8 +489,8 @@ def test_the_map() -> None:
 
 
 def test_the_tap_hears_the_programs_addresses(network: TcpNetwork, device: Device) -> None:
-    heard: list[tuple[What, Peer, Peer, bool, bytes]] = []
-    network.tap = lambda now_ns, address, h: heard.append((h.what, h.local, h.remote, h.out, h.data))
+    heard: list[tuple[TapKind, Peer, Peer, bool, bytes]] = []
+    network.tap = lambda now_ns, address, h: heard.append((h.kind, h.local, h.remote, h.out, h.data))
     link, line = opened(network, device)
     link.submit([Send(1, b"\1\2")], now_ns())
     line.sendall(b"\3")
@@ -501,12 +501,12 @@ def test_the_tap_hears_the_programs_addresses(network: TcpNetwork, device: Devic
     until(link, lambda events: len(heard) == 6)
     here = Peer(UNIT, heard[0][1].port)
     assert heard == [
-        (What.SYN, here, SERVER, True, b""),
-        (What.OPEN, here, SERVER, True, b""),
-        (What.DATA, here, SERVER, True, b"\1\2"),
-        (What.DATA, here, SERVER, False, b"\3"),
-        (What.FIN, here, SERVER, True, b""),
-        (What.FIN, here, SERVER, False, b""),
+        (TapKind.SYN, here, SERVER, True, b""),
+        (TapKind.OPEN, here, SERVER, True, b""),
+        (TapKind.DATA, here, SERVER, True, b"\1\2"),
+        (TapKind.DATA, here, SERVER, False, b"\3"),
+        (TapKind.FIN, here, SERVER, True, b""),
+        (TapKind.FIN, here, SERVER, False, b""),
     ]
 
 

@@ -10,7 +10,7 @@ import pytest
 from fbvm.base.areas import AREAS
 from fbvm.base.memory import Memory
 from fbvm.code.compiler import compile_text
-from fbvm.record.trace import images
+from fbvm.record.trace import memory_images
 
 ALL = {"CIO": 6144, "W": 512, "H": 512, "D": 32768}
 
@@ -26,8 +26,8 @@ def test_there_and_back(tmp_path: Path) -> None:
     places = [("CIO", 0), ("CIO", 1499), ("CIO", 6143), ("W", 511), ("H", 7), ("D", 0), ("D", 32767)]
     for number, (area, word) in enumerate(places):
         one.words(area)[word] = 0x8000 + number
-    images.save(one, path, ALL)
-    images.load(other, path)
+    memory_images.save(one, path, ALL)
+    memory_images.load(other, path)
     assert [other.words(area)[word] for area, word in places] == [0x8000 + number for number in range(len(places))]
     assert other.words("D")[1:32767].tolist() == 32766 * [0]
 
@@ -35,7 +35,7 @@ def test_there_and_back(tmp_path: Path) -> None:
 def test_the_form_of_the_file(tmp_path: Path) -> None:
     path, one = tmp_path / "image.json", memory()
     one.words("D")[2] = 7
-    images.save(one, path, ALL)
+    memory_images.save(one, path, ALL)
     assert json.loads(path.read_text()) == {"spaces": {"CIO": [], "W": [], "H": [], "D": [0, 0, 7]}}
     assert list(tmp_path.iterdir()) == [path]
 
@@ -43,7 +43,7 @@ def test_the_form_of_the_file(tmp_path: Path) -> None:
 def test_a_part_of_an_area(tmp_path: Path) -> None:
     path, one = tmp_path / "image.json", memory()
     one.words("CIO")[0:3] = memoryview(b"\1\0\2\0\3\0").cast("H")
-    images.save(one, path, {"CIO": 2})
+    memory_images.save(one, path, {"CIO": 2})
     assert json.loads(path.read_text()) == {"spaces": {"CIO": [1, 2]}}
 
 
@@ -51,10 +51,10 @@ def test_words_of_units_are_neither_saved_nor_loaded(tmp_path: Path) -> None:
     path, one = tmp_path / "image.json", memory()
     for area, word in (("CIO", 1500), ("CIO", 1899), ("D", 30000), ("D", 31599)):
         one.words(area)[word] = 1
-    images.save(one, path, ALL)
+    memory_images.save(one, path, ALL)
     assert json.loads(path.read_text())["spaces"] == {"CIO": [], "W": [], "H": [], "D": []}
     path.write_text(json.dumps({"spaces": {"CIO": 1901 * [5]}}))
-    images.load(one, path)
+    memory_images.load(one, path)
     assert one.words("CIO")[1499:1501].tolist() == [5, 1]
     assert one.words("CIO")[1899:1901].tolist() == [1, 5]
 
@@ -63,7 +63,7 @@ def test_spaces_that_the_file_lacks_stay(tmp_path: Path) -> None:
     path, one = tmp_path / "image.json", memory()
     one.words("D")[0:3] = memoryview(b"\1\0\2\0\3\0").cast("H")
     path.write_text('{"spaces": {"D": [9]}}')
-    images.load(one, path)
+    memory_images.load(one, path)
     assert one.words("D")[0:3].tolist() == [9, 2, 3]
 
 
@@ -86,6 +86,6 @@ def test_what_is_no_image(name: str, tmp_path: Path) -> None:
     text, said = WRONG[name]
     path, one = tmp_path / "image.json", memory()
     path.write_text(text)
-    with pytest.raises(images.ImageError, match=said):
-        images.load(one, path)
+    with pytest.raises(memory_images.ImageError, match=said):
+        memory_images.load(one, path)
     assert one.words("D")[0] == 0, "nothing has been written"

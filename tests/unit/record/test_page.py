@@ -14,14 +14,14 @@ import pytest
 from trace_rig import image, record, traced
 
 from fbvm.machine.plc import Plc
-from fbvm.record.draw.svg import Drawing
+from fbvm.record.draw.svg import SvgChart
 from fbvm.record.page import data as module
 from fbvm.record.page.data import page_data
 from fbvm.record.page.page import page
+from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import Signal
 from fbvm.record.trace.signals import recording
-from fbvm.record.trace.traffic import Passed
 from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import Place, UnknownPlace
 from fbvm.wire.link import Peer
@@ -36,7 +36,7 @@ def text(trace: Trace, name: str, scan: int) -> str:
     place = trace.find(name)
     assert isinstance(place, Place)
     value = trace.at(scan).read(place)
-    return str(int(value)) if isinstance(value, bool) else Signal(place, name).said(value)
+    return str(int(value)) if isinstance(value, bool) else Signal(place, name).display(value)
 
 
 @pytest.mark.slow
@@ -140,8 +140,8 @@ def test_the_page_holds_everything_and_asks_for_nothing() -> None:
 SPACE = "{http://www.w3.org/2000/svg}"
 
 
-def drawn(trace: Trace, *names: str, passed: tuple[tuple[int, Passed], ...] = ()) -> ElementTree.Element:
-    return ElementTree.fromstring(Drawing(recording(trace, names), passed, "a <run>").text())
+def drawn(trace: Trace, *names: str, passed: tuple[tuple[int, Packet], ...] = ()) -> ElementTree.Element:
+    return ElementTree.fromstring(SvgChart(recording(trace, names), passed, "a <run>").text())
 
 
 def test_bits_are_bars_and_numbers_steps() -> None:
@@ -156,8 +156,8 @@ def test_bits_are_bars_and_numbers_steps() -> None:
 
 def test_frames_are_arrows() -> None:
     unit, server = Peer("192.168.250.21", 1), Peer("192.168.250.1", 502)
-    passed = ((3, Passed(0, unit, server, "asks & waits")), (4, Passed(0, server, unit, "answers")),
-              (99, Passed(0, unit, server, "behind the end")))  # fmt: skip
+    passed = ((3, Packet(0, unit, server, "asks & waits")), (4, Packet(0, server, unit, "answers")),
+              (99, Packet(0, unit, server, "behind the end")))  # fmt: skip
     svg = drawn(traced(20), "D200", passed=passed)
     arrows = [row for row in svg.iter(f"{SPACE}path") if row.get("class") in ("in", "out")]
     assert [(row.get("class"), row.findtext(f"{SPACE}title")) for row in arrows] == [

@@ -20,7 +20,7 @@ from fbvm.record.export.pcapng import Capture
 from fbvm.wire import modbus
 from fbvm.wire.link import Bind, Close, Connect, Event, Grant, Listen, Peer, Received, Send, SendTo
 from fbvm.wire.modbus import Adu
-from fbvm.wire.tap import Happening, What
+from fbvm.wire.tap import TapEvent, TapKind
 
 SERVER = Peer("192.168.250.1", 502)
 UNIT = "192.168.250.2"
@@ -85,7 +85,7 @@ def test_the_file_begins_with_its_section_and_names_its_interfaces() -> None:
     file = io.BytesIO()
     capture = Capture(file)
     for unit in ("10.0.0.1", "10.0.0.2", "10.0.0.1"):
-        capture.tap(0, unit, Happening(What.UDP, Peer(unit, 1), Peer("10.0.0.9", 2), True, b"x"))
+        capture.tap(0, unit, TapEvent(TapKind.UDP, Peer(unit, 1), Peer("10.0.0.9", 2), True, b"x"))
     kinds = [kind for kind, _ in blocks(file.getvalue())]
     assert kinds == [0x0A0D0D0A, 1, 6, 1, 6, 6]
     assert b"10.0.0.2" in file.getvalue()
@@ -96,7 +96,7 @@ def test_a_comment_names_the_scan() -> None:
     capture = Capture(file, comment=lambda address: f"{address}: {said}")
     for scan in (7, 12):
         said = f"scan {scan}"
-        capture.tap(0, UNIT, Happening(What.UDP, Peer(UNIT, 1), SERVER, True, b"x"))
+        capture.tap(0, UNIT, TapEvent(TapKind.UDP, Peer(UNIT, 1), SERVER, True, b"x"))
     packets = [body for kind, body in blocks(file.getvalue()) if kind == 6]
     for body, number in zip(packets, ("7", "12"), strict=True):
         size = struct.unpack_from("<I", body, 12)[0]
@@ -109,11 +109,11 @@ def test_a_refused_connection_and_a_tap_that_came_late() -> None:
     file = io.BytesIO()
     capture = Capture(file)
     here = Peer(UNIT, 5000)
-    for what, out in [(What.SYN, True), (What.RST, False), (What.DATA, True)]:
-        capture.tap(0, UNIT, Happening(what, here, SERVER, out, b"late" if what is What.DATA else b""))
+    for what, out in [(TapKind.SYN, True), (TapKind.RST, False), (TapKind.DATA, True)]:
+        capture.tap(0, UNIT, TapEvent(what, here, SERVER, out, b"late" if what is TapKind.DATA else b""))
     other = Peer(UNIT, 5001)
-    capture.tap(0, UNIT, Happening(What.DATA, other, SERVER, True, b"mid"))
-    capture.tap(0, UNIT, Happening(What.OPEN, other, SERVER, True))
+    capture.tap(0, UNIT, TapEvent(TapKind.DATA, other, SERVER, True, b"mid"))
+    capture.tap(0, UNIT, TapEvent(TapKind.OPEN, other, SERVER, True))
     assert [(sender, flags, data) for _, sender, flags, data in segments(file.getvalue())] == [
         (UNIT, SYN, b""),
         (SERVER.host, RST | ACK, b""),

@@ -10,8 +10,8 @@ from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Phase, Plc
 from fbvm.record.draw.table import ScanTable
-from fbvm.record.trace.events import Began, Ended, Event, Inside, Read, Statement, Write
-from fbvm.record.trace.history import History, looking
+from fbvm.record.trace.events import Call, Event, ObservedEngine, Read, Return, Statement, Write
+from fbvm.record.trace.history import History, observing
 from fbvm.record.trace.recorder import Signal, signals_of
 from fbvm.watch.names import Names
 
@@ -84,7 +84,7 @@ class Log:
 
 def look(plc: Plc) -> Log:
     log = Log()
-    with looking(plc, log):
+    with observing(plc, log):
         plc.scan()
     return log
 
@@ -93,15 +93,15 @@ def look(plc: Plc) -> Log:
 
 
 def test_bodies_begin_and_end_as_they_call_each_other(plc: Plc, names: Names) -> None:
-    shown = [(type(row).__name__, names.instance(row.frame.base)) for row in look(plc).rows if isinstance(row, Began | Ended)]
+    shown = [(type(row).__name__, names.instance(row.frame.base)) for row in look(plc).rows if isinstance(row, Call | Return)]
     assert shown == [
-        ("Began", "Main"), ("Began", "Main.Steps[1]"), ("Began", "Main.Steps[1].Inner"), ("Ended", "Main.Steps[1].Inner"),
-        ("Ended", "Main.Steps[1]"), ("Began", ""), ("Ended", ""), ("Ended", "Main"),
+        ("Call", "Main"), ("Call", "Main.Steps[1]"), ("Call", "Main.Steps[1].Inner"), ("Return", "Main.Steps[1].Inner"),
+        ("Return", "Main.Steps[1]"), ("Call", ""), ("Return", ""), ("Return", "Main"),
     ]  # fmt: skip
 
 
 def test_a_frame_knows_the_statement_that_called(plc: Plc, image: Image) -> None:
-    inner = look(plc).of(Began)[2].frame
+    inner = look(plc).of(Call)[2].frame
     assert image.sites[inner.site].line == 7
     assert image.sites[inner.caller.site].line == 24
     assert inner.caller.caller.site == -1
@@ -143,20 +143,20 @@ def test_a_trap_comes_back_and_nothing_returns() -> None:
     plc = Plc(made)
     log = look(plc)
     assert plc.trap and plc.trap.code == "R0101"
-    assert not log.of(Ended)
+    assert not log.of(Return)
 
 
 def test_the_engine_is_given_back(plc: Plc) -> None:
     engine = plc.engine
-    with looking(plc, Log()):
-        assert isinstance(plc.engine, Inside)
+    with observing(plc, Log()):
+        assert isinstance(plc.engine, ObservedEngine)
     assert plc.engine is engine
     assert not plc.phases
 
 
 def test_looking_changes_nothing(image: Image) -> None:
     plain, seen = Plc(image), Plc(image)
-    with looking(seen, Log()):
+    with observing(seen, Log()):
         for scan in range(5):
             for plc in (plain, seen):
                 plc.write("Main.Go", scan % 2 == 1)
@@ -267,7 +267,7 @@ def table(plc: Plc, names: Names, *signals: str, every: bool = False) -> ScanTab
 
 def test_a_row_where_something_changed(plc: Plc, names: Names) -> None:
     made = table(plc, names, "Main.Go", "Main.n", "Main.m")
-    with looking(plc, made):
+    with observing(plc, made):
         plc.scan()
         plc.write("Main.Go", True)
         plc.scan()
@@ -282,7 +282,7 @@ scan 1   10ms
 
 def test_every_statement_if_wanted(plc: Plc, names: Names) -> None:
     made = table(plc, names, "D200", every=True)
-    with looking(plc, made):
+    with observing(plc, made):
         plc.scan()
     labels = [row.label for row in made.bands[0].rows]
     assert labels[:4] == ["inputs", "steps.st:24", "steps.st:7", "R_TRIG.st:13"]
@@ -291,7 +291,7 @@ def test_every_statement_if_wanted(plc: Plc, names: Names) -> None:
 
 def test_who_wrote_last_also_if_nothing_changed(plc: Plc, names: Names) -> None:
     made = table(plc, names, "Main.m", "Main.Lamp")
-    with looking(plc, made):
+    with observing(plc, made):
         plc.run(scans=3)
     m, lamp = made.signals
     assert made.last_change(m) is None
@@ -302,6 +302,6 @@ def test_who_wrote_last_also_if_nothing_changed(plc: Plc, names: Names) -> None:
 
 def test_bits_of_a_word_are_told_apart(plc: Plc, names: Names) -> None:
     made = table(plc, names, "CIO 100.03", "CIO 100.04", "CIO 100")
-    with looking(plc, made):
+    with observing(plc, made):
         plc.scan()
     assert [isinstance(signal, Signal) and signal in made.writers for signal in made.signals] == [True, False, True]

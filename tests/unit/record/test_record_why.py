@@ -10,7 +10,7 @@ from trace_rig import image, press, traced
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Phase, Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.record.draw.why import Cause, told, why
+from fbvm.record.draw.why import Cause, cause_text, why
 from fbvm.record.trace.outline import outer_statements
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.writer import Depth, TraceWriter
@@ -45,7 +45,7 @@ def test_conditions_around_a_statement_count(trace: Trace) -> None:
 
 
 def test_the_chain_goes_back_to_what_came_from_outside(trace: Trace) -> None:
-    text = told(trace, ask(trace, "Main.Pump", 41))
+    text = cause_text(trace, ask(trace, "Main.Pump", 41))
     assert text.splitlines()[0] == "Main.Pump = TRUE since scan 8 (80ms), by pump.st:17 in Main:  Pump := Delay.Q;"
     assert "Main.Start = TRUE since scan 3 (30ms), from outside the program" in text
     assert "(see above)" in text
@@ -53,19 +53,19 @@ def test_the_chain_goes_back_to_what_came_from_outside(trace: Trace) -> None:
 
 @pytest.mark.slow
 def test_each_scan_has_its_own_answer(trace: Trace) -> None:
-    assert "FALSE since power-on" in told(trace, ask(trace, "Main.Pump", 7))
-    assert "FALSE since scan 150" in told(trace, ask(trace, "Main.Pump", 299))
+    assert "FALSE since power-on" in cause_text(trace, ask(trace, "Main.Pump", 7))
+    assert "FALSE since scan 150" in cause_text(trace, ask(trace, "Main.Pump", 299))
 
 
 def test_only_so_deep(trace: Trace) -> None:
-    assert len(told(trace, ask(trace, "Main.Pump", 41, 0)).splitlines()) == 1
-    assert len(told(trace, ask(trace, "Main.Pump", 41, 1)).splitlines()) == 2
+    assert len(cause_text(trace, ask(trace, "Main.Pump", 41, 0)).splitlines()) == 1
+    assert len(cause_text(trace, ask(trace, "Main.Pump", 41, 1)).splitlines()) == 2
 
 
 @pytest.mark.slow
 def test_what_is_long_ago_is_found() -> None:
     trace = traced(400, Depth.STATEMENTS)
-    assert "FALSE since scan 150" in told(trace, ask(trace, "Main.Pump", 399))
+    assert "FALSE since scan 150" in cause_text(trace, ask(trace, "Main.Pump", 399))
 
 
 def test_a_trace_that_begins_later_says_so() -> None:
@@ -77,7 +77,7 @@ def test_a_trace_that_begins_later_says_so() -> None:
     plc.run(scans=5)
     writer.close()
     trace = Trace(io.BytesIO(file.getvalue()))
-    assert told(trace, ask(trace, "Main.Pump", 24)) == "Main.Pump = TRUE since the trace begins"
+    assert cause_text(trace, ask(trace, "Main.Pump", 24)) == "Main.Pump = TRUE since the trace begins"
 
 
 def test_a_unit_changes_words_in_the_refresh() -> None:
@@ -169,7 +169,7 @@ def test_what_lies_behind_a_reference_is_explained_where_it_lies() -> None:
     plc.run(scans=3)
     writer.close()
     trace = Trace(io.BytesIO(file.getvalue()))
-    lines = {name: told(trace, ask(trace, name, 2, 0)) for name in ("Main.r^", "Main.f", "Main.add.total", "Main.none^")}
+    lines = {name: cause_text(trace, ask(trace, name, 2, 0)) for name in ("Main.r^", "Main.f", "Main.add.total", "Main.none^")}
     assert lines == {
         "Main.r^": "Main.r^ (Main.a) = 3 since scan 2 (20ms), by pump.st:6 in Main",
         "Main.f": "Main.f (Main.b) = 3 since scan 2 (20ms), by pump.st:2 in Main.add",
@@ -189,7 +189,7 @@ def test_an_interlock_is_why_its_outputs_are_off() -> None:
     plc.run(scans=5)
     writer.close()
     trace = Trace(io.BytesIO(file.getvalue()))
-    assert told(trace, ask(trace, "Main.Motor", 9, 1)).splitlines()[1:] == [
+    assert cause_text(trace, ask(trace, "Main.Motor", 9, 1)).splitlines()[1:] == [
         "├ if Main.Go = TRUE since power-on",
         "└ if Main.Stop = TRUE since scan 5 (50ms), from outside the program",
     ]

@@ -9,7 +9,7 @@ from fbvm.record.trace.requests import RequestLog
 from fbvm.wire import modbus
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus import Adu, exception_reply
-from fbvm.wire.tap import Happening, What
+from fbvm.wire.tap import TapEvent, TapKind
 
 UNIT = Peer("192.168.250.21", 502)
 CLIENT, OTHER = Peer("127.0.0.1", 50001), Peer("127.0.0.1", 50002)
@@ -24,10 +24,10 @@ class Told:
         self.log = RequestLog(self.file, 1_700_000_000_000_000_000, lambda: self.scans)
 
     def data(self, out: bool, data: bytes, remote: Peer = CLIENT) -> None:
-        self.log.tap(500_000_000, UNIT.host, Happening(What.DATA, UNIT, remote, out, data))
+        self.log.tap(500_000_000, UNIT.host, TapEvent(TapKind.DATA, UNIT, remote, out, data))
 
-    def end(self, what: What = What.RST) -> None:
-        self.log.tap(0, UNIT.host, Happening(what, UNIT, CLIENT, True))
+    def end(self, what: TapKind = TapKind.RST) -> None:
+        self.log.tap(0, UNIT.host, TapEvent(what, UNIT, CLIENT, True))
 
     def rows(self) -> list[dict[str, object]]:
         return [json.loads(line) for line in self.file.getvalue().splitlines()]
@@ -85,7 +85,7 @@ def test_frames_of_another_protocol_are_no_requests() -> None:
 
 
 def test_a_new_connection_begins_anew() -> None:
-    for what in (What.RST, What.OPEN):
+    for what in (TapKind.RST, TapKind.OPEN):
         told = Told()
         told.data(False, adu(modbus.read(3, 1, 1)) + b"\0\1\0")
         told.end(what)

@@ -12,7 +12,7 @@ from fbvm.code.compiler import compile_text
 from fbvm.code.image import SfcPicture
 from fbvm.record.draw import sfc_text as drawing
 from fbvm.record.draw.ladder_svg import ladder_svg
-from fbvm.record.draw.sfc_text import Sighted, sfc_surface, sfc_text
+from fbvm.record.draw.sfc_text import ChartState, sfc_surface, sfc_text
 from fbvm.syntax.ladder.drawing.box_lines import Surface
 
 BATCH = """
@@ -89,10 +89,10 @@ def test_simultaneous_sequences_stand_between_double_lines() -> None:
 
 
 def test_a_scan_shows_its_active_steps_and_what_became_of_conditions() -> None:
-    lines = sfc_text(picture(BATCH), seen=Sighted(frozenset({3}), {1: True}))
+    lines = sfc_text(picture(BATCH), seen=ChartState(frozenset({3}), {1: True}))
     assert "● Draining" in "\n".join(lines) and "● Idle" not in "\n".join(lines)
     assert any("╺╋╸ (1) done: full AND hot → TRUE" in line for line in lines)
-    waiting = "\n".join(sfc_text(picture(BATCH), seen=Sighted(frozenset({1, 2}), {1: False})))
+    waiting = "\n".join(sfc_text(picture(BATCH), seen=ChartState(frozenset({1, 2}), {1: False})))
     assert "╶┼╴ (1) done: full AND hot → FALSE" in waiting and waiting.count("●") == 2
 
 
@@ -142,6 +142,6 @@ def test_every_chart_has_a_drawing(width: int, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_a_picture_has_the_same_text() -> None:
-    surface = sfc_surface(picture(BATCH), 80, Sighted(frozenset({1}), {0: True}))
+    surface = sfc_surface(picture(BATCH), 80, ChartState(frozenset({1}), {0: True}))
     svg = ladder_svg([("PROGRAM Main", surface)])
     assert all(f">{word}<" in svg for word in ("PROGRAM Main", "heater", "L T#5s")) and 'class="power"' in svg

@@ -20,9 +20,9 @@ from fbvm.machine.plc import Phase, Plc
 from fbvm.record.draw.chart import draw
 from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace import symbols
-from fbvm.record.trace.events import Began, Ended, Event, Frame, Read, Statement, Write
+from fbvm.record.trace.events import Call, Event, Frame, Read, Return, Statement, Write
 from fbvm.record.trace.format import MAGIC, Cursor, TraceError, put, xor
-from fbvm.record.trace.history import looking
+from fbvm.record.trace.history import observing
 from fbvm.record.trace.selection import select
 from fbvm.record.trace.signals import recording
 from fbvm.record.trace.writer import START
@@ -136,7 +136,7 @@ def test_a_trace_tells_what_a_listener_was_told() -> None:
 
 
 @pytest.mark.parametrize(("depth", "kinds"), [
-    (Depth.SCANS, set()), (Depth.WRITES, {Began, Write}), (Depth.STATEMENTS, {Began, Ended, Statement, Read, Write}),
+    (Depth.SCANS, set()), (Depth.WRITES, {Call, Write}), (Depth.STATEMENTS, {Call, Return, Statement, Read, Write}),
 ])  # fmt: skip
 def test_each_depth_holds_its_events(depth: Depth, kinds: set[type]) -> None:
     found: set[type] = set()
@@ -159,7 +159,7 @@ def test_the_scan_table_of_a_trace_is_that_of_the_plc() -> None:
     made = recording(trace, ["Main.Start", "Main.Pump", "D200"])
     signals = [track.signal for track in made.tracks]
     live, told = ScanTable(plc.image.sites, names, signals), ScanTable(trace.sites, trace.names, signals)
-    with looking(plc, live):
+    with observing(plc, live):
         for _ in range(12):
             press(plc)
             plc.scan()

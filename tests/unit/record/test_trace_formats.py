@@ -13,22 +13,22 @@ from trace_rig import image, traced
 
 from fbvm.machine.plc import Plc
 from fbvm.record.export.vcd import write_vcd
+from fbvm.record.trace.csv_reader import CsvError, read_csv
+from fbvm.record.trace.csv_writer import write_csv
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import Recorder, Recording
-from fbvm.record.trace.rows import write_rows
-from fbvm.record.trace.rows_reader import RowsError, read_rows
 from fbvm.record.trace.signals import recording
 
 
 def rows(made: Recording) -> str:
     file = io.StringIO(newline="")
-    write_rows(made, file)
+    write_csv(made, file)
     return file.getvalue()
 
 
 def as_trace(text: str) -> Trace:
     out = io.BytesIO()
-    read_rows(io.StringIO(text, newline=""), out)
+    read_csv(io.StringIO(text, newline=""), out)
     return Trace(io.BytesIO(out.getvalue()))
 
 
@@ -111,8 +111,8 @@ def test_a_table_from_elsewhere_becomes_a_trace() -> None:
     ("scan,time_ms,D5\n1,5,99999\n", "line 2: D5: 99999 is out of range"),
 ])  # fmt: skip
 def test_what_is_no_such_table(text: str, said: str) -> None:
-    with pytest.raises(RowsError, match=said):
-        read_rows(io.StringIO(text, newline=""), io.BytesIO())
+    with pytest.raises(CsvError, match=said):
+        read_csv(io.StringIO(text, newline=""), io.BytesIO())
 
 
 @pytest.mark.slow

@@ -12,9 +12,9 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.ladder_svg import ladder_svg
 from fbvm.record.draw.ladder_text import ladder_surface, ladder_text
-from fbvm.record.draw.power import Executed, Power
-from fbvm.record.draw.rung_values import Values
-from fbvm.record.trace.history import looking
+from fbvm.record.draw.power import PowerFlow, RungExecution
+from fbvm.record.draw.rung_values import RungValues
+from fbvm.record.trace.history import observing
 from fbvm.syntax.ladder.drawing.widths import Sight
 
 
@@ -118,13 +118,13 @@ def test_no_line_is_wider_than_asked(width: int) -> None:
 # --- power --------------------------------------------------------------------------------------------------------
 
 
-def executed(rungs: str, on: str, declarations: str = "a, b, c, d, e, f : BOOL;") -> list[Executed]:
+def executed(rungs: str, on: str, declarations: str = "a, b, c, d, e, f : BOOL;") -> list[RungExecution]:
     """What the first scan saw with these variables ON."""
     plc = Plc(image(rungs, declarations))
-    power = Power(plc.image.rungs, lambda scan: scan == 0)
+    power = PowerFlow(plc.image.rungs, lambda scan: scan == 0)
     for name in on:
         plc.write(f"Main.{name}", True)
-    with looking(plc, power):
+    with observing(plc, power):
         plc.scan()
         plc.scan()
     return power.executed
@@ -168,8 +168,8 @@ def test_power_behind_a_block_is_its_ENO() -> None:
     made = compile_text(f"{block}PROGRAM Main VAR a, b : BOOL; END_VAR\nLADDER\n{rungs}\nEND_LADDER\nEND_PROGRAM")
     plc = Plc(made.image)  # type: ignore[arg-type]
     plc.write("Main.a", True)
-    power = Power(plc.image.rungs, lambda scan: True)
-    with looking(plc, power):
+    power = PowerFlow(plc.image.rungs, lambda scan: True)
+    with observing(plc, power):
         plc.scan()
     made = power.executed[0]
     assert ladder_text(made.picture, sight=Sight(made.states))[2] == "┣━━┫ ┣━━━┥EN        ENO├──────( )──┤"
@@ -179,10 +179,10 @@ def test_values_are_those_that_the_rung_read() -> None:
     """The second rung changes what the first one compared and gave to the block."""
     declared = "n : INT; d : WORD := 7; b : BOOL; t : CTU;"
     plc = Plc(image("LD> d &5\nFBCALL CTU t PV:=n\nOUT b\nLD P_On\n++ d", declared))
-    values = Values(plc.image, plc.memory.areas)
-    power = Power(plc.image.rungs, lambda scan: scan == 0, values.keep)
+    values = RungValues(plc.image, plc.memory.areas)
+    power = PowerFlow(plc.image.rungs, lambda scan: scan == 0, values.keep)
     plc.write("Main.n", 3)
-    with looking(plc, power):
+    with observing(plc, power):
         plc.scan()
     first = power.executed[0]
     assert ladder_text(first.picture, sight=Sight(first.states, values=values.of(first)))[1:] == text("""
@@ -211,8 +211,8 @@ def test_each_instance_has_its_own_power() -> None:
         END_FUNCTION_BLOCK
         PROGRAM Main VAR one, two : Lamp; END_VAR one(on := TRUE); two(on := FALSE); END_PROGRAM
     """).image)
-    power = Power(plc.image.rungs, lambda scan: True)
-    with looking(plc, power):
+    power = PowerFlow(plc.image.rungs, lambda scan: True)
+    with observing(plc, power):
         plc.scan()
     assert [made.states for made in power.executed] == [{0: [True], 1: [True]}, {0: [False], 1: [False]}]
     assert power.executed[0].base != power.executed[1].base

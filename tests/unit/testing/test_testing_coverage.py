@@ -12,8 +12,8 @@ from test_testing_plugin import run
 
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
-from fbvm.record.trace.branches import forks, statements
-from fbvm.record.trace.history import looking
+from fbvm.record.trace.branches import branches, statements
+from fbvm.record.trace.history import observing
 from fbvm.testing.coverage import PAST, Coverage, FileCoverage
 from fbvm.testing.coverage_report import cobertura, percent, table, write_pages
 from fbvm.testing.subject import subject
@@ -60,7 +60,7 @@ def counted(file: Path, *which: int) -> Coverage:
     coverage = Coverage()
     what = subject([file], "")
     plc = Plc(what.image)
-    with looking(plc, coverage.listener(what)):
+    with observing(plc, coverage.listener(what)):
         for value in which:
             plc.write("Test.Block.Which", value)
             plc.scan()
@@ -94,7 +94,7 @@ def test_rungs_that_were_jumped_over_are_missing(tmp_path: Path) -> None:
     file.write_text(f"PROGRAM Main\nLADDER\n{rungs}END_LADDER\nEND_PROGRAM\n", encoding="utf-8")
     coverage, what = Coverage(), subject([file], "")
     plc = Plc(what.image)
-    with looking(plc, coverage.listener(what)):
+    with observing(plc, coverage.listener(what)):
         plc.scan()
         assert only(coverage).missing == [6]
         plc.write("W0.00", True)
@@ -159,7 +159,7 @@ END_IF
 t(EN := b > 1, IN := TRUE);
 END_PROGRAM""").image
     assert image is not None
-    shown = [(image.sites[fork.site].line, [image.sites[way].line for way in fork.ways], fork.past) for fork in forks(image)
+    shown = [(image.sites[fork.site].line, [image.sites[way].line for way in fork.ways], fork.past) for fork in branches(image)
              if image.sites[fork.site].pou == "Main"]  # fmt: skip
     assert shown == [(3, [4, 6, 8], False)]
     lines = sorted(image.sites[number].line for number in statements(image) if image.sites[number].pou == "Main")

@@ -23,7 +23,7 @@ MS = " [ms]"
 DURATIONS = frozenset(("TIME", "LTIME"))
 
 
-def write_rows(recording: Recording, file: TextIO) -> None:
+def write_csv(recording: Recording, file: TextIO) -> None:
     """Writes a recording; open the file with `newline=""`."""
     writer = csv.writer(file, lineterminator="\n")
     signals = [track.signal for track in recording.tracks]

@@ -14,7 +14,7 @@ from fbvm.base.types import BOOL, LINT, LREAL, TIME, ULINT, Field, StructType, T
 from fbvm.check.declarations.size_limits import MAX_SIZE
 from fbvm.code.image import Image, Layout
 from fbvm.machine.plc import Plc
-from fbvm.record.trace.rows import MS, SCAN, TIME_MS
+from fbvm.record.trace.csv_writer import MS, SCAN, TIME_MS
 from fbvm.record.trace.writer import TraceWriter
 
 LONGEST_TEXT = 254
@@ -29,7 +29,7 @@ Parts: TypeAlias = "dict[Step, Parts | Type]"
 """The members or the elements of a variable."""
 
 
-class RowsError(ValueError):
+class CsvError(ValueError):
     """The text is no such table; the message names the line."""
 
 
@@ -42,14 +42,14 @@ class Column:
     read: Callable[[str], Any]
 
 
-def read_rows(file: TextIO, out: BinaryIO) -> int:
+def read_csv(file: TextIO, out: BinaryIO) -> int:
     """Writes a trace of the scans that a table describes; returns how many.  Raises RowsError."""
     rows = list(csv.reader(file))
     if not rows or rows[0][:2] != [SCAN, TIME_MS]:
-        raise RowsError(f"line 1: the first two columns are {SCAN} and {TIME_MS}")
+        raise CsvError(f"line 1: the first two columns are {SCAN} and {TIME_MS}")
     for number, row in enumerate(rows[1:], 2):
         if len(row) != len(rows[0]):
-            raise RowsError(f"line {number}: {len(row)} cells, {len(rows[0])} expected")
+            raise CsvError(f"line {number}: {len(row)} cells, {len(rows[0])} expected")
     columns = _columns(rows[0], rows[1:])
     plc = Plc(_image(columns), engine="python")
     writer = TraceWriter(plc, out, selected=[column.name for column in columns])
@@ -61,7 +61,7 @@ def read_rows(file: TextIO, out: BinaryIO) -> int:
                     plc.write(column.name, column.read(cell))
             plc.scan(_nanoseconds(row[1]))
         except (ValueError, TypeError, ArithmeticError) as error:
-            raise RowsError(f"line {number}: {error}") from None
+            raise CsvError(f"line {number}: {error}") from None
     writer.close()
     return len(rows) - 1
 
@@ -119,21 +119,21 @@ def _is_address(name: str) -> bool:
 def _plant(tree: Parts, column: Column) -> None:
     """Adds a variable to the tree of all variables."""
     if not _PATH.fullmatch(column.name):
-        raise RowsError(f"line 1: {column.name!r} is neither a path of names nor an address")
+        raise CsvError(f"line 1: {column.name!r} is neither a path of names nor an address")
     steps: list[Step] = [name or tuple(map(int, subscripts.split(","))) for name, subscripts in _STEP.findall(column.name)]
     inner, owner = tree, ""
     for number, step in enumerate(steps):
         if inner and type(step) is not type(next(iter(inner))):
-            raise RowsError(f"line 1: {owner} has elements and members")
+            raise CsvError(f"line 1: {owner} has elements and members")
         owner = step if isinstance(step, str) else owner
         if number == len(steps) - 1:
             if step in inner:
-                raise RowsError(f"line 1: {column.name} stands there twice")
+                raise CsvError(f"line 1: {column.name} stands there twice")
             inner[step] = column.type
             return
         below = inner.setdefault(step, {})
         if isinstance(below, Type):
-            raise RowsError(f"line 1: {owner} is a variable and has members")
+            raise CsvError(f"line 1: {owner} is a variable and has members")
         inner = below
 
 
@@ -144,11 +144,11 @@ def _type(name: str, what: Parts | Type) -> Type:
     subscripts = [step for step in what if isinstance(step, tuple)]
     if subscripts:
         if len({len(one) for one in subscripts}) > 1:
-            raise RowsError(f"line 1: the elements of {name} differ")
+            raise CsvError(f"line 1: the elements of {name} differ")
         bounds = tuple((min(along), max(along)) for along in zip(*subscripts, strict=True))
         kind = array(bounds, _type(name, _united(name, list(what.values()))))
         if kind.size > MAX_SIZE:
-            raise RowsError(f"line 1: {name} has {kind.count} elements, and no memory holds them")
+            raise CsvError(f"line 1: {name} has {kind.count} elements, and no memory holds them")
         return kind
     fields, at = {}, 0
     for inner, part in what.items():
@@ -165,7 +165,7 @@ def _united(name: str, elements: list[Parts | Type]) -> Parts | Type:
     for other in more:
         if isinstance(first, Type) or isinstance(other, Type):
             if first != other:
-                raise RowsError(f"line 1: the elements of {name} differ")
+                raise CsvError(f"line 1: the elements of {name} differ")
             continue
         first = {step: _united(name, [part[step] for part in (first, other) if step in part]) for step in (*first, *other)}
     return first

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 from fbvm.base.types import BOOL
 from fbvm.code.image import SfcPicture
 from fbvm.machine.plc import Phase
-from fbvm.record.draw.sfc_text import Sighted
-from fbvm.record.draw.table import Scanned
+from fbvm.record.draw.sfc_text import ChartState
+from fbvm.record.draw.table import ScanState
 from fbvm.record.trace.events import Contact, Event, Statement
 from fbvm.watch.paths import Place
 
 
 @dataclass(eq=False)
-class Called:
+class ChartCall:
     """One call of a chart: where its instance begins, which conditions were worked out, and the steps that were active when
     the scan's programs had ended."""
 
@@ -26,40 +26,40 @@ class Called:
     active: frozenset[int] = frozenset()
 
     @property
-    def sighted(self) -> Sighted:
-        return Sighted(self.active, self.tested)
+    def sighted(self) -> ChartState:
+        return ChartState(self.active, self.tested)
 
 
-def active_steps(picture: SfcPicture, base: int, plc: Scanned) -> frozenset[int]:
+def active_steps(picture: SfcPicture, base: int, plc: ScanState) -> frozenset[int]:
     """The steps of an instance that are active now."""
     return frozenset(number for number, (name, _, flag, _) in enumerate(picture.steps)
                      if plc.read(Place(name, BOOL, base + flag)))
 
 
-class Evolutions:
+class ChartRecorder:
     """A listener that keeps the calls of charts in the scans that `wanted` names, in order."""
 
     def __init__(self, charts: Sequence[SfcPicture], wanted: Callable[[int], bool]) -> None:
-        self.called: list[Called] = []
+        self.called: list[ChartCall] = []
         self._wanted = wanted
         self._charts = {chart.site: chart for chart in charts}
         self._transitions = {row[0]: (chart.site, number) for chart in charts
                              for number, row in enumerate(chart.transitions)}  # fmt: skip
-        self._latest: dict[tuple[int, int], Called] = {}
+        self._latest: dict[tuple[int, int], ChartCall] = {}
 
-    def phase(self, plc: Scanned, phase: Phase) -> None:
+    def phase(self, plc: ScanState, phase: Phase) -> None:
         """The programs of a scan have ended, or nothing is left from the scan before."""
         for called in self._latest.values():
             called.active = active_steps(called.picture, called.base, plc)
         if phase is Phase.INPUTS:
             self._latest.clear()
 
-    def event(self, plc: Scanned, event: Event) -> None:
+    def event(self, plc: ScanState, event: Event) -> None:
         """Follow the calls of charts and their transitions."""
         if not self._wanted(plc.scans):
             return
         if isinstance(event, Statement) and event.site in self._charts:
-            made = Called(plc.scans, event.frame.base, self._charts[event.site])
+            made = ChartCall(plc.scans, event.frame.base, self._charts[event.site])
             self._latest[event.frame.base, event.site] = made
             self.called.append(made)
         elif isinstance(event, Contact) and event.site in self._transitions:

@@ -8,14 +8,14 @@ from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Phase, Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
-from fbvm.record.trace.events import Event, Passing
+from fbvm.record.trace.events import Event, NetworkEvent
+from fbvm.record.trace.packets import Dissector, add_tap
 from fbvm.record.trace.reader import Moment, Trace
-from fbvm.record.trace.traffic import Reader, listen
 from fbvm.record.trace.writer import TraceWriter
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire import modbus
 from fbvm.wire.link import Peer
-from fbvm.wire.tap import Happening, What
+from fbvm.wire.tap import TapEvent, TapKind
 
 UNIT, SERVER = Peer("192.168.250.21", 49152), Peer("192.168.250.1", 502)
 PROGRAM = """
@@ -27,19 +27,19 @@ END_PROGRAM
 """
 
 
-def said(*happenings: Happening) -> list[str]:
-    reader = Reader()
-    return [passed.said for happening in happenings for passed in reader.read(0, happening)]
+def said(*events: TapEvent) -> list[str]:
+    reader = Dissector()
+    return [packet.info for event in events for packet in reader.dissect(0, event)]
 
 
-def data(out: bool, content: bytes) -> Happening:
-    return Happening(What.DATA, UNIT, SERVER, out, content)
+def data(out: bool, content: bytes) -> TapEvent:
+    return TapEvent(TapKind.DATA, UNIT, SERVER, out, content)
 
 
 def test_frames_are_put_together_however_they_were_cut() -> None:
     asked = modbus.Adu(1, 1, modbus.read(3, 7, 1)).to_bytes()
     reply = modbus.Adu(1, 1, modbus.data_reply(3, b"\0\5")).to_bytes()
-    opening = Happening(What.SYN, UNIT, SERVER, True)
+    opening = TapEvent(TapKind.SYN, UNIT, SERVER, True)
     assert said(opening, data(True, asked[:5]), data(True, asked[5:] + asked), data(False, reply)) == [
         "asks for a connection", "5 bytes, a frame in part",
         "Modbus 1, unit 1: 03 read holding registers, address 7, quantity 1",
@@ -58,10 +58,10 @@ def test_without_its_beginning_a_conversation_is_known_by_the_port() -> None:
 def test_what_is_no_modbus_is_counted() -> None:
     assert said(data(True, b"\0\0\0\0\xff\xff!"), data(True, b"more")) == [
         "7 bytes, no Modbus: length 65535 outside 2..254", "4 bytes"]
-    assert said(Happening(What.UDP, UNIT, SERVER, True, b"x")) == ["datagram of 1 byte"]
-    twice = Happening(What.DATA, UNIT, SERVER, False, b"told twice", True)
+    assert said(TapEvent(TapKind.UDP, UNIT, SERVER, True, b"x")) == ["datagram of 1 byte"]
+    twice = TapEvent(TapKind.DATA, UNIT, SERVER, False, b"told twice", True)
     assert said(twice)[0].startswith("10 bytes")
-    assert list(Reader(once=True).read(0, twice)) == []
+    assert list(Dissector(once=True).dissect(0, twice)) == []
 
 
 class Noted:
@@ -75,8 +75,8 @@ class Noted:
         self._phases = 0 if phase is Phase.REFRESH else self._phases + 1
 
     def event(self, moment: Moment, event: Event) -> None:
-        if isinstance(event, Passing):
-            self.rows.append((moment.scans, event.now_ns, str(event.happening)))
+        if isinstance(event, NetworkEvent):
+            self.rows.append((moment.scans, event.now_ns, str(event.tap_event)))
 
 
 def test_a_trace_keeps_what_passed() -> None:
@@ -85,7 +85,7 @@ def test_a_trace_keeps_what_passed() -> None:
     plc, network, heard = Plc(image), LoopNetwork(), list[tuple[int, int, str]]()
     network.place(SERVER, ModbusPeer())
     plc.attach(Etn21(0, UNIT.host), network)
-    network.tap = lambda now_ns, unit, happening: heard.append((plc.scans, now_ns, str(happening)))
+    network.tap = lambda now_ns, unit, event: heard.append((plc.scans, now_ns, str(event)))
     before, file = network.tap, io.BytesIO()
     writer = TraceWriter(plc, file)
     plc.run(scans=250)
@@ -98,10 +98,10 @@ def test_a_trace_keeps_what_passed() -> None:
 
 
 def test_several_may_listen() -> None:
-    network, first, second = LoopNetwork(), list[Happening](), list[Happening]()
-    assert listen(network, lambda now_ns, unit, happening: first.append(happening)) is None
-    before = listen(network, lambda now_ns, unit, happening: second.append(happening))
-    network.tell_unit(UNIT.host, What.SYN, UNIT, SERVER, True)
+    network, first, second = LoopNetwork(), list[TapEvent](), list[TapEvent]()
+    assert add_tap(network, lambda now_ns, unit, event: first.append(event)) is None
+    before = add_tap(network, lambda now_ns, unit, event: second.append(event))
+    network.tell_unit(UNIT.host, TapKind.SYN, UNIT, SERVER, True)
     network.tap = before
-    network.tell_unit(UNIT.host, What.SYN, UNIT, SERVER, True)
+    network.tell_unit(UNIT.host, TapKind.SYN, UNIT, SERVER, True)
     assert (len(first), len(second)) == (2, 1)
