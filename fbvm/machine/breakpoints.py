@@ -186,7 +186,7 @@ class Breakpoints:
     def _shown(self, found: Place | Span, value: Value) -> str:
         image = self._plc.image
         names = Names.of(image, self._plc.memory.areas)
-        return show(found.type, names.told(found.type, value)) if isinstance(found, Place) else str(value)
+        return show(found.type, names.name_references(found.type, value)) if isinstance(found, Place) else str(value)
 
 
 def find_line(image: Image, where: str) -> tuple[str, frozenset[int]]:

@@ -1,1 +1,1 @@
-"""Stepping: a PLC whose program stands still at any statement of any scan, and can go back."""
+"""A debugger: steps through the statements of a program, scan by scan, forwards and backwards."""

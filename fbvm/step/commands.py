@@ -1,4 +1,4 @@
-"""The language of stepping: a word, and what it is about.  `help` lists it; a line without a word repeats the last move.
+"""The commands of `fbvm step`: a word and its argument.  `help` lists them; an empty line repeats the last move.
 
     run Main.Delay.Q          back scan        force CIO 0.00 = TRUE          print Main.Delay D200..D209
 """
@@ -16,33 +16,33 @@ from fbvm.record.draw.table import ScanTable
 from fbvm.record.draw.why import cause_text, why
 from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.recorder import signals_at
-from fbvm.step.past import Past
+from fbvm.step.breakpoints import Breakpoint, parse_breakpoint
+from fbvm.step.scan_replay import Action
 from fbvm.step.session import Session
-from fbvm.step.targets import Target, target
-from fbvm.step.twin import Act
-from fbvm.step.words import Words
+from fbvm.step.session_events import SessionEvents
+from fbvm.step.stop_report import StopReport
 from fbvm.watch.conditions import ConditionError, parse_condition
 from fbvm.watch.names import is_single
 from fbvm.watch.paths import Place, Span, UnknownPlace
-from fbvm.watch.places import parsed
+from fbvm.watch.places import parse_for
 from fbvm.watch.values import parse_time_ns
 
 LOOK_AHEAD_NS = 60_000_000_000
-"""How far `run` looks for a line or a condition."""
+"""How far `run` executes to find a line or a condition."""
 TABLE_SCANS = 5
 
 
 class CommandError(Exception):
-    """A line that means nothing, or cannot be done here; the message says why."""
+    """A line is no command, or the command cannot be executed here; the message says why."""
 
 
 class ExpectationError(CommandError):
-    """What a script expects does not hold."""
+    """The condition of `expect` does not hold."""
 
 
 @dataclass(frozen=True)
 class Command:
-    """One word of the language."""
+    """A command: its name and short form, its syntax and help; `moves` if it changes the position."""
 
     name: str
     short: str
@@ -50,7 +50,7 @@ class Command:
     help: str
     moves: bool = False
     takes: str = ""
-    """What completes its argument: "place", "line", "command" or nothing."""
+    """What its argument is completed with: "place", "line", "command" or nothing."""
 
 
 COMMANDS = (
@@ -84,30 +84,32 @@ COMMANDS = (
     Command("help", "h", "help [COMMAND]", "this list, or one of its lines", takes="command"),
     Command("quit", "q", "quit", "ends the session"),
 )  # fmt: skip
-WORDS = {word: command for command in COMMANDS for word in (command.name, command.short) if word}
+COMMANDS_BY_WORD = {word: command for command in COMMANDS for word in (command.name, command.short) if word}
 
 
 class Commands:
-    """Understands lines about a session.  `run` gives what is to be said; raises CommandError."""
+    """Executes command lines on a session.
 
-    def __init__(self, session: Session, words: Words, packets: Callable[[], list[Packet]] = list) -> None:
-        self.session, self.words = session, words
+    `report` makes the texts, `packets` returns the packets of the network so far.  `ended` is True after `quit`."""
+
+    def __init__(self, session: Session, report: StopReport, packets: Callable[[], list[Packet]] = list) -> None:
+        self.session, self.report = session, report
         self.watches: list[str] = []
-        self.breakpoints: list[Target] = []
+        self.breakpoints: list[Breakpoint] = []
         self.ended = False
         self._packets = packets
         self._last = "step"
 
     def run(self, line: str) -> Iterator[str]:
-        """Does what a line says."""
+        """Executes a line and yields the lines that it prints.  Raises CommandError."""
         line = line.strip()
         if line.startswith("//"):
             return
         name, _, rest = (line or self._last).partition(" ")
-        command = WORDS.get(name.lower())
+        command = COMMANDS_BY_WORD.get(name.lower())
         rest = rest.strip()
         if command is None and re.search(r":=|(?<![<>])=", line):
-            command, rest = WORDS["write"], line
+            command, rest = COMMANDS_BY_WORD["write"], line
         if command is None:
             raise CommandError(f"{name!r} is no command; `help` lists them")
         if command.moves:
@@ -115,20 +117,20 @@ class Commands:
             self.session.mark()
         function: Callable[[str], Iterator[str] | None] = getattr(self, f"_{command.name}")
         try:
-            said = function(rest)
-            yield from said or ()
+            lines = function(rest)
+            yield from lines or ()
         except (ConditionError, UnknownPlace, ValueError, TypeError) as error:
             raise CommandError(str(error)) from None
         if command.moves:
             yield from self.stop()
 
     def stop(self) -> Iterator[str]:
-        """Where the program stands, what changed, what is watched."""
-        yield self.words.place()
-        yield from self.words.around()
-        yield from self.words.changes()
+        """The lines that are printed at each stop: position, source, changed values, watched values."""
+        yield self.report.place()
+        yield from self.report.around()
+        yield from self.report.changes()
         for name in self.watches:
-            yield self.words.value(name)
+            yield self.report.value(name)
 
     # --- moves
 
@@ -138,10 +140,10 @@ class Commands:
 
     def _next(self, rest: str) -> None:
         for _ in range(_count(rest)):
-            self.session.over()
+            self.session.step_over()
 
     def _out(self, rest: str) -> None:
-        self.session.out()
+        self.session.step_out()
 
     def _scan(self, rest: str) -> None:
         self.session.scan(_count(rest))
@@ -170,15 +172,15 @@ class Commands:
             if not self.session.run_back(lambda statement: any(each.reached(statement) for each in targets)):
                 yield f"{rest} was never reached before"
 
-    def _targets(self, rest: str) -> list[Target]:
+    def _targets(self, rest: str) -> list[Breakpoint]:
         if rest:
             return [self._target(rest)]
         if not self.breakpoints:
             raise CommandError("say where to: a line, a condition or a time; or set breakpoints")
         return self.breakpoints
 
-    def _target(self, text: str) -> Target:
-        return target(text, self.session, self.words.site())
+    def _target(self, text: str) -> Breakpoint:
+        return parse_breakpoint(text, self.session, self.report.site())
 
     # --- breakpoints
 
@@ -201,12 +203,12 @@ class Commands:
 
     def _print(self, rest: str) -> Iterator[str]:
         for name in self._names(rest):
-            yield self.words.value(name)
+            yield self.report.value(name)
 
     def _watch(self, rest: str) -> Iterator[str]:
         names = self._names(rest)
         for name in names:
-            yield self.words.value(name)
+            yield self.report.value(name)
         self.watches += [name for name in names if name not in self.watches]
 
     def _unwatch(self, rest: str) -> None:
@@ -232,11 +234,11 @@ class Commands:
         if not match:
             raise CommandError("write NAME = VALUE")
         found = self.session.find(match[1])
-        return found, parsed(found, match[2])
+        return found, parse_for(found, match[2])
 
-    def _act(self, act: Act, name: str) -> Iterator[str]:
-        self.session.act(act)
-        yield self.words.value(name)
+    def _act(self, action: Action, name: str) -> Iterator[str]:
+        self.session.act(action)
+        yield self.report.value(name)
 
     def _mode(self, rest: str) -> None:
         self._between()
@@ -262,26 +264,26 @@ class Commands:
         if not names:
             raise CommandError("name variables, or watch some")
         signals = [signal for name in names for signal in signals_at(self.session.find(name), {})]
-        table = ScanTable(self.words.sites, self.session.names, signals)
+        table = ScanTable(self.report.sites, self.session.names, signals)
         here = self.session.here.scan
         self.session.follow(table, range(here - TABLE_SCANS + 1, here + 1))
         yield table.draw()
 
     def _why(self, rest: str) -> Iterator[str]:
-        past = Past(self.session, self.words)
+        past = SessionEvents(self.session, self.report)
         yield cause_text(past, why(past, _place(self.session, rest), self.session.here.scan))
 
     def _list(self, rest: str) -> Iterator[str]:
-        return self.words.around(_count(rest) if rest else 10)
+        return self.report.around(_count(rest) if rest else 10)
 
     def _rung(self, rest: str) -> Iterator[str]:
-        return self.words.rung(_count(rest, least=0) if rest else None)
+        return self.report.rung(_count(rest, least=0) if rest else None)
 
     def _sfc(self, rest: str) -> Iterator[str]:
-        return self.words.chart()
+        return self.report.chart()
 
     def _calls(self, rest: str) -> Iterator[str]:
-        return self.words.calls()
+        return self.report.calls()
 
     def _net(self, rest: str) -> Iterator[str]:
         end_ns, cycle_ns = self.session.now_ns, self.session.plc.cycle_ns
@@ -293,14 +295,14 @@ class Commands:
     def _expect(self, rest: str) -> Iterator[str]:
         condition = parse_condition(rest, self.session.find)
         if not condition.holds(self.session.read):
-            raise ExpectationError(f"{rest} does not hold in {self.words.place()}")
+            raise ExpectationError(f"{rest} does not hold in {self.report.place()}")
         return iter(())
 
     def _help(self, rest: str) -> Iterator[str]:
-        if rest and rest not in WORDS:
+        if rest and rest not in COMMANDS_BY_WORD:
             raise CommandError(f"{rest!r} is no command")
         for command in COMMANDS:
-            if not rest or WORDS[rest] is command:
+            if not rest or COMMANDS_BY_WORD[rest] is command:
                 short = f"{command.short:<2}" if command.short else "  "
                 yield f"  {short} {command.usage:<32} {command.help}"
         if not rest:
@@ -311,23 +313,23 @@ class Commands:
 
     @staticmethod
     def _names(rest: str) -> list[str]:
-        """Names parted by blanks or commas; `CIO 0.00` is one."""
+        """The names in an argument, separated by blanks or commas; `CIO 0.00` is one name."""
         parts = re.findall(r"(?:CIO\s+)?[^\s,\[]+(?:\[[^\]]*\])*(?:[^\s,]*)", rest, re.I)
         if not parts:
             raise CommandError("name something")
         return parts
 
     def completions(self, text: str) -> list[str]:
-        """What the last word of a line may become."""
+        """Completions of the last word of a line."""
         name, blank, rest = text.lstrip().partition(" ")
         if not blank:
             return [command.name for command in COMMANDS if command.name.startswith(name.lower())]
-        takes = WORDS[name.lower()].takes if name.lower() in WORDS else "place"
-        return completed(self.session, takes, re.split(r"[\s,(]", rest)[-1], list(WORDS))
+        takes = COMMANDS_BY_WORD[name.lower()].takes if name.lower() in COMMANDS_BY_WORD else "place"
+        return completed(self.session, takes, re.split(r"[\s,(]", rest)[-1], list(COMMANDS_BY_WORD))
 
 
 def completed(session: Session, takes: str, word: str, words: Mapping[str, object] | list[str]) -> list[str]:
-    """Paths of the program that begin with a word; words of the language for `help`."""
+    """Completions of a word: paths of the program, or for `help` names of commands."""
     if takes == "command":
         return [each for each in words if each.startswith(word)]
     if takes not in ("place", "line"):

@@ -33,13 +33,13 @@ def summary(results: Mapping[str, Mapping[str, Result]], lessons: tuple[Lesson, 
     heads = " ".join(f"{lesson.number:>5}" for lesson in lessons)
     return [f"{'':<{wide}} {heads}  done"] + [
         f"{name:<{wide}} {' '.join(f'{_short(begun.get(lesson.slug)):>5}' for lesson in lessons)}  "
-        f"{sum(result.whole for result in begun.values()):>4}" for name, begun in results.items()]  # fmt: skip
+        f"{sum(result.is_complete for result in begun.values()):>4}" for name, begun in results.items()]  # fmt: skip
 
 
 def _short(result: Result | None) -> str:
     if result is None:
         return "-"
-    return "ok" if result.whole else f"{result.prediction + result.passed}/{1 + result.checks}"
+    return "ok" if result.is_complete else f"{result.prediction + result.passed}/{1 + result.checks}"
 
 
 def report(results: Mapping[str, Mapping[str, Result]], lessons: tuple[Lesson, ...], out: Path) -> str:
@@ -48,7 +48,7 @@ def report(results: Mapping[str, Mapping[str, Result]], lessons: tuple[Lesson, .
     heads = "<th>".join(["learner", *numbers, "done"])
     rows = "\n".join(
         f"<tr><th>{escape(name)}{''.join(_cell(name, lesson, begun.get(lesson.slug)) for lesson in lessons)}"
-        f"<td>{sum(result.whole for result in begun.values())}" for name, begun in results.items())  # fmt: skip
+        f"<td>{sum(result.is_complete for result in begun.values())}" for name, begun in results.items())  # fmt: skip
     details = "\n".join(_details(name, lesson, begun[lesson.slug], out) for name, begun in results.items()
                         for lesson in lessons if lesson.slug in begun and begun[lesson.slug].failed)  # fmt: skip
     return _PAGE.format(title="Lessons", heads=heads, rows=rows, details=details)
@@ -59,8 +59,9 @@ def _cell(name: str, lesson: Lesson, result: Result | None) -> str:
         return '<td class="none">-'
     mark = "✓" if result.prediction else "✗"
     text = f"{mark} {result.passed}/{result.checks}"
-    return f'<td class="{"good" if result.whole else "bad"}"><a href="#{_anchor(name, lesson)}">{text}</a>' if result.failed \
-        else f'<td class="good">{text}'  # fmt: skip
+    if not result.failed:
+        return f'<td class="good">{text}'
+    return f'<td class="{"good" if result.is_complete else "bad"}"><a href="#{_anchor(name, lesson)}">{text}</a>'
 
 
 def _anchor(name: str, lesson: Lesson) -> str:

@@ -17,9 +17,9 @@ from fbvm.record.trace.branches import Branch, branches, statements
 from fbvm.record.trace.events import Event, Frame, Return, Statement
 from fbvm.testing.subject import LIBRARY, Subject
 
-Spot = tuple[int, int]
+Position = tuple[int, int]
 """Line and column."""
-PAST: Spot = (0, 0)
+SKIPPED: Position = (0, 0)
 """The way past all branches."""
 
 
@@ -27,8 +27,8 @@ PAST: Spot = (0, 0)
 class FileCoverage:
     """One file: how often each statement was executed, and for each that chooses how often each way was taken."""
 
-    statements: dict[Spot, int] = field(default_factory=dict)
-    ways: dict[Spot, dict[Spot, int]] = field(default_factory=dict)
+    statements: dict[Position, int] = field(default_factory=dict)
+    branches: dict[Position, dict[Position, int]] = field(default_factory=dict)
 
     @property
     def lines(self) -> dict[int, int]:
@@ -47,22 +47,22 @@ class FileCoverage:
     def partial(self) -> dict[int, list[int]]:
         """By line of an IF or CASE the lines to which it never went; 0 is past it."""
         made: dict[int, list[int]] = {}
-        for (line, column), ways in self.ways.items():
+        for (line, column), ways in self.branches.items():
             if self.statements.get((line, column)):
                 made.setdefault(line, []).extend(way[0] for way, count in ways.items() if not count)
         return {line: sorted(set(to)) for line, to in made.items() if to}
 
     def rate(self) -> float:
         """The share of statements and ways that were executed, 0 to 1; 1 of nothing."""
-        counts = [*self.statements.values(), *(count for ways in self.ways.values() for count in ways.values())]
+        counts = [*self.statements.values(), *(count for ways in self.branches.values() for count in ways.values())]
         return sum(count > 0 for count in counts) / len(counts) if counts else 1.0
 
     def add(self, other: FileCoverage) -> None:
         """Adds what somebody else counted."""
         for spot, count in other.statements.items():
             self.statements[spot] = self.statements.get(spot, 0) + count
-        for spot, ways in other.ways.items():
-            mine = self.ways.setdefault(spot, {})
+        for spot, ways in other.branches.items():
+            mine = self.branches.setdefault(spot, {})
             for way, count in ways.items():
                 mine[way] = mine.get(way, 0) + count
 
@@ -85,7 +85,7 @@ class Coverage:
     def to_data(self) -> dict[str, Any]:
         """As plain lists, for another process."""
         return {name: [[[*spot, count] for spot, count in each.statements.items()],
-                       [[*spot, *way, count] for spot, ways in each.ways.items() for way, count in ways.items()]]
+                       [[*spot, *way, count] for spot, ways in each.branches.items() for way, count in ways.items()]]
                 for name, each in self.files.items()}  # fmt: skip
 
     @classmethod
@@ -95,7 +95,7 @@ class Coverage:
         for name, (rows, ways) in data.items():
             each = made.files[name] = FileCoverage({(line, column): count for line, column, count in rows})
             for line, column, to_line, to_column, count in ways:
-                each.ways.setdefault((line, column), {})[to_line, to_column] = count
+                each.branches.setdefault((line, column), {})[to_line, to_column] = count
         return made
 
 
@@ -104,8 +104,8 @@ class Counter:
 
     def __init__(self, coverage: Coverage, subject: Subject) -> None:
         image = subject.image
-        self._statements: dict[int, tuple[FileCoverage, Spot]] = {}
-        self._forks: dict[int, tuple[FileCoverage, Spot, Branch]] = {}
+        self._statements: dict[int, tuple[FileCoverage, Position]] = {}
+        self._branches: dict[int, tuple[FileCoverage, Position, Branch]] = {}
         self._sites = image.sites
         self._open: dict[Frame, int] = {}
         paths = {name: _path(name, subject) for name in {site.file for site in image.sites}}
@@ -115,12 +115,12 @@ class Counter:
                 each = coverage.files.setdefault(path, FileCoverage())
                 self._statements[number] = each, _spot(site)
                 each.statements.setdefault(_spot(site), 0)
-        for fork in branches(image):
-            if fork.site in self._statements:
-                each, spot = self._statements[fork.site]
-                self._forks[fork.site] = each, spot, fork
-                ways = each.ways.setdefault(spot, {})
-                for way in (*(_spot(self._sites[way]) for way in fork.ways), *([PAST] if fork.past else [])):
+        for branch in branches(image):
+            if branch.site in self._statements:
+                each, spot = self._statements[branch.site]
+                self._branches[branch.site] = each, spot, branch
+                ways = each.branches.setdefault(spot, {})
+                for way in (*(_spot(self._sites[way]) for way in branch.targets), *([SKIPPED] if branch.may_skip else [])):
                     ways.setdefault(way, 0)
 
     def phase(self, plc: Plc, phase: Phase) -> None:
@@ -132,7 +132,7 @@ class Counter:
             if event.site in self._statements:
                 each, spot = self._statements[event.site]
                 each.statements[spot] += 1
-            if event.site in self._forks:
+            if event.site in self._branches:
                 self._open[event.frame] = event.site
         elif isinstance(event, Return):
             self._decide(event.frame, -1)
@@ -142,13 +142,13 @@ class Counter:
         chose = self._open.pop(frame, None)
         if chose is None:
             return
-        each, spot, fork = self._forks[chose]
-        way = _spot(self._sites[site]) if site in fork.ways else PAST
-        if way in each.ways[spot]:
-            each.ways[spot][way] += 1
+        each, spot, branch = self._branches[chose]
+        way = _spot(self._sites[site]) if site in branch.targets else SKIPPED
+        if way in each.branches[spot]:
+            each.branches[spot][way] += 1
 
 
-def _spot(site: Site) -> Spot:
+def _spot(site: Site) -> Position:
     return site.line, site.column
 
 

@@ -32,7 +32,7 @@ def _missed(coverage: FileCoverage) -> str:
         else:
             runs.append([line, line])
     said = [(first, str(first) if first == last else f"{first}-{last}") for first, last in runs]
-    said += [(line, f"{line}->{to or 'past'}") for line, ways in coverage.partial.items() for to in ways]
+    said += [(line, f"{line}->{to or 'past'}") for line, branches in coverage.partial.items() for to in branches]
     return ", ".join(text for _, text in sorted(said, key=lambda row: row[0]))
 
 
@@ -44,14 +44,14 @@ def table(coverage: Coverage, root: Path) -> Iterator[str]:
     rows.append(("TOTAL", *_counts(total), percent(total.rate()), ""))
     left = max(len(row[0]) for row in rows)
     yield f"{'Name':<{left}}  Stmts  Miss  Branch  Miss  Cover  Missing"
-    for name, statements, missed, ways, untaken, cover, missing in rows:
-        yield f"{name:<{left}}  {statements:>5}  {missed:>4}  {ways:>6}  {untaken:>4}  {cover:>5}  {missing}".rstrip()
+    for name, statements, missed, branches, untaken, cover, missing in rows:
+        yield f"{name:<{left}}  {statements:>5}  {missed:>4}  {branches:>6}  {untaken:>4}  {cover:>5}  {missing}".rstrip()
 
 
 def _counts(coverage: FileCoverage) -> tuple[int, int, int, int]:
-    ways = [count for each in coverage.ways.values() for count in each.values()]
-    return (len(coverage.statements), sum(not count for count in coverage.statements.values()), len(ways),
-            sum(not count for count in ways))  # fmt: skip
+    branches = [count for each in coverage.branches.values() for count in each.values()]
+    return (len(coverage.statements), sum(not count for count in coverage.statements.values()), len(branches),
+            sum(not count for count in branches))  # fmt: skip
 
 
 _LINES_OF_A_FILE = 1_000_000
@@ -62,7 +62,7 @@ def _total(coverage: Coverage) -> FileCoverage:
     for number, each in enumerate(coverage.files.values()):
         shift = number * _LINES_OF_A_FILE  # so that lines of two files are not one
         total.statements |= {(line + shift, column): count for (line, column), count in each.statements.items()}
-        total.ways |= {(line + shift, column): ways for (line, column), ways in each.ways.items()}
+        total.branches |= {(line + shift, column): branches for (line, column), branches in each.branches.items()}
     return total
 
 
@@ -87,8 +87,8 @@ def cobertura(coverage: Coverage, root: Path) -> str:
         ElementTree.SubElement(row, "methods")
         lines = ElementTree.SubElement(row, "lines")
         taken: dict[int, list[int]] = {}
-        for (line, _), ways in each.ways.items():
-            taken.setdefault(line, []).extend(ways.values())
+        for (line, _), branches in each.branches.items():
+            taken.setdefault(line, []).extend(branches.values())
         for line, count in sorted(each.lines.items()):
             _line(lines, line, count, taken.get(line, []))
     ElementTree.indent(top)
@@ -96,17 +96,17 @@ def cobertura(coverage: Coverage, root: Path) -> str:
 
 
 def _rates(coverage: FileCoverage) -> dict[str, str]:
-    lines, (_, _, ways, missed) = coverage.lines, _counts(coverage)
+    lines, (_, _, branches, missed) = coverage.lines, _counts(coverage)
     line_rate = sum(count > 0 for count in lines.values()) / len(lines) if lines else 1.0
-    return {"line-rate": f"{line_rate:.4f}", "branch-rate": f"{(ways - missed) / ways if ways else 1.0:.4f}"}
+    return {"line-rate": f"{line_rate:.4f}", "branch-rate": f"{(branches - missed) / branches if branches else 1.0:.4f}"}
 
 
-def _line(parent: ElementTree.Element, line: int, count: int, ways: list[int]) -> None:
+def _line(parent: ElementTree.Element, line: int, count: int, branches: list[int]) -> None:
     """A line that was executed so often, and how often each way was taken from it."""
-    row = {"number": str(line), "hits": str(count), "branch": "true" if ways else "false"}
-    if ways:
-        taken = sum(count > 0 for count in ways)
-        row["condition-coverage"] = f"{100 * taken // len(ways)}% ({taken}/{len(ways)})"
+    row = {"number": str(line), "hits": str(count), "branch": "true" if branches else "false"}
+    if branches:
+        taken = sum(count > 0 for count in branches)
+        row["condition-coverage"] = f"{100 * taken // len(branches)}% ({taken}/{len(branches)})"
     ElementTree.SubElement(parent, "line", row)
 
 
@@ -136,9 +136,9 @@ def write_pages(coverage: Coverage, root: Path, folder: Path) -> Path:
     for number, (path, each) in enumerate(sorted(coverage.files.items())):
         name, page = _shown(path, root), f"{number}_{Path(path).stem}.html"
         (folder / page).write_text(_page(f"{name}: {percent(each.rate())}", _source(path, each)), encoding="utf-8")
-        statements, missed, ways, untaken = _counts(each)
+        statements, missed, branches, untaken = _counts(each)
         rows.append(f'<tr><td><a href="{html.escape(page)}">{html.escape(name)}</a><td>{statements}<td>{missed}'
-                    f"<td>{ways}<td>{untaken}<td>{percent(each.rate())}")  # fmt: skip
+                    f"<td>{branches}<td>{untaken}<td>{percent(each.rate())}")  # fmt: skip
     head = "<tr><th>File<th>Statements<th>missed<th>Branches<th>missed<th>Coverage"
     total = percent(_total(coverage).rate())
     index = folder / "index.html"
@@ -157,8 +157,8 @@ def _source(path: str, coverage: FileCoverage) -> str:
     lines, partial, out = coverage.lines, coverage.partial, []
     for number in range(1, len(source.line_starts) + 1):
         kind = "" if number not in lines else "miss" if not lines[number] else "part" if number in partial else "run"
-        ways = ", ".join("past it" if not to else f"to line {to}" for to in partial.get(number, []))
-        note = f' title="never went {ways}"' if kind == "part" else ""
+        branches = ", ".join("past it" if not to else f"to line {to}" for to in partial.get(number, []))
+        note = f' title="never went {branches}"' if kind == "part" else ""
         count = f"{lines[number]:>7}" if number in lines else " " * 7
         out.append(f'<div class="{kind}"{note}><i>{number:>5} {count}</i>  {html.escape(source.line(number))}</div>')
     return f"<p><a href=\"index.html\">all files</a></p><pre>{''.join(out)}</pre>"

@@ -126,7 +126,7 @@ class Result:
     failed: list[tuple[str, str]] = field(default_factory=list)
 
     @property
-    def whole(self) -> bool:
+    def is_complete(self) -> bool:
         return self.prediction and self.passed == self.checks
 
 

@@ -53,7 +53,7 @@ def write_page(path: Path, title: str, history: History, subject: Subject, units
         finally:
             writer.close()
 
-    history.redo(range(max(scans.start, scans.stop - MOST_SCANS), scans.stop), recorded)
+    history.replay_with(range(max(scans.start, scans.stop - MOST_SCANS), scans.stop), recorded)
     trace = Trace(io.BytesIO(file.getvalue()))
     trace.described, trace.meanings = descriptions(units), meanings(units)  # those that did it again had no units
     data = page_data(trace, title=title, prefix=subject.prefix, pinned=[place.name for place in asked])

@@ -16,7 +16,7 @@ from fbvm.net.loop import LoopNetwork
 from fbvm.run.plant import Kind, Plant
 from fbvm.run.project import FILE, Project, read_project
 from fbvm.syntax.text import read
-from fbvm.testing.rig import PATIENCE, Rig, to_ns
+from fbvm.testing.rig import DEFAULT_LIMIT, Rig, to_ns
 from fbvm.testing.subject import Subject, SubjectError
 from fbvm.watch.conditions import parse_condition
 from fbvm.watch.paths import Place, UnknownPlace
@@ -88,7 +88,7 @@ class PlantRig:
             self.scan()
         return self
 
-    def until(self, condition: str | Callable[[PlantRig], object], /, *, max: str | int = PATIENCE) -> PlantRig:
+    def until(self, condition: str | Callable[[PlantRig], object], /, *, max: str | int = DEFAULT_LIMIT) -> PlantRig:
         """Everybody scans until a condition holds: a function, or names behind those of their PLCs, `pump.Main.Done`.
 
         Raises AssertionError if it does not hold within `max`, Trapped after a trap."""

@@ -20,8 +20,8 @@ import pytest
 
 from fbvm.base.data import PACKAGE
 from fbvm.testing.session import MOST_PAGES, count_coverage, failure_page, library_folders, search_folders
-from fbvm.testing.warned import NAME as WARNED
-from fbvm.testing.warned import Warned, add_options, warned_of
+from fbvm.testing.warning_plugin import NAME as WARNINGS
+from fbvm.testing.warning_plugin import WarningPlugin, add_options, warning_plugin
 
 if TYPE_CHECKING:
     from fbvm.net.loop import LoopNetwork
@@ -71,7 +71,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Warnings are collected; coverage is counted if an option asks for it."""
-    config.pluginmanager.register(Warned(config), WARNED)
+    config.pluginmanager.register(WarningPlugin(config), WARNINGS)
     if any(config.getoption(name) for name in ("fbvm_cov", "fbvm_cov_html", "fbvm_cov_xml")):
         from fbvm.testing.coverage_plugin import NAME, CoveragePlugin
 
@@ -165,10 +165,10 @@ def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
         __tracebackhide__ = True
         own = [folder / path for path in libraries for folder in folders if (folder / path).is_dir()]
         shelves = [*own, *library_folders(request.config, request.path)]
-        warned = warned_of(request.config)
-        rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, wanted=warned.wanted,
+        warnings = warning_plugin(request.config)
+        rig = Rig.of(what, cycle, block=block, folders=folders, libraries=shelves, wanted=warnings.wanted,
                      dialect=dialect or request.config.getini("fbvm_dialect"), **given)
-        warned.note(rig.subject)
+        warnings.add(rig.subject)
         rigs.append(rig)
         _attend(request, rig)
         return rig
@@ -243,7 +243,7 @@ def _asking(excinfo: pytest.ExceptionInfo[BaseException], rigs: Sequence[Rig]) -
     """Rigs that the failed statement asked for something, with its file and lines; all rigs if it asked none."""
     for entry in reversed(excinfo.traceback):
         file, lines = str(entry.path), _statement(str(entry.path), entry.lineno + 1)
-        asked = [rig for rig in rigs if any(name == file and line in lines for name, line, _ in rig.asked)]
+        asked = [rig for rig in rigs if any(name == file and line in lines for name, line, _ in rig.reads)]
         if asked:
             return [(rig, (file, lines)) for rig in asked]
     return [(rig, None) for rig in rigs]

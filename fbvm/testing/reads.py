@@ -12,7 +12,7 @@ _HERE = str(Path(__file__).parent)
 
 
 @dataclass
-class Reads:
+class VariableReads:
     """Places with file and line of who asked for each."""
 
     rows: list[tuple[str, int, Place]] = field(default_factory=list)

@@ -7,7 +7,7 @@ from fbvm.machine.plc import Phase, Plc
 from fbvm.record.draw.table import LastWrite, ScanTable
 from fbvm.record.trace.history import History
 from fbvm.record.trace.recorder import Signal
-from fbvm.testing.reads import Reads
+from fbvm.testing.reads import VariableReads
 from fbvm.testing.subject import Subject
 from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place
@@ -23,7 +23,7 @@ MOST_COLUMNS = 8
 class Report:
     """Writes reports about one PLC."""
 
-    def __init__(self, plc: Plc, subject: Subject, history: History, reads: Reads) -> None:
+    def __init__(self, plc: Plc, subject: Subject, history: History, reads: VariableReads) -> None:
         self._plc, self._subject, self._history, self._reads = plc, subject, history, reads
         self.names = Names.of(plc.image, plc.memory.areas)
 
@@ -56,7 +56,7 @@ class Report:
     def _again(self, signals: list[Signal], scans: int) -> ScanTable:
         table = ScanTable(self._plc.image.sites, self.names, signals)
         end = self._plc.scans
-        self._history.again(range(max(0, end - scans), end), table)
+        self._history.replay(range(max(0, end - scans), end), table)
         return table
 
     def _told(self, table: ScanTable, signal: Signal) -> str:

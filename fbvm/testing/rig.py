@@ -25,7 +25,7 @@ from fbvm.record.trace.history import History
 from fbvm.record.trace.packets import Dissector, Packet, add_tap
 from fbvm.record.trace.recorder import Recorder
 from fbvm.testing.pages import write_page
-from fbvm.testing.reads import Reads
+from fbvm.testing.reads import VariableReads
 from fbvm.testing.report import Report
 from fbvm.testing.subject import Stub, Subject, subject
 from fbvm.testing.values import Values, value_of, write
@@ -41,7 +41,7 @@ MOST_PACKETS = 10_000
 """Packets that are kept for the page of a failure."""
 MOST_SHOWN = 6
 """Packets that the report of a failure lists."""
-PATIENCE = "1m"
+DEFAULT_LIMIT = "1m"
 """How long `until` waits if nobody says, in virtual time."""
 
 
@@ -94,7 +94,7 @@ class Rig:
     subject: Subject
     network: LoopNetwork
     _history: History
-    _reads: Reads
+    _reads: VariableReads
     _timed: list[tuple[int, str, object]]
     _report: Report
     _packets: deque[tuple[int, Packet]]
@@ -107,7 +107,7 @@ class Rig:
         set_(self, "plc", plc)
         set_(self, "subject", what)
         set_(self, "_history", History(plc))
-        set_(self, "_reads", Reads())
+        set_(self, "_reads", VariableReads())
         set_(self, "_timed", [])
         set_(self, "network", network or LoopNetwork())
         set_(self, "_report", Report(plc, what, self._history, self._reads))
@@ -185,7 +185,7 @@ class Rig:
             raise AttributeError(str(error)) from None
 
     def __getitem__(self, name: str) -> Any:
-        return value_of(self.plc, self.find(name), self._reads.add, self._history.touch)
+        return value_of(self.plc, self.find(name), self._reads.add, self._history.mark_changed)
 
     def __setattr__(self, name: str, value: object) -> None:
         try:
@@ -195,7 +195,7 @@ class Rig:
 
     def __setitem__(self, name: str, value: object) -> None:
         __tracebackhide__ = True
-        self._history.touch()
+        self._history.mark_changed()
         try:
             write(self.plc, self.find(name), value)
         except (TypeError, ValueError) as error:
@@ -228,7 +228,7 @@ class Rig:
             self._scan()
         return self
 
-    def until(self, condition: str | Callable[[Rig], object], /, *, max: str | int = PATIENCE, **named: object) -> Rig:
+    def until(self, condition: str | Callable[[Rig], object], /, *, max: str | int = DEFAULT_LIMIT, **named: object) -> Rig:
         """Writes inputs, then scans until a condition holds after a scan: `"m.Done AND Count > 5"` or a function.
 
         Raises AssertionError if it does not hold within `max`, Trapped after a trap."""
@@ -289,26 +289,26 @@ class Rig:
 
     def power_on(self) -> Rig:
         """Power off and on: what is retained keeps its values."""
-        self._history.touch()
+        self._history.mark_changed()
         self.plc.warm_start()
         return self
 
     def cold_start(self) -> Rig:
         """Power on as new: everything has its initial value."""
-        self._history.touch()
+        self._history.mark_changed()
         self.plc.cold_start()
         return self
 
     def mode(self, mode: str) -> Rig:
         """"PROGRAM": units are refreshed, the program stands.  "RUN" after it clears what is not retained."""
-        self._history.touch()
+        self._history.mark_changed()
         self.plc.mode = Mode(mode.upper())
         return self
 
     def force(self, values: Mapping[str, object] | None = None, /, **named: object) -> Forced:
         """Holds variables until `unforce`, or to the end of a `with` block.  What is left forced fails the test."""
         given = {**(values or {}), **named}
-        self._history.touch()
+        self._history.mark_changed()
         for name, value in given.items():
             place = self.find(name)
             write(self.plc, place, value)
@@ -317,7 +317,7 @@ class Rig:
 
     def unforce(self, *names: str) -> Rig:
         """Ends forces, all of them if none is named."""
-        self._history.touch()
+        self._history.mark_changed()
         for name in names:
             self.plc.unforce(self.find(name).name)
         if not names:
@@ -342,7 +342,7 @@ class Rig:
         return self._report.table([place for place in places if isinstance(place, Place)], scans)
 
     @property
-    def asked(self) -> list[tuple[str, int, Place]]:
+    def reads(self) -> list[tuple[str, int, Place]]:
         """What the test asked for since the last scan: file, line, place."""
         return self._reads.rows
 

@@ -25,13 +25,13 @@ from fbvm.testing.pages import write_page
 from fbvm.testing.rig import Trapped
 from fbvm.testing.session import count_coverage, failure_page, library_folders
 from fbvm.testing.subject import LIBRARY, Subject, SubjectError, pous, subject
-from fbvm.testing.warned import warned_of
+from fbvm.testing.warning_plugin import warning_plugin
 from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value, show_time
 
 CYCLE_NS = 10_000_000
-PATIENCE_NS = 60_000_000_000
+LIMIT_NS = 60_000_000_000
 BANDS, LOOKED_BACK = 4, 100
 
 
@@ -70,10 +70,10 @@ class StItem(pytest.Item):
     def runtest(self) -> None:
         near = [self.path.parent] if self.path.parent != self.config.rootpath else []
         shelves = [LIBRARY, *library_folders(self.config, self.path), *near]
-        warned = warned_of(self.config)
+        warnings = warning_plugin(self.config)
         dialect = self.config.getini("fbvm_dialect")
-        made = self.subject = subject([self.path], self.name, shelves, wanted=warned.wanted, dialect=dialect)
-        warned.note(made)
+        made = self.subject = subject([self.path], self.name, shelves, wanted=warnings.wanted, dialect=dialect)
+        warnings.add(made)
         plc = Plc(made.image, CYCLE_NS)
         watch = Assertions(plc, made.prefix)
         history = History(plc)
@@ -82,7 +82,7 @@ class StItem(pytest.Item):
                 _run(plc, history, f"{made.prefix}Done")
         except AssertFailed as failed:
             table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])
-            history.again(range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1), table)
+            history.replay(range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1), table)
             failed.table = table.draw([band for band in table.bands if band.moved][-BANDS:]) if failed.values else ""
             asked = [signal.place for signal, _ in failed.values]
             failed.page = failure_page(self, "", lambda path: write_page(path, self.nodeid, history, made, plc, asked,
@@ -120,8 +120,8 @@ def _run(plc: Plc, history: History, done: str) -> None:
             raise Trapped(trap)
         if not waits or plc.read(done):
             return
-        if plc.elapsed_ns >= PATIENCE_NS:
-            raise AssertionError(f"Done is still FALSE after {show_time(PATIENCE_NS)[2:]}")
+        if plc.elapsed_ns >= LIMIT_NS:
+            raise AssertionError(f"Done is still FALSE after {show_time(LIMIT_NS)[2:]}")
 
 
 class Assertions:

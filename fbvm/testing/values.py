@@ -10,7 +10,7 @@ from fbvm.machine.plc import Plc
 from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.values import Value, parse_value, sort_of
 
-Told = Callable[[Place], None]
+OnRead = Callable[[Place], None]
 """Who is told that a variable was read."""
 
 
@@ -28,18 +28,18 @@ class Values:
 
     Where a variable is called like something of Python's, write `values["name"]`."""
 
-    __slots__ = ("_place", "_plc", "_read", "_touched")
+    __slots__ = ("_changed", "_place", "_plc", "_read")
     _place: Place
     _plc: Plc
-    _read: Told
-    _touched: Callable[[], None]
+    _read: OnRead
+    _changed: Callable[[], None]
 
-    def __init__(self, plc: Plc, place: Place, read: Told, touched: Callable[[], None]) -> None:
+    def __init__(self, plc: Plc, place: Place, read: OnRead, changed: Callable[[], None]) -> None:
         set_ = object.__setattr__
         set_(self, "_plc", plc)
         set_(self, "_place", place)
         set_(self, "_read", read)
-        set_(self, "_touched", touched)
+        set_(self, "_changed", changed)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -56,10 +56,10 @@ class Values:
             raise AttributeError(str(error)) from None
 
     def __getitem__(self, path: str) -> Any:
-        return value_of(self._plc, self._find(path), self._read, self._touched)
+        return value_of(self._plc, self._find(path), self._read, self._changed)
 
     def __setitem__(self, path: str, value: object) -> None:
-        self._touched()
+        self._changed()
         write(self._plc, self._find(path), value)
 
     def __dir__(self) -> list[str]:
@@ -81,11 +81,11 @@ class Values:
         return found
 
 
-def value_of(plc: Plc, found: Place | Span, read: Told, touched: Callable[[], None]) -> Any:
+def value_of(plc: Plc, found: Place | Span, read: OnRead, changed: Callable[[], None]) -> Any:
     """The value at a place; of a structure or instance, its variables."""
     if isinstance(found, Place):
         if isinstance(base(found.type), StructType):
-            return Values(plc, found, read, touched)
+            return Values(plc, found, read, changed)
         read(found)
     return plc.read(found)
 

@@ -1,1 +1,1 @@
-"""What somebody outside asks of a PLC's memory: places by name or address, their values, conditions about them."""
+"""Access to a PLC's memory by name: paths and addresses, values, conditions."""

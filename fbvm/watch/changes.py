@@ -1,4 +1,4 @@
-"""What of an array, a structure or a range of addresses has changed: the part that tells most."""
+"""The part of an array, a structure or a range of addresses that has changed."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from fbvm.watch.paths import Place, Span, element, member
 from fbvm.watch.values import Value
 
 Change = tuple[Place | Span, Value, Value]
-"""A place, what it held and what it holds."""
+"""A place, its old value and its new value."""
 
 
 def changed(found: Place | Span, before: Value, after: Value) -> Change:
-    """The only part that differs, down to a single value; all of what several parts of differ."""
+    """The smallest part of `found` that contains all differences between the values `before` and `after`."""
     change: Change = found, before, after
     while len(parts := list(_different(*change))) == 1:
         change = parts[0]
@@ -24,7 +24,7 @@ def _different(found: Place | Span, before: Value, after: Value) -> Iterator[Cha
     kind = base(found.type) if isinstance(found, Place) else None
     if isinstance(before, list) and isinstance(after, list):
         for number, (old, new) in enumerate(zip(before, after, strict=True)):
-            if repr(old) != repr(new):  # NAN is no other NAN
+            if repr(old) != repr(new):  # by text, since NaN is not equal to NaN
                 if isinstance(found, Span):
                     yield found.places[number], old, new
                 elif isinstance(kind, ArrayType):

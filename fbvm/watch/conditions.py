@@ -40,9 +40,10 @@ class Condition:
 
 
 def parse_condition(text: str, find: Find) -> Condition:
-    """The condition that `text` writes.  Raises ConditionError for what means nothing or can never hold."""
+    """The condition that `text` writes.  `find` finds places by name.  Raises ConditionError for a text that is no condition, or
+    a comparison that can never hold."""
     parser = _Parser(text, find)
-    term = parser.level(0).known()
+    term = parser.level(0).resolved()
     if parser.kind:
         raise ConditionError(f"{parser.word!r} is not expected in {text!r}")
     if term.sort != "BOOL":

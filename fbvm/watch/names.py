@@ -1,4 +1,4 @@
-"""What lies at a byte: the way back from the flat memory to the paths and addresses that people know.
+"""The names of memory: the path or the address of the variable to which a byte of the flat memory belongs.
 
 A variable of the program is named by its path, a word or bit of an area by the variable that is located there, else by
 its address.  Frames of functions have no names that outlive a call, and none here.
@@ -25,23 +25,24 @@ _LETTERS = {2: "W", 4: "D", 8: "L"}
 
 
 class Names:
-    """The names of everything in the memory of one program.  Knows where things lie, not what they hold.
+    """The names of all variables and addresses in the memory of one program; values are not read here.
 
-    `extents` are those of the program's objects: with them it is known that a pointer has left its variable."""
+    `symbols` and `areas` are those of the program, `extents` the first and last byte offsets of its objects, by which a
+    pointer that points behind its variable is recognised."""
 
     def __init__(self, symbols: Mapping[str, Field], areas: Mapping[str, Area],
                  extents: Sequence[tuple[int, int]] = ()) -> None:  # fmt: skip
         self._symbols, self._areas, self._extents = symbols, areas, extents
-        tops = [Place(field.name, _bound(field.type) if field.reference else field.type, field.offset, field.bit)
+        symbols_places = [Place(field.name, _bound(field.type) if field.reference else field.type, field.offset, field.bit)
                 for field in symbols.values()]
-        self._slots = sorted((place for place in tops if self._in_slots(place)), key=lambda place: place.offset)
+        self._slots = sorted((place for place in symbols_places if self._in_slots(place)), key=lambda place: place.offset)
         self._starts = [place.offset for place in self._slots]
-        self._located = [place for place in tops if not self._in_slots(place)]
+        self._located = [place for place in symbols_places if not self._in_slots(place)]
         for place in self._slots:
             self._located += _located_in(place)
         self._known: dict[tuple[int, int | None], Place | None] = {}
         self._instances: dict[int, Place] = {}
-        self._leads: dict[tuple[int, str], str] = {}
+        self._reference_names: dict[tuple[int, str], str] = {}
 
     @classmethod
     def of(cls, image: Image, areas: Mapping[str, Area]) -> Names:
@@ -53,7 +54,7 @@ class Names:
                                                     for area in self._areas.values())  # fmt: skip
 
     def at(self, offset: int, bit: int | None = None) -> Place | None:
-        """The single value to which a byte, or one bit of it, belongs; None for what has no name."""
+        """The single value to which byte `offset`, or bit `bit` of it, belongs; None for a byte without a name."""
         key = offset, bit
         if key not in self._known:
             self._known[key] = self._slot(offset) or self._in_area(offset, bit)
@@ -88,30 +89,35 @@ class Names:
     # --- references
 
     def read(self, read: Callable[[Any], Value], where: Place | Span) -> Value:
-        """The value at a place, for people and scripts: references in it are texts that say what they lead to."""
+        """The value that the function `read` returns for a place, with names in place of references (see `name_references`)."""
         value = read(where)
-        return self.told(where.type, value) if isinstance(where, Place) and not isinstance(where.type, Elementary) else value
+        if not isinstance(where, Place) or isinstance(where.type, Elementary):
+            return value
+        return self.name_references(where.type, value)
 
-    def told(self, kind: Type, value: Value) -> Value:
-        """The same value with `-> Main.a[3]` in place of each reference."""
+    def name_references(self, kind: Type, value: Value) -> Value:
+        """The value of a variable of type `kind`, with a text such as `-> Main.a[3]` in place of each reference in it."""
         plain = base(as_read(kind))
         if isinstance(plain, RefType) and type(value) is int:
-            return self.lead(value, plain.target)
+            return self.reference_name(value, plain.target)
         if isinstance(value, list) and isinstance(plain, ArrayType):
-            return [self.told(plain.element, item) for item in value]
+            return [self.name_references(plain.element, item) for item in value]
         if isinstance(value, dict) and isinstance(plain, StructType):
             kinds = {field.name: field.type for field in plain.fields.values()}
-            return {name: self.told(kinds[name], item) for name, item in value.items()}
+            return {name: self.name_references(kinds[name], item) for name, item in value.items()}
         return value
 
-    def lead(self, reference: int, target: Type | None) -> str:
-        """Where a reference to `target` leads: `-> Main.a[3]`, `-> D200`; `outside of Main.a` if it has left its variable."""
-        key = reference, target.name if target else ""
-        if key not in self._leads:
-            self._leads[key] = self._lead(reference, target)
-        return self._leads[key]
+    def reference_name(self, reference: int, target: Type | None) -> str:
+        """The variable that a reference points to: `-> Main.a[3]`, `-> D200`; `outside of Main.a`
+        if the reference has left its variable.
 
-    def _lead(self, reference: int, target: Type | None) -> str:
+        `reference` are the 64 bits of the reference, `target` is its declared target type, None for NULL."""
+        key = reference, target.name if target else ""
+        if key not in self._reference_names:
+            self._reference_names[key] = self._find_reference_name(reference, target)
+        return self._reference_names[key]
+
+    def _find_reference_name(self, reference: int, target: Type | None) -> str:
         number, offset = reference >> OBJECT_SHIFT, reference >> OFFSET_SHIFT & OFFSET_MASK
         row = number - FIRST_OBJECT
         if 0 <= row < len(self._extents):
@@ -127,7 +133,7 @@ class Names:
         return f"-> {place.name}" + (f" + {behind} byte{'s' * (behind != 1)}" if behind else "")
 
     def _whole(self, start: int, end: int) -> str:
-        """The name of a variable that has these bytes for its own; of an area its own name."""
+        """The name of the variable, or of the area, that fills these bytes."""
         for area in self._areas.values():
             if (area.offset, _end(area)) == (start, end):
                 return area.name
@@ -136,7 +142,7 @@ class Names:
         return (fitting or chain[-1:] or [Place("its variable", REFERENCE, start)])[0].name
 
     def _fitting(self, offset: int, bit: int | None, target: Type | None) -> Place | None:
-        """What is meant by a reference to a byte: of what begins there the part of the target's type."""
+        """The variable that a reference to a byte means: of those that begin there the one of the target's type."""
         chain = list(self._chain(offset, bit))
         same = [place for place in chain
                 if place.offset == offset and target and base(place.type).name == base(target).name]
@@ -152,7 +158,7 @@ class Names:
         return find_place({}, self._areas, f"%{area.name}{_LETTERS[size]}{number}") if rest == 0 else None
 
     def _chain(self, offset: int, bit: int | None) -> Iterator[Place]:
-        """The variables to which a byte belongs, each with its parts behind it."""
+        """The variables to which a byte belongs: each is followed by its element or member that holds the byte."""
         top = self._top(offset)
         for start in [top] if top else self._at_area(offset, bit):
             place: Place | None = start
@@ -204,7 +210,7 @@ class Names:
 
 
 def _bound(kind: Type) -> RefType:
-    """The type of what an in-out or a REFERENCE TO itself holds."""
+    """The type of the 64-bit reference in the slot of an in-out or a REFERENCE TO."""
     return replace(REFERENCE, target=followed(kind))
 
 

@@ -1,6 +1,6 @@
-"""From what a user writes to a place in memory: `Main.conn.ENO`, `Main.a[3].b`, `D200`, `CIO 1509.15`, `D200..D202`.
+"""Parses what users write to places in memory: `Main.conn.ENO`, `Main.a[3].b`, `D200`, `CIO 1509.15`, `D200..D202`.
 
-A name beats an address, `%D200` is always an address.  Knows where things lie, not what they hold (see `values`).
+The name of a variable goes before an address; `%D200` is always an address.  Values are read by `places`.
 """
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ class Place:
     area: str = ""
     constant: bool = False
     hexadecimal: bool = False
-    """Declared to be read so."""
+    """True if a pragma of the declaration asks for hexadecimal."""
 
     @property
     def is_generated(self) -> bool:
-        """True for what rungs remember: nobody has written its name, and nobody can."""
+        """True for a variable that the compiler has added, such as the memory of an edge in a rung."""
         return "$" in self.name
 
     def inner(self, name: str, type_: Type, distance: int, bit: int | None = None) -> Place:
@@ -81,7 +81,16 @@ _ADDRESS_TYPES = {8: BYTE, 16: WORD, 32: DWORD, 64: LWORD}
 
 
 def find(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> Place | Span:
-    """The place or the span that `text` names.  Raises UnknownPlace for text that names nothing."""
+    """The place or the span that `text` names.
+
+    `symbols` are the program's variables by folded name, `areas` the memory areas of the PLC.  Raises UnknownPlace.
+
+    >>> from fbvm.base.areas import AREAS
+    >>> find({}, AREAS, "D200").offset == AREAS["D"].offset + 400
+    True
+    >>> [place.name for place in find({}, AREAS, "CIO 0.14..1.00").places]
+    ['CIO 0.14', 'CIO 0.15', 'CIO 1.00']
+    """
     if ".." in text:
         return _span(areas, text)
     first = _FIRST.match(text)
@@ -96,7 +105,7 @@ def find(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> 
 
 
 def find_place(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: str) -> Place:
-    """Like `find`, for one value only.  Raises UnknownPlace for a span, too."""
+    """The one place that `text` names.  Raises UnknownPlace, also for a span."""
     found = find(symbols, areas, text)
     if isinstance(found, Span):
         raise UnknownPlace(f"{text} is a range; name one place")
@@ -104,7 +113,7 @@ def find_place(symbols: Mapping[str, Field], areas: Mapping[str, Area], text: st
 
 
 def _unknown(symbols: Mapping[str, Field], text: str, first: str, reason: str) -> str:
-    """What to say about a name that is neither a symbol nor an address."""
+    """The message for a name that is neither a symbol nor an address."""
     if meant := _meant(text):
         return f"there is no {text.strip()}; did you mean {meant}?"
     if not first or re.fullmatch(r"\s*(%.*|[A-Za-z]{1,3}\s*\d+(\.\d+)?|\d+(\.\d+)?|E\w\s*[_:]\s*\d+.*)", text):
@@ -120,7 +129,7 @@ def _unknown(symbols: Mapping[str, Field], text: str, first: str, reason: str) -
 
 
 def _holder(symbols: Mapping[str, Field], name: str) -> str:
-    """The path of an instance that has such a variable, the nearest one; each type is looked into once."""
+    """The shortest path of an instance that declares a variable `name`, "" if none does."""
     known: set[int] = set()
     waiting = deque((field.name, field.type) for field in symbols.values() if not field.reference)
     while waiting:
@@ -138,13 +147,13 @@ def _holder(symbols: Mapping[str, Field], name: str) -> str:
 
 
 _OTHER_NAMES = {"EM": "E", "HR": "H", "WR": "W", "AR": "A", "TIM": "T", "CNT": "C", "DR": "D", "IR": "CIO "}
-"""How areas are called in other software and in older manuals."""
+"""Names of areas in other software and in older manuals."""
 _OTHER = re.compile(rf"\s*%?({'|'.join(_OTHER_NAMES)})\s*([0-9A-F]\s*[_:]\s*)?(\d+(?:\.\d+)?)\s*", re.I)
 _FLAG = re.compile(r"\s*%?(T|C)(?:IM|NT)?\s*(\d+)\s*\.\s*(Q|CF|DN)\s*", re.I)
 
 
 def _meant(text: str) -> str:
-    """How an address of another spelling is written here; "" for what looks like none."""
+    """The spelling here of an address as other software writes it; "" for a text that is none."""
     if match := _FLAG.fullmatch(text):
         return ("TF" if match[1].upper() == "T" else "CNF") + match[2]
     match = _OTHER.fullmatch(text)
@@ -163,7 +172,7 @@ def _span(areas: Mapping[str, Area], text: str) -> Span:
 
 
 def address_range(areas: Mapping[str, Area], text: str) -> list[Address]:
-    """The addresses of `D200..D202`, both ends with them.  Raises UnknownPlace for what is no such range."""
+    """The addresses of `D200..D202`, both ends included.  Raises UnknownPlace for a text that is no range of addresses."""
     low_text, _, high_text = text.partition("..")
     low, high = (_span_end(areas, part, text) for part in (low_text, high_text))
     same = (low.area, low.size_bits, low.bit is None) == (high.area, high.size_bits, high.bit is None)
@@ -198,7 +207,7 @@ def _at(areas: Mapping[str, Area], address: Address) -> Place:
 
 
 def _top(symbols: Mapping[str, Field], text: str) -> tuple[Field, int] | None:
-    """The symbol that a path begins with, and where it goes on: `Main`, `GVL.level`, or `level` if one list has it."""
+    """The symbol at the beginning of a path, and its end: `Main`, `GVL.level`, or `level` if only one list has it."""
     names = _NAMES.match(text)
     if names is None:
         return None
@@ -296,7 +305,7 @@ def _element(place: Place, text: str) -> Place:
 
 
 def element(place: Place, kind: ArrayType, number: int) -> Place:
-    """The element of an array that so many stand in front of."""
+    """The element of an array with index `number` in memory order, counted from 0."""
     subscripts: list[str] = []
     left = number
     for low, high in reversed(kind.bounds):

@@ -24,7 +24,7 @@ from fbvm.watch.values import Value, as_read, conform, parse_value, split_list
 
 
 def read(memory: Memory, place: Place) -> Value:
-    """The value at a place; None if the way to it leads through a null reference."""
+    """The value at a place as a Python value (see `values`); None if a reference on the way to it is null."""
     at = _follow(memory, place)
     if at is None:
         return None
@@ -32,7 +32,7 @@ def read(memory: Memory, place: Place) -> Value:
 
 
 def write(memory: Memory, place: Place, value: object) -> None:
-    """Writes a value, wholly or not at all.
+    """Writes a Python value to a place, wholly or not at all.
 
     Raises ValueError (out of range, constant, null reference) or TypeError (a value of another kind)."""
     for offset, data, bit in list(_pieces(memory, place, value)):
@@ -43,7 +43,7 @@ def write(memory: Memory, place: Place, value: object) -> None:
 
 
 def dereferenced(memory: Memory, place: Place) -> Place | None:
-    """Where a place lies now, without references on the way to it; None if one of them is null."""
+    """The place with its references followed: an offset and a bit, no hops; None if a reference on the way is null."""
     at = _follow(memory, place)
     return None if at is None else replace(place, offset=at[0], bit=at[1], hops=())
 
@@ -64,7 +64,7 @@ def _follow(memory: Memory, place: Place) -> tuple[int, int | None] | None:
 def _read(memory: Memory, kind: Type, offset: int, bit: int | None) -> Value:
     plain = base(kind)
     if isinstance(plain, OpenArrayType | AnyType):
-        return None  # what was passed may be gone, and only its owner knows its bounds
+        return None  # the argument may have ended, and only the called POU knows its bounds
     if isinstance(plain, ArrayType):
         return [_read(memory, plain.element, *_element(plain, offset, bit, number)) for number in range(plain.count)]
     if isinstance(plain, StructType):
@@ -105,7 +105,7 @@ def _text(memory: Memory, kind: StringType, offset: int) -> str:
 
 
 def _pieces(memory: Memory, place: Place, value: object) -> Iterator[tuple[int, bytes, int | None]]:
-    """The bytes that writing `value` changes: offset, bytes, bit.  Checks everything on the way."""
+    """The bytes of `value` at a place, as (offset, bytes, bit); raises before the first one is written if any does not fit."""
     if place.constant:
         raise ValueError(f"{place.name} is CONSTANT")
     at = _follow(memory, place)
@@ -127,10 +127,10 @@ def _pieces(memory: Memory, place: Place, value: object) -> Iterator[tuple[int, 
         yield offset, _encoded(plain, conform(place.type, value, place.name)), bit
 
 
-def parsed(where: Place | Span, text: str) -> Value:
-    """The value that a text writes for a place; for a span those of its places, parted by commas, as a list.
+def parse_for(where: Place | Span, text: str) -> Value:
+    """The value of a text such as `T#10ms` for a place; for a span a list of values, which commas separate in the text.
 
-    Raises ValueError or TypeError with the name of the place."""
+    Raises ValueError (out of range, no literal) or TypeError (another kind of literal), with the name of the place."""
     if isinstance(where, Place):
         return parse_value(where.type, text, where.name)
     texts = split_list(text)

@@ -1,4 +1,4 @@
-"""Cuts a condition into words: literals, places, operators.  An address is one word also with blanks: `W 0`, `E0 : 5`."""
+"""The tokens of a condition: literals, places, operators.  An address with blanks is one token: `W 0`, `E0 : 5`."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _WORDS = frozenset(("AND", "OR", "XOR", "NOT", "MOD", "TRUE", "FALSE"))
 
 
 def tokens(text: str) -> Iterator[tuple[str, str]]:
-    """Kind (text, literal, place, sign, word) and the words themselves.  Raises ConditionError."""
+    """Kind (text, literal, place, sign, word) and text of each token.  Raises ConditionError."""
     at = 0
     while at < len(text.rstrip()):
         match = _TOKEN.match(text, at)

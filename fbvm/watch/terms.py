@@ -1,7 +1,7 @@
-"""Parts of conditions: what may be compared and computed with what, and what a literal means beside a place.
+"""Terms of conditions: the types of operators, and the type that a literal takes from the other operand.
 
 A literal takes the type of the other operand, as in a program: beside a REAL it is rounded to 32 bits, beside an
-enumeration a name is its member.  What could never hold is refused, in the words in which a write would be.
+enumeration a name is its member.  A comparison that can never hold is an error, with the message of a write.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ Read = Callable[[Place], Value]
 
 @dataclass(frozen=True)
 class Term:
-    """A part of a condition: its value as a function of reading, and of what sort it is (see `sort_of`).
+    """A part of a condition.  `value` computes it from a function that reads places; `sort` is its class (see `sort_of`).
 
-    `type` is None for what takes the type of the other operand; `constant` is the value of what reads nothing;
-    `unknown` says why a name names nothing, which matters only if it is no member of an enumeration either."""
+    `type` is None for a literal, which takes the type of the other operand; `constant` is the value of a term without
+    variables; `unknown` is the error of a name that is no variable, and may still be a member of an enumeration."""
 
     text: str
     value: Callable[[Read], Value]
@@ -35,15 +35,15 @@ class Term:
     place: bool = False
     unknown: str = ""
 
-    def known(self) -> Term:
-        """The same term.  Raises ConditionError if its name names nothing."""
+    def resolved(self) -> Term:
+        """The same term.  Raises ConditionError for a name that is no variable."""
         if self.unknown:
             raise ConditionError(self.unknown)
         return self
 
     @property
     def described(self) -> str:
-        """Type for messages, or what it is without one."""
+        """The type for messages; of a literal its class."""
         return self.type.name if self.type else self.sort if self.sort == "BOOL" else f"a {self.sort.lower()}"
 
 
@@ -91,18 +91,18 @@ _COMPUTES: dict[tuple[str, str], tuple[str, Type]] = {
 
 
 def pair(sign: str, left: Term, right: Term, whole: str) -> Term:
-    """`left sign right`.  Raises ConditionError if that means nothing, or could never be computed or hold."""
+    """The term `left sign right`, `whole` being the condition.  Raises ConditionError for operands that do not fit."""
     text = f"{left.text} {sign} {right.text}"
     if sign in _LOGIC:
-        if not left.known().sort == right.known().sort == "BOOL":
+        if not left.resolved().sort == right.resolved().sort == "BOOL":
             raise ConditionError(f"{sign} joins conditions; one side is not BOOL in {whole!r}")
         return _computed(text, sign, left, right, "BOOL", BOOL)
     if sign in _COMPARES:
-        left, right = _fitted(left, right).known(), _fitted(right, left).known()
+        left, right = _fitted(left, right).resolved(), _fitted(right, left).resolved()
         if left.sort != right.sort:
             raise ConditionError(f"{sign} compares {left.described} with {right.described} in {whole!r}")
         return _computed(text, sign, left, right, "BOOL", BOOL)
-    sorts = ["date" if term.known().sort in DATES else term.sort for term in (left, right)]
+    sorts = ["date" if term.resolved().sort in DATES else term.sort for term in (left, right)]
     signs, kind = _COMPUTES.get((sorts[0], sorts[1]), ("", DINT))
     if sign not in signs.split():
         raise ConditionError(f"{sign} needs numbers in {whole!r}, not {left.described} and {right.described}")
@@ -118,7 +118,7 @@ def pair(sign: str, left: Term, right: Term, whole: str) -> Term:
 
 def signed(sign: str, inner: Term, whole: str) -> Term:
     """`-inner` or `+inner`."""
-    if inner.known().sort not in ("number", "time"):
+    if inner.resolved().sort not in ("number", "time"):
         raise ConditionError(f"{sign} needs a number in {whole!r}")
     if sign == "+":
         return inner
@@ -129,7 +129,7 @@ def signed(sign: str, inner: Term, whole: str) -> Term:
 
 def inverted(inner: Term, whole: str) -> Term:
     """`NOT inner`."""
-    if inner.known().sort != "BOOL":
+    if inner.resolved().sort != "BOOL":
         raise ConditionError(f"NOT needs a BOOL in {whole!r}")
     return Term(f"NOT {inner.text}", lambda read: not inner.value(read), "BOOL", BOOL)
 

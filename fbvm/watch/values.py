@@ -1,4 +1,4 @@
-"""Values of the program as Python values: checked on the way in, shown readably on the way out.
+"""Values of the program as Python values: checked before they are written, formatted as literals to be read.
 
 BOOL is bool, integers and bit strings are int, REAL and LREAL float, TIME and dates int nanoseconds, STRING and WSTRING
 str, CHAR and WCHAR a str of one character, an enumeration its number (its member's name is taken on the way in), arrays
@@ -38,8 +38,7 @@ from fbvm.syntax.st import literals
 from fbvm.syntax.st.texts import to_text
 
 Value: TypeAlias = "bool | int | float | str | list[Value] | dict[str, Value] | None"
-"""What a place holds, as a Python value; None is a null reference, another one its 64 bits, or the text that `Names` makes of
-them."""
+"""The value of a place.  A reference is None if it is null, else its 64 bits, or the text that `Names` makes of them."""
 
 _PIECE = re.compile(r"(\d[\d_]*(?:\.\d+)?)(ms|us|ns|d|h|m|s)_?", re.I)
 _PREFIX = re.compile(r"(?:TIME|LTIME|LT|T)#", re.I)
@@ -48,7 +47,11 @@ _INTEGER = re.compile(r"([+-]?)(?:(2|8|16)#([0-9A-F_]+)|0x([0-9A-F_]+)|(\d[\d_]*
 
 
 def parse_time_ns(text: str) -> int:
-    """Nanoseconds of `10ms`, `1.5s`, `1m30s`, `T#10ms`, `-5s`.  Raises ValueError."""
+    """Nanoseconds of a duration; the prefix T# may be left out.  Raises ValueError.
+
+    >>> parse_time_ns("1.5s"), parse_time_ns("T#1m30s"), parse_time_ns("-5us")
+    (1500000000, 90000000000, -5000)
+    """
     rest = _PREFIX.sub("", text.strip(), count=1)
     sign, rest = (-1, rest[1:]) if rest.startswith("-") else (1, rest)
     total, at = 0, 0
@@ -63,12 +66,12 @@ def parse_time_ns(text: str) -> int:
 
 
 def show_time(time_ns: int) -> str:
-    """`T#1m30s`, the way it is written in a program."""
+    """A duration in nanoseconds as a literal of a program: `T#1m30s`."""
     return to_text("TIME", time_ns).decode("ascii")
 
 
 def sort_of(kind: Type) -> str:
-    """What a value is when it is compared: BOOL, number, time, text, enumeration, or one of DATES; "" for others."""
+    """The class of values that can be compared: BOOL, number, time, text, enumeration or one of DATES; "" for others."""
     plain = base(kind)
     if isinstance(plain, EnumType):
         return "enumeration"
@@ -92,7 +95,7 @@ _EXAMPLES = {
 
 
 def refusal(kind: Type, name: str, text: str) -> TypeError:
-    """That `name` does not take `text`, and what it takes."""
+    """The error that variable `name` of type `kind` does not take the literal `text`, with an example of one that it takes."""
     number = "a number" if "ANY_REAL" in families(kind) else "a whole number"
     example = "one character" if "ANY_CHAR" in families(kind) else _EXAMPLES.get(sort_of(kind), number)
     return TypeError(f"{name} is {kind.name} and takes {example}, not {text}")
@@ -103,11 +106,13 @@ def nearest_real(value: float) -> float:
     return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
-# --- in: a Python value for a type ------------------------------------------------------------------------------------
+# --- Python values for a type ---------------------------------------------------------------------------------------
 
 
 def conform(kind: Type, value: object, name: str) -> Value:
-    """`value` as a place of type `kind` holds it.  Raises ValueError (out of range) or TypeError, both with `name`."""
+    """A Python value as a place of type `kind` holds it; a REAL is rounded to 32 bits, a member's name becomes its number.
+
+    Raises ValueError (out of range) or TypeError (another kind of value), with the name of the variable, `name`."""
     low, high = (kind.low, kind.high) if isinstance(kind, SubrangeType) else (None, None)
     plain = base(kind)
     if isinstance(plain, EnumType):
@@ -187,7 +192,7 @@ def _enumerated(kind: EnumType, value: object, name: str) -> int:
     return value
 
 
-# --- in: text for a type ----------------------------------------------------------------------------------------------
+# --- literals for a type -----------------------------------------------------------------------------------------------
 
 
 def literal(text: str) -> tuple[Value, Type | None]:
@@ -265,7 +270,7 @@ def _literal_of(kind: Type, text: str, name: str) -> Value:
 
 
 def split_list(text: str) -> list[str]:
-    """The parts of `1,2,3` or `[1, 2, 3]`: commas within brackets and quotes do not part."""
+    """The parts of `1,2,3` or `[1, 2, 3]`: commas within brackets and quotes do not separate."""
     text = text.strip()
     if text.startswith("[") and text.endswith("]"):
         text = text[1:-1]
@@ -281,7 +286,7 @@ def split_list(text: str) -> list[str]:
     return [part.strip() for part in parts]
 
 
-# --- out --------------------------------------------------------------------------------------------------------------
+# --- formatting ------------------------------------------------------------------------------------------------------------
 
 
 _ESCAPES = {"$": "$$", "\n": "$L", "\f": "$P", "\r": "$R", "\t": "$T"}
@@ -299,7 +304,7 @@ _PINS = {"VAR_INPUT": 0, "VAR_IN_OUT": 1, "VAR_OUTPUT": 2}
 
 
 def plain_value(kind: Type, value: Value) -> Value:
-    """The same value for JSON: each REAL as the number that people see; what JSON has no number for as text, "nan"."""
+    """The same value for JSON: a REAL as its shortest decimal number, infinities and NaN as the texts "inf" and "nan"."""
     plain = base(kind)
     if isinstance(plain, ArrayType) and isinstance(value, list):
         return [plain_value(plain.element, item) for item in value]
@@ -311,15 +316,15 @@ def plain_value(kind: Type, value: Value) -> Value:
 
 
 def in_hexadecimal(kind: Type, value: int) -> str:
-    """A whole number with all its digits: 16#0081."""
+    """An integer of type `kind` in hexadecimal with all its digits: 16#0081."""
     size = kind.size
     return f"16#{value & (1 << 8 * size) - 1:0{2 * size}X}"
 
 
 def as_read(kind: Type) -> Type:
-    """The type of what is read where a value of `kind` stands in a larger one: of a REFERENCE TO a single value that value.
+    """The type that is read for a member of type `kind`: of a REFERENCE TO a single value the type of that value.
 
-    Structures behind references are read by their own names, since they may lead back."""
+    Structures are not followed, since references in them may form a circle."""
     target = followed(kind)
     return target if machine(target) else kind
 

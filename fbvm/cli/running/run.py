@@ -34,7 +34,7 @@ from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
 from fbvm.run.running import EVENT, PACES, TimedWrite
 from fbvm.units.backplane import usual_units
-from fbvm.watch.places import parsed
+from fbvm.watch.places import parse_for
 
 
 @click.command("run")
@@ -163,7 +163,7 @@ def _run(
 def _write(plc: Plc, given: Setting) -> TimedWrite:
     """A setting with its value read for the type of its place; a range takes values parted by commas."""
     found = plc.find(given.name)
-    return TimedWrite(found, parsed(found, given.value), given.at_ns)
+    return TimedWrite(found, parse_for(found, given.value), given.at_ns)
 
 
 def _tell_doors(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...]) -> None:

@@ -16,8 +16,8 @@ from fbvm.cli.shared.sources import compiled, source_options
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.session import Session
-from fbvm.step.words import Words
-from fbvm.watch.places import parsed
+from fbvm.step.stop_report import StopReport
+from fbvm.watch.places import parse_for
 
 
 @click.command("step", epilog="At the prompt, `help` lists the commands.  A script: printf 'run Main.Done\\nprint D200\\n' | "
@@ -54,12 +54,12 @@ def command(
         debugged = DebugTarget(image, cycle_ns, mappings, timing, seed)
         texts = source_texts(image, {str(path): path for path in files}, libraries)
     session = Session(debugged.make)
-    commands = Commands(session, Words(session, texts), lambda: debugged.packets)
+    commands = Commands(session, StopReport(session, texts), lambda: debugged.packets)
     try:
         for given in settings:
             _write(session, given)
         for text in watched:
-            commands.words.value(text)
+            commands.report.value(text)
             commands.watches.append(text)
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
@@ -75,7 +75,7 @@ def _write(session: Session, given: Setting) -> None:
     if given.time:
         raise ValueError(f"--set {given}: here values are written before the first scan only; leave out @{given.time}")
     place = session.find(given.name)
-    value = parsed(place, given.value)
+    value = parse_for(place, given.value)
     session.act(lambda plc: plc.write(place, value))
 
 

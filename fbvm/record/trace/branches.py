@@ -20,8 +20,8 @@ class Branch:
     Besides, it may go past all of them if `past`."""
 
     site: int
-    ways: tuple[int, ...]
-    past: bool
+    targets: tuple[int, ...]
+    may_skip: bool
 
 
 def statements(image: Image) -> list[int]:

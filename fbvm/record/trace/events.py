@@ -105,7 +105,7 @@ class ObservedEngine:
 
     def __init__(self, image: Image, memory: Memory, tell: Callable[[Event], None], program: object = None) -> None:
         self.memory = memory
-        self.tell = tell
+        self.report = tell
         self.program = program
         self._engine = PythonEngine(image, memory, observed=True)
         known = program._engine if isinstance(program, ObservedEngine) else program
@@ -117,7 +117,7 @@ class ObservedEngine:
 
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of one task once, telling what they do."""
-        observations, tell, event = self._observe(task_index), self.tell, self._event
+        observations, tell, event = self._observe(task_index), self.report, self._event
         while True:
             try:
                 told = event(next(observations))

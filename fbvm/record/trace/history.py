@@ -1,7 +1,7 @@
 """The recent scans of a PLC, to be done again under observation: a run stays fast until somebody wants to see inside.
 
 Keeps states from which scans follow, a state at least every `every` scans.  Doing again needs no units and no network:
-what they changed stands in the next state.  What is written from outside must be announced with `touch`.
+what they changed stands in the next state.  What is written from outside must be announced with `mark_changed`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def observing(plc: Plc, listener: Listener) -> Iterator[None]:
     program = plc.engine
     tell = partial(listener.event, plc)
     if isinstance(program, ObservedEngine):
-        tell = partial(_both, program.tell, tell)
+        tell = partial(_both, program.report, tell)
     plc.engine = ObservedEngine(plc.image, plc.memory, tell, program)
     plc.phases.append(listener.phase)
     try:
@@ -56,24 +56,24 @@ class History:
         self._plc = plc
         self._every = every
         self._states: deque[State] = deque(maxlen=keep)
-        self._touched = True
+        self._changed = True
         self._substituted: list[int] = []
-        self._played: deque[tuple[int, int, bytes]] = deque(maxlen=keep * every)
+        self._substitute_results: deque[tuple[int, int, bytes]] = deque(maxlen=keep * every)
         self._ends: deque[tuple[int, Snapshot]] = deque(maxlen=keep)
-        plc.watchers.append(self._ended)
+        plc.watchers.append(self._scan_ended)
 
-    def touch(self) -> None:
+    def mark_changed(self) -> None:
         """Something outside the program changed the PLC since its last scan."""
-        self._touched = True
+        self._changed = True
 
     def before_scan(self) -> None:
         """To be called before each scan."""
         plc = self._plc
-        if self._touched or plc.units or plc.scans - self._states[-1].scans >= self._every:
+        if self._changed or plc.units or plc.scans - self._states[-1].scans >= self._every:
             self._states.append(plc.snapshot())
-            self._touched = bool(plc.units)
+            self._changed = bool(plc.units)
 
-    def _ended(self, plc: Plc) -> None:
+    def _scan_ended(self, plc: Plc) -> None:
         """What units changed is told apart from what is written before the next scan."""
         if plc.units:
             self._ends.append((plc.scans - 1, plc.memory.snapshot()))
@@ -85,7 +85,7 @@ class History:
 
         def noted(base: int) -> None:
             function(base)
-            self._played.append((self._plc.scans, base, bytes(memory.map[base : base + size])))
+            self._substitute_results.append((self._plc.scans, base, bytes(memory.map[base : base + size])))
 
         python_of(engine).substitute(body, noted)
 
@@ -97,20 +97,20 @@ class History:
     def at(self, scan: int) -> Plc:
         """A PLC in the state before a scan, without units.  Raises ValueError if the scan is not kept."""
         twin = self._twin()
-        self._bring(twin, scan)
+        self._advance_to(twin, scan)
         return twin
 
-    def again(self, scans: range, listener: Listener) -> None:
+    def replay(self, scans: range, listener: Listener) -> None:
         """Does scans again; the listener looks inside.  Beyond the last one it goes on as if nobody did anything."""
-        self.redo(scans, lambda twin: observing(twin, listener))
+        self.replay_with(scans, lambda twin: observing(twin, listener))
 
-    def redo(self, scans: range, attached: Callable[[Plc], AbstractContextManager[object]]) -> None:
+    def replay_with(self, scans: range, attached: Callable[[Plc], AbstractContextManager[object]]) -> None:
         """Does scans again on a PLC to which something is attached meanwhile."""
         scans = range(max(scans.start, self._states[0].scans if self._states else scans.stop), scans.stop)
         if not scans:
             return
         twin = self._twin()
-        self._bring(twin, scans.start)
+        self._advance_to(twin, scans.start)
         states, ends = {state.scans: state for state in self._states}, dict(self._ends)
 
         def refresh(plc: Plc, phase: Phase) -> None:
@@ -129,20 +129,20 @@ class History:
         plc = self._plc
         twin = Plc(plc.image, plc.cycle_ns, budget=plc.budget)
         for body in self._substituted:
-            python_of(twin.engine).substitute(body, self._player(twin))
+            python_of(twin.engine).substitute(body, self._playback(twin))
         return twin
 
-    def _player(self, twin: Plc) -> Callable[[int], None]:
+    def _playback(self, twin: Plc) -> Callable[[int], None]:
         """What a substitute left in its instance in each scan of before."""
 
         def play(base: int) -> None:
-            for scan, at, data in self._played:
+            for scan, at, data in self._substitute_results:
                 if (scan, at) == (twin.scans, base):
                     twin.memory.u8[base : base + len(data)] = data
 
         return play
 
-    def _bring(self, twin: Plc, scan: int) -> None:
+    def _advance_to(self, twin: Plc, scan: int) -> None:
         """Brings a twin to the state before a scan."""
         before = [state for state in self._states if state.scans <= scan]
         if not before or scan > self._plc.scans:

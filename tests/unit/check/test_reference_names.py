@@ -24,7 +24,7 @@ from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.signals import chosen_signals, recording
 from fbvm.record.trace.writer import Depth
 from fbvm.step.session import Session
-from fbvm.step.words import Words
+from fbvm.step.stop_report import StopReport
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
 
@@ -94,14 +94,14 @@ def test_without_extents_a_pointer_is_where_it_is(ran: Plc) -> None:
 
 def test_what_no_variable_has_is_said_so(ran: Plc) -> None:
     names = Names.of(ran.image, ran.memory.areas)
-    assert names.lead((1 << 40) + 255, None) == "-> a local variable"
-    assert names.lead(255, None) == "no variable (16#00000000000000FF)"
+    assert names.reference_name((1 << 40) + 255, None) == "-> a local variable"
+    assert names.reference_name(255, None) == "no variable (16#00000000000000FF)"
 
 
 def test_each_lead_is_looked_up_once(ran: Plc, monkeypatch: pytest.MonkeyPatch) -> None:
     names, place = Names.of(ran.image, ran.memory.areas), ran.find("Main.element")
     once = names.read(ran.read, place)
-    monkeypatch.setattr(names, "_lead", lambda *_: pytest.fail("looked up again"))
+    monkeypatch.setattr(names, "_find_reference_name", lambda *_: pytest.fail("looked up again"))
     assert names.read(ran.read, place) == once
 
 
@@ -110,7 +110,7 @@ def test_why_and_stepping_say_it(trace: Trace) -> None:
     assert isinstance(place, Place)
     assert cause_text(trace, why(trace, place, 2)).startswith("Main.element = -> Main.a[2] since scan 2")
     session = Session(made)
-    words = Words(session, {})
+    words = StopReport(session, {})
     session.scan()
     session.mark()
     session.scan()

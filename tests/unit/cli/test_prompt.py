@@ -16,7 +16,7 @@ from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.step.commands import Commands
 from fbvm.step.session import Session
-from fbvm.step.words import Words
+from fbvm.step.stop_report import StopReport
 
 TEXT = "PROGRAM Main\nVAR Count : INT; Delay : TON; END_VAR\n    Count := Count + 1;\n    Delay();\nEND_PROGRAM\n"
 CONTROL_C, CONTROL_D = "\x03", "\x04"
@@ -26,7 +26,7 @@ def commands() -> Commands:
     image = compile_text(TEXT).image
     assert image is not None
     session = Session(lambda: Plc(image))
-    return Commands(session, Words(session, {}))
+    return Commands(session, StopReport(session, {}))
 
 
 def typed(text: str) -> list[str]:

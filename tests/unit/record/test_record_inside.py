@@ -208,7 +208,7 @@ def test_the_values_within_some_bytes(plc: Plc, names: Names) -> None:
 def steps(plc: Plc, history: History, count: int) -> None:
     for _ in range(count):
         if plc.scans % 7 == 3:
-            history.touch()
+            history.mark_changed()
             plc.write("Main.Go", not plc.read("Main.Go"))
         history.before_scan()
         plc.scan()
@@ -242,7 +242,7 @@ def test_only_so_many_states_are_kept(plc: Plc) -> None:
 
 def test_nothing_is_kept_before_the_first_scan(plc: Plc) -> None:
     history, log = History(plc), Log()
-    history.again(range(5), log)
+    history.replay(range(5), log)
     assert history.scans == range(0)
     assert log.rows == []
 

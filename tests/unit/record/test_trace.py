@@ -126,7 +126,7 @@ def test_a_trace_tells_what_a_listener_was_told() -> None:
     file = io.BytesIO()
     writer = TraceWriter(plc, file, Depth.STATEMENTS)
     plc.phases.append(live.phase)
-    tell, plc.engine.tell = plc.engine.tell, lambda event: (tell(event), live.event(plc, event))  # type: ignore[attr-defined]
+    report, plc.engine.report = plc.engine.report, lambda event: (report(event), live.event(plc, event))  # type: ignore[attr-defined]
     for _ in range(12):
         press(plc)
         plc.scan()

@@ -19,7 +19,7 @@ from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
 from fbvm.step.commands import COMMANDS, CommandError, Commands, ExpectationError
 from fbvm.step.session import Position, Session
-from fbvm.step.words import Words
+from fbvm.step.stop_report import StopReport
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
@@ -51,7 +51,7 @@ def made(text: str = TEXT) -> Commands:
     assert compilation.image is not None
     image = compilation.image
     session = Session(lambda: Plc(image))
-    return Commands(session, Words(session, {image.sites[0].file: text}))
+    return Commands(session, StopReport(session, {image.sites[0].file: text}))
 
 
 def said(commands: Commands, *lines: str) -> str:
@@ -59,7 +59,7 @@ def said(commands: Commands, *lines: str) -> str:
 
 
 def line_of(commands: Commands) -> int | None:
-    site = commands.words.site()
+    site = commands.report.site()
     return site.line if site else None
 
 

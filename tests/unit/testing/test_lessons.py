@@ -89,7 +89,7 @@ def test_a_class(tmp_path: Path) -> None:
     (tmp_path / "class" / "bert" / "lessons" / first.slug / "test_lesson.py").write_text(
         "def test_prediction(): pass\ndef test_program(): pass\n", encoding="utf-8")  # nobody marks his own work
     results = check_class(tmp_path / "class", tmp_path / "out")
-    assert results["anna"][first.slug].whole
+    assert results["anna"][first.slug].is_complete
     assert not results["bert"][first.slug].prediction
     assert (results["bert"][first.slug].passed, results["bert"][first.slug].checks) == (0, 1)
     assert results["carla"] == {}

@@ -14,7 +14,7 @@ from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.record.trace.branches import branches, statements
 from fbvm.record.trace.history import observing
-from fbvm.testing.coverage import PAST, Coverage, FileCoverage
+from fbvm.testing.coverage import SKIPPED, Coverage, FileCoverage
 from fbvm.testing.coverage_report import cobertura, percent, table, write_pages
 from fbvm.testing.subject import subject
 
@@ -141,7 +141,7 @@ def test_counts_of_two_processes_add_up(file: Path) -> None:
     total = Coverage.from_data(counted(file, 1, 2).to_data())
     total.add(counted(file, 1, 3))
     each, known = only(total), only(counted(file, 1, 2, 1, 3))
-    assert (each.statements, each.ways) == (known.statements, known.ways)
+    assert (each.statements, each.branches) == (known.statements, known.branches)
 
 
 def test_branches_of_an_image() -> None:
@@ -159,8 +159,8 @@ END_IF
 t(EN := b > 1, IN := TRUE);
 END_PROGRAM""").image
     assert image is not None
-    shown = [(image.sites[fork.site].line, [image.sites[way].line for way in fork.ways], fork.past) for fork in branches(image)
-             if image.sites[fork.site].pou == "Main"]  # fmt: skip
+    shown = [(image.sites[branch.site].line, [image.sites[target].line for target in branch.targets], branch.may_skip)
+             for branch in branches(image) if image.sites[branch.site].pou == "Main"]  # fmt: skip
     assert shown == [(3, [4, 6, 8], False)]
     lines = sorted(image.sites[number].line for number in statements(image) if image.sites[number].pou == "Main")
     assert lines == [3, 4, 6, 8, 9, 12]
@@ -201,7 +201,7 @@ def test_pages(file: Path) -> None:
 
 
 def test_the_way_past_is_no_place() -> None:
-    assert PAST == (0, 0)
+    assert SKIPPED == (0, 0)
 
 
 # --- in pytest --------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""A session's past as the search for causes reads it, in place of a trace."""
+"""The events of a stepping session in the form in which `record.draw.why` reads a trace."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from fbvm.machine.plc import Plc
 from fbvm.record.draw.why import Follower
 from fbvm.record.trace.outline import outer_statements
 from fbvm.step.session import Session
-from fbvm.step.words import Words
+from fbvm.step.stop_report import StopReport
 from fbvm.watch.names import Names
 
 
-class Past:
-    """What happened up to here."""
+class SessionEvents:
+    """The events up to the position of the session."""
 
-    def __init__(self, session: Session, words: Words) -> None:
-        self._session, self._words = session, words
+    def __init__(self, session: Session, report: StopReport) -> None:
+        self._session, self._report = session, report
         self.names: Names = session.names
         self.sites = session.plc.image.sites
         self.outer = outer_statements(session.plc.image)
@@ -25,13 +25,13 @@ class Past:
         return range(self._session.here.scan + 1)
 
     def at(self, scan: int) -> Plc:
-        """The PLC of the session, which stands there."""
+        """The PLC of the session; `why` asks for the current scan only."""
         return self._session.plc
 
     def follow(self, follower: Follower, scans: range | None = None) -> None:
-        """Tells all that happened in some scans."""
+        """Reports the phases and events of some scans, or of all, to `follower`."""
         self._session.follow(follower, scans or self.scans)
 
     def line(self, site: Site) -> str:
         """The text of the line on which a statement stands."""
-        return self._words.line(site.file, site.line).strip()
+        return self._report.line(site.file, site.line).strip()

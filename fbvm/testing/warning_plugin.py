@@ -29,7 +29,7 @@ def add_options(parser: pytest.Parser, group: pytest.OptionGroup) -> None:
     group.addoption("--fbvm-warnings-as-errors", action="store_true", help="warnings of PLC code are errors")
 
 
-class Warned:
+class WarningPlugin:
     """Which warnings are wanted in a session, and those that there were."""
 
     def __init__(self, config: pytest.Config) -> None:
@@ -41,7 +41,7 @@ class Warned:
             raise pytest.UsageError(f"--fbvm-no-warn: {error}") from None
         self._shown: dict[str, None] = {}
 
-    def note(self, subject: Subject) -> None:
+    def add(self, subject: Subject) -> None:
         """Remember what a subject is warned of."""
         self._shown.update(dict.fromkeys(each.render() for each in subject.warnings))
 
@@ -64,8 +64,8 @@ class Warned:
                 terminalreporter.line(text)
 
 
-def warned_of(config: pytest.Config) -> Warned:
+def warning_plugin(config: pytest.Config) -> WarningPlugin:
     """The warnings of a session."""
-    warned: Warned | None = config.pluginmanager.get_plugin(NAME)
-    assert warned is not None, "it is registered when pytest starts"
-    return warned
+    plugin: WarningPlugin | None = config.pluginmanager.get_plugin(NAME)
+    assert plugin is not None, "it is registered when pytest starts"
+    return plugin

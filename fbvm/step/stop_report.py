@@ -1,4 +1,4 @@
-"""What is said at a stop: where the program stands, the lines around, what changed, and values."""
+"""The texts of a stop: the position, the source around it, changed values, rungs, charts, calls."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, show, show_time
 
 AROUND = 2
-"""Lines before and behind the one that comes next."""
+"""Lines of the source that are shown before and behind the current one."""
 MOST_CHANGES = 8
 WIDEST_RUNG = 100
 WIDE = 32
-"""Columns of a rung's line before it is said whether it conducts."""
+"""Columns of a source line before the state of its contact, ON or off."""
 
 
-class Words:
-    """Says it in text; `texts` are the sources by name."""
+class StopReport:
+    """Makes texts about the current position of a session; `texts` are the sources by name."""
 
     def __init__(self, session: Session, texts: Mapping[str, str]) -> None:
         self._session = session
@@ -32,19 +32,19 @@ class Words:
         self.sites = session.plc.image.sites
 
     def site(self) -> Site | None:
-        """The statement that comes next, or that a trap has ended."""
+        """The statement that is executed next, or that a trap has ended."""
         statement = self._session.statement
         if self._session.trap:
             return self._session.trap.site
         return self.sites[statement.site] if statement else None
 
     def line(self, file: str, number: int) -> str:
-        """A line of a source, "" if it is not there."""
+        """Line `number` of a source, "" if the source or the line is unknown."""
         rows = self._lines.get(file, [])
         return rows[number - 1].rstrip() if 0 < number <= len(rows) else ""
 
     def place(self) -> str:
-        """`scan 3, 30ms: pump.st:15 in Main.Station`"""
+        """The position: `scan 3, 30ms: pump.st:15 in Main.Station`."""
         session, site = self._session, self.site()
         text = f"scan {session.here.scan}, {show_time(session.now_ns)[2:]}: "
         if session.trap:
@@ -58,7 +58,7 @@ class Words:
         return self._session.names.instance(frame.base) or self._session.plc.image.bodies[frame.body].name
 
     def around(self, lines: int = AROUND) -> Iterator[str]:
-        """The lines around the statement that comes next, which is marked."""
+        """The source around the next statement, whose line is marked with >; `lines` before and behind it."""
         site = self.site()
         if site is None:
             return
@@ -70,7 +70,7 @@ class Words:
                 yield f" {'>' if number == site.line else ' '}{number:>4}  {said}".rstrip()
 
     def _power(self, file: str) -> dict[int, bool]:
-        """Of rungs of this instance in this scan, line by line, whether the element conducts."""
+        """By line of a ladder source: whether its element conducted in this scan, in rungs of the current instance."""
         statement = self._session.statement
         return {site.line: seen[-1] for rung in self._session.rungs
                 if statement and rung.base == statement.frame.base and not rung.picture.is_text
@@ -78,7 +78,7 @@ class Words:
                 if (site := self.sites[rung.picture.steps[step][0]]).file == file}  # fmt: skip
 
     def rung(self, number: int | None) -> Iterator[str]:
-        """The drawing of a rung of this POU; without a number, of those executed last and next.  Raises ValueError."""
+        """The drawing of rung `number` of this POU; without a number of the last and the next rung.  Raises ValueError."""
         statement, image = self._session.statement, self._session.plc.image
         mine = [rung for rung in image.rungs if statement and rung.body == statement.frame.body]
         if not mine or statement is None:
@@ -94,7 +94,7 @@ class Words:
             yield from ladder_text(rung, WIDEST_RUNG, sight)
 
     def chart(self) -> Iterator[str]:
-        """The drawing of the chart of this POU, with its steps as they are here.  Raises ValueError."""
+        """The drawing of the chart of this POU with its active steps.  Raises ValueError if the POU is no chart."""
         statement, image = self._session.statement, self._session.plc.image
         here = image.bodies[statement.frame.body].name if statement else ""
         for chart in image.charts:
@@ -108,7 +108,7 @@ class Words:
         raise ValueError("there is no chart here")
 
     def changes(self) -> Iterator[str]:
-        """What the last move changed."""
+        """The values that the last move changed, a line each."""
         changes = list(self._session.changes())
         for change in changes[:MOST_CHANGES]:
             old, new = (text.removeprefix("-> ") for text in (change.old, change.new))
@@ -117,7 +117,7 @@ class Words:
             yield f"  and {len(changes) - MOST_CHANGES} more"
 
     def calls(self) -> Iterator[str]:
-        """Who called whom, the innermost first."""
+        """The call stack, the innermost body first."""
         statement = self._session.statement
         if statement is None:
             return
@@ -127,7 +127,7 @@ class Words:
             frame, site = frame.caller, frame.site
 
     def value(self, text: str) -> str:
-        """`Main.Delay.ET = T#20ms`; words of addresses also in hexadecimal, what units call them beside it."""
+        """`Main.Delay.ET = T#20ms`; of words also the hexadecimal value, and the description of a unit's word."""
         found = self._session.find(text)
         value = self._session.read(found)
         if isinstance(found, Span):
@@ -136,7 +136,7 @@ class Words:
         return self._one(found, value)
 
     def _one(self, place: Place, found: Value) -> str:
-        name, value = place.name, self._session.names.told(place.type, found)
+        name, value = place.name, self._session.names.name_references(place.type, found)
         if isinstance(base(place.type), StructType) and isinstance(value, dict):
             return f"{name} = {place.type.name} {show(place.type, value)}"
         text = f"{name} = {show(place.type, value)}"
@@ -149,5 +149,5 @@ class Words:
 
 
 def short(site: Site) -> str:
-    """`pump.st:15`"""
+    """The file and line of a statement: `pump.st:15`."""
     return f"{site.file.rpartition('/')[2]}:{site.line}"
