@@ -72,7 +72,7 @@ class ScanReplay:
         self.values = RungValues(plc.image, self.plc.memory.areas)
         self.power = PowerFlow(plc.image.rungs, lambda scan: True, self.values.keep)
         """The rungs that the scan has executed, with their power."""
-        self.evolutions = ChartRecorder(plc.image.charts, lambda scan: True)
+        self.chart_recorder = ChartRecorder(plc.image.charts, lambda scan: True)
         """The charts that the scan has executed."""
         self._stop: Stop = lambda number, statement: False
         self._actions: Mapping[int, Sequence[Action]] = {}
@@ -87,7 +87,7 @@ class ScanReplay:
         self.plc.restore(state)
         self.statement, self.count = None, 0
         self.power = PowerFlow(self.plc.image.rungs, lambda scan: True, self.values.keep)
-        self.evolutions = ChartRecorder(self.plc.image.charts, lambda scan: True)
+        self.chart_recorder = ChartRecorder(self.plc.image.charts, lambda scan: True)
         self._stop, self._actions, self._listener = stop, actions, listener
         if self.plc.trap:
             return False
@@ -110,7 +110,7 @@ class ScanReplay:
 
     def _event(self, event: Event) -> None:
         self.power.event(self.plc, event)
-        self.evolutions.event(self.plc, event)
+        self.chart_recorder.event(self.plc, event)
         if isinstance(event, Statement):
             if self.count:
                 for action in self._actions.get(self.count, ()):

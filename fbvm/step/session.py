@@ -101,7 +101,7 @@ class Session:
     @property
     def charts(self) -> list[ChartCall]:
         """The calls of charts in this scan so far, in order."""
-        return self._replay.evolutions.called
+        return self._replay.chart_recorder.calls
 
     @property
     def now_ns(self) -> int:

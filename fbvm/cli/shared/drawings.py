@@ -103,12 +103,12 @@ def draw_executed_charts(plc: Plc, scans: str | None) -> Iterator[None]:
     seen = ChartRecorder(plc.image.charts, scan_filter(scans))
     with observing(plc, seen):
         yield
-    if not seen.called:
+    if not seen.calls:
         _warn_nothing_drawn(plc, f"--sfc {scans}", "chart", bool(plc.image.charts))
     names = Names.of(plc.image, plc.memory.areas)
-    for called in seen.called:
+    for called in seen.calls:
         click.echo(f"scan {called.scan}, {names.instance(called.base)}")
-        print_lines(sfc_text(called.picture, chart_width(), called.sighted))
+        print_lines(sfc_text(called.picture, chart_width(), called.state))
 
 
 def _warn_nothing_drawn(plc: Plc, option: str, part: str, declared: bool) -> None:

@@ -3,7 +3,7 @@
     CIO1519.02  ##...       TCP Active Open Request Switch
     D200        0 |12|513   = 0, 12, 513
 
-A `|` stands in the scan at whose end a word has a new value; values that found no room are listed at the right.
+A `|` stands in the scan at whose end a word has a new value; values without room are listed at the right.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from fbvm.record.trace.recorder import Recorder, Recording, Signal, Track, defau
 from fbvm.watch.values import Value
 
 QUIET_SCANS = 12
-"""A longer stretch in which nothing changes is drawn short where a chart may be compressed."""
+"""`compress` shortens longer stretches in which nothing changes."""
 GAP = "~"
 RULER_STEP = 10
 MOST_VALUES = 12
-"""Values that are listed at the right."""
+"""Values that the list at the right has at most."""
 
 
 class Chart(str):
@@ -57,10 +57,11 @@ def chart(
     until: str | Callable[[Plc], bool] | None = None,
     max_scans: int = 1000,
 ) -> Chart:
-    """Runs `plc` for so many scans, or until a condition holds, and draws the signals.
+    """Runs `plc` for `scans` scans, or until a condition holds, and draws the signals.
 
-    Without `signals`: what units describe and programs declare, as far as it changed.  Raises as `Recorder` does, and
-    AssertionError if the condition does not hold within `max_scans`."""
+    `signals` are paths, addresses, ranges, or pairs of one and its description; without them those signals are drawn that
+    units describe or programs declare and that change.  `until` is a condition as text or a function.  Raises UnknownPlace,
+    TypeError for an array or a structure, and AssertionError if the condition does not hold within `max_scans` scans."""
     chosen: Iterable[str | tuple[str, str] | Signal] = default_signals(plc) if signals is None else signals
     before = {}
     recorder = Recorder(plc, chosen)
@@ -88,9 +89,9 @@ def draw(
     ruler: bool = False,
     compress: bool = False,
 ) -> Chart:
-    """The chart of a recording.
+    """The chart of a recording, or of some of its `tracks`.
 
-    `width` in characters wraps it, `ruler` numbers the scans, `compress` cuts quiet stretches."""
+    `width` in characters wraps the chart, `ruler` adds the numbers of scans, `compress` shortens stretches without changes."""
     tracks = recorder.tracks if tracks is None else tracks
     if not tracks or not recorder.scans:
         return Chart("")
@@ -111,7 +112,7 @@ def draw(
 
 
 def _columns(scans: range, tracks: Sequence[Track]) -> list[int | None]:
-    """The scans to draw; None stands for those left out between two quiet ends."""
+    """The scans to draw; None stands for scans that are left out because nothing changes."""
     turns = sorted({scan for track in tracks for scan, _ in track.changes} | {scans.stop})
     columns: list[int | None] = []
     for start, end in itertools.pairwise(turns):
@@ -123,7 +124,7 @@ def _columns(scans: range, tracks: Sequence[Track]) -> list[int | None]:
 
 
 def _row(track: Track, values: Sequence[Value], first: int, piece: Sequence[int | None]) -> tuple[str, str]:
-    """The cells of a signal in these scans, and what stands at their right; `values` are those from scan `first` on."""
+    """The cells of a signal in these scans, and the note at their right; `values` begin with scan `first`."""
     signal = track.signal
     note = signal.description
     if signal.is_bit:
@@ -137,9 +138,9 @@ def _row(track: Track, values: Sequence[Value], first: int, piece: Sequence[int 
 
 
 def _numbers(texts: Sequence[str | None]) -> tuple[str, bool]:
-    """A row of numbers, each from the column on in which it appears; and whether all found room.
+    """A row of numbers, each from the column of its first scan on; True if there was room for all.
 
-    The last one always does: nothing stands at its right."""
+    There is always room for the last one."""
     cells, complete, at = [" "] * len(texts), True, 0
     while at < len(texts):
         end = at + 1

@@ -1,4 +1,4 @@
-"""Rungs and charts as SVG: the same drawing as the one of characters, its lines drawn as lines, power in colour."""
+"""Rungs and charts as SVG: the same drawing as the one of characters, with lines and colours."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _STYLE = """
 """
 _ENDS = {LEFT: (-0.5, 0.0), RIGHT: (0.5, 0.0), DOWN: (0.0, 0.5), UP: (0.0, -0.5)}
 _TURNS = {**dict.fromkeys((LEFT, RIGHT), ((UP, -1), (DOWN, 1))), **dict.fromkeys((UP, DOWN), ((LEFT, -1), (RIGHT, 1)))}
-"""The ways that turn off a way, and on which side."""
+"""The directions across a direction, and their sides."""
 _OPPOSITE = {LEFT: RIGHT, RIGHT: LEFT, UP: DOWN, DOWN: UP}
 SINGLE = ((0.0, 0.0),)
 Drawn = tuple[str, Surface]
@@ -36,7 +36,7 @@ Drawn = tuple[str, Surface]
 
 
 def ladder_svg(rungs: Sequence[Drawn]) -> str:
-    """A picture of rungs, one below the other.  It follows the reader's choice of light or dark."""
+    """A picture of rungs, one below the other.  The colours follow the reader's choice of light or dark."""
     parts: list[str] = []
     row = columns = 0
     for head, surface in rungs:
@@ -52,8 +52,8 @@ def ladder_svg(rungs: Sequence[Drawn]) -> str:
 
 
 def rung_svg(surface: Surface) -> str:
-    """A drawing of a rung or a chart as a part of a page, which says what `svg.rung` and its `text`, `path`, `mark`, `power`,
-    `faint` look like."""
+    """A drawing of a rung or a chart as an SVG element of a page, whose style sheet has `svg.rung` with `text`, `path`, `mark`,
+    `power` and `faint`."""
     places = [*surface.lines, *surface.texts]
     width = (max(x for x, _ in places) + 2) * CELL_WIDTH
     height = (max(y for _, y in places) + 1) * CELL_HEIGHT

@@ -1,4 +1,4 @@
-"""The power in rungs: what contacts, outputs and blocks of ladder saw in the scans that somebody asked for."""
+"""The power flow in rungs: the states of contacts, outputs and blocks in each execution of a rung."""
 
 from __future__ import annotations
 
@@ -13,22 +13,24 @@ from fbvm.record.trace.events import Contact, Event, Read, Statement, Write
 
 @dataclass(eq=False)
 class RungExecution:
-    """One execution of a rung: where its instance begins, and what was seen at each step, in the order of time."""
+    """One execution of a rung: the offset of its instance, and the states of each step in the order of evaluation."""
 
     scan: int
     base: int
     picture: RungPicture
     states: dict[int, list[bool]] = field(default_factory=dict)
     values: dict[tuple[int, int, int | None], str] = field(default_factory=dict)
-    """What was read and written, as text, if somebody wanted that: by statement, offset and bit."""
+    """The values that were read and written, as text, by site, offset and bit; empty without `keep`."""
 
 
 Keep = Callable[[ScanState, RungExecution, Read | Write], None]
-"""Notes what an execution of a rung reads and writes."""
+"""Called for each read and write of an execution of a rung."""
 
 
 class PowerFlow:
-    """A listener that keeps the executions of rungs in the scans that `wanted` names, in order."""
+    """A listener that keeps the executions of `rungs` in the scans for which `wanted` returns True, in order.
+
+    `keep` is called for each read and write in them."""
 
     def __init__(self, rungs: Sequence[RungPicture], wanted: Callable[[int], bool], keep: Keep | None = None) -> None:
         self.executed: list[RungExecution] = []
@@ -39,12 +41,12 @@ class PowerFlow:
         self._latest: dict[tuple[int, int], RungExecution] = {}
 
     def phase(self, plc: ScanState, phase: Phase) -> None:
-        """Nothing is left from the scan before."""
+        """Forgets the executions of the scan before."""
         if phase is Phase.INPUTS:
             self._latest.clear()
 
     def event(self, plc: ScanState, event: Event) -> None:
-        """Follow rungs and their contacts."""
+        """Records the execution of a rung, and the state of a contact."""
         if not self._wanted(plc.scans):
             return
         if isinstance(event, Statement) and event.is_rung:

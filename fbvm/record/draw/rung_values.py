@@ -1,4 +1,4 @@
-"""Values in rungs: what the operands of comparisons, instructions and blocks were when a rung was executed."""
+"""The values that operands of comparisons, instructions and blocks had when a rung was executed."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from fbvm.watch.paths import Place, UnknownPlace, find_place
 
 
 class RungValues:
-    """Makes texts of what a rung reads and writes, and finds them again by its operands."""
+    """Keeps the values that rungs read and write as texts, and finds them by operands."""
 
     def __init__(self, image: Image, areas: Mapping[str, Area]) -> None:
         self._symbols, self._areas = image.symbols, areas
         self._names = Names.of(image, areas)
 
     def keep(self, plc: ScanState, made: RungExecution, event: Read | Write) -> None:
-        """Note the value of what was read or written in a rung."""
+        """Keeps the value of a read or write in an execution of a rung; a `Keep` for `PowerFlow`."""
         bit = event.bit if event.bit != WHOLE_BYTES else None
         place = self._names.at(event.offset, bit)
         if place is not None and len(event.value) <= 8:
@@ -32,7 +32,7 @@ class RungValues:
             made.values[event.site, event.offset, bit] = text.replace(" ", "")
 
     def of(self, made: RungExecution) -> Callable[[int, str], str]:
-        """The values of the operands of a rung as it was executed, "" of those that nobody has seen."""
+        """A function from step and operand to the value in an execution of a rung, "" for an operand without one."""
         instance = self._names.instance(made.base)
 
         def value(step: int, operand: str) -> str:
@@ -43,7 +43,7 @@ class RungValues:
             if joined(mnemonic) is None:
                 sites = site, made.picture.site
                 return next((text for one in sites if (text := made.values.get((one, place.offset, place.bit)))), "")
-            # what contacts compare is read by the statement of the output behind them
+            # comparisons of contacts are read by the statement of the output behind them
             wanted = place.offset, place.bit
             return next((text for (_, *where), text in made.values.items() if tuple(where) == wanted), "")
 

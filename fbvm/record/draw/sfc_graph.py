@@ -1,8 +1,8 @@
-"""The order in which a chart is drawn: what stands below what, and which links are jumps.
+"""The layout of a chart: the node above each node, and the links that are drawn as jumps.
 
 Steps and transitions are the nodes.  A link that leads back, or to a step that is drawn somewhere else, is a jump.  Of
-all others, a node with several of them in front of it, where ways meet again, stands below the node at which these ways
-have parted: its immediate dominator.
+the other links, a node with several predecessors, where branches converge, is drawn below the node where these branches
+diverge: its immediate dominator.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Graph:
         self.picture = picture
         self.apart = apart
         self.following: dict[Node, list[Node]] = {}
-        """What stands behind a node, jumps included, those transitions first that go first."""
+        """The successors of a node, jumps included, transitions in the order of their priority."""
         order = sorted(range(len(picture.transitions)), key=lambda n: (not picture.transitions[n][2], picture.transitions[n][2]))
         for number in range(len(picture.steps)):
             self.following[Node(True, number)] = [Node(False, n) for n in order if number in picture.transitions[n][3]]
@@ -35,7 +35,7 @@ class Graph:
             self.following[Node(False, number)] = [Node(True, step) for step in targets]
         self.roots: list[Node] = []
         self.order: list[Node] = []
-        """All nodes, each behind those in front of it."""
+        """All nodes, each behind its predecessors."""
         self._back: set[tuple[Node, Node]] = set()
         self._walk()
         self.before: dict[Node, list[Node]] = {node: [] for node in self.order}
@@ -48,7 +48,7 @@ class Graph:
         self.above: dict[Node, Node | None] = {}
         self._dominate()
         self.below: dict[Node, list[Node]] = {node: [] for node in self.order}
-        """Nodes where ways meet again that have parted at a node, in order."""
+        """By node the nodes where the branches that diverge there converge, in order."""
         for node in self.order:
             above = self.above[node]
             if above is not None and len(self.before[node]) > 1:
@@ -59,7 +59,7 @@ class Graph:
         return (node, follower) in self._back or follower.is_step and follower.number in self.apart
 
     def _walk(self) -> None:
-        """Order the nodes: initial steps are roots, then what is drawn apart, then what nothing leads to."""
+        """Orders the nodes: roots are initial steps, then steps that are drawn apart, then steps without predecessors."""
         steps = self.picture.steps
         begins = [n for n, step in enumerate(steps) if step[1]]
         others = [n for n in range(len(steps)) if n not in begins]
@@ -73,7 +73,7 @@ class Graph:
         self.order = [node for part in left for node in part]
 
     def _from(self, root: Node, done: set[Node]) -> list[Node]:
-        """What can be reached from a root, in an order; links to nodes that are still open lead back."""
+        """The nodes that are reached from a root, in order; links to nodes that are still open lead back."""
         open_: set[Node] = {root}
         path = [(root, iter(self.following[root]))]
         finished: list[Node] = []
@@ -102,13 +102,13 @@ class Graph:
         return finished[::-1]
 
     def _dominate(self) -> None:
-        """For each node the last one through which all ways from its root lead."""
+        """Finds the immediate dominator of each node: the last node through which all paths from the root lead."""
         depth: dict[Node, int] = {}
         for node in self.order:
-            fathers = self.before[node]
-            above: Node | None = fathers[0] if fathers else None
-            for father in fathers[1:]:
-                other: Node | None = father
+            predecessors = self.before[node]
+            above: Node | None = predecessors[0] if predecessors else None
+            for predecessor in predecessors[1:]:
+                other: Node | None = predecessor
                 while above != other:
                     if above is None or other is None:
                         above = other = None

@@ -1,6 +1,6 @@
-"""Pieces of a drawn chart: each knows its size, where it is entered, which of its ends are open, and how it is painted.
+"""Pieces of the drawing of a chart: each has a size, the column of its entry, open ends, and functions that draw it.
 
-Two pieces are put side by side, or one below the other, without looking into them; so no line crosses another."""
+Pieces are put side by side, or one below the other, by these alone; so no line crosses another."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ WING = 2
 
 @dataclass
 class End:
-    """An open end in the last row of a piece: its column, the node that it leads to, whether power goes that way."""
+    """An open end in the last row of a piece: its column, the node that it leads to, whether it is drawn with power."""
 
     x: int
     to: Node
@@ -32,7 +32,7 @@ class End:
 
 @dataclass
 class Piece:
-    """A part of a drawing: `entry` is the column in its first row at which it is entered, or left if it is one node."""
+    """A part of a drawing; `entry` is the column of the line into its first row, and, of a single node, out of its last."""
 
     width: int
     height: int
@@ -42,7 +42,7 @@ class Piece:
     """Other pieces in it, and where."""
     ends: list[End] = field(default_factory=list)
     thick: bool = False
-    """Whether power goes into it."""
+    """True if the line into it is drawn with power."""
 
     def draw(self, surface: Surface, x: int, y: int) -> None:
         """Paint it, and all that is in it, however deep."""
@@ -127,8 +127,8 @@ def transition(label: str, wrapped: int, fired: bool) -> Piece:
     return piece
 
 
-def met(piece: Piece, name: str) -> Piece:
-    """A transition at which another way ends that is not drawn down to it: an arrow with this name leads there."""
+def arrow_target(piece: Piece, name: str) -> Piece:
+    """A transition to which arrows lead from other branches; `name` is written beside it."""
     made = Piece(0, 0, piece.entry + WING - 1, thick=piece.thick)
     made.line_across(made.entry - WING, made.entry + WING, 0, double=True)
     made.text(made.entry + WING + 1, 0, f"◄ {name}")
@@ -155,7 +155,7 @@ def passing(to: Node, thick: bool) -> Piece:
 # --- put together ---------------------------------------------------------------------------------------------------
 
 
-def over(own: Piece, children: Sequence[Piece], double: bool) -> Piece:
+def stack(own: Piece, children: Sequence[Piece], double: bool) -> Piece:
     """A node above what follows it: one below the other, or below a line across."""
     if not children:
         return own

@@ -1,5 +1,5 @@
 """Sequential function charts as drawings of characters: steps with their actions, transitions with their conditions, single
-and double lines where ways part and meet, arrows for jumps; with tokens and thick lines where a recorded scan went."""
+and double lines where branches diverge and converge, arrows for jumps; of a recorded scan also tokens and thick lines."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from fbvm.record.draw.sfc_pieces import Piece
 from fbvm.syntax.ladder.drawing.box_lines import Surface
 
 LEAST = 24
-"""Columns that a chart needs for anything to be drawn."""
+"""The least width of a drawing in columns."""
 WRAPPED = (60, 36, 24, 16)
-"""Columns of a line of a condition; the first is taken with which the chart is narrow enough."""
+"""Widths of the lines of a condition that are tried, in columns, until the chart is narrow enough."""
 TOKEN = "●"
 NAMED = 0
-"""In place of such columns: conditions stand below the chart, and transitions have names."""
+"""In place of a width: conditions are written below the chart, and transitions have names."""
 
 
 @dataclass(frozen=True)
 class ChartState:
-    """What was seen of a chart in one scan: the steps that were active at its end, by number, and the conditions that were
-    worked out, by the number of their transition."""
+    """The state of a chart in one scan: the numbers of the steps that were active at its end, and the values of evaluated
+    conditions by the number of their transition."""
 
     active: frozenset[int] = frozenset()
     tested: Mapping[int, bool] = field(default_factory=dict)
 
 
 def sfc_text(picture: SfcPicture, width: int = 80, seen: ChartState | None = None) -> list[str]:
-    """The lines of a chart; without `seen` as it is at rest."""
+    """The drawing of a chart as lines of text, at most `width` columns wide; without `seen` no step is active."""
     return sfc_surface(picture, width, seen).rows()
 
 
 def sfc_surface(picture: SfcPicture, width: int = 80, seen: ChartState | None = None) -> Surface:
-    """The drawing of a chart.  One that is too wide has its conditions in several lines, then below it, and then branches
-    that stand by themselves."""
+    """The drawing of a chart.  If it is too wide, conditions are wrapped, then written below it, and then branches are drawn
+    apart."""
     width = max(width, LEAST)
     apart: frozenset[int] = frozenset()
     for wrapped in (*WRAPPED, NAMED):
@@ -55,7 +55,7 @@ def sfc_surface(picture: SfcPicture, width: int = 80, seen: ChartState | None = 
 
 
 class _Drawing:
-    """One attempt."""
+    """The drawing for one width of conditions and one set of steps that are drawn apart."""
 
     def __init__(self, picture: SfcPicture, seen: ChartState | None, wrapped: int, apart: frozenset[int]) -> None:
         self.picture, self.seen, self.wrapped = picture, seen, wrapped
@@ -66,7 +66,7 @@ class _Drawing:
         self.width = max(self._pieces[root].width for root in self.graph.roots)
 
     def surface(self) -> Surface:
-        """The networks and what stands apart, one below the other, and the conditions that found no place."""
+        """The networks and the branches that are drawn apart, one below the other, and conditions without room beside them."""
         surface, row = Surface(), 0
         for root in self.graph.roots:
             piece = self._pieces[root]
@@ -79,7 +79,7 @@ class _Drawing:
         return surface
 
     def branch_of_the_widest(self) -> int | None:
-        """A step that begins a branch of the widest drawing and can stand by itself, the last such one."""
+        """The last step of the widest network that begins a branch and can be drawn apart."""
         widest = max(self.graph.roots, key=lambda root: self._pieces[root].width)
         inside, left = [], [widest]
         while left:
@@ -99,16 +99,16 @@ class _Drawing:
     # --- pieces -----------------------------------------------------------------------------------------------------
 
     def _piece(self, node: Node) -> Piece:
-        """A node with all that stands below it."""
+        """A node with all nodes below it."""
         graph = self.graph
         children: list[Piece] = []
         for jumps, followers in groupby(graph.following[node], lambda follower: graph.is_jump(node, follower)):
             group = list(followers)
             if jumps and not node.is_step:
-                children.append(pieces.jump([self._label(one) for one in group], self._went(node, group[0])))
+                children.append(pieces.jump([self._label(one) for one in group], self._fired(node, group[0])))
                 continue
             for follower in group:
-                thick = self._went(node, follower)
+                thick = self._fired(node, follower)
                 if jumps:
                     children.append(pieces.jump([self._label(follower)], thick))
                 elif len(graph.before[follower]) == 1:
@@ -117,7 +117,7 @@ class _Drawing:
                     children.append(child)
                 else:
                     children.append(pieces.passing(follower, thick))
-        made = pieces.over(self._own(node), children, double=not node.is_step)
+        made = pieces.stack(self._own(node), children, double=not node.is_step)
         for merged in graph.below[node]:
             if any(end.to == merged for end in made.ends):
                 made = pieces.join(made, merged, self._pieces[merged], not merged.is_step, self._label(merged))
@@ -126,9 +126,9 @@ class _Drawing:
     def _own(self, node: Node) -> Piece:
         if not node.is_step:
             label = f"{self._priority(node.number)}{self._name(node.number)}" if self.wrapped == NAMED else \
-                self._whole(node.number)
+                self._full_label(node.number)
             piece = pieces.transition(label, self.wrapped or WRAPPED[0], self._tested(node.number) is True)
-            return piece if node not in self.graph.met else pieces.met(piece, self._name(node.number))
+            return piece if node not in self.graph.met else pieces.arrow_target(piece, self._name(node.number))
         name, initial, _, rows = self.picture.steps[node.number]
         active = self.seen is not None and node.number in self.seen.active
         label = name if self.seen is None else f"{TOKEN if active else ' '} {name}"
@@ -142,8 +142,8 @@ class _Drawing:
     def _tested(self, number: int) -> bool | None:
         return self.seen.tested.get(number) if self.seen is not None else None
 
-    def _went(self, node: Node, follower: Node) -> bool:
-        """Whether the transition of a link fired."""
+    def _fired(self, node: Node, follower: Node) -> bool:
+        """True if the transition of a link has fired."""
         return self._tested(follower.number if node.is_step else node.number) is True
 
     def _name(self, number: int) -> str:
@@ -153,7 +153,7 @@ class _Drawing:
         priority = self.picture.transitions[number][2]
         return f"({priority}) " if priority else ""
 
-    def _whole(self, number: int) -> str:
+    def _full_label(self, number: int) -> str:
         _, name, _, _, _, condition = self.picture.transitions[number]
         named = f"{name}: " if name and condition != name else ""
         return f"{self._priority(number)}{named}{condition}{self._result(number)}"

@@ -62,7 +62,7 @@ class Collector:
         self.pictures: list[str] = []
         self.ladder: dict[int, list[list[int]]] = {}
         self._power = PowerFlow(trace.rungs, lambda scan: True)
-        self._evolutions = ChartRecorder(trace.charts, lambda scan: True)
+        self._chart_recorder = ChartRecorder(trace.charts, lambda scan: True)
         self._dissector = Dissector()
         self._known: list[str] = []
         self._ended: list[str] = []
@@ -90,7 +90,7 @@ class Collector:
         if moved or phase is Phase.INPUTS:
             self._add(moment.scans, [-1 - PHASES.index(phase), -1, *moved])
         self._power.phase(moment, phase)
-        self._evolutions.phase(moment, phase)
+        self._chart_recorder.phase(moment, phase)
         if phase is Phase.PROGRAM:
             self._draw(moment.scans)
         if phase is Phase.REFRESH:
@@ -99,7 +99,7 @@ class Collector:
     def event(self, moment: Moment, event: Event) -> None:
         """Notes a statement, and what it writes."""
         self._power.event(moment, event)
-        self._evolutions.event(moment, event)
+        self._chart_recorder.event(moment, event)
         if isinstance(event, NetworkEvent):
             self.packets += [(moment.scans, packet) for packet in self._dissector.dissect(event.now_ns, event.tap_event)]
         elif isinstance(event, Contact):
@@ -120,14 +120,14 @@ class Collector:
             key = made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items())
             self._picture(scan, made.base, key, partial(_rung, made.picture, Sight(made.states)))
         self._power.executed.clear()
-        for called in self._evolutions.called:
+        for called in self._chart_recorder.calls:
             key = called.picture.site, tuple(sorted(called.tested.items())), called.active
             self._picture(scan, called.base, key, partial(self._chart, called))
-        self._evolutions.called.clear()
+        self._chart_recorder.calls.clear()
 
     def _chart(self, called: ChartCall) -> list[str]:
         name, kind = self._trace.bodies[called.picture.body]
-        return [f"{kind} {name}", rung_svg(sfc_surface(called.picture, RUNG_WIDTH, called.sighted))]
+        return [f"{kind} {name}", rung_svg(sfc_surface(called.picture, RUNG_WIDTH, called.state))]
 
     def _picture(self, scan: int, base: int, key: tuple[object, ...], lines: Callable[[], list[str]]) -> None:
         if key not in self.drawings and len(self.pictures) < MOST_PICTURES:

@@ -1,1 +1,1 @@
-"""Recording and reading: what happened scan by scan, in memory and in files."""
+"""Traces: events and values of each scan, recorded in memory and in files, and read again."""

@@ -1,6 +1,6 @@
-"""The branches of a program: what each IF and CASE may do next, by the statement that is then executed.
+"""The branches of a program: the statements that may be executed next after each IF and CASE.
 
-A loop is no branch: leaving it is part of every loop that ends.
+Loops are not counted as branches, since every loop that ends is left.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from fbvm.code.shapes import blocks
 
 @dataclass(frozen=True)
 class Branch:
-    """A statement that chooses: `ways` are the sites of the first statement of each way it has.
+    """An IF or CASE: its site, and in `targets` the site of the first statement of each of its branches.
 
-    Besides, it may go past all of them if `past`."""
+    `may_skip` is True if it can execute none of them."""
 
     site: int
     targets: tuple[int, ...]
@@ -25,16 +25,16 @@ class Branch:
 
 
 def statements(image: Image) -> list[int]:
-    """The sites of all statements and rungs."""
+    """The sites of all statements and rungs, in order."""
     return sorted({site for body in image.bodies for site in _sites(body.code)})
 
 
 def branches(image: Image) -> list[Branch]:
-    """All statements that choose."""
+    """All IF and CASE statements that have branches with statements, in the order of their sites."""
     found: dict[int, tuple[list[int], bool]] = {}
     for body in image.bodies:
         _walk(body.code, -1, found)
-    return [Branch(site, tuple(dict.fromkeys(ways)), past) for site, (ways, past) in sorted(found.items()) if ways]
+    return [Branch(site, tuple(dict.fromkeys(targets)), skips) for site, (targets, skips) in sorted(found.items()) if targets]
 
 
 def _sites(block: Block) -> Iterator[int]:
@@ -53,10 +53,10 @@ def _walk(block: Block, around: int, found: dict[int, tuple[list[int], bool]]) -
             continue
         inner = blocks(node)
         if node[0] in ("if", "case") and here >= 0:
-            ways = [first for each in inner if (first := next(_sites(each), None)) is not None]
-            past = next(_sites(inner[-1]), None) is None
+            targets = [first for each in inner if (first := next(_sites(each), None)) is not None]
+            may_skip = next(_sites(inner[-1]), None) is None
             known, before = found.get(here, ([], False))
-            if ways:
-                found[here] = [*known, *ways], before or past
+            if targets:
+                found[here] = [*known, *targets], before or may_skip
         for each in inner:
             _walk(each, here, found)

@@ -1,4 +1,4 @@
-"""CSV as a trace: a table as `rows` writes it, or as others do."""
+"""Makes a trace of a CSV table, as `csv_writer` or another program writes it."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ Parts: TypeAlias = "dict[Step, Parts | Type]"
 
 
 class CsvError(ValueError):
-    """The text is no such table; the message names the line."""
+    """The text is no table of scans; the message names the line."""
 
 
 @dataclass(frozen=True)
 class Column:
-    """A variable of a table: its path or address, its type, and how a cell is read."""
+    """A variable of a table: its path or address, its type, and the function that reads a cell."""
 
     name: str
     type: Type
@@ -81,7 +81,7 @@ def _columns(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[Col
 
 
 def _kind(heading: str, cells: Sequence[str]) -> tuple[Type, Callable[[str], Any]]:
-    """The narrowest type that all cells fit, and how they are read."""
+    """The narrowest type that holds all cells of a column, and the function that reads one."""
     if heading.endswith(MS):
         return TIME, _nanoseconds
     if all(cell in ("TRUE", "FALSE") for cell in cells):
@@ -94,11 +94,11 @@ def _kind(heading: str, cells: Sequence[str]) -> tuple[Type, Callable[[str], Any
 
 
 def _image(columns: Iterable[Column]) -> Image:
-    """A program without code that has these variables."""
+    """The image of a program without code that declares these variables."""
     tree: Parts = {}
     for column in columns:
         if not _is_address(column.name):
-            _plant(tree, column)
+            _insert(tree, column)
     symbols, at = {}, SLOTS_OFFSET
     for name, what in tree.items():
         kind = _type(str(name), what)
@@ -116,7 +116,7 @@ def _is_address(name: str) -> bool:
     return True
 
 
-def _plant(tree: Parts, column: Column) -> None:
+def _insert(tree: Parts, column: Column) -> None:
     """Adds a variable to the tree of all variables."""
     if not _PATH.fullmatch(column.name):
         raise CsvError(f"line 1: {column.name!r} is neither a path of names nor an address")
@@ -138,7 +138,7 @@ def _plant(tree: Parts, column: Column) -> None:
 
 
 def _type(name: str, what: Parts | Type) -> Type:
-    """The type of a variable that has these parts."""
+    """The type of a variable with these members or elements."""
     if isinstance(what, Type):
         return what
     subscripts = [step for step in what if isinstance(step, tuple)]
@@ -146,7 +146,7 @@ def _type(name: str, what: Parts | Type) -> Type:
         if len({len(one) for one in subscripts}) > 1:
             raise CsvError(f"line 1: the elements of {name} differ")
         bounds = tuple((min(along), max(along)) for along in zip(*subscripts, strict=True))
-        kind = array(bounds, _type(name, _united(name, list(what.values()))))
+        kind = array(bounds, _type(name, _merged(name, list(what.values()))))
         if kind.size > MAX_SIZE:
             raise CsvError(f"line 1: {name} has {kind.count} elements, and no memory holds them")
         return kind
@@ -159,13 +159,13 @@ def _type(name: str, what: Parts | Type) -> Type:
     return StructType(name, at + -at % 8, 8, fields)
 
 
-def _united(name: str, elements: list[Parts | Type]) -> Parts | Type:
-    """What every element of an array has that some of them have."""
+def _merged(name: str, elements: list[Parts | Type]) -> Parts | Type:
+    """The members of the element type of an array: those of all its elements."""
     first, *more = elements
     for other in more:
         if isinstance(first, Type) or isinstance(other, Type):
             if first != other:
                 raise CsvError(f"line 1: the elements of {name} differ")
             continue
-        first = {step: _united(name, [part[step] for part in (first, other) if step in part]) for step in (*first, *other)}
+        first = {step: _merged(name, [part[step] for part in (first, other) if step in part]) for step in (*first, *other)}
     return first

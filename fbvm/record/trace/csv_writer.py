@@ -3,7 +3,7 @@
     scan,time_ms,Main.Start,Main.Delay.ET [ms],D200
     0,0,FALSE,0,7
 
-BOOL is TRUE or FALSE, times are numbers of milliseconds in a column that says so, dates are literals, enumerations are
+BOOL is TRUE or FALSE, times are numbers of milliseconds in a column with the suffix [ms], dates are literals, enumerations are
 their members' names.
 """
 
@@ -24,7 +24,7 @@ DURATIONS = frozenset(("TIME", "LTIME"))
 
 
 def write_csv(recording: Recording, file: TextIO) -> None:
-    """Writes a recording; open the file with `newline=""`."""
+    """Writes a recording as CSV to a text file that was opened with `newline=""`."""
     writer = csv.writer(file, lineterminator="\n")
     signals = [track.signal for track in recording.tracks]
     writer.writerow([SCAN, TIME_MS, *(_heading(signal) for signal in signals)])

@@ -1,7 +1,7 @@
-"""What happens inside a scan: every statement, call, read and write, with the instance that did it and the values.
+"""The events inside a scan: statements, calls, reads and writes, each with its instance and values.
 
-`ObservedEngine` takes the place of a PLC's engine while somebody looks and gives it back afterwards.  It tells what happened
-and keeps nothing.
+`ObservedEngine` replaces the engine of a PLC as long as a listener is attached (`history.observing`).  It reports events and
+keeps none.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from fbvm.wire.tap import TapEvent
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
-    """One execution of a body: its number in the image, where its instance begins, and who called it.
+    """One execution of a body: its number in the image, the offset of its instance, the site of the call, and the caller.
 
-    `site` is the statement of the caller, NO_SITE for a program."""
+    `site` is NO_SITE for a program."""
 
     body: int
     base: int
@@ -34,17 +34,17 @@ class Frame:
 
 
 OUTSIDE = Frame(NO_SITE, 0, NO_SITE, None)
-"""Who calls programs."""
+"""The caller of programs."""
 
 
 class Call(NamedTuple):
-    """A body began."""
+    """The execution of a body begins."""
 
     frame: Frame
 
 
 class Return(NamedTuple):
-    """A body ended."""
+    """The execution of a body has ended."""
 
     frame: Frame
 
@@ -58,7 +58,7 @@ class Statement(NamedTuple):
 
 
 class Read(NamedTuple):
-    """A variable was read.  `bit` is WHOLE_BYTES, or that of a located BOOL, whose `value` is then one byte 0 or 1."""
+    """A variable has been read.  `bit` is WHOLE_BYTES; of a located BOOL its bit, and `value` is then one byte, 0 or 1."""
 
     site: int
     frame: Frame
@@ -68,7 +68,7 @@ class Read(NamedTuple):
 
 
 class Write(NamedTuple):
-    """A variable was written; `old` and `value` may be the same."""
+    """A variable has been written; `old` and `value` may be equal."""
 
     site: int
     frame: Frame
@@ -79,7 +79,7 @@ class Write(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """A contact of a rung let power through or not; `element` is what the image calls it."""
+    """A contact of a rung has been evaluated; `value` is True if it conducts, `element` its key in the image."""
 
     site: int
     frame: Frame
@@ -88,7 +88,7 @@ class Contact(NamedTuple):
 
 
 class NetworkEvent(NamedTuple):
-    """Something passed the network at a unit of the PLC, in the I/O refresh."""
+    """An event of the network at a unit of the PLC, reported in the I/O refresh."""
 
     now_ns: int
     tap_event: TapEvent
@@ -98,37 +98,39 @@ Event: TypeAlias = Call | Return | Statement | Read | Write | Contact | NetworkE
 
 
 class ObservedEngine:
-    """An engine that tells every event of a run.  `program` is the engine in whose place it stands."""
+    """An engine that calls `report` for every event of a task.
+
+    `program` is the engine that it replaces, whose substitutes of bodies it takes over."""
 
     machine = None
-    """It runs no machine code."""
+    """There is no machine code."""
 
-    def __init__(self, image: Image, memory: Memory, tell: Callable[[Event], None], program: object = None) -> None:
+    def __init__(self, image: Image, memory: Memory, report: Callable[[Event], None], program: object = None) -> None:
         self.memory = memory
-        self.report = tell
+        self.report = report
         self.program = program
         self._engine = PythonEngine(image, memory, observed=True)
         known = program._engine if isinstance(program, ObservedEngine) else program
         for body, function in substitutes_of(known).items():
             self._engine.substitute(body, function)
         self._shadow = bytearray(memory.size)
-        self._frame, self._unwritten = OUTSIDE, 0
-        """What is executed, and how many bodies are over it that no statement calls."""
+        self._frame, self._generated_depth = OUTSIDE, 0
+        """The current frame, and the depth of calls inside a call that no statement of the source has made."""
 
     def run(self, task_index: int) -> Trap | None:
-        """Executes the programs of one task once, telling what they do."""
-        observations, tell, event = self._observe(task_index), self.report, self._event
+        """Executes the programs of one task once and reports their events; returns the trap that ended them, if any."""
+        observations, report, to_event = self._observe(task_index), self.report, self._event
         while True:
             try:
-                told = event(next(observations))
+                event = to_event(next(observations))
             except StopIteration as end:
                 trap: Trap | None = end.value
                 return trap
-            if told is not None:
-                tell(told)
+            if event is not None:
+                report(event)
 
     def steps(self, task_index: int) -> Generator[Event, None, Trap | None]:
-        """The events of one execution of a task; execution stands still between two of them."""
+        """Executes a task once; yields each event, and execution waits until the next one is asked for."""
         observations = self._observe(task_index)
         while True:
             try:
@@ -142,16 +144,17 @@ class ObservedEngine:
 
     def _observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
         self._shadow[:] = self.memory.u8
-        self._frame, self._unwritten = OUTSIDE, 0
+        self._frame, self._generated_depth = OUTSIDE, 0
         return self._engine.observe(task_index)
 
     def _event(self, seen: Observation) -> Event | None:
-        """What an observation means; follows calls.  None for a statement of a body that no statement calls, such as one
-        that the front end has called at the beginning of rungs: nobody stands still there."""
+        """The event of an observation of the Python engine; keeps the current frame.
+
+        None for a statement inside a call that the compiler has added, such as one at the beginning of rungs."""
         kind, site, detail = seen
         frame = self._frame
         if kind == "statement" or kind == "rung":
-            return None if self._unwritten else Statement(site, frame, kind == "rung")
+            return None if self._generated_depth else Statement(site, frame, kind == "rung")
         if kind == "read" or kind == "write":
             form, offset, bit = detail
             size = detail_size(form)
@@ -165,12 +168,12 @@ class ObservedEngine:
         if kind == "call":
             body, base = detail
             self._frame = Frame(body, base, site, frame)
-            self._unwritten += bool(self._unwritten) or frame is not OUTSIDE and site == NO_SITE
+            self._generated_depth += bool(self._generated_depth) or frame is not OUTSIDE and site == NO_SITE
             return Call(self._frame)
         if kind == "return":
             assert frame.caller is not None
             self._frame = frame.caller
-            self._unwritten -= bool(self._unwritten)
+            self._generated_depth -= bool(self._generated_depth)
             return Return(frame)
         return Contact(site, frame, *detail)
 

@@ -1,11 +1,11 @@
-"""The trace file: how bytes are laid out on disk.  `trace.writer` writes it, `trace` reads it.
+"""The format of trace files, which `trace.writer` writes and `trace.reader` reads.
 
 A file is `MAGIC` and chunks: kind (1 byte), size (4 bytes), CRC-32 of the payload (4 bytes), number of the first scan (8)
 and of scans (4), payload compressed by zlib.  The first chunk is the HEADER, JSON.  Each BLOCK holds some scans and can
 be read without those before it: it begins with LINES, the memory before its first scan.  A chunk that is cut off ends
 the file, so it can be read while it grows.
 
-Then stand records: a tag, then unsigned numbers of 7 bits a byte, the lowest first, the top bit set if more follow.
+Records follow: a tag, then unsigned numbers of 7 bits a byte, the lowest first, the top bit set if more follow.
 
     PHASE      phase, then LINES         memory changed since the last PHASE by something other than a recorded write
     SCAN       number, time ns           a scan begins; both as the difference from the scan before in the block
@@ -15,8 +15,8 @@ Then stand records: a tag, then unsigned numbers of 7 bits a byte, the lowest fi
     READ       frame, site + 1, offset, bit, size, bytes
     WRITE      frame, site + 1, offset, bit, size, old bytes, new bytes
     CONTACT    frame, site, value, JSON of the element (its size, bytes)
-    NETWORK    JSON of what passed at a unit (its size, bytes), before the PHASE of the I/O refresh: time ns, what, local
-               host and port, remote host and port, 1 if the unit did it, 1 if it is told twice, hexadecimal data
+    NETWORK    JSON of an event of the network (its size, bytes), before the PHASE of the I/O refresh: time ns, kind, local
+               host and port, remote host and port, 1 if the unit sent it, 1 if it is mirrored, hexadecimal data
 
 LINES are a count, then for each line of LINE bytes of memory that changed: the difference of its number from the one
 before, and the exclusive or of its old and new bytes.
@@ -35,7 +35,7 @@ from fbvm.machine.plc import Phase
 MAGIC = b"FBVMTRC1"
 HEADER, BLOCK = 1, 2
 LINE = 32
-"""Bytes of memory whose change is written as one."""
+"""Bytes of memory that are compared and written together."""
 PHASE, SCAN, FRAME, END, STATEMENT, READ, WRITE, CONTACT, NETWORK = range(9)
 PHASES = (Phase.INPUTS, Phase.PROGRAM, Phase.REFRESH)
 _CHUNK = struct.Struct("<BIIQI")
@@ -43,12 +43,12 @@ LARGEST_BYTES = 1 << 30
 
 
 class TraceError(ValueError):
-    """A file that is no trace, or a damaged one; the message says what is wrong with it."""
+    """The file is no trace or is damaged; the message says in which way."""
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """Where a chunk lies, and the scans in it."""
+    """The position of a chunk in the file, its first scan and the number of its scans."""
 
     kind: int
     at: int
@@ -57,7 +57,7 @@ class Chunk:
 
 
 def write_chunk(file: BinaryIO, kind: int, payload: bytes, first: int = 0, scans: int = 0) -> int:
-    """Writes a chunk and hands it to the system; returns its size in bytes."""
+    """Writes a chunk and flushes the file; returns the size of the chunk in bytes."""
     packed = zlib.compress(payload, 6)
     file.write(_CHUNK.pack(kind, len(packed), zlib.crc32(packed), first, scans) + packed)
     file.flush()
@@ -65,7 +65,7 @@ def write_chunk(file: BinaryIO, kind: int, payload: bytes, first: int = 0, scans
 
 
 def chunks(file: BinaryIO) -> Iterator[Chunk]:
-    """The whole chunks from here on; the file stands behind the last one given."""
+    """The complete chunks from the position of the file on, which is then behind the last one."""
     at = file.tell()
     while len(head := file.read(_CHUNK.size)) == _CHUNK.size:
         kind, size, _, first, scans = _CHUNK.unpack(head)

@@ -1,7 +1,7 @@
-"""The recent scans of a PLC, to be done again under observation: a run stays fast until somebody wants to see inside.
+"""The recent scans of a PLC, which can be executed again with a listener: the run itself needs no listener and stays fast.
 
-Keeps states from which scans follow, a state at least every `every` scans.  Doing again needs no units and no network:
-what they changed stands in the next state.  What is written from outside must be announced with `mark_changed`.
+A state is kept at least every `every` scans, and scans are executed again from there, without units and network: what
+units changed is in the next state.  `mark_changed` announces a change from outside the program.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from fbvm.record.trace.events import Event, ObservedEngine
 
 
 class Listener(Protocol):
-    """Who is told what happens inside scans."""
+    """Receives the phases and events of scans."""
 
     def phase(self, plc: Plc, phase: Phase) -> None:
-        """A phase of a scan is over."""
+        """Called at the end of a phase."""
 
     def event(self, plc: Plc, event: Event) -> None:
-        """Something happened in the program."""
+        """Called for each event."""
 
 
 @contextmanager
 def observing(plc: Plc, listener: Listener) -> Iterator[None]:
-    """Tells a listener all that happens inside the scans of `plc` meanwhile."""
+    """Reports the events of all scans of `plc` to `listener` inside the `with` block."""
     program = plc.engine
-    tell = partial(listener.event, plc)
+    report = partial(listener.event, plc)
     if isinstance(program, ObservedEngine):
-        tell = partial(_both, program.report, tell)
-    plc.engine = ObservedEngine(plc.image, plc.memory, tell, program)
+        report = partial(_both, program.report, report)
+    plc.engine = ObservedEngine(plc.image, plc.memory, report, program)
     plc.phases.append(listener.phase)
     try:
         yield
@@ -50,7 +50,7 @@ def _both(first: Callable[[Event], None], second: Callable[[Event], None], event
 
 
 class History:
-    """States of `plc` before its scans, `keep` of them, the oldest forgotten first."""
+    """The last `keep` states of `plc` before scans."""
 
     def __init__(self, plc: Plc, every: int = 32, keep: int = 256) -> None:
         self._plc = plc
@@ -63,90 +63,90 @@ class History:
         plc.watchers.append(self._scan_ended)
 
     def mark_changed(self) -> None:
-        """Something outside the program changed the PLC since its last scan."""
+        """Announces that the PLC has been changed from outside the program since its last scan."""
         self._changed = True
 
     def before_scan(self) -> None:
-        """To be called before each scan."""
+        """Keeps a state if one is due; to be called before each scan."""
         plc = self._plc
         if self._changed or plc.units or plc.scans - self._states[-1].scans >= self._every:
             self._states.append(plc.snapshot())
             self._changed = bool(plc.units)
 
     def _scan_ended(self, plc: Plc) -> None:
-        """What units changed is told apart from what is written before the next scan."""
+        """Keeps the memory after the I/O refresh, so that changes by units differ from writes before the next scan."""
         if plc.units:
             self._ends.append((plc.scans - 1, plc.memory.snapshot()))
 
     def substitute(self, body: int, function: Callable[[int], None]) -> None:
-        """Python in place of a body, which is not called again when scans are: what it did is played back."""
+        """Executes a Python function in place of a body.  A replay does not call the function but restores what it wrote."""
         self._substituted.append(body)
         engine, memory, size = self._plc.engine, self._plc.memory, self._plc.image.bodies[body].instance_size
 
-        def noted(base: int) -> None:
+        def recorded(base: int) -> None:
             function(base)
             self._substitute_results.append((self._plc.scans, base, bytes(memory.map[base : base + size])))
 
-        python_of(engine).substitute(body, noted)
+        python_of(engine).substitute(body, recorded)
 
     @property
     def scans(self) -> range:
-        """The scans that can be done again."""
+        """The scans that can be executed again."""
         return range(self._states[0].scans, self._plc.scans) if self._states else range(0)
 
     def at(self, scan: int) -> Plc:
-        """A PLC in the state before a scan, without units.  Raises ValueError if the scan is not kept."""
-        twin = self._twin()
-        self._advance_to(twin, scan)
-        return twin
+        """A new PLC in the state before a scan, without units.  Raises ValueError if the scan is not kept."""
+        replica = self._replica()
+        self._advance_to(replica, scan)
+        return replica
 
     def replay(self, scans: range, listener: Listener) -> None:
-        """Does scans again; the listener looks inside.  Beyond the last one it goes on as if nobody did anything."""
-        self.replay_with(scans, lambda twin: observing(twin, listener))
+        """Executes scans again and reports their events to `listener`.  Scans after the last one are executed without inputs."""
+        self.replay_with(scans, lambda replica: observing(replica, listener))
 
     def replay_with(self, scans: range, attached: Callable[[Plc], AbstractContextManager[object]]) -> None:
-        """Does scans again on a PLC to which something is attached meanwhile."""
+        """Executes scans again on a new PLC, inside the context that `attached` makes for this PLC."""
         scans = range(max(scans.start, self._states[0].scans if self._states else scans.stop), scans.stop)
         if not scans:
             return
-        twin = self._twin()
-        self._advance_to(twin, scans.start)
+        replica = self._replica()
+        self._advance_to(replica, scans.start)
         states, ends = {state.scans: state for state in self._states}, dict(self._ends)
 
         def refresh(plc: Plc, phase: Phase) -> None:
-            """What the units did comes after the program."""
+            """Restores the changes by units after the program."""
             if phase is Phase.PROGRAM and plc.scans in ends:
                 plc.memory.restore(ends[plc.scans])
 
-        with attached(twin):
-            twin.phases.append(refresh)
+        with attached(replica):
+            replica.phases.append(refresh)
             for scan in scans:
                 if scan in states and scan != scans.start:
-                    twin.restore(states[scan])
-                twin.scan()
+                    replica.restore(states[scan])
+                replica.scan()
 
-    def _twin(self) -> Plc:
+    def _replica(self) -> Plc:
         plc = self._plc
-        twin = Plc(plc.image, plc.cycle_ns, budget=plc.budget)
+        replica = Plc(plc.image, plc.cycle_ns, budget=plc.budget)
         for body in self._substituted:
-            python_of(twin.engine).substitute(body, self._playback(twin))
-        return twin
+            python_of(replica.engine).substitute(body, self._playback(replica))
+        return replica
 
-    def _playback(self, twin: Plc) -> Callable[[int], None]:
-        """What a substitute left in its instance in each scan of before."""
+    def _playback(self, replica: Plc) -> Callable[[int], None]:
+        """A function that writes into an instance what its substitute wrote in the same scan."""
 
         def play(base: int) -> None:
             for scan, at, data in self._substitute_results:
-                if (scan, at) == (twin.scans, base):
-                    twin.memory.u8[base : base + len(data)] = data
+                if (scan, at) == (replica.scans, base):
+                    replica.memory.u8[base : base + len(data)] = data
 
         return play
 
-    def _advance_to(self, twin: Plc, scan: int) -> None:
-        """Brings a twin to the state before a scan."""
+    def _advance_to(self, replica: Plc, scan: int) -> None:
+        """Puts a PLC into the state before a scan."""
         before = [state for state in self._states if state.scans <= scan]
         if not before or scan > self._plc.scans:
             raise ValueError(f"scan {scan} is not kept; those from {self.scans.start} to {self._plc.scans} are")
-        twin.restore(before[-1])
-        while twin.scans < scan:
-            twin.scan()
+        replica.restore(before[-1])
+        while replica.scans < scan:
+            replica.scan()

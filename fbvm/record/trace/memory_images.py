@@ -1,6 +1,6 @@
-"""Memory images: what the areas of a PLC hold, as JSON, `{"spaces": {"CIO": [words from address 0 on], "D": [...]}}`.
+"""Memory images: the words of areas of a PLC as JSON, `{"spaces": {"CIO": [words from address 0 on], "D": [...]}}`.
 
-The words of CPU bus units are left out in both directions: they say how a unit is now, not what a user has stored.
+The words of CPU bus units are left out in both directions: they are the state of a unit, no data of the user.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ class ImageError(ValueError):
 
 
 def save(memory: Memory, path: Path, counts: Mapping[str, int]) -> None:
-    """Writes the first so many words of these areas; words of 0 at the end are left out.
+    """Writes the first words of some areas into a file; `counts` is the number of words by area.
 
-    The file is replaced at once or not at all.  Raises OSError."""
+    Words of 0 at the end are left out.  The file is replaced at once or not at all.  Raises OSError."""
     spaces = {}
     for name, count in counts.items():
         words = memory.words(name)[:count].tolist()
@@ -32,13 +32,13 @@ def save(memory: Memory, path: Path, counts: Mapping[str, int]) -> None:
             words.pop()
         spaces[name] = words
     lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(words)}" for name, words in spaces.items())
-    beside = path.with_name(path.name + ".new")
-    beside.write_text(f'{{"spaces": {{\n{lines}\n}}}}\n', encoding="utf-8")
-    os.replace(beside, path)
+    part = path.with_name(path.name + ".new")
+    part.write_text(f'{{"spaces": {{\n{lines}\n}}}}\n', encoding="utf-8")
+    os.replace(part, path)
 
 
 def load(memory: Memory, path: Path) -> None:
-    """Writes an image into a memory, wholly or not at all; words that it does not have stay.
+    """Loads an image into a memory, wholly or not at all; words that the image does not have keep their values.
 
     Raises OSError, and ImageError for a file that is no image or has words that this memory lacks."""
     try:
@@ -48,20 +48,20 @@ def load(memory: Memory, path: Path) -> None:
     spaces = found.get("spaces") if isinstance(found, dict) else None
     if not isinstance(spaces, dict):
         raise ImageError(f'{path} has no "spaces"')
-    for there, number, word in list(_words(memory, path, spaces)):
-        there[number] = word
+    for view, number, word in list(_words(memory, path, spaces)):
+        view[number] = word
 
 
 def _words(memory: Memory, path: Path, spaces: dict[str, object]) -> Iterator[tuple[memoryview, int, int]]:
     for name, words in spaces.items():
         try:
-            there = memory.words(name)
+            view = memory.words(name)
         except KeyError:
             raise ImageError(f"{path}: this PLC has no area {name}") from None
-        if not isinstance(words, list) or len(words) > len(there):
-            raise ImageError(f"{path}: {name} is not a list of at most {len(there)} words")
+        if not isinstance(words, list) or len(words) > len(view):
+            raise ImageError(f"{path}: {name} is not a list of at most {len(view)} words")
         for number, word in enumerate(words):
             if not isinstance(word, int) or isinstance(word, bool) or not 0 <= word <= 0xFFFF:
                 raise ImageError(f"{path}: {name} {number} is {word!r}, no word from 0 to 65535")
             if number not in OF_UNITS.get(name, ()):
-                yield there, number, word
+                yield view, number, word

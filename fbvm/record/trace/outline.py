@@ -1,4 +1,4 @@
-"""Which statement stands inside which: for each statement of an image the one that decides whether it is executed."""
+"""The nesting of statements: for each statement of an image the IF, CASE or loop around it."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def outer_statements(image: Image) -> list[int]:
 
 
 def _walk(block: Block, around: int, outer: dict[int, int]) -> None:
-    """Notes what stands around each statement of a block.
+    """Enters the statement around each statement of a block.
 
-    Of statements that begin at one place, as those of a rung and of its first step, the outermost counts."""
+    Of statements with the same site, such as a rung and its first step, the outermost counts."""
     here = around
     for node in block:
         if node[0] == "observe" and node[1] in ("statement", "rung"):

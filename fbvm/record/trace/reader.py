@@ -1,9 +1,9 @@
-"""Reads a trace: values at the end of any scan, and what happened inside, without the program.
+"""Reads a trace: values at the end of any scan, and the events inside scans; the program is not needed.
 
     trace = Trace.open("run.fbtrace")
     trace.at(41).read("D200")
 
-A file that is still being written is read as far as it is whole; `refresh` looks for more.
+Of a file that is still being written the complete blocks are read; `refresh` reads further ones.
 """
 
 from __future__ import annotations
@@ -53,18 +53,18 @@ from fbvm.wire.tap import TapEvent, TapKind
 
 
 class Follower(Protocol):
-    """Who is told what a trace holds; like a `history.Listener`, with a moment in place of a PLC."""
+    """Receives the phases and events of a trace, as a `history.Listener` does of a PLC."""
 
     def phase(self, moment: Moment, phase: Phase) -> None:
-        """A phase of a scan is over; REFRESH is the end of the scan."""
+        """Called at the end of a phase; REFRESH is the end of the scan."""
 
     def event(self, moment: Moment, event: Event) -> None:
-        """Something happened in the program."""
+        """Called for each event."""
 
 
 @dataclass
 class Moment:
-    """A PLC at some moment of a trace: its memory, the number of the scan and its time."""
+    """The PLC at a moment of a trace: its memory, the number of the scan and its time."""
 
     trace: Trace
     memory: Memory
@@ -84,7 +84,7 @@ class Moment:
 
 
 class Trace:
-    """A trace in a file that is open for reading.  Raises TraceError if it is none."""
+    """A trace in a file that is open for reading.  Raises TraceError if the file is no trace."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
@@ -95,12 +95,12 @@ class Trace:
             raise TraceError("the trace has no header yet")
         self.header = _header(read_chunk(file, header.at))
         head = self.header
-        self._take(head)
+        self._read_header(head)
         self._blocks: list[Chunk] = []
         self._end = file.tell()
         self.refresh()
 
-    def _take(self, head: dict[str, Any]) -> None:
+    def _read_header(self, head: dict[str, Any]) -> None:
         try:
             self.symbols = symbols.from_data(head)
             self._extents = [(int(start), int(end)) for start, end in head.get("objects", ())]
@@ -128,7 +128,7 @@ class Trace:
 
     @classmethod
     def open(cls, path: Path | str) -> Trace:
-        """The trace in a file.  Raises OSError, TraceError."""
+        """Opens a trace file; close it, or use it in a `with` statement.  Raises OSError, TraceError."""
         file = Path(path).open("rb")  # noqa: SIM115 - the trace closes it
         try:
             return cls(file)
@@ -147,16 +147,16 @@ class Trace:
         self.close()
 
     def refresh(self) -> None:
-        """Looks for scans that were written since."""
+        """Reads the blocks that have been written to the file since it was opened."""
         self._file.seek(self._end)
         for chunk in chunks(self._file):
             if chunk.kind == BLOCK and chunk.scans:
                 while self._blocks and self._blocks[-1].first >= chunk.first:
-                    self._blocks.pop()  # the PLC went back in time; what it did instead counts
+                    self._blocks.pop()  # the PLC was put back to an earlier scan: the later block counts
                 self._blocks.append(chunk)
         self._end = self._file.tell()
 
-    # --- what it holds
+    # --- contents
 
     @property
     def scans(self) -> range:
@@ -170,24 +170,24 @@ class Trace:
         return find(self.symbols, self.areas, text)
 
     def line(self, site: Site) -> str:
-        """The text of the line on which a statement stands, "" if the trace does not have it."""
+        """The source line of a statement, "" if the trace does not have it."""
         return self._lines.get(site.file, {}).get(site.line, "")
 
     def at(self, scan: int) -> Moment:
-        """The PLC at the end of a scan.  Raises ValueError if it is not recorded."""
+        """The PLC at the end of a scan.  Raises ValueError if the scan is not recorded."""
         moment = next(self.moments(range(scan, scan + 1)), None)
         if moment is None:
             raise ValueError(f"scan {scan} is not in the trace, which has {_shown(self.scans)}")
         return moment
 
     def moments(self, scans: range | None = None) -> Iterator[Moment]:
-        """The PLC at the end of each scan; the same object every time."""
+        """The PLC at the end of each scan; the same object for all scans."""
         for phase, moment in self._play(scans, None):
             if phase is Phase.REFRESH:
                 yield moment
 
     def follow(self, follower: Follower, scans: range | None = None) -> None:
-        """Tells all that happened in some scans."""
+        """Reports the phases and events of some scans, or of all, to `follower`."""
         for phase, moment in self._play(scans, follower):
             follower.phase(moment, phase)
 
@@ -210,7 +210,7 @@ class Trace:
 
 
 class _Player:
-    """Plays one block."""
+    """Reads one block: applies changes of memory and makes events."""
 
     def __init__(self, trace: Trace, cursor: Cursor, memory: Memory, follower: Follower | None, wanted: range) -> None:
         self._cursor, self._follower, self._wanted = cursor, follower, wanted
@@ -243,7 +243,7 @@ class _Player:
                     self._follower.event(moment, event)
 
     def _lines(self) -> None:
-        """Applies the changes of memory; what recorded writes did is among them."""
+        """Applies the changes of memory, which include those of recorded writes."""
         cursor, base, live = self._cursor, self._base, self._moment.memory.u8
         for start, end in self._touched:
             live[start:end] = base[start:end]
@@ -312,7 +312,7 @@ def _passing(text: bytes) -> NetworkEvent:
         local, remote = Peer(str(host), int(port)), Peer(str(other), int(other_port))
         return NetworkEvent(int(now_ns), TapEvent(TapKind(what), local, remote, bool(out), bytes.fromhex(data), bool(mirrored)))
     except (ValueError, TypeError) as error:
-        raise IndexError(f"what passed the network is not readable: {error}") from None
+        raise IndexError(f"an event of the network cannot be read: {error}") from None
 
 
 def _header(payload: bytes) -> dict[str, Any]:

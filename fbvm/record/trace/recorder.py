@@ -1,6 +1,6 @@
-"""Writes down chosen signals once a scan, after the I/O refresh, as lists of changes.
+"""Records signals once a scan, after the I/O refresh, as lists of changes.
 
-Sees what the memory holds at the end of a scan and nothing of what happened inside it.
+A recorder reads memory at the end of scans; values inside a scan are in traces.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ HEXADECIMAL_AREAS = frozenset(("CIO", "W", "H", "A"))
 
 @dataclass(frozen=True)
 class Signal:
-    """One row of a recording: the place, how it is called, what it is."""
+    """One row of a recording: a place, its label, and the description by the unit that has this address."""
 
     place: Place
     label: str
     description: str = ""
     meanings: tuple[tuple[int, str], ...] = ()
-    """What some values mean, such as the states of a socket."""
+    """Texts of some values, such as the states of a socket."""
 
     @property
     def is_bit(self) -> bool:
@@ -43,19 +43,19 @@ class Signal:
         return show(self.place.type, value).removeprefix("T#")
 
     def display(self, value: Value) -> str:
-        """The same, or what the value means if somebody knows it; for people only."""
+        """The text in `meanings` for a value, else `text`; for people only."""
         return next((text for known, text in self.meanings if known == value), None) or self.text(value)
 
 
 @dataclass
 class Track:
-    """What a signal did: (scan, value) for the first recorded scan and for each at whose end it was another."""
+    """The values of a signal: (scan, value) for the first recorded scan and each scan at whose end the value is another one."""
 
     signal: Signal
     changes: list[tuple[int, Value]] = field(default_factory=list)
 
     def add(self, scan: int, value: Value) -> None:
-        """Notes the value at the end of a scan."""
+        """Appends the value at the end of a scan if it is another one."""
         if not self.changes or self.changes[-1][1] != value:
             self.changes.append((scan, value))
 
@@ -70,7 +70,7 @@ class Track:
 
 @dataclass
 class Recording:
-    """What some signals did from scan number `first` on, and the time of each scan."""
+    """The values of some signals from scan number `first` on, and the time of each scan in nanoseconds."""
 
     tracks: list[Track]
     first: int
@@ -82,16 +82,17 @@ class Recording:
         return range(self.first, self.first + len(self.times_ns))
 
     def relabelled(self, prefix: str) -> Recording:
-        """The same with labels that do not begin with a prefix."""
+        """The same recording without a prefix of the labels."""
         tracks = [Track(replace(track.signal, label=track.signal.label.removeprefix(prefix)), track.changes)
                   for track in self.tracks]  # fmt: skip
         return Recording(tracks, self.first, self.times_ns)
 
 
 class Recorder(Recording):
-    """Records from the next scan of `plc` until `stop`.  `signals` are names, addresses, ranges or (one, description).
+    """Records signals from the next scan of `plc` until `stop`.
 
-    Raises UnknownPlace for a name that is none, TypeError for an array or structure."""
+    `signals` are paths, addresses, ranges, or pairs of one and its description.  Raises UnknownPlace, and TypeError for an
+    array or a structure."""
 
     def __init__(self, plc: Plc, signals: Iterable[str | tuple[str, str] | Signal]) -> None:
         super().__init__([Track(signal) for given in signals for signal in signals_of(plc, given)], plc.scans)
@@ -99,7 +100,7 @@ class Recorder(Recording):
         plc.watchers.append(self._watch)
 
     def stop(self) -> None:
-        """Ends the recording; what was recorded stays."""
+        """Ends the recording; recorded values stay."""
         if self._watch in self._plc.watchers:
             self._plc.watchers.remove(self._watch)
 
@@ -137,12 +138,12 @@ def signal(place: Place, description: str = "", meanings: Mapping[int, str] | No
 
 
 def is_charted(place: Place) -> bool:
-    """True for what is shown if nobody says what: no array, no structure, and no reference, which somebody has to name."""
+    """True for a place that charts show by default: no array, no structure, no reference."""
     return isinstance(base(place.type), Elementary | StringType | EnumType)
 
 
 def description_of(plc: Plc, place: Place) -> str:
-    """What an attached unit says of an address, "" if nobody knows it."""
+    """The description of an address by an attached unit, "" without one."""
     for attached in plc.units:
         descriptions: dict[str, str] = getattr(attached.unit, "descriptions", {})
         if place.area and place.name in descriptions:
@@ -151,7 +152,7 @@ def description_of(plc: Plc, place: Place) -> str:
 
 
 def default_signals(plc: Plc) -> list[Signal]:
-    """What is charted when nobody says what: all that units describe, and the programs' own single values."""
+    """The signals of a chart by default: all addresses that units describe, and the programs' own single values."""
     signals: list[Signal] = []
     for attached in plc.units:
         for address in getattr(attached.unit, "descriptions", {}):

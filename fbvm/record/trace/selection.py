@@ -1,4 +1,4 @@
-"""What of the memory a trace keeps: path patterns (`Main.*.Q`, `Main.Pump`), addresses and ranges (`D200..D299`)."""
+"""The values that a trace keeps: path patterns (`Main.*.Q`, `Main.Pump`), addresses and ranges (`D200..D299`)."""
 
 from __future__ import annotations
 
@@ -12,27 +12,27 @@ from fbvm.base.types import ArrayType, Field, StructType, followed
 from fbvm.watch.paths import Place, Span, UnknownPlace, find, member
 
 MOST_ELEMENTS = 4096
-"""Elements of an array of structures that a pattern with a star is tried on."""
+"""Elements of an array of structures that are compared with a pattern with a star."""
 
 FEW_ELEMENTS = 32
-"""Elements of an array that are shown if nobody names them."""
+"""Elements that an array may have to be shown by default."""
 
 
 @dataclass(frozen=True)
 class Selection:
-    """Some values; `everything` if no pattern was given."""
+    """The selected places, or `everything` if there is no pattern."""
 
     places: tuple[Place, ...]
     everything: bool
 
     def covers(self, offset: int, size: int, bit: int) -> bool:
-        """True if an access to some bytes, or one bit, concerns a selected value."""
+        """True if an access to some bytes, or to bit `bit`, reads or writes a selected value."""
         return self.everything or any(
             place.offset < offset + size and offset < place.offset + place.type.size
             and (place.bit is None or bit in (place.bit, WHOLE_BYTES)) for place in self.places)  # fmt: skip
 
     def extents(self, start: int, end: int, step: int) -> list[tuple[int, int]]:
-        """Where the selected values lie, in whole steps and without overlap."""
+        """The byte ranges of the selected values between `start` and `end`, in multiples of `step` and without overlap."""
         if self.everything:
             return [(start, end)]
         steps = sorted({number for place in self.places
@@ -47,35 +47,35 @@ class Selection:
 
 
 def select(symbols: Mapping[str, Field], areas: Mapping[str, Area], patterns: Sequence[str]) -> Selection:
-    """The values that patterns name; a structure or an instance stands for all in it.
+    """The values that patterns name; a structure or an instance selects all its members.
 
-    Raises UnknownPlace for a pattern that fits nothing."""
+    Raises UnknownPlace for a pattern without a match."""
     places: dict[Place, None] = {}
     for pattern in patterns:
-        places.update(dict.fromkeys(_fitting(symbols, areas, pattern)))
+        places.update(dict.fromkeys(_matching_places(symbols, areas, pattern)))
     inner = [part for place in places for part in (place, *_located(place))]
     return Selection(tuple(inner), not patterns)
 
 
-def _fitting(symbols: Mapping[str, Field], areas: Mapping[str, Area], pattern: str) -> Iterator[Place]:
+def _matching_places(symbols: Mapping[str, Field], areas: Mapping[str, Area], pattern: str) -> Iterator[Place]:
     if "*" not in pattern:
         found = find(symbols, areas, pattern)
         yield from found.places if isinstance(found, Span) else (found,)
         return
     fits = re.compile(".*".join(re.escape(part.strip()) for part in pattern.split("*")), re.I).fullmatch
-    chosen = [place for top in symbol_places(symbols) for place in _matching(top, fits)]
+    chosen = [place for top in symbol_places(symbols) for place in _within(top, fits)]
     if not chosen:
         raise UnknownPlace(f"no variable is called like {pattern}")
     yield from chosen
 
 
-def _matching(place: Place, fits: object) -> Iterator[Place]:
+def _within(place: Place, fits: object) -> Iterator[Place]:
     assert callable(fits)
     if fits(place.name):
         yield place
     elif isinstance(place.type, StructType):
         for inner in _members(place):
-            yield from _matching(inner, fits)
+            yield from _within(inner, fits)
     elif isinstance(place.type, ArrayType):
         low = place.type.bounds[0][0]
         if not isinstance(place.type.element, StructType | ArrayType):
@@ -84,11 +84,11 @@ def _matching(place: Place, fits: object) -> Iterator[Place]:
             return
         for number in range(min(place.type.count, MOST_ELEMENTS)):
             element = place.inner(f"{place.name}[{low + number}]", place.type.element, number * place.type.element.size)
-            yield from _matching(element, fits)
+            yield from _within(element, fits)
 
 
 def symbol_places(symbols: Mapping[str, Field]) -> Iterator[Place]:
-    """The places of all symbols; those behind references are places of others."""
+    """The places of all symbols that are no references."""
     return (Place(field.name, field.type, field.offset, field.bit) for field in symbols.values()
             if not field.reference and followed(field.type) is field.type)
 
@@ -102,7 +102,7 @@ def _members(place: Place) -> Iterator[Place]:
 
 
 def single_places(place: Place) -> Iterator[Place]:
-    """All single values in a place; of arrays only those that have few elements."""
+    """All single values in a place, without arrays of more than FEW_ELEMENTS elements."""
     if isinstance(place.type, StructType):
         for inner in _members(place):
             yield from single_places(inner)
@@ -116,7 +116,7 @@ def single_places(place: Place) -> Iterator[Place]:
 
 
 def _located(place: Place) -> Iterator[Place]:
-    """Variables of an instance that lie elsewhere, in an area."""
+    """Variables of an instance that are located in an area (AT)."""
     if isinstance(place.type, StructType):
         for inner in _members(place):
             outside = not place.offset <= inner.offset < place.offset + place.type.size

@@ -1,4 +1,4 @@
-"""The texts of a program's sources, as far as their files are still there: for lines beside what is shown."""
+"""The texts of a program's sources, for the lines of statements in charts, tables and traces."""
 
 from __future__ import annotations
 
@@ -12,7 +12,9 @@ from fbvm.syntax.text import read
 
 
 def source_texts(image: Image, own: Mapping[str, Path | str], libraries: Sequence[Path] = ()) -> dict[str, str]:
-    """Texts by name.  `own` are files, or their texts; the rest is looked for in libraries."""
+    """The texts of the sources of an image by name, without those whose files are gone.
+
+    `own` are files or texts by name; other sources are looked for in the folders `libraries` and in `fblib`."""
     texts = {}
     for name in sorted({site.file for site in image.sites}):
         known = own.get(name)

@@ -1,4 +1,4 @@
-"""Symbols as plain data and back: what a trace keeps of an image, so that it can be shown without the source.
+"""Symbols as plain data and back: a trace keeps the symbols of its image, so it can be shown without the source.
 
 Structures are written once and named by number.  A type that a reader does not know is bytes of some size.
 """
@@ -26,11 +26,11 @@ from fbvm.base.types import (
 
 
 class SymbolError(ValueError):
-    """The data are no symbols."""
+    """The data are no symbols that `to_data` has written."""
 
 
 def to_data(symbols: Mapping[str, Field]) -> dict[str, Any]:
-    """Symbols as JSON can write them."""
+    """Symbols as lists and dictionaries that JSON can write."""
     writer = _Writer()
     fields = [writer.field(field) for field in symbols.values()]
     return {"types": writer.structures, "symbols": fields}
@@ -56,7 +56,7 @@ class _Writer:
         return [field.name, self.type(field.type), field.offset, field.kind, field.bit, flags, *space]
 
     def type(self, kind: Type) -> Any:
-        """An elementary type is its name, any other a list that begins with what it is."""
+        """A type as data: an elementary type is its name, any other type a list with its kind in front."""
         if isinstance(kind, Elementary):
             return kind.name
         if isinstance(kind, StringType):

@@ -1,4 +1,4 @@
-"""Writes a trace while a PLC runs: memory at the end of each scan, and what happened inside it as deep as is asked."""
+"""Writes a trace while a PLC runs: the memory at the end of each scan, and events inside the scan to a chosen depth."""
 
 from __future__ import annotations
 
@@ -43,15 +43,16 @@ from fbvm.wire.tap import TapEvent
 FORMAT = 1
 BLOCK_SCANS = 100
 BLOCK_BYTES = 1 << 18
-"""A block is written when it has so many scans or bytes."""
+"""The number of scans, or bytes, at which a block is written."""
 PIECE, PART = 4096, 512
-"""Bytes that are compared at once, and those of a piece that differs."""
+"""Bytes that are compared at once; of a piece that differs, parts of PART bytes are compared."""
 START = AREAS["CF"].offset // LINE * LINE
-"""Memory before this is the system page, which follows from the rest."""
+"""The first byte that is recorded; the system page before it is not."""
 
 
 class Depth(Enum):
-    """SCANS: values at the end of each scan.  WRITES: and every write.  STATEMENTS: and every statement, call and read."""
+    """What a trace holds.  SCANS: memory at the end of each scan; WRITES: also every write; STATEMENTS: also every statement,
+    call and read."""
 
     SCANS = "scans"
     WRITES = "writes"
@@ -59,10 +60,17 @@ class Depth(Enum):
 
 
 class TraceWriter:
-    """Records `plc` into `file` from its next scan until `close`.
+    """Records `plc` into `file`, a binary file, from its next scan until `close`.
 
-    `selected` are patterns as `selection` has them, all memory without any; `lines` is text of the source by file and
-    line number, for readers.  Raises UnknownPlace."""
+    `depth` says what is recorded.  `selected` are paths, patterns, addresses and ranges (`Main.*.Q`, `D200..D299`); without
+    them all memory is recorded.  `lines` are source lines by file and line number, which readers show.  Raises UnknownPlace
+    for a pattern without a match.
+
+        with open("run.fbtrace", "wb") as file:
+            writer = TraceWriter(plc, file, Depth.STATEMENTS)
+            plc.run(scans=100)
+            writer.close()
+    """
 
     def __init__(
         self, plc: Plc, file: BinaryIO, depth: Depth = Depth.SCANS, selected: Sequence[str] = (),
@@ -100,21 +108,21 @@ class TraceWriter:
             self._attached.callback(setattr, network, "tap", add_tap(network, self._tap))
 
     def close(self) -> None:
-        """Ends the recording and writes what is left; the file stays open."""
+        """Ends the recording and writes the last block; the file stays open."""
         self._attached.close()
         self.flush()
 
     def flush(self) -> None:
-        """Writes the scans that stand in memory, for somebody who reads along."""
+        """Writes the scans that are still in memory, so that a reader sees them."""
         if self._scans:
             self.size_bytes += write_chunk(self._file, BLOCK, bytes(self._out), self._first, self._scans)
         self._out.clear()
         self._scans = 0
 
-    # --- what the PLC tells
+    # --- called by the PLC
 
     def phase(self, plc: Plc, phase: Phase) -> None:
-        """A phase inside a scan is over."""
+        """Called at the end of a phase."""
         if phase is not Phase.REFRESH:
             self._begin(plc.scans)
             self._changes(phase)
@@ -163,7 +171,7 @@ class TraceWriter:
             last = number
 
     def _changed(self) -> Iterator[tuple[int, bytes]]:
-        """The lines that changed since the last time: number, old xor new."""
+        """The lines of memory that have changed since the last call: number, old xor new."""
         buffer, shadow = self._plc.memory.map, self._shadow
         for number, (at, end) in enumerate(zip(self._pieces, self._ends, strict=True)):
             now, old = buffer[at:end], shadow[number]
@@ -172,7 +180,7 @@ class TraceWriter:
                 yield from _different(at, now, old)
 
     def _whole(self) -> Iterator[tuple[int, bytes]]:
-        """All that is not zero."""
+        """The lines of memory that are not zero."""
         for at, known in zip(self._pieces, self._shadow, strict=True):
             if any(known):
                 yield from _different(at, known, bytes(len(known)))
@@ -180,7 +188,7 @@ class TraceWriter:
     # --- events
 
     def event(self, plc: Plc, event: Event) -> None:
-        """Something happened in the program."""
+        """Called for each event."""
         note = self._notes.get(type(event))
         if note is not None:
             note(event)
@@ -213,7 +221,7 @@ class TraceWriter:
         self._out += text
 
     def _head(self, tag: int, frame: Frame, *numbers: int) -> None:
-        """Tag, frame and numbers; most of them come again in the next scan."""
+        """Writes tag, frame and numbers; the bytes are kept, since most of them are the same in the next scan."""
         key = (tag, self._frames[frame] if frame in self._frames else self._frame(frame), numbers)
         head = self._heads.get(key)
         if head is None:
@@ -223,7 +231,7 @@ class TraceWriter:
         self._out += head
 
     def _frame(self, frame: Frame) -> int:
-        """The number of a frame, written when it is met first."""
+        """The number of a frame, which is written at its first event."""
         number = self._frames.get(frame)
         if number is None:
             caller = frame.caller
@@ -268,17 +276,17 @@ def _header(plc: Plc, depth: Depth, selected: Sequence[str], lines: Mapping[str,
 
 
 def descriptions(plc: Plc) -> dict[str, str]:
-    """What the units of a PLC call their words and bits, by address."""
+    """The descriptions of words and bits by the units of a PLC, by address."""
     return {address: text for attached in plc.units for address, text in getattr(attached.unit, "descriptions", {}).items()}
 
 
 def meanings(plc: Plc) -> dict[str, dict[int, str]]:
-    """What values of the units' words mean, by address."""
+    """The texts of values of words by the units of a PLC, by address and value."""
     return {address: dict(rows) for attached in plc.units for address, rows in getattr(attached.unit, "meanings", {}).items()}
 
 
 def source_lines(image: Image, texts: Mapping[str, str]) -> dict[str, dict[int, str]]:
-    """The lines on which statements stand, without margin, of files whose text is known."""
+    """The source lines with statements, without their margin, by file and line number; `texts` are sources by name."""
     made: dict[str, dict[int, str]] = {}
     split = {name: text.split("\n") for name, text in texts.items()}
     for site in image.sites:
