@@ -1,8 +1,8 @@
 """The memory areas of a PLC, where each lies in the flat buffer, and addresses such as `D100` or `CIO 1519.03`.
 
 Omron areas count 16-bit words, the portable areas %I %Q %M count bytes.  The buffer begins with the system page (what
-machine and engines tell each other); behind the areas come the slots of globals and instances, E banks come last and
-only if a program or a unit names them.  Before them lie areas that units bring (mailboxes), if the program names any.
+machine and engines exchange); behind the areas come the slots of globals and instances, E banks come last and
+only if a program or a unit names them.  Before them lie the areas of units (mailboxes), if the program names any.
 Sizes: W394 and etn21 facts, CS1/CJ1/CJ2 (CIO 6144, W 512, H 512 + 1024 for blocks, A 960, D 32768, 13 E banks, T/C 4096).
 """
 
@@ -24,7 +24,7 @@ class Area:
     count: int
     unit_bits: int
     read_only: int = 0
-    """How many units from the start on a program must not write."""
+    """The number of units, from the first on, that a program must not write."""
     retained: bool = False
     """Kept over a warm start and a mode change."""
 
@@ -77,13 +77,13 @@ E_PLC_ADDRESS = 0x18000
 E_NAMES = tuple(f"E{bank:X}" for bank in range(E_BANKS))
 
 
-# --- areas that units bring -----------------------------------------------------------------------------------------
+# --- areas of units --------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Mailbox:
-    """An area of its own that a unit brings, through which the blocks of its library reach it: words for the unit as
-    a whole, then slots of equal size, of which an instance claims a free one."""
+    """An area of a unit, through which the blocks of its library exchange words with the unit: words for the unit as a
+    whole, then slots of equal size; an instance of a block claims a free slot."""
 
     name: str
     head_words: int
@@ -92,7 +92,7 @@ class Mailbox:
 
     @property
     def words(self) -> int:
-        """How many words it has in all."""
+        """The number of words in all."""
         return self.head_words + self.slots * self.slot_words
 
     def at(self, offset: int) -> Area:
@@ -105,7 +105,7 @@ MAILBOX_MOST_WORDS = 1 << 20
 
 
 def refusal(mailbox: Mailbox) -> str:
-    """Why there cannot be such a mailbox, "" if there can."""
+    """The error of a mailbox with a wrong name or size, "" if there is none."""
     name = mailbox.name
     if not MAILBOX_NAME.fullmatch(name) or name in AREAS or name == "DM":
         return f"{name!r} cannot name an area: write 2 to 8 capitals that no other area has"
@@ -167,7 +167,7 @@ class Address:
 
 _OMRON = re.compile(r"%?\s*(CIO|DM|D|W|H|A|TF|CNF|CF|T|C|E([0-9A-F])_|E([0-9A-F])\s*:)?\s*(\d+)(?:\.(\d+))?", re.I)
 _PORTABLE = re.compile(r"%\s*([IQM])([XBWDL]?)(\d+)(?:\.(\d+))?", re.I)
-_BROUGHT = re.compile(rf"%?\s*({MAILBOX_NAME.pattern})\s*(\d+)(?:\.(\d+))?", re.I)
+_MAILBOX = re.compile(rf"%?\s*({MAILBOX_NAME.pattern})\s*(\d+)(?:\.(\d+))?", re.I)
 _SIZES = {"X": 1, "": 1, "B": 8, "W": 16, "D": 32, "L": 64}
 
 
@@ -178,18 +178,22 @@ class AddressError(ValueError):
 def parse_address(text: str, areas: Mapping[str, Area] = AREAS) -> Address:
     """The address that `text` names: `D100`, `%D100`, `CIO 1519.03`, `1519.03`, `E0_100`, `%MW10`, `%IX0.3`.
 
-    `areas` are those that there are, with what units bring; E banks are known without being among them.
-    A bit of a larger unit is one of its bytes: `%MW4.15` is `%MX9.7`.  Raises AddressError for text that is no address or
-    lies outside its area."""
+    `areas` are the areas of the PLC, with those of its units; E banks are always known.  A bit of a larger unit is
+    returned as a bit of one of its bytes.  Raises AddressError for text that is no address, and for an address outside its
+    area.
+
+    >>> str(parse_address("1519.3")), str(parse_address("DM100")), str(parse_address("%MW4.15"))
+    ('CIO 1519.03', 'D100', '%MX9.7')
+    """
     text = text.strip()
     if match := _PORTABLE.fullmatch(text):
         return _portable(match)
     match = _OMRON.fullmatch(text)
     if not match:
-        brought = _BROUGHT.fullmatch(text)
-        if brought and brought[1].upper() in areas:
-            bit = int(brought[3]) if brought[3] is not None else None
-            return check_address(Address(brought[1].upper(), int(brought[2]), bit), areas)
+        mailbox = _MAILBOX.fullmatch(text)
+        if mailbox and mailbox[1].upper() in areas:
+            bit = int(mailbox[3]) if mailbox[3] is not None else None
+            return check_address(Address(mailbox[1].upper(), int(mailbox[2]), bit), areas)
         raise AddressError(f"{text!r} is not an address")
     name = (match[1] or "CIO").upper().replace(" ", "")
     if name.startswith("E") or name == "DM":

@@ -1,7 +1,7 @@
-"""What the operations of code yield for given values: the same functions serve the engine and constant folding.
+"""The results of operations for given values; the engine and constant folding use the same functions.
 
-Integers are Python's own until `wrap` brings them into a machine type; a REAL is a Python float whose value fits 32
-bits (`single` rounds).  A function that has no answer raises Undefined with the code of the trap.
+Integers are Python integers until `wrap` reduces them to a machine type; a REAL is a Python float whose value fits 32
+bits (`single` rounds).  A function without a result raises Undefined with the code of the trap.
 Source: IEC 61131-3 ed. 3 tables 22 to 30, IEEE 754-2008; edges as the table of operations states them."""
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _CODES = {"f32": "<f", "f64": "<d"}
 
 
 class Undefined(ArithmeticError):
-    """An operation has no answer: `code` of the trap that follows, the `values` that caused it."""
+    """An operation has no result: `code` is that of the trap, `values` are the operands that cause it."""
 
     def __init__(self, code: str, *values: object) -> None:
         super().__init__(code, *values)
@@ -46,7 +46,11 @@ def width(machine: str) -> int:
 
 
 def wrap(value: int, machine: str) -> int:
-    """The low bits of a number, read as the machine type reads them."""
+    """A number reduced to a machine type: its low bits, as a signed or unsigned number.
+
+    >>> wrap(32768, "i16"), wrap(-1, "u8")
+    (-32768, 255)
+    """
     low, high = limits(machine)
     return value if low <= value <= high else (value - low & high - low) + low
 
@@ -58,7 +62,11 @@ def single(value: float) -> float:
 
 
 def shortest(value: float) -> float:
-    """Of all numbers that are read as the same 32-bit float the one with the shortest text: 0.1, not 0.10000000149011612."""
+    """The number with the shortest text of those that round to the same 32-bit float.
+
+    >>> shortest(single(0.1))
+    0.1
+    """
     if not math.isfinite(value):
         return value
     for digits in range(1, 10):
@@ -111,7 +119,7 @@ def quotient(a: int, b: int) -> int:
 
 
 def remainder(a: int, b: int) -> int:
-    """What `quotient` leaves, with the sign of a."""
+    """The remainder of `quotient`, with the sign of a."""
     if b == 0:
         raise Undefined("R0101", a, b)
     return a - b * quotient(a, b)

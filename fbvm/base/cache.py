@@ -1,7 +1,7 @@
-"""Files that save time: what was worked out once is there the next time, for any process of this user on this machine.
+"""Files with results that are used again by later processes of the same user.
 
-A file is named by the hash of all that its contents depend on, and ends with a hash of these: damaged or foreign files
-are passed over.  Nothing is unpickled.  What cannot be read or written does no harm, it only takes longer."""
+The name of a file is the hash of all inputs of its contents; a file ends with a hash of its contents, so damaged files are
+ignored.  Nothing is unpickled.  A file that cannot be read or written only costs time."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _on = True
 
 
 def switch(on: bool) -> None:
-    """Use the files from now on, or do not."""
+    """Switches all caches on or off."""
     global _on
     _on = on
 
 
 def name_of(parts: Iterable[str]) -> str:
-    """The name for what depends on these texts."""
+    """The name of the file whose contents depend on these texts: their SHA-256 hash in hexadecimal."""
     digest = hashlib.sha256()
     for part in parts:
         digest.update(f"{len(part)}:{part}".encode("utf-8", "surrogatepass"))
@@ -36,15 +36,14 @@ def name_of(parts: Iterable[str]) -> str:
 
 
 SUFFIXES = (".py", ".st", ".toml", ".lark", ".txt")
-"""What decides in this package how others are compiled."""
+"""Endings of files of this package on which compilations depend."""
 
 
 @cache
 def state_of(*folders: Path) -> str:
-    """A hash of the host and of the files of this package in some folders: where each is, how large, and when it was written.
+    """A hash of the Python version and of path, size and modification time of all files of this package in some folders.
 
-    That stands for what they hold, as it does for the host's bytecode: to read hundreds of them takes longer than most
-    compilations."""
+    The contents are not read, as for Python's bytecode: to read hundreds of files takes longer than most compilations."""
     return name_of((sys.version, *(part for folder in folders for part in _state(str(folder)))))
 
 
@@ -61,10 +60,10 @@ def _state(folder: str) -> Iterator[str]:
 
 @dataclass
 class Cache:
-    """The files of one kind.  `head` is what each begins with; above `limit_bytes` in all, or `limit_files`, the oldest go
-    until a quarter of the room is free.
+    """The files of one kind, in a folder of this name; each begins with the bytes `head`.
 
-    Each time that one is written all are looked at, which takes as long as there are many."""
+    Above `limit_bytes` in all, or `limit_files`, the files that were used least recently are removed until a quarter is
+    free.  Each write lists the folder."""
 
     kind: str
     head: bytes
@@ -73,11 +72,11 @@ class Cache:
 
     @property
     def folder(self) -> Path:
-        """Where they are."""
+        """The folder of the files."""
         return cache_folder() / self.kind
 
     def read(self, name: str) -> bytes | None:
-        """What was stored under a name; None if there is nothing, or nothing that can be trusted."""
+        """The contents that were written under a name; None without a file, or for a damaged or foreign one."""
         folder = self.folder
         if not _on or not _private(folder):
             return None
@@ -92,7 +91,7 @@ class Cache:
         return body[len(self.head):]
 
     def write(self, name: str, content: bytes) -> None:
-        """Store under a name, by way of a file of its own so that nobody reads half of it."""
+        """Writes contents under a name, through a temporary file, so that no process reads an incomplete one."""
         if not _on:
             return
         folder, body = self.folder, self.head + content
@@ -122,7 +121,7 @@ class Cache:
 
 
 def _private(folder: Path) -> bool:
-    """True if nobody but this user can put files there: what is in them is believed."""
+    """True if only this user can write files into a folder, since their contents are trusted."""
     try:
         found = folder.stat()
     except OSError:
@@ -133,11 +132,11 @@ def _private(folder: Path) -> bool:
 
 
 def _files(folder: Path) -> Iterator[tuple[float, int, str]]:
-    """When each file was used last, its size, and where it is."""
+    """The time of the last use, the size and the path of each file."""
     with os.scandir(folder) as entries:
         for entry in entries:
             try:
                 found = entry.stat()
-            except OSError:  # somebody else made room
+            except OSError:  # another process has removed it
                 continue
             yield found.st_mtime, found.st_size, entry.path

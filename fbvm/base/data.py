@@ -1,4 +1,4 @@
-"""Finds the folders `grammar/` and `fblib/` that travel with the package, and the folder for what can be made again."""
+"""Finds the folders `grammar/` and `fblib/` that travel with the package, and the folder of caches."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PACKAGE = Path(__file__).resolve().parent.parent
 
 @cache
 def data_folder(name: str) -> Path:
-    """The folder `grammar` or `fblib`: inside the package in a wheel, beside it in a checkout or an editable install.
+    """The folder `grammar`, `fblib` or `examples`: inside the package in a wheel, beside it in a checkout or an editable install.
 
     Raises FileNotFoundError if the installation is damaged and has neither."""
     for folder in (PACKAGE / "_data" / name, PACKAGE.parent / name):
@@ -23,9 +23,9 @@ def data_folder(name: str) -> Path:
 
 
 def cache_folder() -> Path:
-    """The user's folder for things that save time and may be lost; it need not exist and perhaps cannot be written.
+    """The user's folder for caches, or that which the environment variable FBVM_CACHE names.
 
-    `FBVM_CACHE` names another one."""
+    The folder may be missing and may not be writable."""
     if named := os.environ.get("FBVM_CACHE"):
         return Path(named)
     if sys.platform == "win32":

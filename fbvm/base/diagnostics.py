@@ -1,4 +1,4 @@
-"""Messages about a program: each with a code, a place, what is wrong and where it helps what to write instead."""
+"""Diagnostics of a program: each has a code, a position, a message, and a hint where one helps."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ class Diagnostic:
     hint: str = ""
     related: tuple[Source, int, str] | None = field(default=None, compare=False)
     raised: bool = False
-    """True for a warning that counts as an error, because somebody wants it so."""
+    """True for a warning that counts as an error because of an option."""
     lossless: bool = field(default=False, compare=False)
-    """True for a syntax error in spite of which all that was written has been read."""
+    """True for a syntax error after which the whole text could still be parsed."""
 
     @property
     def severity(self) -> str:
@@ -131,5 +131,5 @@ def caret_lines(source: Source, start: int, end: int) -> list[str]:
 
 
 def errors(diagnostics: Sequence[Diagnostic]) -> list[Diagnostic]:
-    """Those that forbid running."""
+    """The errors among diagnostics; a program with one is not run."""
     return [d for d in diagnostics if d.severity == "error"]

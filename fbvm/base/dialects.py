@@ -1,4 +1,4 @@
-"""Dialects: where compilers of the field disagree, which answer is taken.  Data only; whoever decides asks a switch.
+"""Dialects: the answers to questions in which compilers disagree, as switches.  Data only; the compiler reads the switches.
 
 The default is the third edition where it speaks, and what CODESYS users see where it is silent.  A dialect never makes a
 correct program of the standard mean something else but where its switches say so.
@@ -131,12 +131,12 @@ def dialect(name: str) -> Dialect:
 
 
 def takers(switch: str) -> str:
-    """How to ask for a dialect that answers another way, for hints."""
+    """The option for a dialect with a switch set, for hints: `--dialect codesys or rusty`."""
     return "--dialect " + " or ".join(row.name for row in DIALECTS.values() if getattr(row, switch))
 
 
 def page() -> str:
-    """All dialects for people: who needs which, and how each answers what others disagree about."""
+    """The page about dialects: whose programs each is for, and its answer to each question."""
     lines = ["# Dialects", "", "Where compilers disagree, a dialect says which answer is taken: `--dialect NAME`, `dialect = "
              '"NAME"` under a', "[plc] of fbvm.toml, or `dialect=` of the compile functions and test rigs.", ""]
     lines += [f"- {row.name}: {row.for_whom}." for row in DIALECTS.values()]

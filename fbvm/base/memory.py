@@ -1,6 +1,6 @@
 """The flat memory of one PLC: one anonymous mapping, typed views over it, and snapshots that share unchanged pages.
 
-It costs only the pages that are touched.  It does not know what lies where but for the areas that it is told."""
+Only pages that are written take memory.  The layout is that of the areas; variables are known to others."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class Memory:
             raise IndexError(f"{size} bytes at {offset} are not in a memory of {self.size}")
 
     def snapshot(self) -> Snapshot:
-        """The contents now.  Pages that did not change are shared with the snapshot that was taken or restored last."""
+        """The contents now.  Pages without changes are shared with the last snapshot that was taken or restored."""
         last = self._last.pages if self._last else (None,) * (self.size // PAGE_BYTES)
         pages: list[bytes | None] = []
         for number, known in enumerate(last):
@@ -116,15 +116,15 @@ class Memory:
         return other
 
     def close(self) -> None:
-        """Give the buffer back.  Views that were handed out cannot be used any more."""
+        """Frees the buffer.  Views of the buffer cannot be used afterwards."""
         for view in (*self._words.values(), *self.views.values(), self.u8):
             view.release()
-        with contextlib.suppress(BufferError):  # somebody still holds a slice: the mapping ends with it
+        with contextlib.suppress(BufferError):  # a slice is still in use: the mapping ends with it
             self.map.close()
 
 
 def compare(a: Snapshot, b: Snapshot) -> list[tuple[int, int]]:
-    """Where two snapshots of one size differ: (offset, length) of each run of bytes, from low to high."""
+    """The differences of two snapshots of one size: (offset, length) of each run of bytes, from low to high."""
     runs: list[tuple[int, int]] = []
     for number, (left, right) in enumerate(zip(a.pages, b.pages, strict=True)):
         if left is not right:

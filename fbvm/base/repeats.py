@@ -1,4 +1,4 @@
-"""One message for a name that is unknown in many places: it has one cause."""
+"""One message for a name that is unknown in many places."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from fbvm.base.diagnostics import Diagnostic
 NAMES = frozenset(("S0201", "S0204", "S0401"))
 """Codes of names that nobody declares."""
 FEW = 2
-"""So often a name of one source is complained about in each place."""
+"""Up to this number of messages about one name of a source all are kept."""
 LISTED = 4
-"""How many lines are named."""
+"""Lines that the message names."""
 
 
 def gathered(found: Sequence[Diagnostic]) -> list[Diagnostic]:

@@ -1,4 +1,4 @@
-"""Data types: their names, sizes in memory, ranges, and what converts to what without being asked.
+"""Data types: their names, sizes in memory, ranges, and implicit conversions.
 
 Layout (little-endian, naturally aligned): BOOL one byte, STRING[n] n + 1 bytes, TIME and dates 64-bit nanoseconds,
 references 64 bits.  Source: IEC 61131-3 ed. 3 tables 10 and 11, figures 5 and 11.
@@ -14,7 +14,7 @@ from functools import cache, lru_cache
 
 @lru_cache(1 << 16)
 def fold(name: str) -> str:
-    """A name as it is compared: case does not matter."""
+    """A name in the form in which names are compared: in capitals, since case does not matter."""
     return name.upper()
 
 
@@ -62,29 +62,29 @@ class ArrayType(Type):
 
     @property
     def count(self) -> int:
-        """How many elements it has in all."""
+        """The number of elements in all dimensions."""
         return _elements(self.bounds)
 
 
 @dataclass(frozen=True)
 class OpenArrayType(Type):
-    """ARRAY [*] of an in-out: what is passed brings its bounds.  `size` is that of the parameter's slot: a reference and
+    """ARRAY [*] of an in-out: the argument brings its bounds.  `size` is that of the parameter's slot: a reference and
     for each dimension the lower and the upper bound, 64 bits each."""
 
     dimensions: int
     element: Type
 
     def bound_offset(self, dimension: int, upper: bool) -> int:
-        """Where in the slot a bound of `dimension` (from 0) lies."""
+        """The offset in the slot of a bound of `dimension` (from 0)."""
         return 8 + 16 * dimension + (8 if upper else 0)
 
 
 @dataclass(frozen=True)
 class AnyType(Type):
-    """ANY or a narrower generic type as a parameter: whatever is passed brings its place, size and type.
+    """ANY or a narrower generic type as a parameter: the argument brings its place, size and type.
 
-    `name` is that of the generic type.  `size` is that of the parameter's slot: a reference, and from ANY_SIZE on what is
-    known of its target."""
+    `name` is that of the generic type.  `size` is that of the parameter's slot: a reference, and from ANY_SIZE on size and
+    type of the argument."""
 
 
 ANY_SIZE, ANY_BITS, ANY_STRIDE, ANY_CLASS = 8, 12, 16, 20
@@ -98,7 +98,7 @@ class Field:
 
     `kind` is "" for structure members, else the section's word (VAR_INPUT ...); `bit` is set for a BOOL located on a
     bit; `absolute` for a located variable, whose offset is one of the buffer; `reference` for an in-out, whose slot
-    holds a reference to a value of `type`; `hexadecimal` for one that people want to read so."""
+    holds a reference to a value of `type`; `hexadecimal` for one that a pragma shows in hexadecimal."""
 
     name: str
     type: Type
@@ -232,7 +232,7 @@ def bound(target: Type) -> RefType:
 
 
 def followed(kind: Type) -> Type:
-    """The type of what is meant where a variable of `kind` is named."""
+    """The type of the value that a variable of type `kind` names: of a REFERENCE TO its target."""
     return kind.target if isinstance(kind, RefType) and kind.follows and kind.target is not None else kind
 
 
@@ -315,11 +315,15 @@ _IMPLICIT = {
     "TIME": "LTIME", "DATE": "LDATE", "TIME_OF_DAY": "LTIME_OF_DAY", "DATE_AND_TIME": "LDATE_AND_TIME",
 }
 IMPLICIT: dict[str, tuple[str, ...]] = {name: tuple(to.split()) for name, to in _IMPLICIT.items()}
-"""What each type converts to by itself, smallest first (figure 11; contested rows: LINT and ULINT to LREAL explicit)."""
+"""The implicit conversions of each type, smallest first (figure 11; contested rows: LINT and ULINT to LREAL explicit)."""
 
 
 def converts(source: Type, target: Type) -> bool:
-    """True if a value of `source` may stand where `target` is wanted without a conversion being written."""
+    """True if a value of type `source` is converted implicitly to type `target`, or the types are equal.
+
+    >>> converts(INT, DINT), converts(DINT, INT)
+    (True, False)
+    """
     source, target = base(source), base(target)
     if source == target:
         return True
@@ -335,7 +339,11 @@ def converts(source: Type, target: Type) -> bool:
 
 
 def common(left: Type, right: Type) -> Type | None:
-    """The smallest type that both convert to by themselves, or None."""
+    """The smallest type to which both are converted implicitly, or None.
+
+    >>> common(INT, UINT).name
+    'DINT'
+    """
     left, right = base(left), base(right)
     if converts(left, right):
         return right

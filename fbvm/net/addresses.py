@@ -1,6 +1,6 @@
-"""Endpoints: the addresses that a PLC program uses, and where on the host they really are.
+"""Endpoints: the addresses that a PLC program uses, and the endpoints of the host that they are mapped to.
 
-Nothing here touches a connection; names of hosts have been resolved before."""
+No connections are made here; host names have been resolved before."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def fits(pattern: Peer, peer: Peer) -> bool:
 
 
 def impossible(local: Peer, remote: Peer) -> str:
-    """The errno name of why nobody can connect from `local` to `remote`; "" if it may be tried.
+    """The errno name with which a connection from `local` to `remote` fails at once, "" if none.
 
     A broadcast address and the own port are refused by the unit's stack with these errors (W343-E1-1 p100-101)."""
     if remote.host == "255.255.255.255":
@@ -28,7 +28,7 @@ def impossible(local: Peer, remote: Peer) -> str:
 
 
 def dotted(real: Peer) -> tuple[str, int]:
-    """An endpoint for the host.  Raises OSError for a name, which would have to be looked up and so could block."""
+    """An endpoint as the socket functions take it.  Raises OSError for a host name, whose resolution could block."""
     try:
         return str(IPv4Address(real.host)), real.port
     except ValueError:
@@ -36,10 +36,11 @@ def dotted(real: Peer) -> tuple[str, int]:
 
 
 class AddressMap:
-    """Rows "what the program says" -> "where on the host".  What has no row is used as it is.
+    """Maps endpoints of the program to endpoints of the host; an endpoint without a row is mapped to itself.
 
-    A row for port 0 holds for every port of its address.  A row to port 0 keeps the port when connecting, and lets the
-    system choose one when listening."""
+    `rows` are pairs of an endpoint of the program and one of the host.  A row for port 0 is for every port of its address.
+    A row to port 0 keeps the port when connecting, and lets the system choose one when listening.  Units listen on the
+    host's address `bind` where no row says another."""
 
     def __init__(self, rows: Mapping[Peer, Peer], bind: str) -> None:
         self._rows = dict(rows)
@@ -48,35 +49,35 @@ class AddressMap:
 
     @property
     def unused(self) -> list[Peer]:
-        """What the program was said to name, and did not name until now."""
-        return [said for said in self._rows if said not in self._used]
+        """The endpoints of the program whose rows have not been used so far."""
+        return [endpoint for endpoint in self._rows if endpoint not in self._used]
 
     def outward(self, remote: Peer) -> Peer:
-        """Where to connect to, or send a datagram to."""
+        """The endpoint of the host to which to connect, or to send a datagram."""
         real = self._row(remote)
         return Peer(real.host, real.port or remote.port) if real else remote
 
     def local(self, endpoint: Peer) -> Peer:
-        """Where to listen for a unit's endpoint; port 0: the system has to choose one."""
+        """The endpoint of the host on which to listen for a unit's endpoint; port 0 lets the system choose one."""
         return self._row(endpoint) or Peer(self._bind, endpoint.port)
 
     def inward(self, caller: Peer, own: Container[str]) -> Peer:
-        """What the program calls a caller from the host: by the first row that leads to just this endpoint, else by
-        the first that leads to its whole address.  Rows for `own` addresses say where to listen, not who calls."""
-        others = [(said, real) for said, real in self._rows.items() if said.host not in own]
-        for said, real in others:
+        """The endpoint of the program for a caller from the host: by the first row to this very endpoint, else by the
+        first row to its address.  Rows for `own` addresses, those of units, are for listening and are left out."""
+        others = [(endpoint, real) for endpoint, real in self._rows.items() if endpoint.host not in own]
+        for endpoint, real in others:
             if real == caller:
-                self._used.add(said)
-                return Peer(said.host, said.port or caller.port)
-        for said, real in others:
-            if real == Peer(caller.host, 0) and said.port == 0:
-                self._used.add(said)
-                return Peer(said.host, caller.port)
+                self._used.add(endpoint)
+                return Peer(endpoint.host, endpoint.port or caller.port)
+        for endpoint, real in others:
+            if real == Peer(caller.host, 0) and endpoint.port == 0:
+                self._used.add(endpoint)
+                return Peer(endpoint.host, caller.port)
         return caller
 
     def _row(self, endpoint: Peer) -> Peer | None:
-        for said in (endpoint, Peer(endpoint.host, 0)):
-            if said in self._rows:
-                self._used.add(said)
-                return self._rows[said]
+        for known in (endpoint, Peer(endpoint.host, 0)):
+            if known in self._rows:
+                self._used.add(known)
+                return self._rows[known]
         return None

@@ -1,4 +1,4 @@
-"""What the links of both networks have in common: channels by number, requests in order, events in order."""
+"""The common part of the links of both networks: channels by number, requests and events in order."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from collections.abc import Iterable, Sequence
 from fbvm.wire.link import Bind, Close, Closed, Connect, Event, Failed, Grant, Listen, Peer, Request, Send, SendTo
 
 SEND_BUFFER_BYTES = 262_144
-"""What may wait on one connection for the other side; more is ENOBUFS."""
+"""Bytes that may wait on a connection to be sent; `Send` of more fails with ENOBUFS."""
 MAX_DATAGRAM_BYTES = 65_507
 MAX_DATAGRAMS = 64
-"""Datagrams that are handed over at once, or kept in memory until then."""
+"""Datagrams that are handed over in one call, or kept in memory until then."""
 ANYBODY = Peer("0.0.0.0", 0)
 
 
 def undeliverable(remote: Peer, data: bytes) -> str:
-    """The errno name of why no datagram can be sent there; "" if one can."""
+    """The errno name with which a datagram to `remote` fails, "" if it can be sent."""
     if remote.host == "0.0.0.0" or remote.port == 0:
         return "EADDRNOTAVAIL"
     return "EMSGSIZE" if len(data) > MAX_DATAGRAM_BYTES else ""
 
 
 class Channel:
-    """A channel in use.  `send` and `send_to` give back the errno name of a failure, or ""."""
+    """A channel in use.  `send` and `send_to` return the errno name of a failure, or ""."""
 
     def __init__(self, link: ChannelLink, channel: int) -> None:
         self.link = link
@@ -31,81 +31,81 @@ class Channel:
         self.granted = 0
 
     def grant(self, size_bytes: int) -> None:
-        """The unit has room for so much."""
+        """Sets the number of bytes that the unit has room for."""
         self.granted = size_bytes
 
     def close(self, reset: bool, now_ns: int) -> None:
-        """The unit is done with it."""
+        """Closes the channel, by RST if `reset`."""
 
     def send(self, data: bytes, now_ns: int) -> str:
-        """Bytes for a TCP connection."""
+        """Sends bytes on a TCP connection."""
         return "ENOTCONN"
 
     def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
-        """One datagram."""
+        """Sends one datagram."""
         return "ENOTCONN"
 
     def fetch(self, now_ns: int) -> None:
-        """Tell the link what the unit may be given only now."""
+        """Appends the events that depend on the unit's grant, such as received bytes, to those of the link."""
 
     def failed(self, error: str) -> None:
-        """The open has failed: the channel may be used again."""
+        """Reports that the open has failed, and frees the channel."""
         del self.link.channels[self.channel]
-        self.link.told.append(Failed(self.channel, "open", error))
+        self.link.pending.append(Failed(self.channel, "open", error))
 
 
 class ChannelLink(ABC):
-    """One unit's place on a network; its children know how channels are opened."""
+    """The link of one unit; a subclass for each network opens the channels."""
 
     def __init__(self, address: str) -> None:
         self.address = address
-        self.told: list[Event] = []
-        """Events that wait to be fetched."""
+        self.pending: list[Event] = []
+        """Events that the unit has not fetched."""
         self.channels: dict[int, Channel] = {}
 
     @abstractmethod
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
-        """Put the new channel into `channels`, or tell that it failed."""
+        """Opens a channel: puts it into `channels`, or appends `Failed` to the events."""
 
     @abstractmethod
     def events(self, now_ns: int) -> Sequence[Event]:
-        """What happened up to `now_ns`, in order, each once."""
+        """The events up to `now_ns`, in order, each once."""
 
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
-        """Take requests in order.  Raises ValueError if a unit opens a channel that is in use."""
+        """Carries out requests in order.  Raises ValueError for an open of a channel that is in use."""
         for request in requests:
-            there = self.channels.get(request.channel)
+            open_channel = self.channels.get(request.channel)
             match request:
                 case Send():
-                    self._check(request.channel, there.send(request.data, now_ns) if there else "ENOTCONN")
+                    self._check(request.channel, open_channel.send(request.data, now_ns) if open_channel else "ENOTCONN")
                 case Grant():
-                    if there:
-                        there.grant(request.size)
+                    if open_channel:
+                        open_channel.grant(request.size)
                 case Connect() | Listen() | Bind():
-                    if there:
+                    if open_channel:
                         raise ValueError(f"channel {request.channel} of {self.address} is in use")
                     self.open(request, now_ns)
                 case Close(channel, reset):
-                    if there:
+                    if open_channel:
                         del self.channels[channel]
-                        there.close(reset, now_ns)
-                    self.told.append(Closed(channel))
+                        open_channel.close(reset, now_ns)
+                    self.pending.append(Closed(channel))
                 case SendTo(channel, remote, data):
-                    self._check(channel, there.send_to(remote, data, now_ns) if there else "ENOTCONN")
-        if self.told:
-            self.stir()
+                    self._check(channel, open_channel.send_to(remote, data, now_ns) if open_channel else "ENOTCONN")
+        if self.pending:
+            self.mark_pending()
 
-    def stir(self) -> None:  # noqa: B027
-        """There is something to tell: nothing to do where nobody sleeps meanwhile."""
+    def mark_pending(self) -> None:  # noqa: B027
+        """Called when events are pending; a network that sleeps in `wait` overrides it."""
 
     @property
     def is_quiet(self) -> bool:
-        """True if there is nothing to tell before the next `submit`: no channel is in use."""
-        return not self.told and not self.channels
+        """True if there are no events before the next `submit`: none is pending, and no channel is in use."""
+        return not self.pending and not self.channels
 
     def pass_by(self, refreshes: int) -> None:  # noqa: B027
-        """So many refreshes have taken place in which nobody asked: nothing to do where nobody counts them."""
+        """Counts refreshes in which `events` was not called; a network with faults by scan overrides it."""
 
     def _check(self, channel: int, error: str) -> None:
         if error:
-            self.told.append(Failed(channel, "send", error))
+            self.pending.append(Failed(channel, "send", error))

@@ -1,7 +1,7 @@
-"""What may go wrong on the way, as rows of data: a `LoopNetwork` takes the first row that fits a connection.
+"""Faults of a network, as rows of data: a `LoopNetwork` applies the first row that fits a connection.
 
-A row holds always, or during some scans or some time.  Misbehaviour of the peer itself (late, silent, wrong answers)
-is written as a peer, see `net.peers` and `net.misdeeds`.
+A row is in force always, or during some scans or some time.  Misbehaviour of the peer itself (late, silent, wrong answers)
+is a peer of its own, see `net.peers` and `net.misdeeds`.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ from fbvm.wire.link import Peer
 
 ANY = Peer("0.0.0.0", 0)
 FOREVER = 1 << 62
-"""The end of what has none."""
+"""The end of a row that is always in force."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One row: connections with an endpoint that fits `peer`, and what their way does to them.
+    """One row: the faults of connections with an endpoint that fits `peer`.
 
-    `latency_ns` each way instead of the network's, and up to `jitter_ns` more, from the network's seed; `silent`:
-    nothing passes (a dead host, a pulled cable) while the row holds; `error`: opening fails at once with this errno
-    name; `reset`: what is open breaks.  `segment_bytes`: data arrive in pieces of this size, `gap_ns` apart; with
-    `random_cut` in pieces of 1 up to this size, from the network's seed.  `join_ns`: what is sent arrives together at
+    `latency_ns` is the latency in each direction instead of the network's, with up to `jitter_ns` more, from the network's
+    seed; `silent`: nothing passes (a dead host, a pulled cable) while the row is in force; `error`: opening fails at once
+    with this errno name; `reset`: open connections break.  `segment_bytes`: data arrive in pieces of this size, `gap_ns`
+    apart; with `random_cut` in pieces of 1 up to this size, from the network's seed.  `join_ns`: data arrive together at
     multiples of this time.
 
-    The row holds in the scans of the PLC from `from_scan` (0 is the first) until before `until_scan`, and likewise in
-    time; it is asked when something is sent, arrives or is opened.  A scan is one I/O refresh of the unit."""
+    The row is in force in the scans of the PLC from `from_scan` (0 is the first) until before `until_scan`, and likewise in
+    time; the row is looked up when something is sent, arrives or is opened.  A scan is one I/O refresh of the unit."""
 
     peer: Peer = ANY
     latency_ns: int | None = None
@@ -47,11 +47,11 @@ class Fault:
     until_ns: int = FOREVER
 
     def holds(self, scan: int, now_ns: int) -> bool:
-        """Whether the row counts now."""
+        """True if the row is in force in this scan and at this time."""
         return self.from_scan <= scan < self.until_scan and self.from_ns <= now_ns < self.until_ns
 
     def pieces(self, data: bytes, dice: random.Random) -> Iterator[bytes]:
-        """The data as they arrive."""
+        """The pieces in which data arrive; `dice` gives their sizes for `random_cut`."""
         start = 0
         while start < len(data):
             size = self.segment_bytes or len(data)
@@ -65,7 +65,7 @@ NO_FAULT = Fault()
 
 
 def find(faults: Sequence[Fault], one: Peer, other: Peer, scan: int = 0, now_ns: int = 0) -> Fault:
-    """The first row that holds and fits either endpoint, else a row without any fault."""
+    """The first row that is in force and fits either endpoint, else a row without any fault."""
     for row in faults:
         if row.holds(scan, now_ns) and (fits(row.peer, one) or fits(row.peer, other)):
             return row
@@ -83,11 +83,16 @@ KINDS: dict[str, Fault] = {
     "unreachable": Fault(error="EHOSTUNREACH", silent=True),
     "reset": Fault(reset=True),
 }
-"""What may befall a network, by name."""
+"""Faults by name, among which `random_faults` chooses."""
 
 
 def random_faults(seed: int, scans: int, *, longest: int = 100, peer: Peer = ANY) -> list[Fault]:
-    """Rows for so many scans, one after the other with good times between them: kinds and times by the seed."""
+    """Rows for `scans` scans, one after the other with scans without a fault between them; `seed` decides kinds and times.
+
+    >>> [(row.from_scan, row.until_scan) for row in random_faults(1, 100)] == [
+    ...     (row.from_scan, row.until_scan) for row in random_faults(1, 100)]
+    True
+    """
     dice, rows = random.Random(seed), list[Fault]()
     scan = dice.randint(1, longest)
     while scan < scans:

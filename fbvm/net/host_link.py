@@ -12,7 +12,7 @@ from fbvm.wire.link import Event
 class Host(Protocol):
     """What a link needs of its network (`Switchboard` has it)."""
 
-    unheard: set[HostLink]
+    links_pending: set[HostLink]
     """Links with events that `wait` has to return for."""
     watched: int
     """Sockets that are registered with the selector."""
@@ -46,10 +46,10 @@ class HostLink(ChannelLink):
         if self.waiting:
             for there in list(self.waiting):
                 there.fetch(now_ns)
-        told, self.told = self.told, []
+        events, self.pending = self.pending, []
         self.is_quiet = not self.waiting and (driven or not self._network.watched)
-        return told
+        return events
 
-    def stir(self) -> None:
+    def mark_pending(self) -> None:
         self.is_quiet = False
-        self._network.unheard.add(self)
+        self._network.links_pending.add(self)

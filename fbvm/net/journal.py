@@ -1,8 +1,8 @@
 """The journal of one PLC: every input of every scan, a line each, so that a run can be done again to the same memory.
 
-Inputs are the time, what the network told each unit, memory that was written from outside, forces, changes of mode,
-power-on, and what units were given.  After each scan stands a fingerprint of the memory.  Lines are JSON; they are
-data and nothing else.  `fbvm.run.replay` does a journal again.
+Inputs are the time, the events of the network for each unit, memory that was written from outside, forces, changes of
+mode, power-on, and settings of units.  Each scan ends with a fingerprint of the memory.  Lines are JSON.
+`fbvm.run.replay` executes a journal again.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ EVENTS: dict[str, type[Event]] = {
 }
 ZERO_PAGE = bytes(PAGE_BYTES)
 Writes = tuple[tuple[int, bytes], ...]
-"""Bytes written from outside: offset in the flat memory, and what stands there now."""
+"""Bytes written from outside: the offset in the flat memory, and the new bytes."""
 
 
 class JournalError(ValueError):
@@ -33,7 +33,7 @@ class JournalError(ValueError):
 
 
 class Recordable(Protocol):
-    """What a journal needs of a unit, to build it again."""
+    """What a journal needs of a unit, to construct it again."""
 
     @property
     def configuration(self) -> dict[str, Any]:
@@ -41,7 +41,7 @@ class Recordable(Protocol):
 
     @property
     def settings(self) -> dict[str, Any]:
-        """What may be changed on it while it runs."""
+        """The attributes of the unit that may be changed while it runs."""
 
 
 # --- what a journal holds ---------------------------------------------------------------------------------------------
@@ -49,7 +49,7 @@ class Recordable(Protocol):
 
 @dataclass(frozen=True)
 class Header:
-    """Which program ran: fingerprint of its image, cycle, step budget, and what the writer says `about` the run."""
+    """The program of a run: fingerprint of its image, cycle, step budget, and `about`, the data that the writer has added."""
 
     image: str
     cycle_ns: int
@@ -59,8 +59,8 @@ class Header:
 
 @dataclass(frozen=True)
 class Act:
-    """Something that was done to the PLC between scans: "mode" with its name, "start" with "warm" or "cold", "unit"
-    with a unit's class and configuration.  `writes` came before it."""
+    """A change of the PLC between scans: "mode" with its name, "start" with "warm" or "cold", "unit" with a unit's class
+    and configuration.  `writes` were made before it."""
 
     what: str
     value: Any
@@ -69,7 +69,7 @@ class Act:
 
 @dataclass(frozen=True)
 class Scan:
-    """One scan with its inputs, in the order in which they hold: settings, forces, writes, time, events."""
+    """One scan with its inputs, in the order in which they are applied: settings, forces, writes, time, events."""
 
     number: int
     now_ns: int
@@ -84,7 +84,7 @@ class Scan:
 
 @dataclass(frozen=True)
 class End:
-    """The journal was closed after so many scans.  One without it was cut off."""
+    """The end of a journal that was closed, with the number of its scans.  A journal without it was cut off."""
 
     scans: int
 
@@ -93,7 +93,7 @@ Entry = Header | Act | Scan | End
 
 
 class Fingerprint:
-    """Follows a memory: which bytes changed since the last look, and a number that stands for its whole history."""
+    """The changes of a memory since the last call, and a checksum over its whole history."""
 
     def __init__(self, memory: Memory) -> None:
         self._memory = memory
@@ -101,14 +101,14 @@ class Fingerprint:
         self._sum = 0
 
     def changes(self) -> Writes:
-        """What was written since the last look."""
+        """The bytes that have changed since the last call of `changes` or `settle`."""
         now = self._memory.snapshot()
         runs = compare(self._known, now)
         self._known = now
         return tuple((offset, bytes(self._memory.u8[offset : offset + size])) for offset, size in runs)
 
     def settle(self) -> str:
-        """The number for the memory as it is now, in hexadecimal; everything before has its part in it."""
+        """The checksum of the memory and of all its former contents, in hexadecimal."""
         now = self._memory.snapshot()
         for number, (old, new) in enumerate(zip(self._settled.pages, now.pages, strict=True)):
             if old is not new and old != new:
@@ -123,7 +123,7 @@ class Fingerprint:
 class Journal:
     """Writes a journal to a text file while a PLC runs: `Plc(image, journal=Journal(file))`.
 
-    `about` may hold whatever a reader should know and JSON can write.  `close` ends the journal, not the file."""
+    `about` is data for readers, which JSON can write.  `close` ends the journal, not the file."""
 
     def __init__(self, file: TextIO, about: Mapping[str, Any] | None = None) -> None:
         self._file = file
@@ -136,27 +136,27 @@ class Journal:
         self._budget = 0
         self._fingerprint: Fingerprint
 
-    # The PLC calls these.
+    # Called by the PLC.
 
     def begin(self, image: str, cycle_ns: int, budget: int, memory: Memory) -> None:
-        """A PLC with its memory as new."""
+        """Writes the header for a PLC at power-on."""
         self._fingerprint, self._budget = Fingerprint(memory), budget
         self._write({"journal": FORMAT, "image": image, "cycle_ns": cycle_ns, "budget": budget, "about": self._about})
 
     def remark(self, text: str) -> None:
-        """What somebody did, for people who read the journal."""
+        """Adds a text for people who read the journal to the next line."""
         self._remarks.append(text)
 
     @contextmanager
     def acting(self, what: str, value: object) -> Iterator[None]:
-        """Something is done to the PLC that is not a scan; what it does to the memory is not written down."""
+        """Writes an `Act` that is carried out in the `with` block; its changes of memory are not written."""
         line = {what: value, **self._outside()}
         yield
         self._settle()
         self._write(line)
 
     def unit(self, unit: Recordable) -> dict[str, Any]:
-        """How a unit that comes on the backplane is written.  Raises TypeError if it does not say how it was made."""
+        """The class, configuration and settings of a new unit, for an `Act`.  Raises TypeError if it has no configuration."""
         try:
             described = {"class": type(unit).__name__, "with": unit.configuration, "settings": unit.settings}
             self._units.append((unit, unit.settings))
@@ -165,7 +165,7 @@ class Journal:
         return described
 
     def before(self, number: int, now_ns: int, budget: int, forces: Mapping[str, Any]) -> None:
-        """A scan begins."""
+        """Starts the line of a scan; called before the scan."""
         line: dict[str, Any] = {"scan": number, "now_ns": now_ns, **self._outside()}
         if budget != self._budget:
             line["budget"] = self._budget = budget
@@ -179,17 +179,17 @@ class Journal:
         self._line = line
 
     def told(self, unit: int, events: Sequence[Event]) -> None:
-        """What the network tells a unit in this scan."""
+        """Adds the events of the network for a unit to the line of the scan."""
         if events:
             self._line.setdefault("events", {})[str(unit)] = [_from_event(event) for event in events]
 
     def after(self) -> None:
-        """The scan has ended."""
+        """Writes the line of a scan; called after the scan."""
         self._scans += 1
         self._write({**self._line, "memory": self._settle()})
 
     def close(self) -> None:
-        """Say that nothing follows."""
+        """Writes the end of the journal and flushes the file."""
         self._write({"end": self._scans})
         self._file.flush()
 
@@ -215,8 +215,8 @@ class Journal:
 def open_journal(lines: Iterable[str]) -> tuple[Header, Iterator[Entry]]:
     """The header of a journal and, one after the other, its entries.
 
-    Raises JournalError for what is damaged, now or when it is come to.  A last line without its end, as a run that was
-    killed leaves it, is left out."""
+    `lines` are the lines of the file.  Raises JournalError for a damaged line, when it is read.  An incomplete last line,
+    which a killed run leaves, is left out."""
     entries = _read(lines)
     header = next(entries)
     assert isinstance(header, Header)
@@ -254,7 +254,7 @@ def _check_order(entry: Entry, first: bool, scans: int) -> None:
 
 
 def _entry(line: dict[str, Any]) -> Entry:
-    """One line.  Raises all kinds of errors for what has not the right form."""
+    """The entry of one line.  Raises errors of several classes for a line of another form."""
     if not isinstance(line, dict):
         raise TypeError("no entry of a journal")
     if "journal" in line:

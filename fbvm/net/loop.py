@@ -1,7 +1,7 @@
-"""A network in memory with virtual time: units and scripted peers talk to one another, the same way in every run.
+"""A network in memory with virtual time, between units and scripted peers: every run gives the same events.
 
-Nothing happens by itself.  Time moves when a link is told a later one; whatever was due until then is done in order of
-time, and at one moment in the order in which it was asked for.  An answer is never seen in the `submit` that asked.
+Time advances when a link is called with a later time; everything that is due until then is done in order of time, and at
+one time in the order in which it was scheduled.  The answer to a request never comes in the same `submit`.
 """
 
 from __future__ import annotations
@@ -13,19 +13,22 @@ from functools import partial
 
 from fbvm.net.addresses import fits, impossible
 from fbvm.net.faults import NO_FAULT, Fault, find
-from fbvm.net.loop_channels import Bound, Door, Line, MemoryLink
+from fbvm.net.loop_channels import Connection, Listener, MemoryLink, UdpPort
 from fbvm.net.peers import Action, Actions, Conversation, Fin, Leave, Reset, Say, Station, Wake
 from fbvm.net.stream import End
 from fbvm.wire.link import Bind, Connect, Event, Failed, Listen, Peer, Request
 from fbvm.wire.tap import Tap, TapEvent, TapKind
 
 CONNECT_TIMEOUT_NS = 75_000_000_000
-"""When opening towards a silent host gives up, as BSD stacks do.  The unit's own limit is not known: assumed."""
+"""The time after which an open to a silent host fails, as in BSD stacks.  The unit's own limit is not known: assumed."""
 FIRST_EPHEMERAL_PORT, LAST_PORT = 49_152, 65_535
 
 
 class LoopNetwork:
-    """The network of tests and lessons.  `faults` is a list that may be changed at any time, see `net.faults`."""
+    """The network in memory.
+
+    `seed` starts its random numbers, `latency_ns` is the latency in each direction, `faults` is a list of rows that may be
+    changed at any time (see `net.faults`)."""
 
     virtual_time = True
 
@@ -41,108 +44,108 @@ class LoopNetwork:
         self._stations: dict[Peer, Station] = {}
 
     def attach(self, address: str) -> LoopLink:
-        """A place for one unit.  Raises ValueError if the address is taken."""
+        """The link of a new unit.  Raises ValueError if the address is in use."""
         if address in self._links:
             raise ValueError(f"{address} is attached already")
         link = self._links[address] = LoopLink(self, address)
         return link
 
     def place(self, endpoint: Peer, station: Station) -> None:
-        """Put a scripted peer at an endpoint; a former one there takes no new connections any more."""
+        """Puts a scripted peer at an endpoint; new connections go to this peer, open ones stay with the former."""
         self._stations[endpoint] = station
 
     def remove(self, endpoint: Peer) -> None:
-        """Let nobody listen there any more.  Open conversations go on."""
+        """Removes the peer at an endpoint.  Its open connections stay."""
         self._stations.pop(endpoint, None)
 
     def next_due_ns(self) -> int | None:
-        """When something will happen by itself next, so that a run may skip the time until then; None if never."""
+        """The time at which the next scheduled event is due, up to which a run may skip; None if there is none."""
         return self._due[0][0] if self._due else None
 
     def close(self) -> None:
-        """Forget everything that is open or under way."""
+        """Discards all connections and data."""
         self._due.clear()
         self._links.clear()
         self._stations.clear()
 
     def run(self, now_ns: int) -> None:
-        """Do what is due until `now_ns`.  Links call this; a test may."""
+        """Does everything that is due until `now_ns`.  Links call this; a test may."""
         while self._due and self._due[0][0] <= now_ns:
             due_ns, _, call = heapq.heappop(self._due)
             self.now_ns = max(self.now_ns, due_ns)
             call(self.now_ns)
         self.now_ns = max(self.now_ns, now_ns)
 
-    # What a connection needs (stream.Way).
+    # What a connection needs (stream.Carrier).
 
     def at(self, due_ns: int, call: Callable[[int], None]) -> None:
-        """Call back when it is due."""
+        """Schedules a call at `due_ns`."""
         self._count += 1
         heapq.heappush(self._due, (due_ns, self._count, call))
 
     def fault(self, one: Peer, other: Peer) -> Fault:
-        """The row of the fault table that holds now between two endpoints; the scan is the first one's, if it is a unit."""
+        """The fault between two endpoints that is in force now; the scan is that of `one`, if a unit, else of `other`."""
         if not self.faults:
             return NO_FAULT
         link = self._links.get(one.host) or self._links.get(other.host)
         return find(self.faults, one, other, link.scan if link else 0, self.now_ns)
 
     def latency_ns(self, fault: Fault) -> int:
-        """Time for one way."""
+        """The latency in one direction, with jitter."""
         latency_ns = self._latency_ns if fault.latency_ns is None else fault.latency_ns
         return latency_ns + (self._dice.randint(0, fault.jitter_ns) if fault.jitter_ns else 0)
 
     def cut(self, fault: Fault, data: bytes) -> list[bytes]:
-        """Data in the pieces in which they arrive."""
+        """The pieces in which data arrive."""
         return list(fault.pieces(data, self._dice))
 
     def tell(self, end: End, what: TapKind, out: bool, data: bytes = b"") -> None:
-        """Pass a happening at a unit's end on to the tap; a scripted peer has none."""
+        """Reports an event at an end to the tap, if the end is a unit's."""
         if end.unit is not None:
             self.tell_unit(end.unit, what, end.local, end.remote, out, data)
 
     def tell_unit(self, unit: str, what: TapKind, local: Peer, remote: Peer, out: bool, data: bytes = b"") -> None:
-        """Pass a happening at a unit on to the tap."""
+        """Reports an event at a unit to the tap."""
         if self.tap:
             self.tap(self.now_ns, unit, TapEvent(what, local, remote, out, data, remote.host in self._links))
 
     # Opening, and datagrams.
 
-    def dial(self, line: Line, local: Peer, remote: Peer) -> None:
-        """Begin an active open for a unit's channel."""
+    def connect(self, connection: Connection, local: Peer, remote: Peer) -> None:
+        """Starts an active open for a unit's channel."""
         fault = self.fault(local, remote)
         self.tell_unit(local.host, TapKind.SYN, local, remote, True)
         station = self._stations.get(remote)
         if fault.silent or (station and station.deaf):
-            self.at(self.now_ns + CONNECT_TIMEOUT_NS, partial(line.refused, "ETIMEDOUT"))
+            self.at(self.now_ns + CONNECT_TIMEOUT_NS, partial(connection.refused, "ETIMEDOUT"))
             return
-        end = End(self, local, remote, local.host, line)
-        self.at(self.now_ns + self.latency_ns(fault), partial(self._knock, line, end))
+        end = End(self, local, remote, local.host, connection)
+        self.at(self.now_ns + self.latency_ns(fault), partial(self._syn_arrived, connection, end))
 
-    def _knock(self, line: Line, end: End, now_ns: int) -> None:
-        """The SYN has arrived."""
+    def _syn_arrived(self, connection: Connection, end: End, now_ns: int) -> None:
+        """Called when the SYN has arrived at the other endpoint: accepts or refuses the connection."""
         back_ns = now_ns + self.latency_ns(self.fault(end.local, end.remote))
         link = self._links.get(end.remote.host)
-        other = (link.admit(end, now_ns) if link else None) or self._converse(end)
-        self.at(back_ns, partial(line.answered, end, "" if other else "ECONNREFUSED", True))
+        other = (link.accept(end, now_ns) if link else None) or self._accept(end)
+        self.at(back_ns, partial(connection.answered, end, "" if other else "ECONNREFUSED", True))
         if other:
             end.join(other)
-            if isinstance(other.owner, _Talk):
-                other.owner.greet(other, now_ns)
+            if isinstance(other.owner, _PeerOwner):
+                other.owner.opened(other, now_ns)
 
-    def _converse(self, end: End) -> End | None:
+    def _accept(self, end: End) -> End | None:
         station = self._stations.get(end.remote)
         conversation = station.accept(end.local) if station else None
         if conversation is None:
             return None
-        return End(self, end.remote, end.local, None, _Talk(self, conversation))
+        return End(self, end.remote, end.local, None, _PeerOwner(self, conversation))
 
-    def post(self, sender: Peer, receiver: Peer, data: bytes) -> None:
-        """Carry a datagram from a unit to whoever is there."""
+    def send_datagram(self, sender: Peer, receiver: Peer, data: bytes) -> None:
+        """Sends a datagram of a unit."""
         self.tell_unit(sender.host, TapKind.UDP, sender, receiver, True, data)
-        self._carry(sender, receiver, data)
+        self._schedule_datagram(sender, receiver, data)
 
-    def _carry(self, sender: Peer, receiver: Peer, data: bytes) -> None:
+    def _schedule_datagram(self, sender: Peer, receiver: Peer, data: bytes) -> None:
         fault = self.fault(sender, receiver)
         if not fault.silent:
             self.at(self.now_ns + self.latency_ns(fault), partial(self._deliver, sender, receiver, data))
@@ -151,21 +154,21 @@ class LoopNetwork:
         everybody = receiver.host.endswith(".255")
         for address, link in self._links.items():
             if address == receiver.host or (everybody and address != sender.host):
-                link.drop_in(sender, receiver.port, data)
+                link.deliver_datagram(sender, receiver.port, data)
         for endpoint, station in list(self._stations.items()):
             if endpoint == receiver or (everybody and endpoint.port == receiver.port):
                 for answer in station.datagram(data, sender):
-                    self._carry(endpoint, sender, answer)
+                    self._schedule_datagram(endpoint, sender, answer)
 
 
 class LoopLink(MemoryLink):
-    """One unit's place on a `LoopNetwork`."""
+    """The link of one unit of a `LoopNetwork`."""
 
     def __init__(self, network: LoopNetwork, address: str) -> None:
         super().__init__(address)
         self.network = network
         self.scan = 0
-        """Number of the scan in which the unit was refreshed last."""
+        """The number of the scan of the unit's last refresh."""
         self._refreshes = 0
         self._ends: dict[tuple[int, Peer], End] = {}
         self._next_port = FIRST_EPHEMERAL_PORT
@@ -181,11 +184,11 @@ class LoopLink(MemoryLink):
         if any(row.reset for row in self.network.faults):
             for end in list(self._ends.values()):
                 if self.network.fault(end.local, end.remote).reset:
-                    end.tear(now_ns)
+                    end.reset_both(now_ns)
         for there in list(self.channels.values()):
             there.fetch(now_ns)
-        told, self.told = self.told, []
-        return told
+        events, self.pending = self.pending, []
+        return events
 
     @property
     def is_quiet(self) -> bool:
@@ -200,35 +203,35 @@ class LoopLink(MemoryLink):
         self._ends = {where: end for where, end in self._ends.items() if not end.gone}
         error = self._conflict(request)
         if error:
-            self.told.append(Failed(channel, "open", error))
+            self.pending.append(Failed(channel, "open", error))
             return
         port = request.local_port or self._ephemeral_port()
         if isinstance(request, Listen):
-            self.channels[channel] = Door(self, channel, port, request.remote)
+            self.channels[channel] = Listener(self, channel, port, request.remote)
         elif isinstance(request, Bind):
-            self.channels[channel] = Bound(self, channel, port)
+            self.channels[channel] = UdpPort(self, channel, port)
         else:
-            line = self.channels[channel] = Line(self, channel, port)
-            self.network.dial(line, Peer(self.address, port), request.remote)
+            connection = self.channels[channel] = Connection(self, channel, port)
+            self.network.connect(connection, Peer(self.address, port), request.remote)
 
     # For the network and for the channels.
 
-    def admit(self, caller: End, now_ns: int) -> End | None:
-        """A connection from elsewhere: its end at the lowest-numbered door that is open to it (assumed), or None."""
+    def accept(self, caller: End, now_ns: int) -> End | None:
+        """Accepts a connection on the lowest-numbered listener that fits the caller (assumed); its end here, or None."""
         for channel, there in sorted(self.channels.items()):
-            if isinstance(there, Door) and there.port == caller.remote.port and fits(there.remote, caller.local):
-                line = self.channels[channel] = Line(self, channel, there.port)
-                line.granted = there.granted
-                end = End(self.network, caller.remote, caller.local, self.address, line)
+            if isinstance(there, Listener) and there.port == caller.remote.port and fits(there.remote, caller.local):
+                connection = self.channels[channel] = Connection(self, channel, there.port)
+                connection.granted = there.granted
+                end = End(self.network, caller.remote, caller.local, self.address, connection)
                 self.tell(end, TapKind.SYN, False)
-                line.answered(end, "", False, now_ns)
+                connection.answered(end, "", False, now_ns)
                 return end
         return None
 
-    def drop_in(self, sender: Peer, port: int, data: bytes) -> None:
-        """A datagram for this address has arrived; lost if nobody is bound to its port."""
+    def deliver_datagram(self, sender: Peer, port: int, data: bytes) -> None:
+        """Delivers a datagram to the channel that is bound to its port; without one the datagram is lost."""
         for there in self.channels.values():
-            if isinstance(there, Bound) and there.port == port:
+            if isinstance(there, UdpPort) and there.port == port:
                 there.take_in(sender, data)
                 self.network.tell_unit(self.address, TapKind.UDP, Peer(self.address, port), sender, False, data)
 
@@ -238,14 +241,14 @@ class LoopLink(MemoryLink):
     def tell(self, end: End, what: TapKind, out: bool) -> None:
         self.network.tell(end, what, out)
 
-    def post(self, port: int, receiver: Peer, data: bytes) -> None:
-        self.network.post(Peer(self.address, port), receiver, data)
+    def send_datagram(self, port: int, receiver: Peer, data: bytes) -> None:
+        self.network.send_datagram(Peer(self.address, port), receiver, data)
 
     def _conflict(self, request: Connect | Listen | Bind) -> str:
-        """The errno name of what cannot be opened, "" if it can."""
+        """The errno name with which an open fails at once, "" if none."""
         if isinstance(request, Listen):
             return ""
-        kind, port = Bound if isinstance(request, Bind) else Door, request.local_port
+        kind, port = UdpPort if isinstance(request, Bind) else Listener, request.local_port
         if port and any(isinstance(there, kind) and there.port == port for there in self.channels.values()):
             return "EADDRINUSE"
         if isinstance(request, Bind):
@@ -257,7 +260,7 @@ class LoopLink(MemoryLink):
 
     def _ephemeral_port(self) -> int:
         used = {port for port, _ in self._ends}
-        used |= {there.port for there in self.channels.values() if isinstance(there, Door | Line | Bound)}
+        used |= {there.port for there in self.channels.values() if isinstance(there, Listener | Connection | UdpPort)}
         while True:
             port = self._next_port
             self._next_port = FIRST_EPHEMERAL_PORT if port == LAST_PORT else port + 1
@@ -265,21 +268,21 @@ class LoopLink(MemoryLink):
                 return port
 
 
-class _Talk:
-    """Owner of a scripted peer's end: asks the conversation, does what it says."""
+class _PeerOwner:
+    """The owner of a scripted peer's end: reports events to the conversation and performs its actions."""
 
     def __init__(self, network: LoopNetwork, conversation: Conversation) -> None:
         self._network = network
         self._conversation = conversation
         self._end: End
 
-    def greet(self, end: End, now_ns: int) -> None:
+    def opened(self, end: End, now_ns: int) -> None:
         """The connection is open."""
         self._end = end
         self._perform(self._conversation.connected(now_ns), now_ns)
 
     def sent(self, size_bytes: int) -> None:
-        """Nothing to do: a scripted peer does not wait for that."""
+        """Nothing to do: a scripted peer does not wait for its data to be sent."""
 
     def readable(self, now_ns: int) -> None:
         if self._conversation.reads:

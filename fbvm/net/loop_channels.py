@@ -1,4 +1,4 @@
-"""What a channel of a `LoopLink` can be: a TCP line, a door that waits for one caller, a bound UDP port."""
+"""The channels of a `LoopLink`: a TCP connection, a listener for one connection, a UDP port."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from fbvm.wire.tap import TapKind
 
 
 class MemoryLink(ChannelLink):
-    """What these channels need of their link."""
+    """The methods of a link that these channels call."""
 
     @abstractmethod
     def remember(self, end: End) -> None:
-        """Keep an end, so that its pair of endpoints is not used twice."""
+        """Keeps an end, so that its pair of endpoints is not used twice."""
 
     @abstractmethod
     def tell(self, end: End, what: TapKind, out: bool) -> None:
-        """Pass a happening at an end on to the tap."""
+        """Reports an event at an end to the tap."""
 
     @abstractmethod
-    def post(self, port: int, receiver: Peer, data: bytes) -> None:
-        """Carry a datagram."""
+    def send_datagram(self, port: int, receiver: Peer, data: bytes) -> None:
+        """Sends a datagram from a local port."""
 
 
-class _Here(Channel):
+class _LocalChannel(Channel):
     link: MemoryLink
 
     def __init__(self, link: MemoryLink, channel: int, port: int) -> None:
@@ -36,16 +36,16 @@ class _Here(Channel):
         """Local port."""
 
 
-class Door(_Here):
-    """Waits on a port for one caller that fits `remote`."""
+class Listener(_LocalChannel):
+    """Listens on a port for one connection from a peer that fits `remote`."""
 
     def __init__(self, link: MemoryLink, channel: int, port: int, remote: Peer) -> None:
         super().__init__(link, channel, port)
         self.remote = remote
 
 
-class Line(_Here):
-    """A TCP connection, or the wish for one while there is no end."""
+class Connection(_LocalChannel):
+    """A TCP connection; until it is open it has no end."""
 
     _end: End | None = None
     _closed = ""
@@ -59,7 +59,7 @@ class Line(_Here):
             self.failed(error)
 
     def answered(self, end: End, error: str, active: bool, now_ns: int) -> None:
-        """The other side has answered; without an `error` the connection is open."""
+        """Called with the answer to the SYN; without an `error` the connection is open."""
         if error:
             self.link.tell(end, TapKind.RST, False)
             self.refused(error, now_ns)
@@ -70,19 +70,19 @@ class Line(_Here):
             return
         self._end = end
         self.link.remember(end)
-        self.link.told.append(Opened(self.channel, end.local.port, end.remote))
+        self.link.pending.append(Opened(self.channel, end.local.port, end.remote))
 
     def sent(self, size_bytes: int) -> None:
-        self.link.told.append(Sent(self.channel, size_bytes))
+        self.link.pending.append(Sent(self.channel, size_bytes))
 
     def readable(self, now_ns: int) -> None:
-        """Nothing to do: the unit fetches, as far as it has granted."""
+        """Nothing to do: `fetch` takes data as far as the unit has granted."""
 
     def finished(self, now_ns: int) -> None:
-        """Nothing to do: told when everything before it has been fetched."""
+        """Nothing to do: `fetch` reports FIN after all data before it."""
 
     def broken(self, error: str, unsent: int, now_ns: int) -> None:
-        self.link.told += [Failed(self.channel, "send", error)] * unsent
+        self.link.pending += [Failed(self.channel, "send", error)] * unsent
 
     # The unit's side.
 
@@ -102,7 +102,7 @@ class Line(_Here):
         return ""
 
     def fetch(self, now_ns: int) -> None:
-        end, told = self._end, self.link.told
+        end, told = self._end, self.link.pending
         if end is None or self._break_told:
             return
         if end.inbox and self.granted > 0:
@@ -118,26 +118,26 @@ class Line(_Here):
             told.append(Broken(self.channel, end.error))
 
 
-class Bound(_Here):
-    """A UDP port.  Datagrams are handed over whole and need no grant: what has no room is the unit's to drop."""
+class UdpPort(_LocalChannel):
+    """A UDP port.  Datagrams are handed over whole and need no grant; the unit drops those that it has no room for."""
 
     def __init__(self, link: MemoryLink, channel: int, port: int) -> None:
         super().__init__(link, channel, port)
         self._arrived: deque[Received] = deque()
-        link.told.append(Opened(channel, port, ANYBODY))
+        link.pending.append(Opened(channel, port, ANYBODY))
 
     def take_in(self, sender: Peer, data: bytes) -> None:
-        """A datagram has arrived; beyond what can be kept it is lost, as UDP loses."""
+        """Keeps a datagram that has arrived; if MAX_DATAGRAMS are kept already, the datagram is lost."""
         if len(self._arrived) < MAX_DATAGRAMS:
             self._arrived.append(Received(self.channel, data, sender))
 
     def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
         if error := undeliverable(remote, data):
             return error
-        self.link.post(self.port, remote, data)
-        self.link.told.append(Sent(self.channel, len(data)))
+        self.link.send_datagram(self.port, remote, data)
+        self.link.pending.append(Sent(self.channel, len(data)))
         return ""
 
     def fetch(self, now_ns: int) -> None:
-        self.link.told += self._arrived
+        self.link.pending += self._arrived
         self._arrived.clear()

@@ -1,6 +1,6 @@
-"""Wrong ways of a Modbus server, by name, to see how a client copes.
+"""Misbehaviour of a Modbus server, by name, to test clients.
 
-`MISDEEDS` are wrong answers: each takes the right reply frame and gives the actions done in its place, as in
+`MISDEEDS` are wrong replies: each takes the right reply frame and returns the actions that replace it, as in
 `ModbusPeer(reply=MISDEEDS["wrong unit"])`.  `RUDE_PEERS` are servers that misbehave as a whole:
 `network.place(endpoint, RUDE_PEERS["closes between requests"](server))`.
 """
@@ -17,9 +17,9 @@ from fbvm.wire.modbus_server import ModbusServer
 LATE_NS = 60_000_000_000
 """Later than any client waits."""
 NEXT_NS = 6_000_000_000
-"""So late that a client which waits 5 s has gone on to its next request."""
+"""So late that a client with a time-out of 5 s is at its next request."""
 PIECE_GAP_NS = 25_000_000
-"""Between pieces: more than a scan, so that a program sees them come one by one."""
+"""The time between pieces: more than a scan, so that a program receives them one by one."""
 FLOOD_BYTES = 20_000
 GARBAGE = b"HTTP/1.1 400 Bad Request\r\n\r\n"
 
@@ -30,7 +30,7 @@ Reply = Callable[[bytes], Actions]
 
 
 def right(frame: bytes) -> Actions:
-    """No misdeed."""
+    """The right reply."""
     return (Say(frame),)
 
 
@@ -86,7 +86,7 @@ def _half(size: int) -> int:
 
 
 MISDEEDS: dict[str, Reply] = {
-    # The right reply, but not as one likes it.
+    # The right reply at another time, in pieces, or with more data.
     "late": lambda frame: (Say(frame, LATE_NS),),
     "late by one request": lambda frame: (Say(frame, NEXT_NS),),
     "two pieces": lambda frame: (Say(frame[:5]), Say(frame[5:], PIECE_GAP_NS)),
@@ -149,13 +149,13 @@ MISDEEDS: dict[str, Reply] = {
 
 
 def by_script(*names: str) -> Reply:
-    """The misdeeds of these names, one a reply ("" is none); right ones follow."""
+    """A reply function that performs the misdeeds of these names, one a reply ("" is the right reply), then right replies."""
     left = list(names)
     return lambda frame: MISDEEDS.get(left.pop(0) if left else "", right)(frame)
 
 
 def by_seed(seed: int, chance: float = 0.5, names: Iterable[str] = MISDEEDS) -> Reply:
-    """Now and then one of these misdeeds, by the seed."""
+    """A reply function that performs a random misdeed with probability `chance`; `seed` decides which."""
     dice, choices = random.Random(seed), list(names)
     return lambda frame: (MISDEEDS[dice.choice(choices)] if dice.random() < chance else right)(frame)
 
@@ -164,7 +164,7 @@ def by_seed(seed: int, chance: float = 0.5, names: Iterable[str] = MISDEEDS) -> 
 
 
 class RudePeer(ModbusPeer):
-    """A Modbus server that does `greeting` when somebody connects, and `on_bytes` instead of listening.
+    """A Modbus server that performs `greeting` when a connection opens, and `on_bytes` instead of replying.
 
     `connections` is how many it takes before it refuses; `reads` False leaves all requests in the network."""
 
@@ -186,7 +186,7 @@ class RudePeer(ModbusPeer):
         return self._conversations[-1]
 
     def reform(self) -> None:
-        """Behave from now on, also on connections that are open."""
+        """Behaves rightly from now on, also on open connections."""
         self.reply, self.greeting, self.on_bytes, self.connections, self.reads = right, (), (), None, True
         for conversation in self._conversations:
             conversation.reads = True
@@ -262,4 +262,4 @@ RUDE_PEERS: dict[str, Callable[[ModbusServer], Station]] = {
     "floods from the start": lambda server: RudePeer(
         server, greeting=[Say(STRANGE * 40, step * 10_000_000) for step in range(500)]),
 }  # fmt: skip
-"""By name: what makes such a server with these contents."""
+"""By name: functions that make such a peer of a server with its contents."""

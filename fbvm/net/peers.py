@@ -1,6 +1,6 @@
 """Peers that live in a `LoopNetwork`: a Modbus server, and scripted ones that answer late, in pieces, wrong or never.
 
-A peer does no I/O.  It is told what happens to one of its connections and gives back actions for the network to do.
+A peer does no I/O: it is called with the events of a connection and returns actions, which the network performs.
 """
 
 from __future__ import annotations
@@ -25,21 +25,21 @@ class Say:
 
 @dataclass(frozen=True, slots=True)
 class Fin:
-    """Half close: nothing more will be said, listening goes on."""
+    """Half close: send FIN, receiving goes on."""
 
     after_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Leave:
-    """Close in both directions: FIN, and RST if anything still comes."""
+    """Close both directions: send FIN, and RST for data that arrive afterwards."""
 
     after_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Reset:
-    """Tear the connection down by RST."""
+    """Close the connection by RST."""
 
     after_ns: int = 0
 
@@ -59,17 +59,17 @@ Actions = Iterable[Action]
 
 
 class Conversation:
-    """A peer's side of one connection.  Override what matters; each method gives back actions."""
+    """A peer's side of one connection.  Subclasses override methods; each returns actions."""
 
     reads = True
-    """False: leaves everything in the network, so that the window closes."""
+    """False: received data stay in the network, so that the window closes."""
 
     def connected(self, now_ns: int) -> Actions:
         """The connection is open."""
         return ()
 
     def received(self, data: bytes, now_ns: int) -> Actions:
-        """Bytes of the stream, in whatever pieces they came."""
+        """Bytes of the stream have arrived, in pieces of any size."""
         return ()
 
     def peer_closed(self, now_ns: int) -> Actions:
@@ -77,25 +77,25 @@ class Conversation:
         return (Leave(),)
 
     def woken(self, now_ns: int) -> Actions:
-        """The time of a `Wake` has come."""
+        """The time of a `Wake` is over."""
         return ()
 
     def lost(self, error: str, now_ns: int) -> None:
-        """The connection is gone ("ECONNRESET", "ETIMEDOUT")."""
+        """The connection is broken; `error` is "ECONNRESET" or "ETIMEDOUT"."""
 
 
 class Station:
-    """What is placed at an endpoint of a network: opens a conversation for each connection, answers datagrams."""
+    """A peer at an endpoint of a network: opens a conversation for each connection, answers datagrams."""
 
     deaf = False
-    """True: who asks for a connection gets no answer at all."""
+    """True: a SYN is not answered at all."""
 
     def accept(self, caller: Peer) -> Conversation | None:
         """A conversation for a new connection; None refuses it."""
         return None
 
     def datagram(self, data: bytes, caller: Peer) -> Iterable[bytes]:
-        """Datagrams that go back to the caller."""
+        """The datagrams that answer a datagram."""
         return ()
 
 
@@ -103,15 +103,17 @@ class Station:
 
 
 class ModbusPeer(Station):
-    """A Modbus TCP server.  `reply` turns each right reply frame into actions, to be late or wrong on purpose."""
+    """A Modbus TCP server with the contents of `server`.
+
+    `reply` makes actions of each right reply frame, which may send it late or changed (see `net.misdeeds`)."""
 
     def __init__(
         self, server: ModbusServer | None = None, reply: Callable[[bytes], Actions] = lambda frame: (Say(frame),)
     ) -> None:
         self.server = server or ModbusServer()
         self.reply = reply
-        self.heard: list[bytes] = []
-        """Every frame that came, in order, over all connections."""
+        self.received: list[bytes] = []
+        """Every frame that has arrived, in order, over all connections."""
 
     def accept(self, caller: Peer) -> Conversation | None:
         return _ModbusConversation(self)
@@ -126,11 +128,11 @@ class _ModbusConversation(Conversation):
         actions: list[Action] = []
         for found in self._splitter.feed(data):
             if isinstance(found, Fault):
-                self._peer.heard.append(found.data)
+                self._peer.received.append(found.data)
                 if found.fatal:
                     return [*actions, Leave()]
                 continue
-            self._peer.heard.append(found.to_bytes())
+            self._peer.received.append(found.to_bytes())
             pdu = self._peer.server.answer_pdu(found.pdu, found.unit)
             actions += self._peer.reply(Adu(found.transaction, found.unit, pdu).to_bytes())
         return actions
@@ -140,7 +142,7 @@ Step = Sequence[Action] | Callable[[bytes], Actions]
 
 
 class ScriptedPeer(Station):
-    """Does the next step of its script whenever bytes come in; after the last step it stays silent.
+    """Performs the next step of its script whenever bytes arrive; after the last step it stays silent.
 
     A step is a list of actions, or a function from the received bytes to actions.  The script goes on from connection
     to connection.  `greeting` is done when a connection opens; `connections` limits how many are accepted."""
@@ -159,7 +161,7 @@ class ScriptedPeer(Station):
         self.reads = reads
         self.farewell = farewell
         """What is done when the unit sends FIN."""
-        self.heard: list[bytes] = []
+        self.received: list[bytes] = []
         self.callers: list[Peer] = []
         self.log: list[str] = []
         """"fin" and errno names, as connections end."""
@@ -180,7 +182,7 @@ class _ScriptedConversation(Conversation):
         return self._peer.greeting
 
     def received(self, data: bytes, now_ns: int) -> Actions:
-        self._peer.heard.append(data)
+        self._peer.received.append(data)
         if not self._peer.steps:
             return ()
         step = self._peer.steps.pop(0)

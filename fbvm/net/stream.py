@@ -1,6 +1,6 @@
 """One TCP connection in memory: two ends with windows, half close and reset, no sequence numbers and no loss.
 
-The ends know time only as they are told it.  What passes between them waits in `flight` until it is due, in order."""
+Time is an argument of each call.  Data between the ends are in flight until they are due, in order."""
 
 from __future__ import annotations
 
@@ -13,52 +13,52 @@ from fbvm.wire.link import Peer
 from fbvm.wire.tap import TapKind
 
 WINDOW_BYTES = 65_536
-"""What an end takes in before its owner has fetched anything."""
+"""The receive window of an end: bytes that it accepts before its owner has fetched any."""
 RETRANSMIT_NS = 1_000_000_000
 RETRANSMIT_LIMIT_NS = 75_000_000_000
-"""How often, and for how long, a silent way is tried again before the connection breaks with ETIMEDOUT."""
+"""The interval of retransmissions on a silent network, and the time after which the connection breaks with ETIMEDOUT."""
 
 
-class Way(Protocol):
-    """What a connection needs of its network."""
+class Carrier(Protocol):
+    """The methods of a network that a connection calls."""
 
     def at(self, due_ns: int, call: Callable[[int], None]) -> None:
-        """Call back with the time when it is due."""
+        """Schedules a call at `due_ns`."""
 
     def fault(self, one: Peer, other: Peer) -> Fault:
-        """What holds now between two endpoints."""
+        """The fault that is in force between two endpoints."""
 
     def latency_ns(self, fault: Fault) -> int:
-        """Time for one way."""
+        """The latency in one direction."""
 
     def cut(self, fault: Fault, data: bytes) -> list[bytes]:
-        """Data in the pieces in which they arrive."""
+        """The pieces in which data arrive."""
 
     def tell(self, end: End, what: TapKind, out: bool, data: bytes) -> None:
-        """Pass a happening at an end on to the tap."""
+        """Reports an event at an end to the tap."""
 
 
 class Owner(Protocol):
-    """Who holds an end; told what happens to it."""
+    """The owner of an end, which receives its events."""
 
     def sent(self, size_bytes: int) -> None:
-        """All bytes of one `send` are on their way."""
+        """All bytes of one `send` have been transmitted."""
 
     def readable(self, now_ns: int) -> None:
-        """There is something in the inbox."""
+        """Data are in the inbox."""
 
     def finished(self, now_ns: int) -> None:
         """The other side sends nothing more."""
 
     def broken(self, error: str, unsent: int, now_ns: int) -> None:
-        """The connection is gone; `unsent` calls of `send` had not been taken in full."""
+        """The connection is broken; the data of `unsent` calls of `send` have not been transmitted in full."""
 
 
 class End:
-    """One end of a connection.  Without an owner it is an orphan: it sends what it has, then FIN, and wants nothing."""
+    """One end of a connection.  Without an owner it is an orphan: it sends its data, then FIN, and answers data by RST."""
 
-    def __init__(self, way: Way, local: Peer, remote: Peer, unit: str | None, owner: Owner) -> None:
-        self.way = way
+    def __init__(self, carrier: Carrier, local: Peer, remote: Peer, unit: str | None, owner: Owner) -> None:
+        self.carrier = carrier
         self.local = local
         self.remote = remote
         self.unit = unit
@@ -70,35 +70,35 @@ class End:
         self.fin_arrived = False
         self._waiting: deque[bytes] = deque()
         self._taken = 0
-        self._flight: deque[tuple[int, int, TapKind, bytes]] = deque()
-        self._flying_bytes = 0
+        self._in_flight: deque[tuple[int, int, TapKind, bytes]] = deque()
+        self._in_flight_bytes = 0
         self._last_arrival_ns = 0
         self._fin_asked = self._fin_sent = False
 
     @property
     def gone(self) -> bool:
-        """True when nothing can happen here any more, so that the pair of endpoints may be used again."""
+        """True if the end is closed or broken, so that the pair of endpoints may be used again."""
         return bool(self.error) or (self.owner is None and self._fin_sent and self.fin_arrived)
 
     @property
     def waiting_bytes(self) -> int:
-        """What has been given to `send` and has no room in the other side's window yet."""
+        """Bytes of `send` that have no room in the window of the other end yet."""
         return sum(map(len, self._waiting)) - self._taken
 
     def join(self, other: End) -> None:
-        """Make two ends one connection."""
+        """Connects two ends."""
         self.other, other.other = other, self
 
-    # What the owner does.
+    # Called by the owner.
 
     def send(self, data: bytes, now_ns: int) -> None:
-        """Send all of it, as fast as the other side's window allows.  After FIN or a break it goes nowhere."""
+        """Sends all of `data`, as the other end's window allows.  After FIN or a break the data are discarded."""
         if not self._fin_asked and not self.error:
             self._waiting.append(data)
             self._push(now_ns)
 
     def take(self, limit_bytes: int, now_ns: int) -> bytes:
-        """Fetch what has arrived, at most so much; room in the window comes of it."""
+        """Takes at most `limit_bytes` of arrived data, which opens the window."""
         data = bytes(self.inbox[:limit_bytes])
         del self.inbox[: len(data)]
         if data:
@@ -106,42 +106,42 @@ class End:
         return data
 
     def finish(self, now_ns: int) -> None:
-        """Send FIN after everything that waits; receiving goes on (half close)."""
+        """Sends FIN after all waiting data; receiving goes on (half close)."""
         self._fin_asked = True
         self._push(now_ns)
 
     def leave(self, now_ns: int) -> None:
-        """Close in both directions: FIN, and data that still come are answered by RST."""
+        """Closes both directions: sends FIN, and answers further data by RST."""
         self.owner = None
         self.finish(now_ns)
 
     def reset(self, now_ns: int) -> None:
-        """Tear the connection down by RST."""
+        """Closes the connection by RST."""
         self.owner = None
         if not self.error:
             self.error = "ECONNABORTED"
             self._waiting.clear()
-            self._fly(TapKind.RST, b"", now_ns)
+            self._transmit(TapKind.RST, b"", now_ns)
 
-    # What the way does.
+    # Called by the network.
 
-    def tear(self, now_ns: int) -> None:
-        """Something between the two ends resets both of them."""
+    def reset_both(self, now_ns: int) -> None:
+        """Resets both ends, as a device between them may do."""
         for end in (self, self.other):
             if not end.error:
-                self.way.tell(end, TapKind.RST, False, b"")
+                self.carrier.tell(end, TapKind.RST, False, b"")
                 end._break("ECONNRESET", now_ns)
 
     def _push(self, now_ns: int) -> None:
         while self._waiting and not self.error:
             head = self._waiting[0]
-            room = WINDOW_BYTES - self._flying_bytes - len(self.other.inbox)
+            room = WINDOW_BYTES - self._in_flight_bytes - len(self.other.inbox)
             if room <= 0 and head:
                 return
             part = head[self._taken : self._taken + room]
             self._taken += len(part)
-            for piece in self.way.cut(self.way.fault(self.local, self.remote), part):
-                self._fly(TapKind.DATA, piece, now_ns)
+            for piece in self.carrier.cut(self.carrier.fault(self.local, self.remote), part):
+                self._transmit(TapKind.DATA, piece, now_ns)
             if self._taken == len(head):
                 self._waiting.popleft()
                 self._taken = 0
@@ -149,38 +149,38 @@ class End:
                     self.owner.sent(len(head))
         if self._fin_asked and not self._fin_sent and not self.error:
             self._fin_sent = True
-            self._fly(TapKind.FIN, b"", now_ns)
+            self._transmit(TapKind.FIN, b"", now_ns)
 
-    def _fly(self, what: TapKind, data: bytes, now_ns: int) -> None:
-        fault = self.way.fault(self.local, self.remote)
+    def _transmit(self, what: TapKind, data: bytes, now_ns: int) -> None:
+        fault = self.carrier.fault(self.local, self.remote)
         gap_ns = fault.gap_ns if fault.segment_bytes and what is TapKind.DATA else 0
-        arrival_ns = max(now_ns + self.way.latency_ns(fault), self._last_arrival_ns + gap_ns)
+        arrival_ns = max(now_ns + self.carrier.latency_ns(fault), self._last_arrival_ns + gap_ns)
         if fault.join_ns and what is TapKind.DATA:
             arrival_ns = -(-arrival_ns // fault.join_ns) * fault.join_ns
         self._last_arrival_ns = arrival_ns
-        self._flying_bytes += len(data)
-        self._flight.append((arrival_ns, now_ns, what, data))
-        self.way.at(arrival_ns, self._land)
-        self.way.tell(self, what, True, data)
+        self._in_flight_bytes += len(data)
+        self._in_flight.append((arrival_ns, now_ns, what, data))
+        self.carrier.at(arrival_ns, self._deliver_due)
+        self.carrier.tell(self, what, True, data)
 
-    def _land(self, now_ns: int) -> None:
-        while self._flight and self._flight[0][0] <= now_ns:
-            _, sent_ns, what, data = self._flight[0]
-            if self.way.fault(self.local, self.remote).silent:
+    def _deliver_due(self, now_ns: int) -> None:
+        while self._in_flight and self._in_flight[0][0] <= now_ns:
+            _, sent_ns, what, data = self._in_flight[0]
+            if self.carrier.fault(self.local, self.remote).silent:
                 if now_ns - sent_ns < RETRANSMIT_LIMIT_NS:
-                    self.way.at(now_ns + RETRANSMIT_NS, self._land)
+                    self.carrier.at(now_ns + RETRANSMIT_NS, self._deliver_due)
                 else:
-                    self._flight.clear()
+                    self._in_flight.clear()
                     self._break("ETIMEDOUT", now_ns)
                 return
-            self._flight.popleft()
-            self._flying_bytes -= len(data)
+            self._in_flight.popleft()
+            self._in_flight_bytes -= len(data)
             self.other._arrive(what, data, now_ns)
 
     def _arrive(self, what: TapKind, data: bytes, now_ns: int) -> None:
         if self.error:
             return
-        self.way.tell(self, what, False, data)
+        self.carrier.tell(self, what, False, data)
         if what is TapKind.RST:
             self._break("ECONNRESET", now_ns)
         elif what is TapKind.FIN:

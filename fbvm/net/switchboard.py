@@ -1,6 +1,6 @@
-"""What `TcpNetwork` keeps in mind: the links, who is where, which connections the host is ready for.
+"""The selector of `TcpNetwork`: its links, the map of addresses, and the sockets that are ready.
 
-No sockets in here; they pass through as things with a file number.
+Sockets are not used here; they are only registered by their file numbers.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 TCP, UDP = "tcp", "udp"
 FD_SETSIZE = 1024
 COARSE_S = 0.001
-"""To what epoll rounds a timeout up, which is long for a short cycle time: the rest of it is waited for by select."""
+"""The resolution of epoll's timeout, too coarse for a short cycle time: the rest is waited for by select."""
 MAX_CALLERS = 64
-"""Callers that a listener looks at in one scan; the others wait in the host."""
+"""Connections that a listener accepts in one scan; further ones wait in the host."""
 MAX_ORPHANS = 64
 ORPHAN_LIMIT_NS = 10_000_000_000
-"""A closed connection gets so long to send its rest and to hear the peer's FIN, then it is reset."""
+"""The time in which a closed connection must have sent its data and received the peer's FIN; then it is reset."""
 
 
 def errno_name(error: OSError | int) -> str:
@@ -37,52 +37,52 @@ def errno_name(error: OSError | int) -> str:
 
 
 def _number(selector: selectors.BaseSelector) -> int | None:
-    """File number by which a selector itself can be waited for; None if it has none, or one too high for select."""
+    """The file number of a selector, for select; None if the selector has none, or one that is too high for select."""
     fileno: Callable[[], int] | None = getattr(selector, "fileno", None)
     number = fileno() if fileno else -1
     return number if 0 <= number < FD_SETSIZE else None
 
 
 class HasFileno(Protocol):
-    """A socket, as far as a selector is concerned."""
+    """A socket as a selector takes it."""
 
     def fileno(self) -> int:
         """Its number on the host."""
 
 
 class Watcher(ABC):
-    """Somebody who is told when the host is ready, and who can let go of what the host lent."""
+    """A channel whose socket is registered with the selector."""
 
     link: HostLink
-    """Whose it is."""
+    """The link of the channel."""
     watched = 0
-    """What of the host it waits for at the moment."""
+    """READ and WRITE, as far as the socket is registered for them."""
 
     @abstractmethod
     def ready(self, ready: int, now_ns: int) -> None:
-        """The host is ready for what was wanted (READ, WRITE)."""
+        """Called when the socket is ready to be read (READ) or written (WRITE)."""
 
     @abstractmethod
     def end(self) -> None:
-        """Give everything back to the host."""
+        """Closes the socket."""
 
 
 class Orphan(Protocol):
-    """A connection that its unit has closed, and that has not ended yet."""
+    """A connection that its unit has closed and whose data are still being sent."""
 
     @property
     def sock(self) -> HasFileno | None:
-        """None when it has ended."""
+        """The socket, None when the connection has ended."""
 
     def give_up(self, now_ns: int) -> None:
-        """End it by RST."""
+        """Ends the connection by RST."""
 
     def end(self) -> None:
-        """Give everything back to the host."""
+        """Closes the socket."""
 
 
 class Switchboard(ABC):
-    """One selector, the map of addresses, and the bookkeeping around them."""
+    """A selector for the sockets of all links, and the map of addresses."""
 
     def __init__(self, address_map: AddressMap) -> None:
         self.tap: Tap | None = None
@@ -91,23 +91,23 @@ class Switchboard(ABC):
         self._selector = selectors.DefaultSelector()
         self._number = _number(self._selector)
         self.watched = 0
-        """How many sockets the selector has."""
+        """The number of sockets that are registered with the selector."""
         self._found: list[tuple[selectors.SelectorKey, int]] = []
-        """What the host was ready for when somebody waited."""
+        """The sockets that were ready in the last `wait`."""
         self._own: dict[tuple[str, Peer], Peer] = {}
         self._orphans: deque[tuple[int, Orphan]] = deque()
-        self.unheard: set[HostLink] = set()
-        """Links that may have something to tell, besides what the host is ready for."""
+        self.links_pending: set[HostLink] = set()
+        """Links that may have pending events although none of their sockets is ready."""
         self.closed = False
         self._driven = False
 
     @abstractmethod
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
-        """Where on the host a unit's own endpoint is."""
+        """The endpoint of the host for a unit's own endpoint."""
 
     @property
     def driven(self) -> bool:
-        """True while somebody else calls `serve` whenever time goes on, for all links at once."""
+        """True if a caller calls `serve` for all links; else each link calls `serve` in `events`."""
         return self._driven
 
     @driven.setter
@@ -117,13 +117,13 @@ class Switchboard(ABC):
             link.is_quiet = False
 
     def wait(self, timeout_s: float) -> bool:
-        """Sleep until a connection wants attention or the time is over; True if there is something to fetch."""
+        """Sleeps until a socket is ready or `timeout_s` seconds are over; True if there are events to fetch."""
         if self.closed:
             return True
-        for link in self.unheard:
-            if link.told:
+        for link in self.links_pending:
+            if link.pending:
                 return True
-        self.unheard.clear()
+        self.links_pending.clear()
         timeout_s = max(timeout_s, 0.0)
         coarse_s = timeout_s if self._number is None else timeout_s // COARSE_S * COARSE_S
         if coarse_s or self._number is None:
@@ -133,7 +133,7 @@ class Switchboard(ABC):
         return bool(select.select([self._number], [], [], timeout_s - coarse_s)[0])
 
     def serve(self, now_ns: int) -> list[HostLink]:
-        """Do everything that the host is ready for; whose connections that was."""
+        """Handles every socket that is ready; returns the links of these sockets."""
         if self.closed:
             return []
         woken: list[HostLink] = []
@@ -145,15 +145,15 @@ class Switchboard(ABC):
             watcher.ready(ready, now_ns)
             link = watcher.link
             link.is_quiet = False
-            if link.told:
-                link.stir()
+            if link.pending:
+                link.mark_pending()
             woken.append(link)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):
             self._orphans.popleft()[1].give_up(now_ns)
         return woken
 
     def close(self) -> None:
-        """End all connections and free what the host lent."""
+        """Closes all connections and sockets."""
         for link in self.links.values():
             while link.channels:
                 _, there = link.channels.popitem()
@@ -166,10 +166,10 @@ class Switchboard(ABC):
         self._selector.close()
         self.closed = True
 
-    # For links and their channels.
+    # Called by links and their channels.
 
     def watch(self, sock: HasFileno, wanted: int, channel: Watcher) -> None:
-        """Be told when the host is ready for what is wanted: READ, WRITE, both or nothing."""
+        """Registers a socket for READ, WRITE, both, or, with 0, no longer."""
         if wanted == channel.watched:
             return
         if not wanted:
@@ -183,31 +183,31 @@ class Switchboard(ABC):
         channel.watched = wanted
 
     def adopt(self, orphan: Orphan, now_ns: int) -> None:
-        """Keep a closed connection until it has ended."""
+        """Keeps a closed connection until it has ended."""
         self._orphans.append((now_ns + ORPHAN_LIMIT_NS, orphan))
         if len(self._orphans) > MAX_ORPHANS:
             self._orphans.popleft()[1].give_up(now_ns)
 
-    def own(self, transport: str, real: Peer, said: Peer | None) -> None:
-        """Note, or forget with None, that an endpoint of the host is a unit's."""
+    def own(self, transport: str, real: Peer, endpoint: Peer | None) -> None:
+        """Notes which endpoint of a unit an endpoint of the host belongs to; None removes the note."""
         where = transport, Peer("127.0.0.1", real.port) if real.host == "0.0.0.0" else real
-        if said:
-            self._own[where] = said
+        if endpoint:
+            self._own[where] = endpoint
         else:
             self._own.pop(where, None)
 
     def outward(self, remote: Peer, transport: str = TCP) -> Peer:
-        """Where on the host the program's peer is."""
+        """The endpoint of the host for a peer that the program names."""
         if remote.host not in self.links:
             return self.map.outward(remote)
         real = self.host_endpoint(remote, transport)
         return Peer("127.0.0.1", real.port) if real.host == "0.0.0.0" else real
 
     def inward(self, transport: str, real: Peer) -> Peer:
-        """What the program calls a peer that came by itself."""
+        """The endpoint of the program for a peer that has connected or sent a datagram."""
         return self._own.get((transport, real)) or self.map.inward(real, self.links)
 
     def tell(self, now_ns: int, what: TapKind, local: Peer, remote: Peer, out: bool, data: bytes = b"") -> None:
-        """Pass a happening on to the tap."""
+        """Reports an event to the tap."""
         if self.tap:
             self.tap(now_ns, local.host, TapEvent(what, local, remote, out, data, remote.host in self.links))

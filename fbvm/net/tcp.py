@@ -1,6 +1,6 @@
 """The host's own network: units talk to real devices and programs over real TCP and UDP, and nothing ever blocks.
 
-One selector for all; work is done when a link is asked for events or given requests.  Only this module uses sockets.
+One selector serves all links; sockets are handled in `events` and `submit` of a link.  No other module uses sockets.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened,
 from fbvm.wire.tap import DATA, TapKind
 
 BUFFER_BYTES = 65_536
-"""Of the host for each connection: small, so that who grants or reads nothing soon closes the TCP window."""
+"""The host's buffers of each connection: small, so that the TCP window closes soon if the unit grants nothing."""
 _RST_ON_CLOSE = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 
 
@@ -34,10 +34,10 @@ def _share_port(sock: socket.socket) -> None:
 
 
 class TcpNetwork(Switchboard):
-    """Real connections.  `address_map` says where on the host the program's endpoints are, see `AddressMap`.
+    """Real connections.  `address_map` maps endpoints of the program to hosts and ports (see `AddressMap`).
 
-    Without a row a unit listens on address `bind`, under the port that it asked for.  Names of hosts in the map are
-    resolved here, once; raises OSError for one that cannot be."""
+    A unit without a row listens on the host's address `bind`, on the port of its request.  Host names of the map are
+    resolved here, once.  Raises OSError for a name that cannot be resolved."""
 
     virtual_time = False
 
@@ -47,14 +47,14 @@ class TcpNetwork(Switchboard):
         self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
 
     def attach(self, address: str) -> TcpLink:
-        """A place for one unit.  Raises ValueError if the address is taken."""
+        """The link of a new unit.  Raises ValueError if the address is in use."""
         if address in self.links:
             raise ValueError(f"{address} is attached already")
         link = self.links[address] = TcpLink(self, address)
         return link
 
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
-        """Where on the host a unit's own endpoint is, or will be once it listens there.
+        """The endpoint of the host for a unit's own endpoint, also before the unit listens.
 
         A port that the system has to choose is chosen now, and stays.  Raises OSError if there is none."""
         real = self.map.local(endpoint)
@@ -72,7 +72,7 @@ class TcpNetwork(Switchboard):
         return self._reserved[transport, endpoint][0]
 
     def close(self) -> None:
-        """End all connections and free what the host lent."""
+        """Closes all connections and sockets."""
         super().close()
         for _, keeper in self._reserved.values():
             if keeper:
@@ -81,7 +81,7 @@ class TcpNetwork(Switchboard):
 
 
 class TcpLink(HostLink):
-    """One unit's place on a `TcpNetwork`."""
+    """The link of one unit of a `TcpNetwork`."""
 
     def __init__(self, network: TcpNetwork, address: str) -> None:
         super().__init__(network, address)
@@ -101,14 +101,14 @@ class TcpLink(HostLink):
 # --- channels ------------------------------------------------------------------------------------------------------
 
 
-class _OnHost(Channel, Watcher):
+class _HostChannel(Channel, Watcher):
     """A channel that has a socket of the host."""
 
     link: TcpLink
     sock: socket.socket | None = None
     transport = TCP
     real = ANYBODY
-    """Where on the host others meet it."""
+    """The endpoint of the host at which peers reach the channel."""
 
     def __init__(self, link: TcpLink, request: Connect | Listen | Bind) -> None:
         super().__init__(link, request.channel)
@@ -118,10 +118,10 @@ class _OnHost(Channel, Watcher):
 
     @abstractmethod
     def open(self, now_ns: int) -> None:
-        """Do what the request asks.  Raises OSError."""
+        """Opens the channel.  Raises OSError."""
 
     def end(self) -> None:
-        """Give the socket back to the host."""
+        """Closes the socket."""
         self.link.waiting.pop(self, None)
         if self.sock:
             if self.transport == TCP:  # a datagram may still be under way, and the port stays this unit's
@@ -150,23 +150,23 @@ class _OnHost(Channel, Watcher):
         return sock
 
 
-class _Door(_OnHost):
-    """Waits for one caller that fits; others are reset.
+class _Listener(_HostChannel):
+    """Listens for one connection from a peer that fits; other connections are reset.
 
-    Several may wait on one port: one has the host's socket, the lowest-numbered takes the caller (assumed)."""
+    Several listeners may share a port: one has the host's socket, the lowest-numbered takes the connection (assumed)."""
 
     def __init__(self, link: TcpLink, request: Listen) -> None:
         super().__init__(link, request)
         self._request = request
 
     def open(self, now_ns: int) -> None:
-        if not any(door.sock for door in self._doors()):
+        if not any(listener.sock for listener in self._listeners()):
             sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
             sock.listen()
             self.network.watch(sock, READ, self)
 
     def end(self) -> None:
-        heir = next(iter(self._doors()), None)
+        heir = next(iter(self._listeners()), None)
         if self.sock and heir:
             self.network.watch(self.sock, 0, self)
             heir.sock, self.sock = self.sock, None
@@ -184,28 +184,28 @@ class _Door(_OnHost):
                     self.failed(errno_name(error))
                 return
             remote = self.network.inward(TCP, Peer(*name))
-            door = next((door for door in self._doors() if fits(door._request.remote, remote)), None)
-            if door:
-                del door.link.channels[door.channel]
-                door.end()
-                wish = Connect(door.channel, remote, door.local.port, door._request.keep_alive)
-                line = door.link.channels[door.channel] = _Line(door.link, wish)
-                line.granted = door.granted
-                line.admit(conn, now_ns)
+            listener = next((listener for listener in self._listeners() if fits(listener._request.remote, remote)), None)
+            if listener:
+                del listener.link.channels[listener.channel]
+                listener.end()
+                request = Connect(listener.channel, remote, listener.local.port, listener._request.keep_alive)
+                connection = listener.link.channels[listener.channel] = _Connection(listener.link, request)
+                connection.granted = listener.granted
+                connection.accept(conn, now_ns)
             else:
                 with suppress(OSError), conn:
                     conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
 
-    def _doors(self) -> list[_Door]:
-        """Those that wait on the same port, by number."""
+    def _listeners(self) -> list[_Listener]:
+        """The listeners on the same port, by number."""
         there = (channel for _, channel in sorted(self.link.channels.items()))
-        return [door for door in there if isinstance(door, _Door) and door.local == self.local]
+        return [listener for listener in there if isinstance(listener, _Listener) and listener.local == self.local]
 
 
-class _Line(_OnHost):
-    """A TCP connection, or the wish for one until it is `_connected`.
+class _Connection(_HostChannel):
+    """A TCP connection, open once it is `_connected`.
 
-    As an `_orphan` it has been closed by its unit: it sends what it has, then FIN, and waits for the peer's."""
+    An `_orphan` has been closed by its unit: it sends its data, then FIN, and waits for the peer's FIN."""
 
     _connected = _orphan = _stalled = _fin_sent = _fin_seen = False
     _taken = 0
@@ -234,8 +234,8 @@ class _Line(_OnHost):
         else:
             self._refused(code, now_ns)
 
-    def admit(self, conn: socket.socket, now_ns: int) -> None:
-        """Take over a connection that somebody else has opened."""
+    def accept(self, conn: socket.socket, now_ns: int) -> None:
+        """Takes over a connection that a listener has accepted."""
         self.sock = conn
         conn.setblocking(False)
         self._tune(conn)
@@ -286,7 +286,7 @@ class _Line(_OnHost):
             self._watch()
 
     def fetch(self, now_ns: int) -> None:
-        """Read only now: until its unit asks, another unit's turn must not use up a grant that may yet be changed."""
+        """Reads the socket now and no earlier, since the unit may change its grant until it asks for events."""
         if self.sock and not self._stalled and not self._fin_seen:
             self._receive(self.sock, now_ns)
         elif self.sock and (code := self.sock.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)):
@@ -352,7 +352,7 @@ class _Line(_OnHost):
         else:
             self.granted -= len(data)
             self._tap(now_ns, DATA, False, data)
-            self.link.told.append(Received(self.channel, data))
+            self.link.pending.append(Received(self.channel, data))
 
     def _flush(self, sock: socket.socket, now_ns: int) -> None:
         try:
@@ -375,7 +375,7 @@ class _Line(_OnHost):
             self._watch()
 
     def _finish(self, sock: socket.socket, now_ns: int) -> None:
-        """Do the next step of an orphan's end."""
+        """Sends FIN once an orphan has sent its data, and closes the socket after the peer's FIN."""
         if self._orphan and not self._outbox and not self._fin_sent:
             self._fin_sent = True
             self._tap(now_ns, TapKind.FIN, True)
@@ -401,15 +401,15 @@ class _Line(_OnHost):
 
     def _report(self, event: Event) -> None:
         if not self._orphan:
-            self.link.told.append(event)
+            self.link.pending.append(event)
 
     def _tap(self, now_ns: int, what: TapKind, out: bool, data: bytes = b"") -> None:
         if self.network.tap:
             self.network.tell(now_ns, what, self.local, self.remote, out, data)
 
 
-class _Bound(_OnHost):
-    """A UDP port.  Datagrams are handed over whole and need no grant: what has no room is the unit's to drop."""
+class _UdpPort(_HostChannel):
+    """A UDP port.  Datagrams are handed over whole and need no grant; the unit drops those that it has no room for."""
 
     transport = UDP
 
@@ -420,7 +420,7 @@ class _Bound(_OnHost):
         self.local = Peer(self.local.host, self.local.port or self.real.port)
         self.network.own(UDP, self.real, self.local)
         self.network.watch(sock, READ, self)
-        self.link.told.append(Opened(self.channel, self.local.port, ANYBODY))
+        self.link.pending.append(Opened(self.channel, self.local.port, ANYBODY))
 
     def ready(self, ready: int, now_ns: int) -> None:
         for _ in range(MAX_DATAGRAMS):
@@ -430,7 +430,7 @@ class _Bound(_OnHost):
                 return
             remote = self.network.inward(UDP, Peer(*name))
             self.network.tell(now_ns, TapKind.UDP, self.local, remote, False, data)
-            self.link.told.append(Received(self.channel, data, remote))
+            self.link.pending.append(Received(self.channel, data, remote))
 
     def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
         if refusal := undeliverable(remote, data):
@@ -443,8 +443,8 @@ class _Bound(_OnHost):
         except OSError as error:
             return errno_name(error)
         self.network.tell(now_ns, TapKind.UDP, self.local, remote, True, data)
-        self.link.told.append(Sent(self.channel, len(data)))
+        self.link.pending.append(Sent(self.channel, len(data)))
         return ""
 
 
-_KINDS: dict[type, Callable[..., _OnHost]] = {Connect: _Line, Listen: _Door, Bind: _Bound}
+_KINDS: dict[type, Callable[..., _HostChannel]] = {Connect: _Connection, Listen: _Listener, Bind: _UdpPort}

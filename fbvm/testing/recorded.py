@@ -52,7 +52,7 @@ class Recorded:
             signals = [track.signal for track in self._recording(trace, names).tracks]
             table = ScanTable(trace.sites, trace.names, signals)
             trace.follow(table, scans)
-        return table.draw(band for band in table.bands if band.moved)
+        return table.draw(band for band in table.bands if band.has_changes)
 
     def golden(self, file: str, *names: str) -> None:
         """Holds the run to a file beside the test; `--fbvm-golden` writes it.  Without names, what changed.

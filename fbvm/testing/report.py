@@ -41,7 +41,7 @@ class Report:
             return ""
         table = self._again(signals, LOOKED_BACK)
         told = "\n".join([*(self._told(table, signal) for signal in signals), *self._blocks(table, signals)])
-        moved = [band for band in table.bands if band.moved][-BANDS:]
+        moved = [band for band in table.bands if band.has_changes][-BANDS:]
         last = table.bands[-1:] if table.bands and table.bands[-1] not in moved else []
         return f"{told}\n\n{table.draw([*moved, *last])}" if table.bands else told
 

@@ -83,7 +83,7 @@ class StItem(pytest.Item):
         except AssertFailed as failed:
             table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])
             history.replay(range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1), table)
-            failed.table = table.draw([band for band in table.bands if band.moved][-BANDS:]) if failed.values else ""
+            failed.table = table.draw([band for band in table.bands if band.has_changes][-BANDS:]) if failed.values else ""
             asked = [signal.place for signal, _ in failed.values]
             failed.page = failure_page(self, "", lambda path: write_page(path, self.nodeid, history, made, plc, asked,
                                                                     unfinished=True))  # fmt: skip

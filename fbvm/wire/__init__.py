@@ -1,1 +1,1 @@
-"""What a unit asks of a network and is told by it, and the Modbus codec.  No I/O in here."""
+"""Requests of units to a network, events of the network, and the Modbus codec.  No I/O in here."""

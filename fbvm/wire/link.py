@@ -89,7 +89,7 @@ class Grant:
 class Close:
     """Close the channel: by FIN, or by RST if `reset`.  Legal in every state.  Answer: `Closed`, always.
 
-    `Closed` comes when the channel number may be used again; a `State` may follow later for the old connection."""
+    After `Closed` the channel number may be used again; no event of the old connection follows."""
 
     channel: int
     reset: bool = False
@@ -167,46 +167,46 @@ Event = Opened | Failed | Sent | Received | PeerClosed | Broken | Closed
 
 
 class Link(Protocol):
-    """One unit's place on a network."""
+    """The connection of one unit to a network."""
 
     address: str
-    """IPv4 address of the unit on the (possibly imagined) network."""
+    """IPv4 address of the unit on the network, as the program names it."""
 
     def submit(self, requests: Iterable[Request], now_ns: int) -> None:
         """Take requests in order.  Never blocks; answers come as events of this or a later call of `events`."""
 
     def events(self, now_ns: int) -> Sequence[Event]:
-        """What happened up to `now_ns`, in order, each once.  Never blocks."""
+        """The events up to `now_ns`, in order, each once.  Never blocks."""
 
     @property
     def is_quiet(self) -> bool:
-        """True if there is nothing to tell before the next `submit`, and so no need to ask."""
+        """True if `events` returns nothing before the next `submit`, so that it need not be called."""
 
     def pass_by(self, refreshes: int) -> None:
-        """So many refreshes have taken place in which nobody asked."""
+        """Counts I/O refreshes in which `events` was not called."""
 
 
 class Network(Protocol):
-    """Something that carries bytes: in memory (`net.loop`) or over the host's TCP (`net.tcp`)."""
+    """A network: in memory (`net.loop`) or over the host's TCP (`net.tcp`)."""
 
     virtual_time: bool
-    """True if time may be virtual here; real connections need real time."""
+    """True if time is virtual; real connections need real time."""
 
     def attach(self, address: str) -> Link:
-        """A place for one unit with this IPv4 address."""
+        """The link of a new unit with this IPv4 address."""
 
     def close(self) -> None:
-        """End all connections and free what the host lent."""
+        """Closes all connections and frees the sockets of the host."""
 
 
 class RealNetwork(Network, Protocol):
-    """One on which things happen while nobody looks."""
+    """A network on which events happen at any time."""
 
     driven: bool
-    """Set by whoever calls `serve` whenever time goes on; else links do so when they are asked for events."""
+    """Set by a caller that calls `serve` for all links; otherwise each link calls `serve` in `events`."""
 
     def wait(self, timeout_s: float) -> bool:
-        """Sleep until something happens or the time is over; True if something did."""
+        """Sleeps until an event happens or `timeout_s` seconds are over; True if there is an event."""
 
     def serve(self, now_ns: int) -> Sequence[Link]:
-        """Do everything that the host is ready for; whose connections that was."""
+        """Handles all sockets that are ready; returns the links of these sockets."""

@@ -1,7 +1,7 @@
 """Modbus TCP frames for decoders, peers and tests: bytes in, frames out, and every layout as a row of a table.
 
-No unit uses this; a unit moves whatever bytes the program gave it.  Nothing here raises for what came from the wire:
-a frame that cannot be right is a `Fault`, a PDU that cannot be right a `Message` with its `fault` said in words.
+No unit uses this; a unit sends the bytes that the program gives it.  Received bytes never raise: an invalid frame is a
+`Fault`, an invalid PDU a `Message` whose `fault` describes the error.
 From MODBUS Application Protocol V1.1b3 ("AP") and MODBUS Messaging on TCP/IP Implementation Guide V1.0b ("IG").
 """
 
@@ -16,7 +16,7 @@ MBAP_SIZE_BYTES = 7
 MAX_PDU_BYTES = 253
 MAX_ADU_BYTES = MBAP_SIZE_BYTES + MAX_PDU_BYTES
 MIN_LENGTH, MAX_LENGTH = 2, 1 + MAX_PDU_BYTES
-"""What the MBAP length field may say: unit id and PDU."""
+"""Limits of the MBAP length field, which counts unit id and PDU."""
 COIL_ON, COIL_OFF = 0xFF00, 0x0000
 
 EXCEPTIONS: dict[int, str] = {  # AP 7
@@ -52,7 +52,7 @@ class Adu:
 class Fault:
     """Bytes of the stream that are no Modbus frame, and why.
 
-    `fatal`: nobody can tell where the next frame begins, the connection has to be closed."""
+    `fatal`: the beginning of the next frame is unknown, so the connection has to be closed."""
 
     reason: str
     data: bytes
@@ -62,8 +62,8 @@ class Fault:
 class Splitter:
     """Cuts a TCP stream into frames, wherever TCP cut or joined it.  One for each direction of a connection.
 
-    A frame with a wrong protocol id is skipped by its length and told as a `Fault`; after a length that cannot be, the
-    stream is out of step and everything later is dropped (`broken`).  IG 3.1.3 p5-6; closing is the caller's."""
+    A frame with a wrong protocol id is skipped by its length and returned as a `Fault`.  After an impossible length the
+    stream is `broken`, and all later bytes are dropped; the caller has to close the connection.  IG 3.1.3 p5-6."""
 
     def __init__(self) -> None:
         self._held = bytearray()
@@ -71,11 +71,15 @@ class Splitter:
 
     @property
     def pending(self) -> bytes:
-        """The beginning of a frame that has not yet come in full."""
+        """The bytes of an incomplete frame."""
         return bytes(self._held)
 
     def feed(self, data: bytes) -> list[Adu | Fault]:
-        """Take the next bytes of the stream; give back what they complete, in order."""
+        """Appends bytes of the stream; returns the frames that they complete, in order.
+
+        >>> Splitter().feed(bytes.fromhex("0001 0000 0006 01 03 0064 0002"))
+        [Adu(transaction=1, unit=1, pdu=b'\\x03\\x00d\\x00\\x02')]
+        """
         found: list[Adu | Fault] = []
         if self.broken:
             return found
@@ -99,7 +103,7 @@ class Splitter:
 
 
 def parse_adu(frame: bytes) -> Adu | Fault:
-    """One whole frame.  What is short, long or of another protocol is a `Fault`."""
+    """The frame of some bytes; a `Fault` for an incomplete frame, several frames, or another protocol."""
     splitter = Splitter()
     found = splitter.feed(frame)
     if len(found) == 1 and not splitter.pending:
@@ -174,7 +178,11 @@ class Message:
 
 
 def decode_request(pdu: bytes) -> Message:
-    """A request PDU as a `Message`.  Checks the structure only, quantities and addresses are the server's matter."""
+    """A request PDU as a `Message`.  Only the structure is checked; servers check quantities and addresses.
+
+    >>> str(decode_request(read(3, 100, 2)))
+    '03 read holding registers, address 100, quantity 2'
+    """
     if not pdu:
         return Message(0, fault="no function code")
     layout = FUNCTIONS.get(pdu[0])
@@ -211,7 +219,7 @@ def _take_apart(pdu: bytes, names: tuple[str, ...], tail: str) -> Message:
 
 
 def mismatch(request: bytes, reply: bytes) -> str:
-    """Why `reply` cannot be the answer to `request` (both PDUs); "" if it can.  Exception replies can be."""
+    """The reason why the PDU `reply` is no reply to the PDU `request`; "" if it may be one, as any exception reply."""
     asked, got = decode_request(request), decode_reply(reply)
     if got.fault:
         return got.fault

@@ -1,6 +1,6 @@
 """A Modbus server without any I/O: four tables, and the answer to a frame.  For scripted peers, tests and lessons.
 
-It is the well-behaved other side; misbehaving on demand is the business of `net.peers`.  The order of checks is that of
+It replies rightly; `net.misdeeds` has servers that misbehave.  The order of checks is that of
 the state diagrams of MODBUS Application Protocol V1.1b3 ("AP") 6.1-6.21.
 """
 
@@ -26,8 +26,9 @@ _COUNTERS = {0x0B: "messages", 0x0C: "", 0x0D: "exceptions", 0x0E: "messages", 0
 class ModbusServer:
     """Coils, discrete inputs, input and holding registers, as plain Python sequences that a test reads and writes.
 
-    `unit_ids` None answers every unit id; others get exception 0B.  `functions` limits what is supported.  `refusals`
-    maps a function code to an exception code that is answered in its place, to see how a client takes it."""
+    The arguments are the sizes of the tables.  `unit_ids` are the unit ids that are answered, None for all; others get
+    exception 0B.  `functions` are the supported function codes.  `refusals` maps function codes to exception codes that
+    are always answered.  `identity` are the objects of the device identification by id."""
 
     def __init__(
         self,
@@ -52,7 +53,7 @@ class ModbusServer:
         self.counts = {"messages": 0, "exceptions": 0}
 
     def answer(self, adu: bytes) -> bytes | None:
-        """The reply to one whole frame; None for what deserves none (another protocol, not one whole frame)."""
+        """The reply to one frame; None for another protocol and for bytes that are not one complete frame."""
         request = modbus.parse_adu(adu)
         if isinstance(request, Fault):
             return None

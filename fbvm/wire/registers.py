@@ -1,4 +1,4 @@
-"""What the servers hold that `fbvm peer`, `fbvm demo` and `--map IP:PORT=peer` start: values that tell their place."""
+"""The contents of the servers of `fbvm peer`, `fbvm demo` and `--map IP:PORT=peer`: values that show their addresses."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What a network tells whoever listens in: every event on a connection, as the PLC program sees its endpoints.
+"""The tap of a network: a function that receives every event on a connection, with the endpoints of the program.
 
-Both networks use these words, so a capture or a trace does not care whether bytes stayed in memory or left the host.
+Both networks report the same events, so captures and traces are the same for bytes in memory and on the host.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ class TapKind(Enum):
     """The kinds of events."""
 
     SYN = "syn"
-    """Somebody asks for a connection; nothing is open yet."""
+    """A connection is requested and not open yet."""
     OPEN = "open"
-    """The connection that was asked for is open."""
+    """The requested connection is open."""
     DATA = "data"
     FIN = "fin"
     RST = "rst"
-    """The connection, or the wish for one, is refused or torn down."""
+    """A request is refused, or the connection is reset."""
     UDP = "udp"
     """One datagram."""
 
@@ -32,11 +32,11 @@ DATA = TapKind.DATA
 
 @dataclass(frozen=True, slots=True)
 class TapEvent:
-    """One event at one unit.  `local` is the unit's endpoint, `remote` its peer's, with the program's addresses.
+    """An event at one unit.  `local` is the unit's endpoint, `remote` its peer's, with the program's addresses.
 
-    `out` says who did it: the unit (for SYN and OPEN: the unit opens actively) or its peer.  `mirrored`: the peer is a
-    unit of the same network, which tells the same from its side; who wants each frame once takes those that are `out`
-    or not `mirrored`."""
+    `out` is True for an event by the unit (SYN and OPEN: the unit opens actively), False for one by its peer.
+    `mirrored`: the peer is a unit of the same network, and the event is reported from the peer's side, too; events that
+    are `out` or not `mirrored` contain each frame once."""
 
     kind: TapKind
     local: Peer

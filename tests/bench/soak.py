@@ -62,7 +62,7 @@ def memory() -> None:
 
     def go(time_ns: int) -> str:
         reason = plc.run(for_ns=time_ns)
-        peer.heard.clear()
+        peer.received.clear()
         return reason
 
     soak(plc, MEMORY_S, go)

@@ -161,4 +161,4 @@ class Rig:
 
     def heard(self) -> list[str]:
         """The frames that the peer was sent."""
-        return [frame.hex(" ").upper() for frame in self.peer.heard]
+        return [frame.hex(" ").upper() for frame in self.peer.received]

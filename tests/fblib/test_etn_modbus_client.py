@@ -106,7 +106,7 @@ def test_the_sheets_own_request(timing: str) -> None:
     rig = Rig(ModbusPeer(), timing=timing).connect()
     rig.peer.server.holding_registers[1000:1003] = array("H", [0xAB12, 0x5678, 0x9713])
     assert rig.ask("03 03 E8 00 03") == "03 06 AB 12 56 78 97 13"
-    assert rig.peer.heard == [bytes.fromhex("00 01 00 00 00 06 FF 03 03 E8 00 03")]
+    assert rig.peer.received == [bytes.fromhex("00 01 00 00 00 06 FF 03 03 E8 00 03")]
     assert rig.plc.read("CIO 5804..CIO 5808") == [0xFF03, 0x06AB, 0x1256, 0x7897, 0x1300]
     assert rig.counters() == [0, 1, 1, 0, 0]
 
@@ -132,11 +132,11 @@ def test_requests_and_replies_of_any_size(size: int) -> None:
     rig = Rig(answering(lambda frame: [Say(heard())])).connect()
 
     def heard() -> bytes:
-        return rig.peer.heard[-1]
+        return rig.peer.received[-1]
 
     pdu = bytes((0x41 + value) & 0xFF for value in range(size))
     assert rig.ask(pdu) == pdu.hex(" ").upper()
-    assert rig.peer.heard == [Adu(1, 255, pdu).to_bytes()]
+    assert rig.peer.received == [Adu(1, 255, pdu).to_bytes()]
 
 
 def test_exceptions_of_the_server() -> None:
@@ -153,7 +153,7 @@ def test_the_unit_identifier(unit: int, sent: int) -> None:
     rig = Rig(ModbusPeer()).connect()
     rig.plc.write("Main.Id", unit)
     rig.ask("03 00 00 00 01")
-    assert rig.peer.heard[-1][6] == sent
+    assert rig.peer.received[-1][6] == sent
 
 
 def test_commands_that_cannot_be() -> None:
@@ -167,7 +167,7 @@ def test_commands_that_cannot_be() -> None:
     assert rig.plc.read("Main.Client.Error_Code") == 0x1100
     rig.plc.write("Main.Command", False)
     rig.scan()
-    assert rig.peer.heard == []
+    assert rig.peer.received == []
 
 
 def test_a_command_while_one_runs() -> None:
@@ -178,7 +178,7 @@ def test_a_command_while_one_runs() -> None:
     assert rig.plc.read("Main.Client.Error_Code") == 0x110C
     rig.until("Main.Client.Done")
     assert rig.reply() == "03 02 00 00"
-    assert len(rig.peer.heard) == 1
+    assert len(rig.peer.received) == 1
 
 
 def test_an_octet_above_ff() -> None:

@@ -102,7 +102,7 @@ def test_200e_what_is_no_array_assumed() -> None:
 def test_2010_a_control_array_that_is_too_short(length: int, control: tuple[int, ...]) -> None:
     rig = Rig(control=f"ARRAY[1..{length}] OF INT")
     assert rig.operate(*control[:length]) == "2010"
-    assert rig.peer.heard == []
+    assert rig.peer.received == []
 
 
 def test_2010_of_one_word_is_told_by_error_alone() -> None:
@@ -182,7 +182,7 @@ def refused(control: tuple[int, ...], **options: str) -> str:
     rig.set("m1_ENABLE", False)
     rig.scan(5)
     assert rig.databuf(2) == [0xEEEE, 0xDDDD]
-    assert rig.peer.heard == []
+    assert rig.peer.received == []
     assert rig.module(noc_map.STATISTICS + noc_map.TRANSMITTER_INTERRUPTS) == 0
     return code
 
@@ -209,7 +209,7 @@ def test_1001_with_both_inputs_nothing_begins() -> None:
     rig.set("m1_ABORT", True)
     rig.set("m1_ENABLE", True)
     rig.scan(3)
-    assert (rig.outputs(), rig.status(), rig.peer.heard) == ("E", "1001", [])
+    assert (rig.outputs(), rig.status(), rig.peer.received) == ("E", "1001", [])
     rig.set("m1_ENABLE", False)
     rig.scan()
     assert rig.outputs() == ""
@@ -424,7 +424,7 @@ def test_a_reply_to_an_aborted_operation_is_passed_over_on_the_same_connection()
     rig.server.holding_registers[0] = 6
     assert rig.operate(*READ) == "0000"
     assert rig.databuf(1) == [6]
-    assert [frame[1] for frame in rig.peer.heard] == [1, 2]
+    assert [frame[1] for frame in rig.peer.received] == [1, 2]
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * ("flood" in name)) for name in MISDEEDS])

@@ -38,7 +38,7 @@ def test_reading_as_the_sheet_has_it(control: tuple[int, ...], sent: str, replie
     for number in range(200):
         peer.server.holding_registers[number] = number
     assert rig.operate(*control, *SHEET) == "0000"
-    assert [frame.hex(" ").upper() for frame in peer.heard] == [sent]
+    assert [frame.hex(" ").upper() for frame in peer.received] == [sent]
     assert rig.databuf(len(replied)) == replied
 
 
@@ -50,7 +50,7 @@ def test_writing_as_the_sheet_has_it(control: tuple[int, ...], sent: str) -> Non
     rig, peer = sheet_rig()
     rig.fill([0x1234, 0xFFFF, 0x0001])
     assert rig.operate(*control, *SHEET) == "0000"
-    assert [frame.hex(" ").upper() for frame in peer.heard] == [sent]
+    assert [frame.hex(" ").upper() for frame in peer.received] == [sent]
     first = control[3] - 1
     assert list(peer.server.holding_registers[first : first + control[2]]) == [0x1234, 0xFFFF, 0x0001][: control[2]]
 
@@ -62,7 +62,7 @@ def test_reading_and_writing_as_the_sheet_has_it() -> None:
         peer.server.holding_registers[number] = number
     rig.fill([0xABCD, 0x0102, 7])
     assert rig.operate(READ_WRITE, 0, 2, 1, 0x0700, *SHEET, 3, 49) == "0000"
-    assert [frame.hex(" ").upper() for frame in peer.heard] == [
+    assert [frame.hex(" ").upper() for frame in peer.received] == [
         "00 01 00 00 00 0F 00 17 00 30 00 03 00 00 00 02 04 AB CD 01 02"]
     assert rig.databuf(4) == [48, 49, 50, 0]
     assert list(peer.server.holding_registers[:3]) == [0xABCD, 0x0102, 2]
@@ -94,7 +94,7 @@ def test_the_longest_and_the_last(control: tuple[int, ...], length: int) -> None
         for number in range(control[2]):
             last[control[3] - 1 + number] = words[number] ^ 0xFFFF
     assert rig.operate(*control, *SERVER_IP, 125, 1) == "0000"
-    [frame] = rig.peer.heard
+    [frame] = rig.peer.received
     assert (len(frame), frame[6]) == (length, control[4] & 0xFF)
     if control[0] == READ:
         assert rig.databuf(control[2]) == [word ^ 0xFFFF for word in words[: control[2]]]
@@ -106,7 +106,7 @@ def test_the_longest_and_the_last(control: tuple[int, ...], length: int) -> None
 def test_the_unit_identifier_is_the_low_byte_of_the_routing_register(unit: int) -> None:
     rig = Rig()
     assert rig.operate(READ, 0, 1, 1, 0x0700 | unit, *SERVER_IP) == "0000"
-    assert rig.peer.heard[0][6] == unit
+    assert rig.peer.received[0][6] == unit
 
 
 def test_transactions_are_counted_over_all_operations() -> None:
@@ -114,7 +114,7 @@ def test_transactions_are_counted_over_all_operations() -> None:
     rig.plc.write("MSTR_Transaction", 0xFFFE)
     for _ in range(3):
         rig.operate(READ, 0, 1, 1, 0x0700, *SERVER_IP)
-    assert [frame[:2] for frame in rig.peer.heard] == [b"\xff\xff", b"\0\0", b"\0\1"]
+    assert [frame[:2] for frame in rig.peer.received] == [b"\xff\xff", b"\0\0", b"\0\1"]
 
 
 def test_one_connection_serves_operations_that_follow_one_another() -> None:
@@ -131,7 +131,7 @@ def test_one_connection_serves_operations_that_follow_one_another() -> None:
     for last in (2, 2, 3, 2, 3):
         assert rig.operate(READ, 0, 1, 1, 0x0700, 192, 168, 250, last) == "0000"
     assert len(callers) == 2
-    assert [frame[1] for frame in rig.peer.heard] == [1, 2, 3, 4, 5]
+    assert [frame[1] for frame in rig.peer.received] == [1, 2, 3, 4, 5]
 
 
 def test_a_server_that_has_closed_is_called_again() -> None:
@@ -139,7 +139,7 @@ def test_a_server_that_has_closed_is_called_again() -> None:
     for _ in range(3):
         assert rig.operate(READ, 0, 1, 1, 0x0700, *SERVER_IP) == "0000"
         rig.scan(3)
-    assert len(rig.peer.heard) == 3
+    assert len(rig.peer.received) == 3
 
 
 def test_the_lines_are_used_again_when_all_are_taken() -> None:
@@ -151,7 +151,7 @@ def test_the_lines_are_used_again_when_all_are_taken() -> None:
     for last in range(100, 140):
         assert rig.operate(READ, 0, 1, 1, 0x0700, 192, 168, 250, last) == "0000"
     assert rig.operate(READ, 0, 1, 1, 0x0700, 192, 168, 250, 139) == "0000"
-    assert len(peer.heard) == 41
+    assert len(peer.received) == 41
 
 
 # --- arrays -------------------------------------------------------------------------------------------------------------
@@ -199,7 +199,7 @@ def test_local_statistics_end_in_the_same_scan_and_send_nothing() -> None:
     assert (rig.outputs(), rig.status()) == ("S", "0000")
     assert rig.databuf(4) == [0x0000, 0x5400, 0x1234, 0x8000 | 0x1000 | 14 << 4 | 7]
     assert rig.databuf(38)[36:] == [0x8971, 0xC6CA]
-    assert rig.peer.heard == []
+    assert rig.peer.received == []
 
 
 @each_of(("length", "first"), [(1, 0), (3, 0), (2, 36), (1, 37), (32, 4), (38, 0)])
@@ -273,7 +273,7 @@ def test_services_are_turned_off_and_on_again(wanted: int) -> None:
     rig.scan(200)
     assert services(rig, BOTH) == "0000"
     assert rig.module(noc_map.SERVICES) == BOTH
-    assert rig.peer.heard == []
+    assert rig.peer.received == []
 
 
 def test_services_in_the_state_asked_for() -> None:

@@ -264,7 +264,7 @@ def test_what_cannot_be_sent_fails_at_once(block: str) -> None:
     rig.scan()
     assert rig.result("rd") == (0, TOO_MUCH[block])
     rig.scan(20)
-    assert (rig.peer.heard, list(rig.plc.memory.words("D"))) == ([], words)
+    assert (rig.peer.received, list(rig.plc.memory.words("D"))) == ([], words)
 
 
 REFUSED = [
@@ -286,13 +286,13 @@ REFUSED = [
 def test_what_can_be_sent_is_left_to_the_server(block: str) -> None:
     rig = Rig(rd=block).connect()
     rig.command("rd")
-    assert (rig.result("rd"), len(rig.peer.heard)) == ((1, "0003"), 1)
+    assert (rig.result("rd"), len(rig.peer.received)) == ((1, "0003"), 1)
 
 
 def test_the_longest_request_that_fits_a_frame() -> None:
     rig = Rig(rd="Fn0F(Coil_Address := 0, Coil_Qty := 1976, DataAddress_DM := 200)").connect()
     rig.command("rd")
-    assert len(rig.peer.heard[0]) == 260
+    assert len(rig.peer.received[0]) == 260
     assert rig.words(32630, 1) == [0]
 
 
@@ -341,7 +341,7 @@ def test_a_command_while_the_last_one_runs() -> None:
     assert rig.result("rd") == (0, "110C")
     rig.run_until("Main.rd.Rcv_Counter = 1", 1)
     assert rig.result("rd") == (1, "")
-    assert len(rig.peer.heard) == 1
+    assert len(rig.peer.received) == 1
 
 
 def test_error_and_code_hold_until_the_next_command() -> None:

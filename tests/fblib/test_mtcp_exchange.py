@@ -153,7 +153,7 @@ def test_the_examples_of_the_sheet(block: str, request_pdu: str, reply_pdu: str)
     request, reply = adu(1, request_pdu), adu(1, reply_pdu)
     assert rig.frame(32500, len(request) // 2).replace(" ", "") == request
     assert rig.frame(32510, len(reply) // 2).replace(" ", "") == reply
-    assert [frame.hex().upper() for frame in rig.peer.heard] == [request]
+    assert [frame.hex().upper() for frame in rig.peer.received] == [request]
     assert rig.result("rd") == (1, "")
 
 
@@ -170,7 +170,7 @@ def test_ten_bits_written() -> None:
     rig = Rig(rd=EXAMPLES[5][0]).connect()
     rig.fill(302, [0xFD3A])
     rig.command("rd")
-    assert rig.peer.heard[0].hex().upper().endswith("0F0014000A023A01"), "bits behind the last coil are sent as 0"
+    assert rig.peer.received[0].hex().upper().endswith("0F0014000A023A01"), "bits behind the last coil are sent as 0"
     assert bytes(rig.server.coils[20:31]) == bytes([0, 1, 0, 1, 1, 1, 0, 0, 1, 0, 0])
 
 
@@ -192,7 +192,7 @@ def test_transaction_numbers_differ() -> None:
     rig = reading()
     for _ in range(4):
         rig.command("rd")
-    numbers = [frame[:2] for frame in rig.peer.heard]
+    numbers = [frame[:2] for frame in rig.peer.received]
     assert len(set(numbers)) == 4
 
 
@@ -200,7 +200,7 @@ def test_transaction_numbers_differ() -> None:
 def test_the_slave_id(slave: int, sent: int) -> None:
     rig = Rig(rd=READ.replace(")", f", SlaveID := {slave})")).connect()
     rig.command("rd")
-    assert rig.peer.heard[0][6] == sent
+    assert rig.peer.received[0][6] == sent
     assert rig.result("rd") == (1, "")
 
 

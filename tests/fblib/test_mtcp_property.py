@@ -131,7 +131,7 @@ def test_any_play_on_the_pins(timing: str, seed: int, wired: bool, changes: list
         rig.scan(scans)
         nothing_wrong(rig)
     works_by_itself(rig)
-    heard = len(rig.peer.heard)
+    heard = len(rig.peer.received)
     assert sum(rig.result(name)[0] for name in READS) <= heard
 
 

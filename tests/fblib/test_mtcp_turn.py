@@ -72,7 +72,7 @@ def test_any_order_of_calls(order: int, connect_last: bool) -> None:
     for number in (1, 2):
         rig.command(*ALL, max_s=2)
         assert {rig.result(name) for name in ALL} == {(number, "")}
-    assert len(rig.peer.heard) == 16
+    assert len(rig.peer.received) == 16
     assert rig.words(100, 6) == [0b1001001001001001, 0b1000010000100001, 1030, 1031, 2040, 2041]
     assert (server.coils[50], server.holding_registers[60]) == (1, 666)
     assert (bytes(server.coils[70:75]), list(server.holding_registers[80:82])) == (bytes([0, 1, 0, 1, 0]), [77, 88])
@@ -139,7 +139,7 @@ def test_a_waiting_block_that_is_no_longer_executed_loses_its_place() -> None:
     rig.set("b_EN", False)
     rig.run_until("Main.a.Rcv_Counter = 1", 1)
     rig.scan(20)
-    assert len(rig.peer.heard) == 1
+    assert len(rig.peer.received) == 1
     rig.set("b_EN", True)
     rig.scan()
     assert rig.result("b") == (0, "0081")

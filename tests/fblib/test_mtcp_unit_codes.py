@@ -66,7 +66,7 @@ def test_a_program_that_drives_the_unit_itself(timing: str) -> None:
     rig.fill(500, [0x0102, 0x0304])
     rig.run_until("Main.Step = 7", 5)
     assert [f"{code:04X}" for code in rig.get("Codes")] == ["0000", "2606", "0000", "1103", "1103", "0000"]  # type: ignore[attr-defined]
-    assert rig.peer.heard == []
+    assert rig.peer.received == []
     assert rig.words(500, 3) == [0x0102, 0x0304, 0]
 
 
@@ -125,7 +125,7 @@ def test_a_block_whose_data_address_a_program_spoils() -> None:
     ).connect()
     rig.command("rd", max_s=1)
     assert rig.result("rd") == (0, "1103")
-    assert rig.peer.heard == []
+    assert rig.peer.received == []
     assert rig.get("conn.ENO")
     rig.set("Spoil", False)
     rig.command("rd")

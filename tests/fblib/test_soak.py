@@ -28,12 +28,12 @@ def test_minutes_with_all_blocks_busy(timing: str, minutes: int) -> None:
     before = usage()
     ended = check(plc)
     for _ in range(2 * times(minutes, 12) - 2):
-        peer.heard.clear()
+        peer.received.clear()
         assert plc.run(for_ns=MINUTE_NS // 2) == "time"
         now = check(plc)
         assert now > ended
         ended = now
-    peer.heard.clear()
+    peer.received.clear()
     after = usage()
     assert after.objects <= before.objects + 300
     # The compiler's thread, which works beside, may have had a file of its cache open just then.

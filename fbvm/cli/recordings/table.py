@@ -31,7 +31,7 @@ def command(path: Path, names: tuple[str, ...], scans: range | None, every: bool
                    for signal in signals_at(trace.find(name), trace.described, trace.meanings)]  # fmt: skip
         table = ScanTable(trace.sites, trace.names, signals, every)
         trace.follow(table, scans)
-    bands = [band for band in table.bands if every or band.moved]
+    bands = [band for band in table.bands if every or band.has_changes]
     if not bands:
         click.echo("none of these changed", err=True)
         sys.exit(status.FAILED)

@@ -1,6 +1,6 @@
-"""A recording as a picture: bits as bars, numbers as steps with their values, frames as arrows; scans and time as rulers.
+"""A time chart as SVG: bits as bars, numbers as steps with their values, packets as arrows; scans and time as rulers.
 
-Plain SVG without scripts, for documents; it is light or dark as its reader wishes.
+Plain SVG without scripts, for documents; its colours follow the reader's choice of light or dark.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from fbvm.watch.values import Value, show_time
 
 ROW, LETTER, MARGIN = 26, 7.3, 8
 RULERS, LANE = 38, 20
-"""Heights of the two rulers and of the lane with frames."""
+"""Heights of the two rulers and of the row with packets."""
 WIDEST, NARROWEST, WANTED = 40.0, 0.5, 1000
 """Pixels of a scan at most and at least, and of the whole chart if possible."""
 TICK = 70
@@ -34,7 +34,7 @@ text { fill: #e6e8ec; stroke: #14161a } .dim { fill: #9aa2ae } .ground { fill: #
 
 
 class SvgChart:
-    """Draws one recording."""
+    """The time chart of a recording, and of packets with the numbers of their scans."""
 
     def __init__(self, recording: Recording, packets: Sequence[tuple[int, Packet]] = (), title: str = "") -> None:
         self._recording, self._title = recording, title
@@ -47,7 +47,7 @@ class SvgChart:
         self._top = MARGIN + RULERS + (LANE if self._packets else 0)
 
     def text(self) -> str:
-        """The file."""
+        """The text of the SVG file."""
         tracks = self._recording.tracks
         width = round(self._left + self._step * len(self._scans) + MARGIN)
         height = self._top + ROW * len(tracks) + MARGIN
@@ -75,14 +75,14 @@ class SvgChart:
             yield f'<text class="dim" x="{x + 3}" y="{MARGIN + 28}">{escape(when)}</text>'
 
     def _arrows(self) -> Iterator[str]:
-        """Up for what the unit sends, down for what comes to it."""
+        """An arrow for each packet: up if the unit has sent it, down if the unit has received it."""
         if not self._packets:
             return
         top = MARGIN + RULERS
         yield f'<text class="dim" x="{MARGIN}" y="{top + 13}">network</text>'
-        beside: dict[int, int] = {}
+        drawn: dict[int, int] = {}
         for scan, packet in self._packets:
-            number = beside[scan] = beside.get(scan, -1) + 1
+            number = drawn[scan] = drawn.get(scan, -1) + 1
             x, out = self._x(scan + 0.5) + 8 * number, packet.source.host == self._unit
             shape = "l-4,7 h3 v9 h2 v-9 h3 z" if out else "l-4,-7 h3 v-9 h2 v9 h3 z"
             yield (f'<path class="{"out" if out else "in"}" d="M{x},{top + (0 if out else 16)} {shape}">'
@@ -108,14 +108,14 @@ class SvgChart:
 
 
 def _levels(values: Sequence[Value]) -> list[float]:
-    """How high each value is drawn, 0 to 1; 0 for what is no number."""
+    """The height of each value, 0 to 1; 0 for a value that is no number."""
     numbers = [float(value) if isinstance(value, int | float) else 0.0 for value in values]
     low, high = min(numbers), max(numbers)
     return [(number - low) / (high - low) if high > low else 0.0 for number in numbers]
 
 
 def _fitting(text: str, room: float) -> str:
-    """As much of a text as has room; "" if that says nothing."""
+    """The beginning of a text that fits into `room` pixels; "" if there is room for too few letters."""
     letters = int(room / LETTER)
     if letters >= len(text):
         return text

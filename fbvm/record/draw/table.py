@@ -4,7 +4,7 @@
       inputs          >TRUE     FALSE    FALSE
       pump.st:12                         >TRUE
 
-A cell is marked with `>` where it changed.  A statement's row shows what it changed only.
+A cell with a new value is marked with `>`.  The row of a statement shows only the values that it has changed.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from fbvm.watch.values import Value, show_time
 MARK = ">"
 WIDEST_CELL = 24
 MOST_READS = 32
-"""Values of which a value without a name is remembered to have been made."""
+"""Values that are kept as the operands of a value without a name."""
 
 
 class ScanState(Protocol):
-    """What is listened to: a PLC, or the moment of a trace."""
+    """A PLC, or a moment of a trace, of which a listener reads values."""
 
     @property
     def scans(self) -> int: ...
@@ -41,7 +41,7 @@ class ScanState(Protocol):
 
 @dataclass(frozen=True)
 class Change:
-    """A variable got a new value: by a statement (`site`) of an instance, or from outside the program."""
+    """A new value of a variable, written by a statement (`site`) of an instance, or from outside the program."""
 
     scan: int
     signal: Signal
@@ -50,12 +50,12 @@ class Change:
     site: Site | None
     instance: str
     phase: Phase | None = None
-    """In which it was if no statement did it."""
+    """The phase of a change that no statement has made."""
 
 
 @dataclass(frozen=True)
 class LastWrite:
-    """A statement that wrote a variable, maybe the value that was there, and what it had read."""
+    """The last statement that wrote a variable, also with an equal value, and the names and values that it had read."""
 
     scan: int
     site: Site | None
@@ -65,7 +65,7 @@ class LastWrite:
 
 @dataclass
 class Row:
-    """One row: what happened, and the values of all variables after it; None where nothing is to be said."""
+    """One row: its label, the values of all variables after it, and which of them are new."""
 
     label: str
     values: list[Value]
@@ -81,33 +81,34 @@ class Band:
     rows: list[Row] = field(default_factory=list)
 
     @property
-    def moved(self) -> bool:
+    def has_changes(self) -> bool:
         return any(any(row.changed) for row in self.rows)
 
 
 class ScanTable:
-    """Listens to scans, of a PLC or of a trace, and writes down what happened to some variables.
+    """A listener that records the changes of some variables in scans of a PLC or of a trace.
 
-    `every` keeps statements that changed none."""
+    `sites` and `names` are those of the image, `signals` the columns.  `every` keeps also statements that change none."""
 
     def __init__(self, sites: Sequence[Site], names: Names, signals: Sequence[Signal], every: bool = False) -> None:
         self.signals = list(signals)
         self.bands: list[Band] = []
         self.changes: list[Change] = []
         self.writers: dict[Signal, LastWrite] = {}
-        """Who wrote each variable last."""
+        """The last write of each variable."""
         self._sites, self._names, self._every = sites, names, every
         self._values: list[Value] | None = None
         self._statement: Statement | None = None
         self._reads: dict[Frame, dict[str, str]] = {}
         self._nameless: dict[int, dict[str, str]] = {}
-        """What was read for the bytes that no name has, such as conditions of rungs."""
+        """By offset the values that were read for a value without a name, such as the condition of a rung."""
 
     def phase(self, plc: ScanState, phase: Phase) -> None:
+        """Records the values that have changed in a phase without a statement."""
         if phase is Phase.INPUTS or not self.bands or self.bands[-1].scan != plc.scans:
             self.bands.append(Band(plc.scans, plc.now_ns))
         self._finish(plc)
-        values, changed = self._look(plc)
+        values, changed = self._read_values(plc)
         for signal, before, now, moved in zip(self.signals, self._values or values, values, changed, strict=True):
             if moved:
                 self.changes.append(Change(plc.scans, signal, before, now, None, "", phase))
@@ -116,6 +117,7 @@ class ScanTable:
             self.bands[-1].rows.append(Row(phase.value, values, changed))
 
     def event(self, plc: ScanState, event: Event) -> None:
+        """Records the reads of a statement, and the changes by its writes."""
         if isinstance(event, Statement):
             self._finish(plc)
             self._statement = event
@@ -131,9 +133,9 @@ class ScanTable:
             self._reads.pop(event.frame, None)
         elif isinstance(event, Write) and self._names.at(event.offset) is None:
             self._nameless[event.offset] = dict(islice(self._reads.get(event.frame, {}).items(), MOST_READS))
-        elif isinstance(event, Write) and (concerned := self._concerned(event)):
+        elif isinstance(event, Write) and (written := self._written_signals(event)):
             reads = tuple(self._reads.get(event.frame, {}).items())
-            for signal in concerned:
+            for signal in written:
                 self.writers[signal] = LastWrite(plc.scans, self._site(event.site), self._names.instance(event.frame.base), reads)
             if event.old != event.value:
                 self._row(plc, event.site, event.frame)
@@ -141,14 +143,14 @@ class ScanTable:
     def _site(self, number: int) -> Site | None:
         return self._sites[number] if number >= 0 else None
 
-    def _concerned(self, event: Write) -> list[Signal]:
+    def _written_signals(self, event: Write) -> list[Signal]:
         end = event.offset + len(event.value)
         near = [signal for signal in self.signals if (place := signal.place).hops
                 or place.offset < end and event.offset < place.offset + place.type.size]  # fmt: skip
         return [signal for signal in near if signal.place.bit is None or event.bit in (signal.place.bit, WHOLE_BYTES)]
 
     def _finish(self, plc: ScanState) -> None:
-        """The last statement is over; if it changed nothing its row is kept only where every row is."""
+        """Ends the row of the last statement; without a change the row is kept only if `every` is set."""
         statement, self._statement = self._statement, None
         if statement and self._every and self._values is not None:
             label = _place(self._sites[statement.site])
@@ -156,7 +158,7 @@ class ScanTable:
                 self.bands[-1].rows.append(Row(label, self._values, [False] * len(self.signals)))
 
     def _row(self, plc: ScanState, site: int, frame: Frame) -> None:
-        values, changed = self._look(plc)
+        values, changed = self._read_values(plc)
         if not any(changed):
             return
         place = self._site(site)
@@ -168,17 +170,17 @@ class ScanTable:
         self.bands[-1].rows.append(Row(_place(place) if place else "stub", values, changed))
         self._statement = None
 
-    def _look(self, plc: ScanState) -> tuple[list[Value], list[bool]]:
+    def _read_values(self, plc: ScanState) -> tuple[list[Value], list[bool]]:
         values = [self._names.read(plc.read, signal.place) for signal in self.signals]
         before = self._values
         return values, [before is not None and now != before[at] for at, now in enumerate(values)]
 
     def last_change(self, signal: Signal) -> Change | None:
-        """The last change of a variable, None if it kept its value."""
+        """The last change of a variable, None if it has kept its value."""
         return next((change for change in reversed(self.changes) if change.signal == signal), None)
 
     def draw(self, bands: Iterable[Band] | None = None) -> str:
-        """The table as text."""
+        """The table as text, of all recorded scans or of some `bands`."""
         chosen = list(self.bands if bands is None else bands)
         headings = [signal.label for signal in self.signals]
         heads = [f"scan {band.scan}   {show_time(band.now_ns).removeprefix('T#')}" for band in chosen]

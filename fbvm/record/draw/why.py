@@ -1,6 +1,6 @@
-"""Why a variable has its value: the statement that gave it, what that statement read, and so on back through scans.
+"""Causes of a value: the statement that wrote it, the values that this statement had read, and so on back through scans.
 
-Needs a trace of statements.  What the conditions around a statement read counts as read by it.
+Needs a trace of depth STATEMENTS.  Reads by the conditions around a statement count as reads by the statement.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from fbvm.watch.places import dereferenced
 from fbvm.watch.values import Value, show_time
 
 DEEPEST = 6
-"""Causes of causes that are looked for if nobody says how deep."""
+"""The default depth of causes of causes."""
 WINDOWS = (100, 2000)
-"""Scans that are read at first, and if they do not suffice; then all."""
+"""Scans that are searched first, and then, before all scans are."""
 MOST_FACTS = 32
-"""Places of which a value without a name is remembered to have been made."""
+"""Operands that are kept of a value without a name."""
 LARGEST_BYTES = 4096
-"""What copies at once is not followed byte by byte if it is larger."""
+"""A larger write is not followed byte by byte."""
 
 
 class Instant(Protocol):
-    """A PLC at some moment of what happened."""
+    """The state of a PLC at a moment of the past."""
 
     @property
     def memory(self) -> Memory: ...
@@ -42,22 +42,22 @@ class Instant(Protocol):
 
 
 class Follower(Protocol):
-    """Who is told what happened."""
+    """Receives phases and events."""
 
     def phase(self, moment: Instant, phase: Phase) -> None: ...
     def event(self, moment: Instant, event: Event) -> None: ...
 
 
 class Readable(Protocol):
-    """Whose values can be read."""
+    """Memory whose values can be read by name."""
 
     @property
     def memory(self) -> Memory: ...
     def read(self, where: str | Place) -> Value: ...
 
 
-class Past(Protocol):
-    """What happened, to be gone through again: a trace, or a session of stepping."""
+class EventSource(Protocol):
+    """A source of events of past scans: a trace, or a stepping session."""
 
     @property
     def names(self) -> Names: ...
@@ -74,7 +74,7 @@ class Past(Protocol):
 
 @dataclass(frozen=True)
 class Fact:
-    """A place was read at some moment, and what it held; `guard` if a condition around the statement read it."""
+    """A read of a place: its value, and the number of the event; `guard` if a condition around the statement has read it."""
 
     place: Place
     value: str
@@ -84,7 +84,7 @@ class Fact:
 
 @dataclass(frozen=True)
 class Change:
-    """A value changed: by a statement of an instance that had read `facts`, or from outside in a phase."""
+    """A change of a value: by a statement of an instance, which had read `facts`, or from outside in a phase."""
 
     scan: int
     now_ns: int
@@ -97,30 +97,32 @@ class Change:
 
 @dataclass
 class Cause:
-    """A value and what gave it; `change` is None if nothing did in what was read."""
+    """A value, the change that led to it and its causes.
+
+    `change` is None if the scans that were searched have none."""
 
     place: Place
     value: str
     change: Change | None
     guard: bool = False
     repeated: bool = False
-    """It is explained at another place of the answer."""
+    """True if its causes are listed at another place of the tree."""
     causes: list[Cause] = field(default_factory=list)
 
 
 class _Changes:
-    """Every change in some scans, by byte and bit."""
+    """All changes of memory in some scans, by byte and bit."""
 
-    def __init__(self, trace: Past, scans: range) -> None:
+    def __init__(self, trace: EventSource, scans: range) -> None:
         self._trace = trace
         self._changes: dict[int, list[tuple[int, Change]]] = {}
         self._reads: dict[tuple[Frame, int], list[Fact]] = {}
         self._nameless: dict[int, tuple[Fact, ...]] = {}
-        """What was read for the bytes that no name has: conditions of rungs, variables of functions."""
-        self._asked: list[Fact] = []
-        """What was read for a nameless value that nothing was written of since: an interlock asks so whether it holds."""
+        """By offset the operands of values without a name: conditions of rungs, variables of functions."""
+        self._pending: list[Fact] = []
+        """The operands of a value without a name that was read and not yet written from: the condition of an interlock."""
         self._guards: list[Fact] = []
-        """Those facts, while the statement behind them is executed."""
+        """These operands, while the next statement is executed, whose condition they are."""
         self._known: Snapshot | None = None
         self.order = 0
         trace.follow(self, scans)
@@ -142,18 +144,18 @@ class _Changes:
         self.order += 1
         if isinstance(event, Statement):
             self._reads[event.frame, event.site] = []
-            self._guards, self._asked = self._asked, []
+            self._guards, self._pending = self._pending, []
         elif isinstance(event, Read):
             place = self._trace.names.at(event.offset, event.bit if event.bit < 8 else None)
             facts = self._reads.setdefault((event.frame, event.site), [])
             if place is None:
-                self._asked = list(self._nameless.get(event.offset, ()))
-                facts += self._asked
+                self._pending = list(self._nameless.get(event.offset, ()))
+                facts += self._pending
             else:
                 facts.append(Fact(place, Signal(place, place.name).text(self._trace.names.read(moment.read, place)), self.order))
         elif isinstance(event, Write):
             self._written(moment, event)
-            self._asked = []
+            self._pending = []
 
     def _written(self, moment: Instant, event: Write) -> None:
         if self._trace.names.at(event.offset, event.bit if event.bit < 8 else None) is None:
@@ -168,7 +170,7 @@ class _Changes:
                     self._changes.setdefault(at, []).append((bits, change))
 
     def _facts(self, frame: Frame, site: int) -> Iterator[Fact]:
-        """What a statement read, then what the conditions around it did."""
+        """The reads of a statement, then those of the conditions around it."""
         own = self._reads.get((frame, site), ())
         yield from own or (replace(fact, guard=True) for fact in self._guards)
         while site >= 0 and (site := self._trace.outer[site]) >= 0:
@@ -176,7 +178,7 @@ class _Changes:
                 yield Fact(fact.place, fact.value, fact.order, True)
 
     def last(self, place: Place, before: int) -> Change | None:
-        """The last change of a place before some moment."""
+        """The last change of a place before the event with number `before`."""
         found: Change | None = None
         for at in range(place.offset, place.offset + max(1, place.type.size)):
             mask = 0xFF if place.bit is None else 1 << place.bit
@@ -188,11 +190,13 @@ class _Changes:
         return found
 
 
-def why(trace: Past, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
-    """What gave a place its value at the end of a scan.  Raises ValueError for a scan that is not recorded."""
+def why(trace: EventSource, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
+    """The causes of the value of a place at the end of a scan.
+
+    `deepest` limits the depth of the tree.  Raises ValueError for a scan that is not recorded."""
     then = trace.at(scan)
     value = Signal(place, place.name).text(trace.names.read(then.read, place))
-    place = _settled(trace.names, then.memory, place)
+    place = _dereferenced(trace.names, then.memory, place)
     start = trace.scans.start
     for window in (*WINDOWS, scan - start + 1):
         first = max(start, scan - window + 1)
@@ -203,8 +207,8 @@ def why(trace: Past, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
     return cause
 
 
-def _settled(names: Names, memory: Memory, place: Place) -> Place:
-    """Where what is asked for lies; behind a reference it has the name of its owner, too."""
+def _dereferenced(names: Names, memory: Memory, place: Place) -> Place:
+    """The place with its references followed; its name says also the variable that it is."""
     found = dereferenced(memory, place) if place.hops else None
     if found is None:
         return place
@@ -236,26 +240,26 @@ def _once(facts: Iterable[Fact]) -> Iterator[Fact]:
 
 
 def _open(cause: Cause) -> bool:
-    """True if somewhere nothing was found that an earlier scan may hold."""
+    """True if a cause has no change, which an earlier scan may have."""
     return cause.change is None or any(_open(inner) for inner in cause.causes)
 
 
 # --- as text ----------------------------------------------------------------------------------------------------------
 
 
-def cause_text(trace: Past, cause: Cause) -> str:
-    """The answer as a tree of lines."""
+def cause_text(trace: EventSource, cause: Cause) -> str:
+    """The causes as a tree of lines."""
     return "\n".join(_lines(trace, cause, "", ""))
 
 
-def _lines(trace: Past, cause: Cause, first: str, rest: str) -> Iterator[str]:
+def _lines(trace: EventSource, cause: Cause, first: str, rest: str) -> Iterator[str]:
     yield f"{first}{'if ' if cause.guard else ''}{cause.place.name} = {cause.value}{_since(trace, cause)}"
     for number, inner in enumerate(cause.causes):
         last = number == len(cause.causes) - 1
         yield from _lines(trace, inner, rest + ("└ " if last else "├ "), rest + ("  " if last else "│ "))
 
 
-def _since(trace: Past, cause: Cause) -> str:
+def _since(trace: EventSource, cause: Cause) -> str:
     change = cause.change
     if change is None:
         return " since the trace begins" if trace.scans.start else " since power-on"

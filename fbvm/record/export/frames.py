@@ -1,6 +1,6 @@
-"""Ethernet frames with IPv4, TCP and UDP as they would lie on the wire, checksums included, for captures.
+"""Ethernet frames with IPv4, TCP and UDP, checksums included, for captures.
 
-Addresses are those that the PLC program sees; each address has a MAC address of its own made of it."""
+Addresses are those that the PLC program sees; the MAC address of each is made of its IPv4 address."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def checksum(data: bytes) -> int:
 
 
 def tcp(sender: Peer, receiver: Peer, number: int, sequence: int, ack: int, flags: int, data: bytes = b"") -> bytes:
-    """One frame with one segment.  `number` is the IP identification; a SYN says the greatest segment."""
+    """One frame with one segment.  `number` is the IP identification; a SYN has the option of the maximum segment size."""
     options = struct.pack(">BBH", 2, 4, MAX_SEGMENT_BYTES) if flags & SYN else b""
     offset = (20 + len(options)) // 4 << 4
     head = struct.pack(

@@ -1,10 +1,10 @@
-"""A capture file that Wireshark opens: what a network's tap heard, as the frames that a real network had carried.
+"""A capture file that Wireshark opens: the events of a network's tap, as the frames that a real network would have carried.
 
     with open("run.pcapng", "wb") as file:
         network.tap = Capture(file).tap
 
-The bytes and times are those of the run.  What the tap does not know is made up plausibly: MAC addresses, sequence
-numbers, the acknowledgements.  File format: draft-ietf-opsawg-pcapng, sections 3.5 and 4.1 to 4.3.
+The bytes and times are those of the run.  The tap has no MAC addresses, sequence numbers and
+acknowledgements; these are generated.  File format: draft-ietf-opsawg-pcapng, sections 3.5 and 4.1 to 4.3.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ NANOSECONDS = b"\x09"
 
 @dataclass
 class _Flow:
-    """A connection as the file has it so far: the next sequence number of each endpoint, and who sent FIN."""
+    """A connection in the file so far: the next sequence number of each endpoint, and the endpoints that have sent FIN."""
 
     next: dict[Peer, int]
     open: bool
@@ -38,11 +38,11 @@ class _Flow:
 
 
 class Capture:
-    """Writes a pcapng file as things happen.  The file is the caller's, who closes it.
+    """Writes each event of a tap to a pcapng file at once.  The caller closes the file.
 
-    `epoch_ns` is added to all times, so that virtual time 0 may be some date.  Each unit is an interface of the file,
-    named by its address; what two units of one network say to each other is written once.  `comment` says something about
-    each packet of a unit, by its address: the scan in which it was."""
+    `epoch_ns`, in nanoseconds since 1970, is the date of the PLC's time 0.  Each unit is an interface of the file, named by
+    its address; packets between two units of one network are written once.  `comment` returns the comment of a packet by
+    the address of its unit, such as the number of the scan."""
 
     def __init__(self, file: BinaryIO, epoch_ns: int = 0, comment: Callable[[str], str] | None = None) -> None:
         self._file = file
@@ -56,7 +56,7 @@ class Capture:
         self._block(SECTION_HEADER, section + _option(SHB_USERAPPL, b"fbvm") + _option(OPTION_END, b""))
 
     def tap(self, now_ns: int, address: str, event: TapEvent) -> None:
-        """Write one event, if it has not been written from the peer's side."""
+        """Writes the frames of an event; called by the network.  Mirrored events are written from the sender's side only."""
         if event.mirrored and not event.out:
             return
         pair = event.local, event.remote
@@ -96,13 +96,13 @@ class Capture:
         return [*segments, self._segment(flow, receiver, sender, ACK)]
 
     def _new_flow(self, opener: Peer, other: Peer, is_open: bool) -> _Flow:
-        """Sequence numbers begin somewhere else for each connection, and the same in each run."""
+        """Sequence numbers begin at another number for each connection, and are the same in each run."""
         self._count += 1
         first = self._count * 0x0100_0000
         return _Flow({opener: first % 2**32, other: (first + 0x0080_0000) % 2**32 if is_open else 0}, is_open)
 
     def _opened(self, flow: _Flow, opener: Peer, other: Peer) -> list[bytes]:
-        if flow.open:  # the tap was set in the middle of it
+        if flow.open:  # the tap was set after the SYN
             return []
         flow.open = True
         flow.next[other] = (flow.next[opener] + 0x0080_0000) % 2**32
@@ -129,8 +129,8 @@ class Capture:
         head = struct.pack(
             "<IIIII", self._interfaces[address], stamp >> 32, stamp & 0xFFFF_FFFF, len(frame), len(frame)
         )
-        said = _option(COMMENT, self._comment(address).encode()) + _option(OPTION_END, b"") if self._comment else b""
-        self._block(ENHANCED_PACKET, head + _padded(frame) + said)
+        options = _option(COMMENT, self._comment(address).encode()) + _option(OPTION_END, b"") if self._comment else b""
+        self._block(ENHANCED_PACKET, head + _padded(frame) + options)
 
     def _block(self, kind: int, body: bytes) -> None:
         size = struct.pack("<I", 12 + len(body))

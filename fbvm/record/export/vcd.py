@@ -1,7 +1,7 @@
 """A recording as a value change dump (IEEE 1364), for GTKWave, Surfer and others; needs the package pyvcd.
 
-Programs and instances are scopes, areas are scopes of their addresses, and the number of the scan is a signal.  Each
-value changes at the time of the scan at whose end it was there.  Times of the program are integers of nanoseconds.
+Programs and instances are scopes, areas are scopes of their addresses, and the number of the scan is a signal.  A
+value changes at the time of the scan at whose end it is new.  Times of the program are integers of nanoseconds.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ COMMENT = "fbvm"
 
 
 def write_vcd(recording: Recording, file: TextIO) -> None:
-    """Writes a recording.  Raises ModuleNotFoundError without pyvcd."""
+    """Writes a recording as VCD to a text file.  Raises ModuleNotFoundError without the package pyvcd."""
     import vcd  # type: ignore[import-not-found,unused-ignore]
 
     with vcd.VCDWriter(file, timescale="1 ns", date="", comment=COMMENT) as writer:

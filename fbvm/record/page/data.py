@@ -1,4 +1,4 @@
-"""All that the page of a run shows, as plain data: signals, words, what happened inside scans, what passed the network.
+"""The data of the HTML page of a run: signals, words, the events inside scans, packets.
 
     {"scans": [first, count], "times": [ns, then differences], "signals": [...], "words": {"D": {"200": [scan, value, ...]}},
      "rows": {scan: [[where, instance, signal, text, ...], ...]}, "frames": [...], ...}
@@ -35,19 +35,19 @@ from fbvm.syntax.ladder.drawing.widths import Sight
 from fbvm.watch.paths import UnknownPlace
 
 MOST_ROWS = 200_000
-"""Statements and phases that are kept, the latest ones; of earlier scans there are values only."""
+"""Rows of statements and phases that are kept, the latest ones; earlier scans have values only."""
 MOST_PICTURES = 5000
-"""Rungs that are drawn, each once for every way in which power went through it."""
+"""Drawings of rungs and charts; executions with the same states share one."""
 RUNG_WIDTH = 90
 FEW_SIGNALS = 60
-"""If there are more, those that stood still are left out unless somebody asks for them."""
+"""If there are more signals, those without changes are left out, unless they are named."""
 POWER = -1
 """In place of a signal: whether an element of a rung conducts."""
 VERSION = 1
 
 
 class Collector:
-    """Follows a trace, or scans that are done again, and collects."""
+    """A listener that collects the data of a trace."""
 
     def __init__(self, trace: Trace, signals: Sequence[Signal]) -> None:
         self._trace, self.signals = trace, list(signals)
@@ -76,16 +76,16 @@ class Collector:
             for offset in range(signal.place.offset, signal.place.offset + max(1, signal.place.type.size)):
                 self._at.setdefault(offset, []).append(number)
 
-    # --- what is told
+    # --- called by the trace
 
     def phase(self, moment: Moment, phase: Phase) -> None:
-        """Notes what a phase changed that no statement did, and at the end of a scan all values."""
+        """Records changes that no statement has made, and at the end of a scan all values."""
         now = moment.memory.snapshot()
         if self._memory is None:
             self.first = moment.scans
             self._known = [self._text(number, moment) for number in range(len(self.signals))]
         self._statement = self._row = None
-        moved = self._moved(self._touched(now), moment)
+        moved = self._new_values(self._touched(now), moment)
         self._memory = now
         if moved or phase is Phase.INPUTS:
             self._add(moment.scans, [-1 - PHASES.index(phase), -1, *moved])
@@ -97,7 +97,7 @@ class Collector:
             self._end(moment, now)
 
     def event(self, moment: Moment, event: Event) -> None:
-        """Notes a statement, and what it writes."""
+        """Records a statement, its writes, the state of a contact, a packet."""
         self._power.event(moment, event)
         self._chart_recorder.event(moment, event)
         if isinstance(event, NetworkEvent):
@@ -112,10 +112,10 @@ class Collector:
                 self._statement = event.site, event.frame
                 self._open(moment, event.site, event.frame)
             assert self._row is not None
-            self._row += self._moved(self._written(event), moment)
+            self._row += self._new_values(self._written(event), moment)
 
     def _draw(self, scan: int) -> None:
-        """Draws the rungs and charts of a scan as they were seen; what looked the same before is drawn once."""
+        """Draws the rungs and charts of a scan; those with the same states share one drawing."""
         for made in self._power.executed:
             key = made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items())
             self._picture(scan, made.base, key, partial(_rung, made.picture, Sight(made.states)))
@@ -160,7 +160,7 @@ class Collector:
         return str(int(value is True)) if signal.is_bit else signal.display(value)
 
     def _touched(self, now: Snapshot) -> set[int]:
-        """The signals in bytes that differ from the phase before."""
+        """The numbers of the signals in bytes that differ from the phase before."""
         if self._memory is None:
             return set()
         runs = compare(self._memory, now)
@@ -171,8 +171,8 @@ class Collector:
         return [number for number in sorted(numbers) if event.bit == WHOLE_BYTES
                 or self.signals[number].place.bit in (None, event.bit)]  # fmt: skip
 
-    def _moved(self, numbers: Iterable[int], moment: Moment) -> list[Any]:
-        """Signal, text, signal, text ... of those that have another value than they had."""
+    def _new_values(self, numbers: Iterable[int], moment: Moment) -> list[Any]:
+        """Signal, text, signal, text ... of those of some signals that have a new value."""
         made: list[Any] = []
         for number in sorted(numbers):
             text = self._text(number, moment)
@@ -233,7 +233,7 @@ def page_data(trace: Trace, names: Sequence[str] = (), scans: range | None = Non
 
 
 def _in_order(trace: Trace) -> list[Signal]:
-    """All signals; what is of most interest comes first: programs' own variables, what units say, then what lies deeper."""
+    """All signals: first the programs' own variables, then described addresses, then members of instances."""
     programs = {field.name for field in trace.symbols.values() if isinstance(field.type, StructType) and field.type.block}
 
     def rank(signal: Signal) -> int:
@@ -294,7 +294,7 @@ def _renumbered(row: list[Any], signals: dict[int, int], sites: dict[int, int]) 
 
 
 def _located(trace: Trace, signals: Sequence[Signal]) -> Iterator[tuple[str, str]]:
-    """Addresses at which variables lie, and the variables."""
+    """Pairs of an address and the variable that is located there."""
     for signal in signals:
         if not signal.place.area:
             try:

@@ -1,7 +1,6 @@
 """The page of a run: one HTML file that opens offline, with everything in it.
 
-What it shows is `page.data`; how, is written by hand in `page/`: HTML, CSS and JavaScript that are put together here as
-they are.
+Its contents are those of `page.data`; HTML, CSS and JavaScript are files of this folder, which are put together unchanged.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ SCRIPTS = ("model.js", "chart.js", "panels.js", "main.js")
 
 
 def page(data: dict[str, Any]) -> str:
-    """The text of the file."""
+    """The text of the HTML file; `data` is the result of `page_data`."""
     packed = zlib.compress(json.dumps(data, separators=(",", ":")).encode(), 9)
     parts = {
         "title": html.escape(str(data["title"])),

@@ -43,7 +43,7 @@ class Column:
 
 
 def read_csv(file: TextIO, out: BinaryIO) -> int:
-    """Writes a trace of the scans that a table describes; returns how many.  Raises RowsError."""
+    """Writes a trace with the scans of a CSV table to `out`; returns the number of scans.  Raises RowsError."""
     rows = list(csv.reader(file))
     if not rows or rows[0][:2] != [SCAN, TIME_MS]:
         raise CsvError(f"line 1: the first two columns are {SCAN} and {TIME_MS}")

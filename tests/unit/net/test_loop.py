@@ -62,7 +62,7 @@ def test_a_modbus_exchange() -> None:
     assert link.events(5) == [Sent(1, 12), Received(1, Adu(1, 255, b"\x03\x02\xab\x12").to_bytes())]
     link.submit([Close(1)], 6)
     assert link.events(6) == [Closed(1)]
-    assert peer.heard == [request]
+    assert peer.received == [request]
 
 
 def test_nobody_listens() -> None:
@@ -115,7 +115,7 @@ def test_half_close_by_the_peer_leaves_sending_possible() -> None:
     assert link.events(1) == [PeerClosed(1)]
     link.submit([Send(1, b"still")], 1)
     assert link.events(1) == [Sent(1, 5)]
-    assert peer.heard == [b"still"]
+    assert peer.received == [b"still"]
 
 
 def test_sending_to_a_peer_that_left_ends_in_a_reset() -> None:

@@ -118,7 +118,7 @@ class Play:
 
     def __init__(self, network: LoopNetwork | TcpNetwork) -> None:
         self.links = {name: network.attach(host) for name, host in HOSTS.items()}
-        self.told: dict[str, list[Event]] = {"a": [], "b": []}
+        self.pending: dict[str, list[Event]] = {"a": [], "b": []}
 
     def submit(self, step: Step, now_ns: int) -> None:
         names, requests = step
@@ -127,8 +127,8 @@ class Play:
 
     def fetch(self, now_ns: int) -> dict[str, list[Event]]:
         for name, link in self.links.items():
-            self.told[name] += link.events(now_ns)
-        return {name: plain(told) for name, told in self.told.items()}
+            self.pending[name] += link.events(now_ns)
+        return {name: plain(told) for name, told in self.pending.items()}
 
 
 @each_of("name", SCENARIOS)
@@ -160,7 +160,7 @@ def test_the_scenarios_see_every_kind_of_event() -> None:
         for now_ns, step in enumerate(steps):
             play.submit(step, now_ns)
             play.fetch(now_ns)
-        for event in [*play.fetch(99)["a"], *play.told["b"]]:
+        for event in [*play.fetch(99)["a"], *play.pending["b"]]:
             seen.add(type(event).__name__)
             if isinstance(event, Failed | Broken):
                 errors.add(event.error)

@@ -199,7 +199,7 @@ def test_connect_send_receive_close() -> None:
         rig.step()
         states.append(words[port_map.STATE])
     assert states == [State.OPENING, State.OPEN, State.OPEN, State.OPEN]
-    assert peer.heard == [b"hello"]
+    assert peer.received == [b"hello"]
     assert (words[port_map.SENDING], heard(words)) == (0, b"worlds")
     assert words[port_map.PEER_IP : port_map.PEER_PORT + 1].tolist() == [0xC0A8, 0xFA02, 502]
     words[port_map.WISH] = Wish.CLOSED
