@@ -14,7 +14,7 @@ import click
 import fbvm
 from fbvm.cli.shared import status
 
-ROOMS = {
+VERB_GROUPS = {
     "running": ("Run PLCs", {
         "demo": "Fetch registers from a real Modbus TCP server and show how it went.",
         "run": "Run a program, in virtual time or over real TCP.",
@@ -47,7 +47,7 @@ ROOMS = {
     }),
 }  # fmt: skip
 """The rooms of verbs: what heads each in `fbvm --help`, and its verbs.  The module of a verb has its name."""
-HOMES = {verb: room for room, (_, verbs) in ROOMS.items() for verb in verbs}
+GROUP_OF = {verb: room for room, (_, verbs) in VERB_GROUPS.items() for verb in verbs}
 
 
 class _Verbs(click.Group):
@@ -62,16 +62,16 @@ class _Verbs(click.Group):
             sys.exit(status.INTERRUPTED)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(HOMES)
+        return list(GROUP_OF)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        if cmd_name not in HOMES:
+        if cmd_name not in GROUP_OF:
             return None
-        command: click.Command = importlib.import_module(f"fbvm.cli.{HOMES[cmd_name]}.{cmd_name}").command
+        command: click.Command = importlib.import_module(f"fbvm.cli.{GROUP_OF[cmd_name]}.{cmd_name}").command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        for heading, verbs in ROOMS.values():
+        for heading, verbs in VERB_GROUPS.values():
             with formatter.section(heading):
                 formatter.write_dl(list(verbs.items()))
 

@@ -13,8 +13,8 @@ import click
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.check.lint.suppression import Wanted
 from fbvm.cli.shared import status
-from fbvm.cli.shared.project_arguments import check_options, project_argument
-from fbvm.cli.shared.sources import chosen, report, source_options
+from fbvm.cli.shared.project_arguments import check_project_options, project_argument
+from fbvm.cli.shared.sources import compile_options, report_diagnostics, source_options
 from fbvm.code.compiler import LONG, compile_files
 
 BESIDE_PROJECTS = {"no_warn": "--no-warn", "warnings_as_errors": "--warnings-as-errors", "as_json": "--json"}
@@ -40,27 +40,27 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         wanted = Wanted.of(codes, warnings_as_errors)
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="--no-warn") from None
-    with _patience(files) as progress:
+    with _progress(files) as progress:
         if project := project_argument(files):
-            check_options(click.get_current_context(), BESIDE_PROJECTS)
+            check_project_options(click.get_current_context(), BESIDE_PROJECTS)
             diagnostics = _of_project(project, wanted)
         else:
             made = compile_files(files, program=program, libraries=libraries, no_warn=codes,
-                                 warnings_as_errors=warnings_as_errors, progress=progress, **chosen())
+                                 warnings_as_errors=warnings_as_errors, progress=progress, **compile_options())
             diagnostics = made.diagnostics
     if diagnostics or as_json:
-        report(diagnostics, as_json)
+        report_diagnostics(diagnostics, as_json)
     if errors(diagnostics):
         sys.exit(status.PROGRAM_ERRORS)
 
 
-def _patience(files: tuple[Path, ...]) -> AbstractContextManager[Callable[[str, int, int], None]]:
+def _progress(files: tuple[Path, ...]) -> AbstractContextManager[Callable[[str, int, int], None]]:
     """Who says on a terminal how far a long check is; for a short one nothing is loaded."""
     if not sys.stderr.isatty() or all(path.is_file() for path in files) and sum(path.stat().st_size for path in files) < LONG:
         return nullcontext(lambda what, done, known: None)
-    from fbvm.cli.shared.progress import patience
+    from fbvm.cli.shared.progress import show_progress
 
-    return patience(f"checking {', '.join(path.name for path in files)}")
+    return show_progress(f"checking {', '.join(path.name for path in files)}")
 
 
 def _of_project(file: Path, wanted: Wanted) -> list[Diagnostic]:

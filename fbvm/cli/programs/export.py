@@ -10,7 +10,7 @@ import click
 
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
-from fbvm.cli.shared.sources import report
+from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.interchange.plcopen.write.exporting import export_xml
 
 
@@ -27,7 +27,7 @@ def command(files: tuple[Path, ...], document: Path, as_json: bool) -> None:
     created = datetime.fromtimestamp(int(latest), UTC).strftime("%Y-%m-%dT%H:%M:%S")
     made = export_xml(files, document.stem, created)
     if made.diagnostics or as_json:
-        report(made.diagnostics, as_json)
+        report_diagnostics(made.diagnostics, as_json)
     if made.text is not None:
         with writing(document):
             document.write_text(made.text, encoding="utf-8")

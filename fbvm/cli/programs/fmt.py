@@ -18,7 +18,7 @@ from fbvm.base.types import fold
 from fbvm.check.calls.standard import is_known
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
-from fbvm.cli.shared.sources import show
+from fbvm.cli.shared.sources import show_diagnostic
 from fbvm.syntax.formatter.formatter import formatted
 from fbvm.syntax.formatter.names import Outside
 from fbvm.syntax.st.parser import parse
@@ -66,7 +66,7 @@ def _one(path: Path, check: bool, diff: bool) -> bool | None:
         return None
     text, wrong = formatted(source, OUTSIDE)
     for diagnostic in wrong:
-        show(diagnostic)
+        show_diagnostic(diagnostic)
     if wrong:
         _left_alone(source.name, "one syntax error" if len(wrong) == 1 else f"{len(wrong)} syntax errors")
         return None
@@ -98,7 +98,7 @@ def _read(path: Path) -> tuple[Source | None, bytes]:
         data = path.read_bytes() if isinstance(source, Source) else b""
     if isinstance(source, Source):
         return source, data
-    show(source)
+    show_diagnostic(source)
     return None, data
 
 

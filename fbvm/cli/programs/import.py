@@ -9,7 +9,7 @@ import click
 
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
-from fbvm.cli.shared.sources import report
+from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.interchange.plcopen.read.importing import import_xml
 
 
@@ -29,7 +29,7 @@ def command(file: Path, folder: Path, force: bool, as_json: bool) -> None:
     if there and not force:
         raise click.UsageError(f"{folder / there[0]} is there already; --force writes over it")
     if made.diagnostics or as_json:
-        report(made.diagnostics, as_json)
+        report_diagnostics(made.diagnostics, as_json)
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in made.files.items():

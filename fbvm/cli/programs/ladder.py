@@ -9,7 +9,7 @@ import click
 from fbvm.cli.shared.drawings import SVG_WIDTH, print_lines, rung_lines, symbol_addresses
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.run_result import chart_width
-from fbvm.cli.shared.sources import compiled, source_arguments
+from fbvm.cli.shared.sources import compile_or_exit, source_arguments
 from fbvm.record.draw.ladder_svg import ladder_svg
 from fbvm.record.draw.ladder_text import ladder_surface
 from fbvm.syntax.ladder.drawing.widths import Sight
@@ -22,7 +22,7 @@ from fbvm.syntax.ladder.drawing.widths import Sight
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], width: int | None,
             svg: Path | None) -> None:
     """Draw the rungs of the files, POU by POU."""
-    image = compiled(files, program, libraries, runnable=False, drawn=True)
+    image = compile_or_exit(files, program, libraries, runnable=False, drawn=True)
     if not image.rungs:
         raise click.UsageError("there is nothing to draw in these files")
     if svg:

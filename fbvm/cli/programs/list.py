@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli.shared.sources import compiled, source_arguments
+from fbvm.cli.shared.sources import compile_or_exit, source_arguments
 from fbvm.code.listing import listing
 from fbvm.engine.native.module import translate
 
@@ -16,5 +16,5 @@ from fbvm.engine.native.module import translate
 @click.option("--native", "as_native", is_flag=True, help="Print the LLVM code instead.")
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], as_native: bool) -> None:
     """Print what the files compile to: tasks, layout, symbols and the code of each POU."""
-    image = compiled(files, program, libraries, runnable=False)
+    image = compile_or_exit(files, program, libraries, runnable=False)
     click.echo(translate(image).text if as_native else listing(image))

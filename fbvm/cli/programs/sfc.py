@@ -9,7 +9,7 @@ import click
 from fbvm.cli.shared.drawings import SVG_WIDTH, print_lines
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.run_result import chart_width
-from fbvm.cli.shared.sources import compiled, source_arguments
+from fbvm.cli.shared.sources import compile_or_exit, source_arguments
 from fbvm.code.image import Image, SfcPicture
 from fbvm.record.draw.ladder_svg import ladder_svg
 from fbvm.record.draw.sfc_text import LEAST, sfc_surface, sfc_text
@@ -22,7 +22,7 @@ from fbvm.record.draw.sfc_text import LEAST, sfc_surface, sfc_text
 def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], width: int | None,
             svg: Path | None) -> None:
     """Draw the sequential function charts of the files, POU by POU."""
-    image = compiled(files, program, libraries, runnable=False)
+    image = compile_or_exit(files, program, libraries, runnable=False)
     if not image.charts:
         raise click.UsageError("there is no chart in these files: no POU has an INITIAL_STEP")
     if svg:

@@ -8,7 +8,7 @@ import click
 
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.run_result import chart_width
-from fbvm.cli.shared.traces import opened, recorded, scans_option, trace_argument
+from fbvm.cli.shared.traces import open_trace, recording_of, scans_option, trace_argument
 from fbvm.record.draw.chart import draw
 
 
@@ -22,7 +22,7 @@ def command(path: Path, names: tuple[str, ...], scans: range | None, width: int 
     """Draw variables of a TRACE, one column a scan.  Without names, those that changed.
 
     A trace can be drawn while it is still being written."""
-    with opened(path) as trace:
+    with open_trace(path) as trace:
         chosen = [name for text in names for name in split_names(text)]
-        made = recorded(trace, chosen, scans)
+        made = recording_of(trace, chosen, scans)
         click.echo(draw(made, width=width or chart_width(), ruler=True, compress=not whole), nl=False)

@@ -11,7 +11,7 @@ import click
 
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
-from fbvm.cli.shared.traces import SUFFIX, opened, recorded, scans_option
+from fbvm.cli.shared.traces import SUFFIX, open_trace, recording_of, scans_option
 from fbvm.record.draw.svg import SvgChart
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.export.vcd import write_vcd
@@ -27,7 +27,7 @@ Names = Sequence[str]
 
 
 def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
-    made = recorded(trace, names, scans)
+    made = recording_of(trace, names, scans)
     with path.open("w", encoding="utf-8", newline="") as file:
         write_csv(made, file)
 
@@ -35,19 +35,19 @@ def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
 def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     text = StringIO()
     try:
-        write_vcd(recorded(trace, names, scans), text)
+        write_vcd(recording_of(trace, names, scans), text)
     except ModuleNotFoundError:
         raise click.UsageError("VCD needs the package pyvcd: pip install 'fbvm[vcd]'") from None
     path.write_text(text.getvalue(), encoding="ascii", errors="replace")
 
 
 def _svg(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
-    made = recorded(trace, names, scans)
+    made = recording_of(trace, names, scans)
     path.write_text(SvgChart(made, packets(trace, made.scans), path.stem).text(), encoding="utf-8")
 
 
 def _html(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
-    recorded(trace, names, range(trace.scans.stop - 1, trace.scans.stop) if scans is None else scans)
+    recording_of(trace, names, range(trace.scans.stop - 1, trace.scans.stop) if scans is None else scans)
     path.write_text(page(page_data(trace, names, scans, path.stem)), encoding="utf-8")
 
 
@@ -90,7 +90,7 @@ def command(source: Path, target: Path, names: tuple[str, ...], scans: range | N
         write = FORMATS.get(target.suffix.lower())
         if write is None:
             raise click.UsageError(f"{target}: what it shall be is not clear; end it with {', '.join(FORMATS)}")
-        with opened(source) as trace:
+        with open_trace(source) as trace:
             write(trace, [name for text in names for name in split_names(text)], scans, target)
 
 

@@ -9,7 +9,7 @@ import click
 
 from fbvm.cli.shared import status
 from fbvm.cli.shared.options import split_names
-from fbvm.cli.shared.traces import opened, scans_option, trace_argument
+from fbvm.cli.shared.traces import open_trace, scans_option, trace_argument
 from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace.recorder import signals_at
 from fbvm.record.trace.writer import Depth
@@ -24,7 +24,7 @@ def command(path: Path, names: tuple[str, ...], scans: range | None, every: bool
     """Show which statement changed variables of a TRACE, and in which phase of the scan.
 
     The trace must have been written with --depth writes or statements.  Status 1 if nothing changed."""
-    with opened(path) as trace:
+    with open_trace(path) as trace:
         if trace.depth is Depth.SCANS:
             raise click.UsageError(f"{path} holds values at scan ends only; write it with --depth statements")
         signals = [signal for text in names for name in split_names(text)

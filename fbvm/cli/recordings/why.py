@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from fbvm.cli.shared.traces import SUFFIX, opened
+from fbvm.cli.shared.traces import SUFFIX, open_trace
 from fbvm.record.draw.why import DEEPEST, cause_text, why
 from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import Place
@@ -22,7 +22,7 @@ def command(name: str, path: Path | None, scan: int | None, deep: int) -> None:
     """Say why a variable has its value: the statement that gave it, what it had read, and so on back through scans.
 
     The TRACE must have been written with --depth statements; it may be left out where the folder has only one."""
-    with opened(path or _only_trace()) as trace:
+    with open_trace(path or _only_trace()) as trace:
         if trace.depth is not Depth.STATEMENTS:
             raise click.UsageError("the trace does not hold what statements read; write it with --depth statements")
         place = trace.find(name)

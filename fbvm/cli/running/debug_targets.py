@@ -10,7 +10,7 @@ from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared import status
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import Mapping
-from fbvm.cli.shared.sources import report
+from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
@@ -108,5 +108,5 @@ def _catch_up(others: list[Running], now_ns: int) -> None:
 
 
 def _refused(diagnostics: list[Diagnostic]) -> SystemExit:
-    report(diagnostics, False)
+    report_diagnostics(diagnostics, False)
     return SystemExit(status.PROGRAM_ERRORS)

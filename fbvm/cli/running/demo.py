@@ -94,7 +94,7 @@ def command(kind: str) -> None:
     program = data_folder("examples") / "demo.st"
     whose = "of another PLC, with a program of its own," if kind == "own" else "of pymodbus"
     try:
-        with own_server() if kind == "own" else foreign_server() as server:
+        with own_server() if kind == "own" else pymodbus_server() as server:
             console.print(f"A Modbus TCP server {whose} listens on 127.0.0.1:{server.port}; what the program calls\n{SERVER} "
                           "is there.", soft_wrap=True)  # fmt: skip
             sys.exit(_show(console, program, server))
@@ -112,7 +112,7 @@ def _show(console: Console, program: Path, server: Server) -> int:
     try:
         plc.attach(Etn21(0, ETN21_ADDRESS), network)
         recorder = Recorder(plc, SIGNALS)
-        with Steps(console, plc) as steps:
+        with StepDisplay(console, plc) as steps:
             plc.watchers.append(steps.watch)
             reason = loop.run(plc, until="Main.Done OR Main.Error_Code <> 0", max_ns=LIMIT_NS)
     finally:
@@ -167,7 +167,7 @@ def modbus_server() -> Iterator[int]:
 
 
 @dataclass(frozen=True)
-class Foreign:
+class PymodbusServer:
     """pymodbus's server; its client asks over a connection of its own."""
 
     port: int
@@ -185,13 +185,13 @@ class Foreign:
 
 
 @contextmanager
-def foreign_server() -> Iterator[Server]:
+def pymodbus_server() -> Iterator[Server]:
     with modbus_server() as port:
-        yield Foreign(port)
+        yield PymodbusServer(port)
 
 
 @dataclass(frozen=True)
-class Own:
+class OwnServer:
     """A PLC with the server program, which saves its memory when it ends."""
 
     port: int
@@ -212,7 +212,7 @@ def own_server() -> Iterator[Server]:
         image = Path(folder) / "memory.json"
         image.write_text(json.dumps({"spaces": {"D": list(range(1000, 1125))}}), encoding="utf-8")
         with _process("serve", "--port", "0", "--image", str(image)) as (process, port):
-            yield Own(port, process, image)
+            yield OwnServer(port, process, image)
 
 
 def compare(plc: Plc, server: Server) -> list[Comparison]:
@@ -236,7 +236,7 @@ def _words(plc: Plc, first: int, count: int) -> tuple[list[str], list[int]]:
 # --- what is shown ----------------------------------------------------------------------------------------------------
 
 
-class Steps:
+class StepDisplay:
     """The steps of the program as they happen, on a terminal; in a pipe once, at the end."""
 
     def __init__(self, console: Console, plc: Plc) -> None:
@@ -244,7 +244,7 @@ class Steps:
         self._began_ms: dict[int, float] = {}
         self._live = Live(self._view(), console=console, auto_refresh=False)
 
-    def __enter__(self) -> Steps:
+    def __enter__(self) -> StepDisplay:
         self._live.start()
         return self
 
@@ -283,7 +283,7 @@ def _table(comparisons: list[Comparison]) -> Table:
     return table
 
 
-def called() -> str:
+def command_name() -> str:
     """How to call this command again from here: `fbvm` where that is found, else the path by which it was called."""
     if shutil.which("fbvm"):
         return "fbvm"
@@ -295,7 +295,7 @@ def called() -> str:
 
 def _next(program: Path) -> str:
     here = program.relative_to(Path.cwd()) if program.is_relative_to(Path.cwd()) else program
-    fbvm = called()
+    fbvm = command_name()
     return f"""
 What to try next:
   {fbvm} run {here} --until Main.Done --max 5s --map {SERVER}=peer --show D200..D209

@@ -12,9 +12,9 @@ from click.core import ParameterSource
 
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.cli.shared import status
-from fbvm.cli.shared.project_arguments import check_options
-from fbvm.cli.shared.run_result import EXIT_STATUS, Progress, for_scripts, shown, trap_for_scripts
-from fbvm.cli.shared.sources import report, show
+from fbvm.cli.shared.project_arguments import check_project_options
+from fbvm.cli.shared.run_result import EXIT_STATUS, RunProgress, json_trap, json_value, value_text
+from fbvm.cli.shared.sources import report_diagnostics, show_diagnostic
 from fbvm.machine.scan_times import Lateness, ScanTimes
 from fbvm.run import run_all
 from fbvm.run.plant import Kind, Plant
@@ -31,7 +31,7 @@ OPTIONS = {"net": "--net", "for_ns": "--for", "scans": "--scans", "scan_time": "
 def run_project(file: Path, context: click.Context) -> int:
     """Runs it to its end, with the options of the command line; the exit status."""
     given = {name for name in context.params if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
-    check_options(context, OPTIONS)
+    check_project_options(context, OPTIONS)
     net = context.params["net"] if "net" in given else None
     for_ns, scans = context.params["for_ns"], context.params["scans"]
     as_json = context.params["as_json"]
@@ -47,10 +47,10 @@ def run_project(file: Path, context: click.Context) -> int:
     if errors(plant.diagnostics):
         return _refuse(plant.diagnostics, as_json)
     for diagnostic in plant.diagnostics:
-        show(diagnostic)
+        show_diagnostic(diagnostic)
     first = plant.runs[0].plc
     try:
-        with Progress(None if as_json else first, plant.scans, plant.for_ns) as progress:
+        with RunProgress(None if as_json else first, plant.scans, plant.for_ns) as progress:
             run_all(plant.runs, lambda: progress.update(first))
     finally:
         plant.close()
@@ -60,7 +60,7 @@ def run_project(file: Path, context: click.Context) -> int:
 
 
 def _refuse(diagnostics: list[Diagnostic], as_json: bool) -> int:
-    report(diagnostics, as_json)
+    report_diagnostics(diagnostics, as_json)
     return status.PROGRAM_ERRORS
 
 
@@ -103,9 +103,9 @@ def _lines(kind: Kind) -> Iterator[str]:
     for name, place in kind.watched.items():
         values = [names.read(run.plc.read, place) for run in kind.runs]
         if all(value == values[0] for value in values):
-            yield f"  {name} = {shown(place, values[0])}"
+            yield f"  {name} = {value_text(place, values[0])}"
         elif isinstance(place, Place) and all(isinstance(value, int | float) for value in values):
-            yield f"  {name} = {shown(place, min(values, key=_number))} .. {shown(place, max(values, key=_number))}"
+            yield f"  {name} = {value_text(place, min(values, key=_number))} .. {value_text(place, max(values, key=_number))}"
         else:
             yield f"  {name} has {len({repr(value) for value in values})} different values"
 
@@ -125,8 +125,8 @@ def _for_scripts(plant: Plant) -> Iterator[tuple[str, object]]:
         for name, run in zip(kind.names, kind.runs, strict=True):
             yield name, {
                 "scans": run.plc.scans, "time_ns": run.plc.elapsed_ns, "stopped": run.reason,
-                "values": {text: for_scripts(place, names.read(run.plc.read, place)) for text, place in kind.watched.items()},
-                "trap": trap_for_scripts(run.plc.trap),
+                "values": {text: json_value(place, names.read(run.plc.read, place)) for text, place in kind.watched.items()},
+                "trap": json_trap(run.plc.trap),
             }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import click
 
 from fbvm.cli.shared import journals
 from fbvm.cli.shared.options import charted_names, show_option
-from fbvm.cli.shared.run_result import Outcome
+from fbvm.cli.shared.run_result import RunResult
 from fbvm.net.journal import JournalError
 from fbvm.record.trace.recorder import Recorder
 from fbvm.run.replay import Replay
@@ -32,7 +32,7 @@ def command(
     """Do again what `fbvm run --journal JOURNAL` did: the same program and inputs, in no time and without a network.
 
     Ends with 1 if the memory was not the same to the bit after some scan, or if --until never held."""
-    with journals.opened(journal) as (header, entries):
+    with journals.open_journal_file(journal) as (header, entries):
         replay = Replay(header, entries, journals.program_of(header, libraries, as_json))
         try:
             places = {text: replay.plc.find(text) for text in shown}
@@ -43,13 +43,13 @@ def command(
             raise
         except (LookupError, TypeError, ValueError) as error:
             raise click.UsageError(str(error)) from None
-    outcome = Outcome(replay.plc, _reason(replay, reason, until), places, recorder, as_json, until or "")
-    outcome.print()
+    result = RunResult(replay.plc, _reason(replay, reason, until), places, recorder, as_json, until or "")
+    result.print()
     if replay.differs is not None:
         click.secho(f"after scan {replay.differs} the memory is not what the journal says", fg="red", err=True)
     elif reason == "end" and not replay.complete:
         click.secho(f"the journal was cut off after {replay.plc.scans} scans", fg="yellow", err=True)
-    sys.exit(outcome.status)
+    sys.exit(result.status)
 
 
 def _reason(replay: Replay, reason: str, until: str | None) -> str:

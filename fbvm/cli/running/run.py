@@ -19,9 +19,9 @@ from fbvm.cli.shared.journals import start_journal
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, charted_names, mapping, setting, show_option, time_ns
 from fbvm.cli.shared.project_arguments import project_argument
-from fbvm.cli.shared.run_result import Outcome, Progress
-from fbvm.cli.shared.sources import compiled, source_options
-from fbvm.cli.shared.traces import paging, statement_lines, tracing
+from fbvm.cli.shared.run_result import RunProgress, RunResult
+from fbvm.cli.shared.sources import compile_or_exit, source_options
+from fbvm.cli.shared.traces import statement_lines, write_page, write_trace
 from fbvm.code.image import Image
 from fbvm.engine.tiers import CHOICES
 from fbvm.machine.plc import Plc
@@ -96,7 +96,7 @@ def command(
         sys.exit(run_project(project, click.get_current_context()))
     _check_usage(**options)
     drawn = bool(options["rungs"]) and not options["journal"]  # who replays a journal compiles as it was recorded
-    image = compiled(files, program, libraries, runnable=True, as_json=as_json, drawn=drawn)
+    image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json, drawn=drawn)
     named = [given.name for given in options["settings"]]
     banks = e_banks_in([*named, *options["shown"], *options["charted"], options["until"] or "", *options["watched"],
                       *options["conditions"], *options["lines"]])
@@ -112,17 +112,17 @@ def command(
             network.tap = _capture(stack, options["pcap"], network, plc).tap
         for unit in usual_units(mailbox_names(image), options["timing"], options["seed"]):
             plc.attach(unit, network)
-        _tell_doors(plc, network, options["mappings"])
-        with tracing(plc, options["trace"], options["depth"], options["selected"], files, libraries), \
-                paging(plc, options["html"], files, libraries), \
+        _print_host_endpoints(plc, network, options["mappings"])
+        with write_trace(plc, options["trace"], options["depth"], options["selected"], files, libraries), \
+                write_page(plc, options["html"], files, libraries), \
                 draw_executed_rungs(plc, options["rungs"]), draw_executed_charts(plc, options["charts"]):  # fmt: skip
-            outcome = _run(plc, as_json, **options)
-        outcome.print()
-        _tell_unused(plc, network)
+            result = _run(plc, as_json, **options)
+        result.print()
+        _warn_unused_mappings(plc, network)
         if plc.halted and not as_json:
             for line in halt_lines(plc, plc.halted, statement_lines(image, files, libraries)):
                 click.secho(line, fg="yellow", err=True)
-    sys.exit(outcome.status)
+    sys.exit(result.status)
 
 
 def _plc(image: Image, cycle_ns: int, engine: str, journal: Journal | None) -> Plc:
@@ -136,7 +136,7 @@ def _run(
     plc: Plc, as_json: bool, *, settings: tuple[Setting, ...], shown: tuple[str, ...], charted: tuple[str, ...],
     pace: str, scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, net: str,
     scan_time: bool, lines: tuple[str, ...], watched: tuple[str, ...], conditions: tuple[str, ...], **_: Any,
-) -> Outcome:  # fmt: skip
+) -> RunResult:  # fmt: skip
     """Runs to the end.  Names, values and conditions that do not fit the program are mistakes of usage."""
     for warning in plc.warnings:
         click.secho(warning, fg="yellow", err=True)
@@ -146,7 +146,7 @@ def _run(
         names = charted_names(charted)
         recorder = Recorder(plc, names) if names else None
         set_breakpoints(plc, lines, watched, conditions)
-        with Progress(None if as_json else plc, scans, for_ns or max_ns) as progress:
+        with RunProgress(None if as_json else plc, scans, for_ns or max_ns) as progress:
             reason = loop.run(
                 plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes, pace=pace,
                 progress=progress.update,
@@ -157,7 +157,7 @@ def _run(
         if not plc.scans or write.at_ns > plc.now_ns:
             click.secho(f"--set {given} was never written: the run ended before", fg="yellow", err=True)
     wanted = scan_time or (net == "tcp" and not as_json and sys.stderr.isatty())
-    return Outcome(plc, reason, places, recorder, as_json, until or "", wanted)
+    return RunResult(plc, reason, places, recorder, as_json, until or "", wanted)
 
 
 def _write(plc: Plc, given: Setting) -> TimedWrite:
@@ -166,7 +166,7 @@ def _write(plc: Plc, given: Setting) -> TimedWrite:
     return TimedWrite(found, parse_for(found, given.value), given.at_ns)
 
 
-def _tell_doors(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...]) -> None:
+def _print_host_endpoints(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...]) -> None:
     """Says where others reach the units on the host, once per row that is about a unit itself."""
     if isinstance(network, LoopNetwork):
         return
@@ -180,7 +180,7 @@ def _tell_doors(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Map
         sys.exit(status.NETWORK)
 
 
-def _tell_unused(plc: Plc, network: LoopNetwork | TcpNetwork) -> None:
+def _warn_unused_mappings(plc: Plc, network: LoopNetwork | TcpNetwork) -> None:
     """Says which rows of --map were of no use: most often the address is a mistake."""
     if isinstance(network, LoopNetwork):
         return

@@ -63,7 +63,7 @@ def command(
         settings["Idle_Time"] = idle_ns
     signals = Signals()
     with ExitStack() as stack:
-        stack.enter_context(signals.heard())
+        stack.enter_context(signals.installed())
         plc = _plc(settings, image)
         network = _network(bind, port)
         stack.callback(network.close)
@@ -145,17 +145,17 @@ class Signals:
         self.end = False
         self.save = False
 
-    def _asked(self, number: int, frame: FrameType | None) -> None:
+    def _handle(self, number: int, frame: FrameType | None) -> None:
         if number in (signal.SIGTERM, signal.SIGINT):
             self.end = True
         else:
             self.save = True
 
     @contextmanager
-    def heard(self) -> Iterator[None]:
+    def installed(self) -> Iterator[None]:
         """While this lasts."""
         numbers = [signal.SIGTERM, signal.SIGINT, *([signal.SIGUSR1] if hasattr(signal, "SIGUSR1") else [])]
-        before = {number: signal.signal(number, self._asked) for number in numbers}
+        before = {number: signal.signal(number, self._handle) for number in numbers}
         try:
             yield
         finally:

@@ -11,8 +11,8 @@ from fbvm.cli.running.debug_targets import DebugTarget, ProjectTarget
 from fbvm.cli.shared import status
 from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, mapping, setting, time_ns
 from fbvm.cli.shared.project_arguments import project_argument
-from fbvm.cli.shared.prompt import prompted
-from fbvm.cli.shared.sources import compiled, source_options
+from fbvm.cli.shared.prompt import prompt_lines
+from fbvm.cli.shared.sources import compile_or_exit, source_options
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.step.commands import CommandError, Commands, ExpectationError
 from fbvm.step.session import Session
@@ -50,7 +50,7 @@ def command(
         debugged = ProjectTarget(project, name)
         texts = source_texts(debugged.image, debugged.files, debugged.libraries)
     else:
-        image = compiled(files, program, libraries, runnable=True, drawn=True)
+        image = compile_or_exit(files, program, libraries, runnable=True, drawn=True)
         debugged = DebugTarget(image, cycle_ns, mappings, timing, seed)
         texts = source_texts(image, {str(path): path for path in files}, libraries)
     session = Session(debugged.make)
@@ -81,7 +81,7 @@ def _write(session: Session, given: Setting) -> None:
 
 def _talk(commands: Commands) -> None:
     """Asks for lines until `quit` or the end of input.  A mistake is said, and nothing else happens."""
-    for line in prompted(commands):
+    for line in prompt_lines(commands):
         try:
             for said in commands.run(line):
                 _say(said)

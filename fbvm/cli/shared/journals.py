@@ -15,7 +15,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.cli.shared import status
 from fbvm.cli.shared.e_banks import with_e_banks
 from fbvm.cli.shared.files import writing
-from fbvm.cli.shared.sources import chosen, report
+from fbvm.cli.shared.sources import compile_options, report_diagnostics
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
 from fbvm.net.journal import Entry, Header, Journal, JournalError, open_journal
@@ -33,7 +33,7 @@ def start_journal(
         file = stack.enter_context(path.open("w", encoding="utf-8", newline="\n"))
     texts = [read(name, str(name)) for name in files]
     journal = Journal(file, {
-        "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program, "chosen": chosen(),
+        "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program, "chosen": compile_options(),
         "libraries": [str(folder) for folder in libraries], "banks": list(banks),
         "options": dict(options),
         "sources": [[text.name, text.text] for text in texts if isinstance(text, Source)],
@@ -43,7 +43,7 @@ def start_journal(
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[tuple[Header, Iterator[Entry]]]:
+def open_journal_file(path: Path) -> Iterator[tuple[Header, Iterator[Entry]]]:
     """A journal to be read.  What is wrong with it, now or while it is done again, is a mistake of usage."""
     try:
         with path.open(encoding="utf-8", newline="\n") as file:
@@ -81,6 +81,6 @@ def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Imag
     compilation = compile_sources(sources, program, folders, runnable=True, lint=False, resource=choice.get("resource"),
                                   dialect=choice.get("dialect", "standard"))
     if compilation.image is None:
-        report(compilation.diagnostics, as_json)
+        report_diagnostics(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)
     return with_e_banks(compilation.image, banks)

@@ -14,7 +14,7 @@ QUICK_S = 2.0
 PER_SECOND = 8
 
 
-class _Late:
+class _DelayedSpinner:
     """Renders as nothing first, later as a spinner and a text."""
 
     def __init__(self, console: Console, text: str) -> None:
@@ -23,7 +23,7 @@ class _Late:
         self._spinner = Spinner("line", text)
         self._began_s = console.get_time()
 
-    def reached(self, what: str, done: int, known: int) -> None:
+    def update(self, what: str, done: int, known: int) -> None:
         """Say how far the work is."""
         self._spinner.update(text=f"{self._text}: {what} {100 * done // max(known, 1)} %")
 
@@ -33,12 +33,12 @@ class _Late:
 
 
 @contextmanager
-def patience(text: str, console: Console | None = None) -> Iterator[Callable[[str, int, int], None]]:
+def show_progress(text: str, console: Console | None = None) -> Iterator[Callable[[str, int, int], None]]:
     """Shows `text` on stderr from two seconds on until the block is over, and how far it is.  Nothing in a pipe."""
     console = console or Console(stderr=True)
-    late = _Late(console, text)
+    spinner = _DelayedSpinner(console, text)
     if not console.is_terminal:
-        yield late.reached
+        yield spinner.update
         return
-    with Live(late, console=console, transient=True, refresh_per_second=PER_SECOND):
-        yield late.reached
+    with Live(spinner, console=console, transient=True, refresh_per_second=PER_SECOND):
+        yield spinner.update

@@ -22,7 +22,7 @@ def project_argument(files: tuple[Path, ...]) -> Path | None:
     return found
 
 
-def check_options(context: click.Context, allowed: Mapping[str, str]) -> None:
+def check_project_options(context: click.Context, allowed: Mapping[str, str]) -> None:
     """Refuse what may not be said beside a project; `allowed` are the names of parameters and of their options."""
     given = {name for name in context.params if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
     given |= {option for option in ("resource", "dialect") if context.meta.get(f"fbvm.{option}") is not None}

@@ -28,7 +28,7 @@ class Completions(Completer):
             yield Completion(found, start_position=-len(word))
 
 
-def prompted(commands: Commands) -> Iterator[str]:
+def prompt_lines(commands: Commands) -> Iterator[str]:
     """Lines that somebody types, until the end of input.  Ctrl-C takes back the line."""
     asking: PromptSession[str] = PromptSession(history=_history(), completer=Completions(commands), complete_while_typing=False)
     while True:

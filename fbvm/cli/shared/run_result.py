@@ -31,7 +31,7 @@ EXIT_STATUS = {"max": status.FAILED, "differs": status.FAILED, "trap": status.ST
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunResult:
     """How a run ended and what was asked to be shown."""
 
     plc: Plc
@@ -57,7 +57,7 @@ class Outcome:
             click.echo(draw(self.recorder, width=chart_width(), ruler=True, compress=True), nl=False)
         names = Names.of(self.plc.image, self.plc.memory.areas)
         for text, place in self.places.items():
-            click.echo(f"{text} = {shown(place, names.read(self.plc.read, place))}")
+            click.echo(f"{text} = {value_text(place, names.read(self.plc.read, place))}")
         if self.scan_time:
             click.echo(str(self.plc.scan_times), err=True)
             if self.plc.lateness.count:
@@ -74,14 +74,14 @@ class Outcome:
             "scans": plc.scans,
             "time_ms": plc.elapsed_ns // 1_000_000 if plc.elapsed_ns % 1_000_000 == 0 else plc.elapsed_ns / 1e6,
             "stopped": self.reason,
-            "values": {text: for_scripts(place, names.read(plc.read, place)) for text, place in self.places.items()},
-            **({"break": _halt(plc.halted)} if plc.halted else {}),
-            "trap": trap_for_scripts(plc.trap),
+            "values": {text: json_value(place, names.read(plc.read, place)) for text, place in self.places.items()},
+            **({"break": _json_halt(plc.halted)} if plc.halted else {}),
+            "trap": json_trap(plc.trap),
             **({"scan_time": plc.scan_times.as_dict(), "lateness": plc.lateness.as_dict()} if self.scan_time else {}),
         }  # fmt: skip
 
 
-def trap_for_scripts(trap: Trap | None) -> dict[str, object] | None:
+def json_trap(trap: Trap | None) -> dict[str, object] | None:
     """What stopped a program, as JSON has it."""
     return None if trap is None else {
         "code": trap.code, "file": trap.site.file, "pou": trap.site.pou, "line": trap.site.line, "column": trap.site.column,
@@ -89,7 +89,7 @@ def trap_for_scripts(trap: Trap | None) -> dict[str, object] | None:
     }  # fmt: skip
 
 
-def _halt(halt: Halt) -> dict[str, object]:
+def _json_halt(halt: Halt) -> dict[str, object]:
     """A scan that stands at a breakpoint, as JSON has it."""
     site = halt.site
     return {
@@ -98,7 +98,7 @@ def _halt(halt: Halt) -> dict[str, object]:
     }  # fmt: skip
 
 
-def shown(place: Place | Span, value: Value) -> str:
+def value_text(place: Place | Span, value: Value) -> str:
     """A value for people; words of addresses, and what is declared to be read so, also in hexadecimal."""
     if isinstance(place, Span) and isinstance(value, list):
         return " ".join(show(part.type, item) for part, item in zip(place.places, value, strict=True))
@@ -111,7 +111,7 @@ def shown(place: Place | Span, value: Value) -> str:
         and not isinstance(value, bool) else text  # fmt: skip
 
 
-def for_scripts(place: Place | Span, value: Value) -> Value:
+def json_value(place: Place | Span, value: Value) -> Value:
     """A value as JSON has it."""
     return plain_value(place.type, value) if isinstance(place, Place) else value
 
@@ -121,7 +121,7 @@ def chart_width() -> int:
     return shutil.get_terminal_size((PIPE_WIDTH, 24)).columns
 
 
-class Progress:
+class RunProgress:
     """A line on the terminal while a run lasts; nothing in a pipe, and nothing without a PLC."""
 
     def __init__(self, plc: Plc | None, scans: int | None, for_ns: int | None) -> None:
@@ -129,7 +129,7 @@ class Progress:
         self._live: Live | None = None
         self._scans, self._for_ns = scans, for_ns
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> RunProgress:
         return self
 
     def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:

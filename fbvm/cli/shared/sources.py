@@ -25,17 +25,17 @@ def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
     return source_options(files(function))
 
 
-def _without_cache(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
+def _switch_cache_off(context: click.Context, parameter: click.Parameter, wanted: bool) -> None:
     if wanted:
         cache.switch(False)
         context.call_on_close(lambda: cache.switch(True))
 
 
-def _kept(context: click.Context, parameter: click.Parameter, value: str | None) -> None:
+def _keep_in_context(context: click.Context, parameter: click.Parameter, value: str | None) -> None:
     context.meta[f"fbvm.{parameter.name}"] = value
 
 
-def chosen() -> dict[str, Any]:
+def compile_options() -> dict[str, Any]:
     """What the options of the present command say about how to compile, as arguments of the compiler."""
     meta = click.get_current_context().meta
     return {name: meta[f"fbvm.{name}"] for name in ("resource", "dialect") if meta.get(f"fbvm.{name}") is not None}
@@ -47,11 +47,11 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--library", "libraries", multiple=True, metavar="DIR",
                      type=click.Path(exists=True, file_okay=False, path_type=Path),
                      help="A folder of libraries of your own, besides those that fbvm brings; may be repeated."),
-        click.option("--no-cache", is_flag=True, expose_value=False, callback=_without_cache,
+        click.option("--no-cache", is_flag=True, expose_value=False, callback=_switch_cache_off,
                      help="Compile anew, and keep nothing of it on disk."),
-        click.option("--resource", metavar="NAME", expose_value=False, callback=_kept,
+        click.option("--resource", metavar="NAME", expose_value=False, callback=_keep_in_context,
                      help="The RESOURCE that the PLC is, where a CONFIGURATION has several."),
-        click.option("--dialect", type=click.Choice(list(DIALECTS)), expose_value=False, callback=_kept,
+        click.option("--dialect", type=click.Choice(list(DIALECTS)), expose_value=False, callback=_keep_in_context,
                      help="How to answer what compilers disagree about; `fbvm explain dialects` says which answers."),
         click.option("--program", metavar="NAME", help="The PROGRAM to run where no CONFIGURATION says it."),
     ):  # fmt: skip
@@ -59,7 +59,7 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
     return function
 
 
-def compiled(
+def compile_or_exit(
     files: Sequence[Path], program: str | None, libraries: Sequence[Path], *, runnable: bool, as_json: bool = False,
     drawn: bool = False,
 ) -> Image:
@@ -67,22 +67,22 @@ def compiled(
 
     With `runnable` it is an error, too, if nothing says which program to run; with `drawn` Structured Text has rungs."""
     compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable, lint=False, drawn=drawn,
-                                **chosen())
+                                **compile_options())
     if compilation.image is None:
-        report(compilation.diagnostics, as_json)
+        report_diagnostics(compilation.diagnostics, as_json)
         sys.exit(status.PROGRAM_ERRORS)
     for diagnostic in compilation.diagnostics:
-        show(diagnostic)
+        show_diagnostic(diagnostic)
     return compilation.image
 
 
-def report(diagnostics: Sequence[Diagnostic], as_json: bool) -> None:
+def report_diagnostics(diagnostics: Sequence[Diagnostic], as_json: bool) -> None:
     """All diagnostics: to stderr as text with a last line that counts, or to stdout as one object."""
     if as_json:
         click.echo(json.dumps({"diagnostics": [diagnostic.as_dict() for diagnostic in diagnostics]}, indent=2))
         return
     for diagnostic in diagnostics:
-        show(diagnostic)
+        show_diagnostic(diagnostic)
     wrong = len(errors(diagnostics))
     counts = [f"{count} {what}{'s' * (count > 1)}" for count, what in ((wrong, "error"), (len(diagnostics) - wrong, "warning"))
               if count]
@@ -90,7 +90,7 @@ def report(diagnostics: Sequence[Diagnostic], as_json: bool) -> None:
         click.secho(f"{' and '.join(counts)}; `fbvm explain CODE` says more about each", bold=True, err=True)
 
 
-def show(diagnostic: Diagnostic) -> None:
+def show_diagnostic(diagnostic: Diagnostic) -> None:
     """One diagnostic on stderr, its first line in colour on a terminal."""
     first, _, rest = diagnostic.render().partition("\n")
     click.secho(first, fg="red" if diagnostic.severity == "error" else "yellow", err=True)

@@ -57,7 +57,7 @@ def scans_option(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Trace]:
+def open_trace(path: Path) -> Iterator[Trace]:
     """The trace in a file.  What is no trace, and names it does not have, are mistakes of usage."""
     try:
         trace = Trace.open(path)
@@ -74,7 +74,7 @@ def opened(path: Path) -> Iterator[Trace]:
         raise click.UsageError(str(error)) from None
 
 
-def recorded(trace: Trace, names: Sequence[str], scans: range | None) -> Recording:
+def recording_of(trace: Trace, names: Sequence[str], scans: range | None) -> Recording:
     """The recording of some variables in some scans; a usage error if there are no such scans."""
     made = recording(trace, names, scans)
     if not made.times_ns:
@@ -87,7 +87,7 @@ def recorded(trace: Trace, names: Sequence[str], scans: range | None) -> Recordi
 
 
 @contextmanager
-def tracing(
+def write_trace(
     plc: Plc, path: Path | None, depth: str, selected: Sequence[str], files: Sequence[Path], libraries: Sequence[Path]
 ) -> Iterator[None]:
     """Records a run into a file, if there is one to write."""
@@ -110,7 +110,7 @@ def tracing(
 
 
 @contextmanager
-def paging(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Sequence[Path]) -> Iterator[None]:
+def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Sequence[Path]) -> Iterator[None]:
     """Writes a run as one HTML file when it is over, if there is one to write."""
     if path is None:
         yield

@@ -11,8 +11,8 @@ from click.testing import CliRunner, Result
 from rows import each_of
 
 from fbvm.base.codes import CODES
-from fbvm.cli.main import HOMES, main
-from fbvm.cli.running.demo import called
+from fbvm.cli.main import GROUP_OF, main
+from fbvm.cli.running.demo import command_name
 from fbvm.cli.shared.options import split_names
 from fbvm.record.draw.chart import Chart
 
@@ -347,7 +347,7 @@ def test_explain_prints_the_page() -> None:
 # --- the command itself -----------------------------------------------------------------------------------------------
 
 
-@each_of("verb", HOMES)
+@each_of("verb", GROUP_OF)
 def test_every_verb_has_help(verb: str) -> None:
     result = fbvm(verb, "--help")
     assert result.exit_code == 0
@@ -356,7 +356,7 @@ def test_every_verb_has_help(verb: str) -> None:
 
 def test_help_names_every_verb() -> None:
     output = fbvm("--help").stdout
-    assert all(verb in output for verb in HOMES)
+    assert all(verb in output for verb in GROUP_OF)
 
 
 def test_an_unknown_verb_is_wrong_usage() -> None:
@@ -521,4 +521,4 @@ def test_the_demo_names_the_command_as_it_can_be_called(
 ) -> None:  # fmt: skip
     monkeypatch.setattr("fbvm.cli.running.demo.shutil.which", lambda name: found)
     monkeypatch.setattr(sys, "argv", [argument.format(here=Path.cwd())])
-    assert called() == called_so
+    assert command_name() == called_so

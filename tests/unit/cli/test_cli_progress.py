@@ -9,7 +9,7 @@ from itertools import groupby
 from rich.console import Console
 
 from fbvm import Source, compile_sources
-from fbvm.cli.shared.progress import PER_SECOND, QUICK_S, patience
+from fbvm.cli.shared.progress import PER_SECOND, QUICK_S, show_progress
 
 
 def said(terminal: bool, seconds: float) -> str:
@@ -18,7 +18,7 @@ def said(terminal: bool, seconds: float) -> str:
     times: Iterator[float] = iter([0.0])
     now = [seconds]
     console = Console(file=file, force_terminal=terminal, width=80, get_time=lambda: next(times, now[0]))
-    with patience("checking long.st", console) as reached:
+    with show_progress("checking long.st", console) as reached:
         reached("read", 30, 120)
         console.print()
     return file.getvalue()

@@ -11,7 +11,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from fbvm.cli.main import HOMES, main
+from fbvm.cli.main import GROUP_OF, main
 
 needs_signals = pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM to react to")
 
@@ -33,7 +33,7 @@ def test_a_peer_ends_cleanly_also_in_the_middle_of_a_connection(number: int) -> 
     assert (process.returncode, said, wrong) == (0, "", "")
 
 
-@pytest.mark.parametrize("verb", HOMES)
+@pytest.mark.parametrize("verb", GROUP_OF)
 def test_ctrl_c_has_its_status_in_each_verb(verb: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(ctx: click.Context) -> None:
         raise KeyboardInterrupt

@@ -11,7 +11,7 @@ from prompt_toolkit.document import Document
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 
-from fbvm.cli.shared.prompt import HISTORY, Completions, prompted
+from fbvm.cli.shared.prompt import HISTORY, Completions, prompt_lines
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.step.commands import Commands
@@ -33,7 +33,7 @@ def typed(text: str) -> list[str]:
     """The lines that come of some keys."""
     with create_pipe_input() as keys, create_app_session(input=keys, output=DummyOutput()):
         keys.send_text(text + CONTROL_D)
-        return list(prompted(commands()))
+        return list(prompt_lines(commands()))
 
 
 @pytest.fixture(autouse=True)
