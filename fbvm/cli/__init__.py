@@ -1,1 +1,1 @@
-"""The command line: one module a verb."""
+"""The command line: one module for each verb, in four folders, and what verbs share in `shared/`."""

@@ -46,7 +46,7 @@ VERB_GROUPS = {
         "convert": "Write a trace as a page, a picture, CSV or VCD, or a CSV as a trace.",
     }),
 }  # fmt: skip
-"""The rooms of verbs: what heads each in `fbvm --help`, and its verbs.  The module of a verb has its name."""
+"""The verbs by folder: heading in `fbvm --help`, and the help of each verb.  The module of a verb has the name of the verb."""
 GROUP_OF = {verb: room for room, (_, verbs) in VERB_GROUPS.items() for verb in verbs}
 
 
@@ -54,7 +54,7 @@ class _Verbs(click.Group):
     """Loads the module of a verb when it is called, so that `fbvm check` starts quickly."""
 
     def invoke(self, ctx: click.Context) -> object:
-        """Runs the verb.  Ctrl-C ends it with its own status, whatever the verb is doing."""
+        """Runs the verb.  Ctrl-C ends it with status 130."""
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:

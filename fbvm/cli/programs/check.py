@@ -17,8 +17,8 @@ from fbvm.cli.shared.project_arguments import check_project_options, project_arg
 from fbvm.cli.shared.sources import compile_options, report_diagnostics, source_options
 from fbvm.code.compiler import LONG, compile_files
 
-BESIDE_PROJECTS = {"no_warn": "--no-warn", "warnings_as_errors": "--warnings-as-errors", "as_json": "--json"}
-"""What may be said beside a project."""
+PROJECT_OPTIONS = {"no_warn": "--no-warn", "warnings_as_errors": "--warnings-as-errors", "as_json": "--json"}
+"""The options that may be given with a project."""
 
 
 @click.command("check")
@@ -42,7 +42,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         raise click.BadParameter(str(error), param_hint="--no-warn") from None
     with _progress(files) as progress:
         if project := project_argument(files):
-            check_project_options(click.get_current_context(), BESIDE_PROJECTS)
+            check_project_options(click.get_current_context(), PROJECT_OPTIONS)
             diagnostics = _of_project(project, wanted)
         else:
             made = compile_files(files, program=program, libraries=libraries, no_warn=codes,
@@ -55,7 +55,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
 
 
 def _progress(files: tuple[Path, ...]) -> AbstractContextManager[Callable[[str, int, int], None]]:
-    """Who says on a terminal how far a long check is; for a short one nothing is loaded."""
+    """A context that shows the progress of a long check on a terminal; for short files, rich is not imported."""
     if not sys.stderr.isatty() or all(path.is_file() for path in files) and sum(path.stat().st_size for path in files) < LONG:
         return nullcontext(lambda what, done, known: None)
     from fbvm.cli.shared.progress import show_progress
@@ -64,7 +64,7 @@ def _progress(files: tuple[Path, ...]) -> AbstractContextManager[Callable[[str, 
 
 
 def _of_project(file: Path, wanted: Wanted) -> list[Diagnostic]:
-    """What is wrong with a project: its file, and the programs of its PLCs, each thing once."""
+    """The diagnostics of a project file and of the programs of its PLCs, without duplicates."""
     from fbvm.run.plant import Plant
     from fbvm.run.project import Project, read_project
 

@@ -1,4 +1,4 @@
-"""`fbvm fmt`: programs as everybody would write them."""
+"""`fbvm fmt`: sources in canonical form."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _found(paths: Iterable[Path]) -> list[Path]:
 
 
 def _one(path: Path, check: bool, diff: bool) -> bool | None:
-    """Format one file; whether it changes, None if it has errors."""
+    """Formats one file; returns True if it changes, None if it has errors."""
     source, data = _read(path)
     if source is None:
         _left_alone(str(path), "it cannot be read")
@@ -89,7 +89,7 @@ def _left_alone(name: str, why: str) -> None:
 
 
 def _read(path: Path) -> tuple[Source | None, bytes]:
-    """A file's text and its bytes; what is no text is reported."""
+    """The text and the bytes of a file; without a text its error is printed."""
     if path == STREAM:
         data = sys.stdin.buffer.read()
         source = decode(data, "stdin")
@@ -103,7 +103,7 @@ def _read(path: Path) -> tuple[Source | None, bytes]:
 
 
 def _encoded(before: str, after: str, data: bytes) -> bytes:
-    """The new text in the encoding of the old one's bytes, and with its mark."""
+    """The new text in the encoding of the old one, with its byte order mark."""
     for mark, encoding in ENCODINGS:
         if data.startswith(mark):
             try:
@@ -115,7 +115,7 @@ def _encoded(before: str, after: str, data: bytes) -> bytes:
 
 
 def _replace(path: Path, data: bytes) -> None:
-    """Write a file through one beside it, so that nobody ever finds half of it."""
+    """Replaces a file at once, by way of a temporary file in the same folder."""
     target = path.resolve()
     part = target.with_name(f"{target.name}.{os.getpid()}.part")
     with writing(path):
@@ -128,13 +128,13 @@ def _replace(path: Path, data: bytes) -> None:
 
 
 def _difference(source: Source, text: str) -> Iterator[str]:
-    """What changes, as a unified diff."""
+    """The changes as a unified diff."""
     before, after = source.text.splitlines(keepends=True), text.splitlines(keepends=True)
     for line in unified_diff(before, after, source.name, source.name):
         yield line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n"
 
 
-# --- what files use without declaring it ---
+# --- declarations of the libraries ---
 
 
 @cache

@@ -13,8 +13,8 @@ from fbvm.cli.shared.files import writing
 EXAMPLE = "project"
 """The folder in `examples/` that is copied."""
 TITLE = "PROJECT"
-"""What stands there in place of the name."""
-WORDS = {
+"""The word in its files that is replaced by the name of the project."""
+DESCRIPTIONS = {
     "src/pump.st": "a function block",
     "src/main.st": "the program that uses it",
     "tests/test_pump.py": "its test",
@@ -22,7 +22,7 @@ WORDS = {
     "requirements.txt": "what to install",
     ".github/workflows/test.yml": "tests on each push",
 }
-"""What is said of the files, in the order in which they are best read."""
+"""The description of each file, in the order in which they are listed."""
 
 
 @click.command("new")
@@ -44,6 +44,6 @@ def command(name: str) -> None:
             copy.parent.mkdir(parents=True, exist_ok=True)
             copy.write_text(path.read_text(encoding="utf-8").replace(TITLE, title), encoding="utf-8", newline="\n")
     click.echo(f"{name}/")
-    for file, said in WORDS.items():
+    for file, said in DESCRIPTIONS.items():
         click.echo(f"  {file:<28}{said}")
     click.echo(f"\ncd {name}\nfbvm test")

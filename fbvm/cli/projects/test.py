@@ -10,8 +10,8 @@ import click
 from fbvm.cli.shared import status
 
 STATUS = {0: status.GOOD, 4: status.USAGE, 5: status.USAGE}
-"""Statuses by pytest's own, the others are failures: 1 of a test, 2 of what could not even be collected (Ctrl-C ends both
-processes); 5 is that there was no test."""
+"""Exit statuses by pytest's; all others are failures: 1 a failed test, 2 a failed collection (Ctrl-C ends both processes).
+pytest's 5 is a run without tests."""
 
 
 @click.command("test", context_settings={"ignore_unknown_options": True, "help_option_names": ["-h", "--help"]},

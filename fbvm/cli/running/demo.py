@@ -40,7 +40,7 @@ from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
 SERVER = Peer("192.168.250.1", 502)
-"""What the program believes that it talks to."""
+"""The endpoint of the server in the program."""
 CYCLE_NS = 10_000_000
 LIMIT_NS = 20_000_000_000
 SIGNALS = (
@@ -72,10 +72,10 @@ class Server(Protocol):
 
     @property
     def port(self) -> int:
-        """Where it listens."""
+        """The port on which it listens."""
 
     def registers(self, first: int, count: int) -> list[int]:
-        """What it holds when the program is done."""
+        """Holding registers of the server after the program has ended."""
 
 
 @click.command("demo")
@@ -216,7 +216,7 @@ def own_server() -> Iterator[Server]:
 
 
 def compare(plc: Plc, server: Server) -> list[Comparison]:
-    """What is in D memory beside what the server holds."""
+    """The words of the PLC beside the registers of the server."""
     quantity, written, source, target, signature = (
         int(str(plc.read(f"Main.{name}"))) for name in ("Quantity", "Written", "Source", "Target", "Signature")
     )
@@ -233,11 +233,11 @@ def _words(plc: Plc, first: int, count: int) -> tuple[list[str], list[int]]:
     return [f"D{word}" for word in words], [plc.memory.words("D")[word] for word in words]
 
 
-# --- what is shown ----------------------------------------------------------------------------------------------------
+# --- output -----------------------------------------------------------------------------------------------------------
 
 
 class StepDisplay:
-    """The steps of the program as they happen, on a terminal; in a pipe once, at the end."""
+    """Shows the steps of the program as they happen on a terminal; in a pipe once, at the end."""
 
     def __init__(self, console: Console, plc: Plc) -> None:
         self._plc = plc
@@ -284,7 +284,7 @@ def _table(comparisons: list[Comparison]) -> Table:
 
 
 def command_name() -> str:
-    """How to call this command again from here: `fbvm` where that is found, else the path by which it was called."""
+    """The command with which this program can be called again: `fbvm`, or the path by which it was called."""
     if shutil.which("fbvm"):
         return "fbvm"
     path = Path(sys.argv[0])

@@ -1,4 +1,4 @@
-"""`fbvm map`: the words and bits that the ETN21 server program serves, under all the numbers that people give them."""
+"""`fbvm map`: the Modbus addresses of the words and bits that the ETN21 server program serves, in all notations."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fbvm.watch.paths import UnknownPlace, address_range
 
 
 class Table(NamedTuple):
-    """One of Modbus's four tables and what stands for it; its addresses are 0 to `last`."""
+    """One of Modbus's four tables and the area that it is mapped to; its addresses are 0 to `last`."""
 
     name: str
     area: str
@@ -48,7 +48,7 @@ def command(ranges: tuple[str, ...]) -> None:
 
 
 def row(table: Table, address: Address) -> tuple[str, ...]:
-    """The address as this table has it."""
+    """The row of an address in a table: its Modbus address in all notations."""
     number = _number(table, address)
     assert number is not None, "asked only for what the table has"
     counted = number + 1

@@ -14,7 +14,7 @@ from fbvm.cli.shared import status
 from fbvm.wire import registers
 
 LISTENING = "listening on "
-"""What the line begins with that names host and port."""
+"""The beginning of the line with host and port."""
 
 
 @click.command("peer")
@@ -60,7 +60,7 @@ async def _serve(host: str, port: int, trace: bool) -> None:
 
 
 def device() -> Any:
-    """The contents as pymodbus takes them; device id 0 answers every unit id."""
+    """The contents in the form of pymodbus; device id 0 answers every unit id."""
     from pymodbus.simulator import DataType, SimData, SimDevice
 
     bits = [[SimData(0, values=values, datatype=DataType.BITS)]

@@ -1,4 +1,4 @@
-"""`fbvm run` of a project: all its PLCs at once, and what came of each."""
+"""`fbvm run` of a project: runs all its PLCs and prints the result of each."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ from fbvm.watch.paths import Place
 from fbvm.watch.values import Value, show_time
 
 OPTIONS = {"net": "--net", "for_ns": "--for", "scans": "--scans", "scan_time": "--scan-time", "as_json": "--json"}
-"""What may be said beside a project; everything else is in its file."""
+"""The options that may be given with a project; all others are in its file."""
 
 
 def run_project(file: Path, context: click.Context) -> int:
-    """Runs it to its end, with the options of the command line; the exit status."""
+    """Runs a project with the options of the command line; returns the exit status."""
     given = {name for name in context.params if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
     check_project_options(context, OPTIONS)
     net = context.params["net"] if "net" in given else None
@@ -65,7 +65,7 @@ def _refuse(diagnostics: list[Diagnostic], as_json: bool) -> int:
 
 
 def _check_end(project: Project, net: str | None, for_ns: int | None, scans: int | None) -> None:
-    """In virtual time nobody would wait for Ctrl-C."""
+    """Raises UsageError for a run in virtual time without an end."""
     ends = for_ns is not None or scans is not None or project.for_ns is not None or project.scans is not None
     if not ends and (net or project.net) == "loop" and not any(row.until for row in project.plcs):
         raise click.UsageError('say when to end: by --for or --scans, by for = "10s" in [run], or by until of a PLC')
@@ -91,7 +91,7 @@ def _print(plant: Plant, as_json: bool, scan_time: bool) -> None:
 
 
 def _lines(kind: Kind) -> Iterator[str]:
-    """A kind's scans, how they ended, and what is watched: a line for each value, or for how far the PLCs' values go."""
+    """The lines about the PLCs of one kind: scans, reasons of the end, and watched values or their range."""
     scans = [run.plc.scans for run in kind.runs]
     many = f"{len(kind.runs):,} PLCs, " if kind.row.count is not None else ""
     each = " each" if many else ""
@@ -137,7 +137,7 @@ def _measures(plant: Plant) -> dict[str, object]:
 
 
 def _measured(runs: list[Running], cycle_ns: int) -> tuple[ScanTimes, Lateness]:
-    """The scans of all of them as one measure."""
+    """The durations and delays of the scans of some PLCs together."""
     times, late = ScanTimes(cycle_ns), Lateness()
     for run in runs:
         times.add(run.plc.scan_times)

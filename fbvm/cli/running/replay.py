@@ -1,4 +1,4 @@
-"""`fbvm replay`: a journal of `fbvm run` done again, to look at what was not looked at."""
+"""`fbvm replay`: executes the run in a journal again, with other output."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def command(
 
 
 def _reason(replay: Replay, reason: str, until: str | None) -> str:
-    """As `fbvm run` says it."""
+    """The reason of the end in the words of `fbvm run`."""
     if reason != "end":
         return reason
     return "trap" if replay.plc.trap else "max" if until else "end"

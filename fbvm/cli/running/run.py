@@ -1,4 +1,4 @@
-"""`fbvm run`: a program, its unit and a network, for so long, and what came of it."""
+"""`fbvm run`: runs a program with its units and a network, and prints the result."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def command(
     if project := project_argument(files):
         sys.exit(run_project(project, click.get_current_context()))
     _check_usage(**options)
-    drawn = bool(options["rungs"]) and not options["journal"]  # who replays a journal compiles as it was recorded
+    drawn = bool(options["rungs"]) and not options["journal"]  # a replay compiles as the journal says
     image = compile_or_exit(files, program, libraries, runnable=True, as_json=as_json, drawn=drawn)
     named = [given.name for given in options["settings"]]
     banks = e_banks_in([*named, *options["shown"], *options["charted"], options["until"] or "", *options["watched"],
@@ -137,7 +137,7 @@ def _run(
     pace: str, scans: int | None, for_ns: int | None, until: str | None, max_ns: int | None, net: str,
     scan_time: bool, lines: tuple[str, ...], watched: tuple[str, ...], conditions: tuple[str, ...], **_: Any,
 ) -> RunResult:  # fmt: skip
-    """Runs to the end.  Names, values and conditions that do not fit the program are mistakes of usage."""
+    """Runs to the end.  Raises UsageError for names, values and conditions that do not fit the program."""
     for warning in plc.warnings:
         click.secho(warning, fg="yellow", err=True)
     try:
@@ -161,13 +161,13 @@ def _run(
 
 
 def _write(plc: Plc, given: Setting) -> TimedWrite:
-    """A setting with its value read for the type of its place; a range takes values parted by commas."""
+    """The write of a setting, with its value parsed for the type of its place."""
     found = plc.find(given.name)
     return TimedWrite(found, parse_for(found, given.value), given.at_ns)
 
 
 def _print_host_endpoints(plc: Plc, network: LoopNetwork | TcpNetwork, mappings: tuple[Mapping, ...]) -> None:
-    """Says where others reach the units on the host, once per row that is about a unit itself."""
+    """Prints the endpoint of the host for each row of --map that names a unit."""
     if isinstance(network, LoopNetwork):
         return
     own = {attached.unit.address for attached in plc.units}
@@ -181,7 +181,7 @@ def _print_host_endpoints(plc: Plc, network: LoopNetwork | TcpNetwork, mappings:
 
 
 def _warn_unused_mappings(plc: Plc, network: LoopNetwork | TcpNetwork) -> None:
-    """Says which rows of --map were of no use: most often the address is a mistake."""
+    """Warns of rows of --map that the run has not used, which often have a wrong address."""
     if isinstance(network, LoopNetwork):
         return
     units = ", ".join(f"{attached.unit.name} has {attached.unit.address}" for attached in plc.units)

@@ -32,7 +32,7 @@ from fbvm.wire.link import Peer
 CYCLE_NS = 10_000_000
 START_LIMIT_NS = 5_000_000_000
 SCANS_OF_AN_OPEN = 4
-"""Within which a unit says that a port cannot be listened on."""
+"""The scans within which a unit reports that a port cannot be used."""
 ENDPOINT = Peer(ETN21_ADDRESS, 502)
 SERVED = {"CIO": 5801, "D": 32768}
 """Words of each area that clients can reach, fblib/omron/etn_modbus/README.md."""
@@ -81,7 +81,7 @@ def command(
 
 
 def _plc(settings: dict[str, int], image: Path | None) -> Plc:
-    """The PLC, its program set and its memory loaded."""
+    """A PLC with the server program, its settings written and its memory loaded."""
     program = compile_files([data_folder("examples") / "server.st"], runnable=True, lint=False).image
     assert program is not None, "the server's own program compiles"
     plc = Plc(program, CYCLE_NS)
@@ -114,7 +114,7 @@ def _network(bind: str, port: int) -> TcpNetwork:
 
 
 def _start(plc: Plc, network: TcpNetwork) -> str:
-    """Runs until the unit listens and says so; what else ended it if it does not get there."""
+    """Runs until the unit listens, and prints the endpoint; returns the reason of the end."""
     opening, failed = plc.find("CIO 1509.00"), plc.find("Main.Server.Error_Code")
     reason = loop.run(plc, until=lambda _: bool(plc.read(opening)), max_ns=START_LIMIT_NS, pace=EVENT)
     if reason == "until":
@@ -137,9 +137,9 @@ def _unusable(real: Peer, why: str) -> NoReturn:
 
 
 class Signals:
-    """What the process is asked for from outside: to end (SIGTERM, Ctrl-C), to save the image (SIGUSR1, where it is).
+    """The signals that the process has received: `end` (SIGTERM, Ctrl-C), `save` the image (SIGUSR1, where it exists).
 
-    Asked for only, so that a scan, with its replies and their lines in the log, is never left in the middle."""
+    They only set flags, so that no scan is interrupted."""
 
     def __init__(self) -> None:
         self.end = False
@@ -153,7 +153,7 @@ class Signals:
 
     @contextmanager
     def installed(self) -> Iterator[None]:
-        """While this lasts."""
+        """Installs the handlers inside the `with` block."""
         numbers = [signal.SIGTERM, signal.SIGINT, *([signal.SIGUSR1] if hasattr(signal, "SIGUSR1") else [])]
         before = {number: signal.signal(number, self._handle) for number in numbers}
         try:

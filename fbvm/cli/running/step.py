@@ -1,4 +1,4 @@
-"""`fbvm step`: a program that stands still at any statement of any scan, for people at a terminal and for scripts."""
+"""`fbvm step`: a debugger for the statements and scans of a program, at a terminal and for scripts."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ def command(
     except (LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
     for line in commands.stop():
-        _say(line)
+        _print(line)
     if sys.stdin.isatty():
-        _talk(commands)
+        _interact(commands)
     else:
         _script(commands)
 
@@ -79,12 +79,12 @@ def _write(session: Session, given: Setting) -> None:
     session.act(lambda plc: plc.write(place, value))
 
 
-def _talk(commands: Commands) -> None:
-    """Asks for lines until `quit` or the end of input.  A mistake is said, and nothing else happens."""
+def _interact(commands: Commands) -> None:
+    """Executes typed lines until `quit` or the end of input; an error is printed."""
     for line in prompt_lines(commands):
         try:
             for said in commands.run(line):
-                _say(said)
+                _print(said)
         except CommandError as error:
             click.secho(str(error), fg="red")
         if commands.ended:
@@ -106,6 +106,6 @@ def _script(commands: Commands) -> None:
             return
 
 
-def _say(line: str) -> None:
-    """A line; the statement that comes next is bold on a terminal."""
+def _print(line: str) -> None:
+    """Prints a line; that of the next statement is bold on a terminal."""
     click.secho(line, bold=line.startswith((" >", "scan ")) or None)

@@ -1,4 +1,4 @@
-"""Breakpoints on the command line: the options, and what is said of a scan that stands at one."""
+"""The options for breakpoints, and the text about a scan that has stopped at one."""
 
 from __future__ import annotations
 
@@ -27,26 +27,28 @@ def breakpoint_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def set_breakpoints(plc: Plc, lines: Sequence[str], watched: Sequence[str], conditions: Sequence[str]) -> None:
-    """As the options say.  Raises ValueError or LookupError for what is not in the program."""
+    """Sets the breakpoints of the options on a PLC.  Raises ValueError or LookupError for an unknown place."""
     for text in lines:
-        where, when = _parted(text)
+        where, when = _split_condition(text)
         plc.breakpoints.line(where, when)
     for text in watched:
-        where, when = _parted(text)
+        where, when = _split_condition(text)
         plc.breakpoints.change(where, when)
     for text in conditions:
         plc.breakpoints.condition(text)
 
 
-def _parted(text: str) -> tuple[str, str]:
-    """What stands in front of IF, and the condition behind it."""
+def _split_condition(text: str) -> tuple[str, str]:
+    """The place in front of IF, and the condition behind it."""
     words = text.split()
     at = next((number for number, word in enumerate(words) if word.upper() == "IF"), len(words))
     return " ".join(words[:at]), " ".join(words[at + 1:])
 
 
 def halt_lines(plc: Plc, halt: Halt, lines: Mapping[str, Mapping[int, str]]) -> Iterator[str]:
-    """Where a scan stands and why, the line of the source, and who called whom; `lines` are texts by file and number."""
+    """The position of a scan that has stopped, the reason, the source line and the call stack.
+
+    `lines` are source lines by file and line number."""
     yield str(halt)
     if halt.site is not None and (text := lines.get(halt.site.file, {}).get(halt.site.line)):
         yield f"  {halt.site.line} | {text}"

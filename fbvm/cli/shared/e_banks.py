@@ -1,4 +1,4 @@
-"""E banks that a program does not name but somebody at the command line does: the PLC gets them, too."""
+"""E banks that options name: the PLC has them, also if the program does not use them."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ _BANK = re.compile(r"(?<!\w)(E[0-9A-F])\s*[_:]\s*\d", re.I)
 
 
 def e_banks_in(texts: Iterable[str]) -> list[str]:
-    """The E banks that names or conditions write, `E3_100` or `E3:100`, in the order of writing."""
+    """The E banks in names and conditions, `E3_100` or `E3:100`, in the order of their first use."""
     found = [match[1].upper() for text in texts for match in _BANK.finditer(text)]
     return [name for name in dict.fromkeys(found) if name in E_NAMES]
 
 
 def with_e_banks(image: Image, banks: Iterable[str]) -> Image:
-    """The same program for a PLC that has these E banks, too.  They come behind its own: nothing else moves."""
+    """The image for a PLC that has these E banks, too.  They follow its own, so no other offset changes."""
     missing = tuple(name for name in banks if name not in image.layout.e_banks)
     if not missing:
         return image

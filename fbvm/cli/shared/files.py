@@ -1,4 +1,4 @@
-"""Files that verbs write: what the host does not let be written is a mistake of usage."""
+"""Files that verbs write; an error of the host is reported as an error of usage."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import click
 
 @contextmanager
 def writing(target: Path | str) -> Iterator[None]:
-    """Around all that opens and writes `target`: ends with status 2 and what the host says, if it says no."""
+    """For a `with` block that opens and writes `target`: an OSError in it ends the verb with status 2 and a message."""
     try:
         yield
     except OSError as error:

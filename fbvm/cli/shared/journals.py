@@ -1,4 +1,4 @@
-"""Journals as files: what `fbvm run --journal` puts into one besides the inputs, and the program that one holds."""
+"""Journal files: the program and options that `fbvm run --journal` adds to the inputs, and the program that is read back."""
 
 from __future__ import annotations
 
@@ -27,8 +27,7 @@ def start_journal(
     stack: ExitStack, path: Path, files: Sequence[Path], program: str | None, libraries: Sequence[Path],
     banks: Sequence[str], options: Mapping[str, object],
 ) -> Journal:  # fmt: skip
-    """A journal to be written to a file; it holds the texts of the program and the `options` of the run, and ends with
-    the stack."""
+    """Starts a journal in a file, with the texts of the program and the `options` of the run; `stack` closes it."""
     with writing(path):
         file = stack.enter_context(path.open("w", encoding="utf-8", newline="\n"))
     texts = [read(name, str(name)) for name in files]
@@ -44,7 +43,8 @@ def start_journal(
 
 @contextmanager
 def open_journal_file(path: Path) -> Iterator[tuple[Header, Iterator[Entry]]]:
-    """A journal to be read.  What is wrong with it, now or while it is done again, is a mistake of usage."""
+    """Opens a journal file for a `with` block: its header and its entries.  A JournalError in the block ends the verb with
+    status 2."""
     try:
         with path.open(encoding="utf-8", newline="\n") as file:
             yield open_journal(_text(file))
@@ -65,7 +65,9 @@ def _text(lines: Iterable[str]) -> Iterator[str]:
 
 
 def program_of(header: Header, libraries: Sequence[Path], as_json: bool) -> Image:
-    """The program whose texts a journal holds.  Ends with status 3 if they have errors here."""
+    """Compiles the program in a journal.  Ends the verb with status 3 if it has errors.
+
+    `libraries` replace the folders that the journal names.  Raises JournalError for a journal without a program."""
     about: dict[str, Any] = header.about
     try:
         sources = [Source(str(name), str(text)) for name, text in about["sources"]]

@@ -1,4 +1,4 @@
-"""Kinds of values that options take, each read once and refused with a sentence."""
+"""Types of option values; a wrong value is an error of usage with a message."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ CYCLE_NS = 10_000_000
 
 
 def time_ns(value: str | int) -> int:
-    """`10ms`, `1.5s`, `T#10ms`: nanoseconds."""
+    """The nanoseconds of `10ms`, `1.5s` or `T#10ms`.  Raises BadParameter, also for a time that is not positive."""
     if isinstance(value, int):
         return value
     try:
@@ -29,7 +29,7 @@ def time_ns(value: str | int) -> int:
 
 @dataclass(frozen=True)
 class Setting:
-    """NAME=VALUE@TIME as written; the value is read when the type of the name is known."""
+    """NAME=VALUE@TIME; the value is text until the type of the variable is known."""
 
     name: str
     value: str
@@ -60,7 +60,7 @@ def setting(value: str) -> Setting:
 
 @dataclass(frozen=True)
 class Mapping:
-    """IP:PORT=HOST:PORT, or IP:PORT=peer (`host` None)."""
+    """IP:PORT=HOST:PORT, or IP:PORT=peer, where `host` is None; `endpoint` is IP:PORT."""
 
     endpoint: Peer
     host: str | None
@@ -105,5 +105,9 @@ def charted_names(options: Iterable[str]) -> list[str]:
 
 
 def split_names(text: str) -> list[str]:
-    """The names of a list such as `Main.done,a[1,2],D5`: commas within brackets do not part."""
+    """The names of a list such as `Main.done,a[1,2],D5`; commas within brackets do not separate.
+
+    >>> split_names("Main.done,a[1,2],D5")
+    ['Main.done', 'a[1,2]', 'D5']
+    """
     return [name for name in split_list(text) if name]

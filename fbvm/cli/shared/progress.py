@@ -1,4 +1,4 @@
-"""A word on the terminal while something takes long that tells nothing by itself; nothing where it is quick."""
+"""A spinner on the terminal for work that takes long."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from rich.live import Live
 from rich.spinner import Spinner
 
 QUICK_S = 2.0
-"""What ends sooner needs no word."""
+"""The time after which the spinner appears, in seconds."""
 PER_SECOND = 8
 
 
 class _DelayedSpinner:
-    """Renders as nothing first, later as a spinner and a text."""
+    """Renders as a spinner and a text, and as nothing in the first two seconds."""
 
     def __init__(self, console: Console, text: str) -> None:
         self._console = console
@@ -24,7 +24,7 @@ class _DelayedSpinner:
         self._began_s = console.get_time()
 
     def update(self, what: str, done: int, known: int) -> None:
-        """Say how far the work is."""
+        """Shows the part of the work that is done: `done` of `known` steps of `what`."""
         self._spinner.update(text=f"{self._text}: {what} {100 * done // max(known, 1)} %")
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
@@ -34,7 +34,9 @@ class _DelayedSpinner:
 
 @contextmanager
 def show_progress(text: str, console: Console | None = None) -> Iterator[Callable[[str, int, int], None]]:
-    """Shows `text` on stderr from two seconds on until the block is over, and how far it is.  Nothing in a pipe."""
+    """Shows `text` with a spinner on stderr inside the `with` block, from its second second on; nothing in a pipe.
+
+    The value of the block is a function that shows progress: name of the step, steps that are done, steps in all."""
     console = console or Console(stderr=True)
     spinner = _DelayedSpinner(console, text)
     if not console.is_terminal:

@@ -1,4 +1,4 @@
-"""Which project is meant where sources may stand, and what may be said beside one."""
+"""The argument PROJECT of verbs that take sources or a project, and the options that may be given with a project."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from click.core import ParameterSource
 
 
 def project_argument(files: tuple[Path, ...]) -> Path | None:
-    """The project file that the arguments of `fbvm run` mean: a .toml file, a folder that has one, or nothing at all,
-    which is the folder where one is.  None if they are sources, for which nothing of projects is loaded."""
+    """The project file that the arguments of a verb name: a .toml file, a folder with an fbvm.toml, or, without arguments, the
+    current folder.  None if the arguments are sources.  Raises UsageError for a folder without a project."""
     if len(files) > 1 or (files and not files[0].is_dir() and files[0].suffix != ".toml"):
         return None
     from fbvm.run.project import FILE, project_file
@@ -23,7 +23,9 @@ def project_argument(files: tuple[Path, ...]) -> Path | None:
 
 
 def check_project_options(context: click.Context, allowed: Mapping[str, str]) -> None:
-    """Refuse what may not be said beside a project; `allowed` are the names of parameters and of their options."""
+    """Raises UsageError for an option that cannot be given with a project.
+
+    `allowed` are the options that can, by the names of their parameters."""
     given = {name for name in context.params if context.get_parameter_source(name) is not ParameterSource.DEFAULT}
     given |= {option for option in ("resource", "dialect") if context.meta.get(f"fbvm.{option}") is not None}
     wrong = [parameter.opts[0] for parameter in context.command.params

@@ -1,4 +1,4 @@
-"""The prompt of a terminal: history, editing, completion.  Only what asks; what is understood is `step.commands`."""
+"""The prompt of a terminal: history, editing, completion.  `step.commands` executes the lines."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ HISTORY = "step_history"
 
 
 class Completions(Completer):
-    """What a word may become, as the commands say it."""
+    """The completions of `Commands` for prompt_toolkit."""
 
     def __init__(self, commands: Commands) -> None:
         self._commands = commands
 
     def get_completions(self, document: Document, complete_event: CompleteEvent) -> Iterable[Completion]:
-        """What the word before the cursor may become."""
+        """The completions of the word before the cursor."""
         word = document.get_word_before_cursor(WORD=True)
         for found in self._commands.completions(document.text_before_cursor):
             yield Completion(found, start_position=-len(word))
 
 
 def prompt_lines(commands: Commands) -> Iterator[str]:
-    """Lines that somebody types, until the end of input.  Ctrl-C takes back the line."""
+    """The lines that a user types, until the end of input.  Ctrl-C discards the line."""
     asking: PromptSession[str] = PromptSession(history=_history(), completer=Completions(commands), complete_while_typing=False)
     while True:
         here = commands.session.here
@@ -42,7 +42,7 @@ def prompt_lines(commands: Commands) -> Iterator[str]:
 
 
 def _history() -> History:
-    """What was typed before, if there is a place to keep it."""
+    """The lines of earlier sessions, in a file of the cache folder if it can be written."""
     try:
         cache_folder().mkdir(parents=True, exist_ok=True)
         (cache_folder() / HISTORY).touch()

@@ -1,4 +1,4 @@
-"""What a run prints: progress while it lasts, then charts and values, or one JSON object."""
+"""The output of a run: a progress bar, then charts and values, or one JSON object."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ EXIT_STATUS = {"max": status.FAILED, "differs": status.FAILED, "trap": status.ST
 
 @dataclass(frozen=True)
 class RunResult:
-    """How a run ended and what was asked to be shown."""
+    """The result of a run: `reason` is the word with which it ended; the rest are the options about its output."""
 
     plc: Plc
     reason: str
@@ -41,7 +41,7 @@ class RunResult:
     as_json: bool
     until: str
     scan_time: bool = False
-    """Whether somebody wants to know how long scans took."""
+    """True if the durations of scans are printed."""
 
     @property
     def status(self) -> int:
@@ -49,7 +49,7 @@ class RunResult:
         return EXIT_STATUS.get(self.reason, status.GOOD)
 
     def print(self) -> None:
-        """Values and charts on stdout, what stopped the run on stderr."""
+        """Prints values and charts on stdout, a trap on stderr."""
         if self.as_json:
             click.echo(json.dumps(self._as_dict(), allow_nan=False))
             return
@@ -82,7 +82,7 @@ class RunResult:
 
 
 def json_trap(trap: Trap | None) -> dict[str, object] | None:
-    """What stopped a program, as JSON has it."""
+    """A trap as an object of JSON."""
     return None if trap is None else {
         "code": trap.code, "file": trap.site.file, "pou": trap.site.pou, "line": trap.site.line, "column": trap.site.column,
         "message": trap.message,
@@ -90,7 +90,7 @@ def json_trap(trap: Trap | None) -> dict[str, object] | None:
 
 
 def _json_halt(halt: Halt) -> dict[str, object]:
-    """A scan that stands at a breakpoint, as JSON has it."""
+    """A scan that has stopped at a breakpoint, as an object of JSON."""
     site = halt.site
     return {
         "scan": halt.scan, "file": site and site.file, "pou": halt.frames[0].pou, "line": site and site.line,
@@ -99,7 +99,7 @@ def _json_halt(halt: Halt) -> dict[str, object]:
 
 
 def value_text(place: Place | Span, value: Value) -> str:
-    """A value for people; words of addresses, and what is declared to be read so, also in hexadecimal."""
+    """A value as a literal; words of addresses, and variables with the pragma for it, also in hexadecimal."""
     if isinstance(place, Span) and isinstance(value, list):
         return " ".join(show(part.type, item) for part, item in zip(place.places, value, strict=True))
     if not isinstance(place, Place):
@@ -112,17 +112,17 @@ def value_text(place: Place | Span, value: Value) -> str:
 
 
 def json_value(place: Place | Span, value: Value) -> Value:
-    """A value as JSON has it."""
+    """A value that JSON can write."""
     return plain_value(place.type, value) if isinstance(place, Place) else value
 
 
 def chart_width() -> int:
-    """Columns for a chart: the terminal's, or a fixed number in a pipe."""
+    """The width of charts in columns: that of the terminal, or PIPE_WIDTH."""
     return shutil.get_terminal_size((PIPE_WIDTH, 24)).columns
 
 
 class RunProgress:
-    """A line on the terminal while a run lasts; nothing in a pipe, and nothing without a PLC."""
+    """A progress bar on the terminal; nothing in a pipe, and nothing without a PLC."""
 
     def __init__(self, plc: Plc | None, scans: int | None, for_ns: int | None) -> None:
         self._shows = plc is not None and sys.stderr.isatty()
@@ -137,7 +137,7 @@ class RunProgress:
             self._live.stop()
 
     def update(self, plc: Plc) -> None:
-        """Shows how far the run is, from the first time on that somebody tells it; what ends before needs no line."""
+        """Shows the progress of the run.  The bar appears with the first call, so a short run has none."""
         if not self._shows:
             return
         from rich.console import Console

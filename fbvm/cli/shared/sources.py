@@ -1,4 +1,4 @@
-"""Sources from files to an Image, diagnostics to the terminal; what `check`, `list` and `run` begin with."""
+"""The options about sources, their compilation, and diagnostics on the terminal."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _keep_in_context(context: click.Context, parameter: click.Parameter, value: 
 
 
 def compile_options() -> dict[str, Any]:
-    """What the options of the present command say about how to compile, as arguments of the compiler."""
+    """The options --resource and --dialect of the present command, as keyword arguments of the compiler."""
     meta = click.get_current_context().meta
     return {name: meta[f"fbvm.{name}"] for name in ("resource", "dialect") if meta.get(f"fbvm.{name}") is not None}
 
@@ -63,9 +63,10 @@ def compile_or_exit(
     files: Sequence[Path], program: str | None, libraries: Sequence[Path], *, runnable: bool, as_json: bool = False,
     drawn: bool = False,
 ) -> Image:
-    """The Image of the files.  Reports warnings; reports errors and ends with status 3 if there are any.
+    """Compiles files to an image and prints warnings; prints errors and ends the verb with status 3 if there are any.
 
-    With `runnable` it is an error, too, if nothing says which program to run; with `drawn` Structured Text has rungs."""
+    With `runnable` it is an error if the files do not say which program to run; with `drawn` statements of Structured Text
+    have rungs."""
     compilation = compile_files(files, program=program, libraries=libraries, runnable=runnable, lint=False, drawn=drawn,
                                 **compile_options())
     if compilation.image is None:
@@ -77,7 +78,7 @@ def compile_or_exit(
 
 
 def report_diagnostics(diagnostics: Sequence[Diagnostic], as_json: bool) -> None:
-    """All diagnostics: to stderr as text with a last line that counts, or to stdout as one object."""
+    """Prints diagnostics: as text with a summary on stderr, or, with `as_json`, as one object on stdout."""
     if as_json:
         click.echo(json.dumps({"diagnostics": [diagnostic.as_dict() for diagnostic in diagnostics]}, indent=2))
         return
@@ -91,7 +92,7 @@ def report_diagnostics(diagnostics: Sequence[Diagnostic], as_json: bool) -> None
 
 
 def show_diagnostic(diagnostic: Diagnostic) -> None:
-    """One diagnostic on stderr, its first line in colour on a terminal."""
+    """Prints one diagnostic on stderr, its first line in colour on a terminal."""
     first, _, rest = diagnostic.render().partition("\n")
     click.secho(first, fg="red" if diagnostic.severity == "error" else "yellow", err=True)
     if rest:

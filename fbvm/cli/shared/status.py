@@ -1,4 +1,4 @@
-"""What the command tells whoever called it."""
+"""The exit statuses of the command `fbvm`."""
 
 from __future__ import annotations
 

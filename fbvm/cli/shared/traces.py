@@ -1,4 +1,4 @@
-"""Traces from files, as verbs take them, and traces that a run writes."""
+"""Trace files: arguments and options of the verbs that read one, and the traces that `fbvm run` writes."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ SUFFIX = ".fbtrace"
 
 
 class ScanRange(click.ParamType[range]):
-    """`41`, `10..60`, `10..`: numbers of scans, both ends with them."""
+    """The option type of `41`, `10..60`, `10..`: numbers of scans, both ends included."""
 
     name = "FIRST..LAST"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> range:
-        """The scans that a text names."""
+        """The scans that a text names.  Raises BadParameter."""
         if isinstance(value, range):
             return value
         first, dots, last = str(value).partition("..")
@@ -58,7 +58,7 @@ def scans_option(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @contextmanager
 def open_trace(path: Path) -> Iterator[Trace]:
-    """The trace in a file.  What is no trace, and names it does not have, are mistakes of usage."""
+    """Opens a trace for a `with` block.  A damaged file and an unknown name in the block end the verb with status 2."""
     try:
         trace = Trace.open(path)
     except OSError as error:
@@ -75,7 +75,7 @@ def open_trace(path: Path) -> Iterator[Trace]:
 
 
 def recording_of(trace: Trace, names: Sequence[str], scans: range | None) -> Recording:
-    """The recording of some variables in some scans; a usage error if there are no such scans."""
+    """The recording of some variables in some scans.  Raises UsageError if the trace has no such scans."""
     made = recording(trace, names, scans)
     if not made.times_ns:
         held = f"scans {trace.scans[0]} to {trace.scans[-1]}" if trace.scans else "no scans yet"
@@ -90,7 +90,7 @@ def recording_of(trace: Trace, names: Sequence[str], scans: range | None) -> Rec
 def write_trace(
     plc: Plc, path: Path | None, depth: str, selected: Sequence[str], files: Sequence[Path], libraries: Sequence[Path]
 ) -> Iterator[None]:
-    """Records a run into a file, if there is one to write."""
+    """Records the scans of `plc` in the `with` block into a trace file, if `path` is given."""
     if path is None:
         if selected:
             raise click.UsageError("--select chooses what --trace keeps, which is not given")
@@ -111,7 +111,7 @@ def write_trace(
 
 @contextmanager
 def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Sequence[Path]) -> Iterator[None]:
-    """Writes a run as one HTML file when it is over, if there is one to write."""
+    """Writes the scans of `plc` in the `with` block as one HTML file, if `path` is given."""
     if path is None:
         yield
         return
@@ -127,5 +127,5 @@ def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Se
 
 
 def statement_lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:
-    """By file and number the lines on which statements of a program stand."""
+    """The source lines with statements, by file and line number."""
     return source_lines(image, source_texts(image, {str(path): path for path in files}, libraries))
