@@ -1,4 +1,4 @@
-"""The report of a teacher's run: one HTML page with a row a learner and a column a lesson, and what went wrong."""
+"""The report of a teacher's run: an HTML page with a row for each learner, a column for each lesson, and all failures."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
-"""What tests executed of a program's text: statements, and ways of IF and CASE, by file and place.
+"""Coverage of PLC code: how often tests have executed each statement, and each branch of IF and CASE.
 
-Counts; how it is shown is `coverage_report`.  What fbvm brings with it is not counted unless a test names its file.
+`coverage_report` formats the counts.  Files of fbvm's own libraries are counted only if a test names them.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ from fbvm.testing.subject import LIBRARY, Subject
 Position = tuple[int, int]
 """Line and column."""
 SKIPPED: Position = (0, 0)
-"""The way past all branches."""
+"""The branch to none of the statements of an IF or CASE."""
 
 
 @dataclass
 class FileCoverage:
-    """One file: how often each statement was executed, and for each that chooses how often each way was taken."""
+    """The counts of one file: executions of each statement, and, of each IF and CASE, of each branch by its first statement."""
 
     statements: dict[Position, int] = field(default_factory=dict)
     branches: dict[Position, dict[Position, int]] = field(default_factory=dict)
 
     @property
     def lines(self) -> dict[int, int]:
-        """How often each line with statements was executed: its statement that was executed least."""
+        """The executions of each line with statements: those of its least executed statement."""
         made: dict[int, int] = {}
         for (line, _), count in self.statements.items():
             made[line] = min(count, made.get(line, count))
@@ -40,12 +40,12 @@ class FileCoverage:
 
     @property
     def missing(self) -> list[int]:
-        """Lines of which something was not executed."""
+        """Lines with a statement that was not executed."""
         return sorted(line for line, count in self.lines.items() if not count)
 
     @property
     def partial(self) -> dict[int, list[int]]:
-        """By line of an IF or CASE the lines to which it never went; 0 is past it."""
+        """By line of an executed IF or CASE the lines of its branches that were not taken; 0 is the branch to none."""
         made: dict[int, list[int]] = {}
         for (line, column), ways in self.branches.items():
             if self.statements.get((line, column)):
@@ -53,12 +53,12 @@ class FileCoverage:
         return {line: sorted(set(to)) for line, to in made.items() if to}
 
     def rate(self) -> float:
-        """The share of statements and ways that were executed, 0 to 1; 1 of nothing."""
+        """The part of statements and branches that were executed, 0 to 1; 1 for a file without statements."""
         counts = [*self.statements.values(), *(count for ways in self.branches.values() for count in ways.values())]
         return sum(count > 0 for count in counts) / len(counts) if counts else 1.0
 
     def add(self, other: FileCoverage) -> None:
-        """Adds what somebody else counted."""
+        """Adds the counts of another process."""
         for spot, count in other.statements.items():
             self.statements[spot] = self.statements.get(spot, 0) + count
         for spot, ways in other.branches.items():
@@ -74,23 +74,23 @@ class Coverage:
         self.files: dict[str, FileCoverage] = {}
 
     def listener(self, subject: Subject) -> Counter:
-        """Who counts one run of a subject."""
+        """A listener that counts one run of a program."""
         return Counter(self, subject)
 
     def add(self, other: Coverage) -> None:
-        """Adds what somebody else counted."""
+        """Adds the counts of another process."""
         for name, coverage in other.files.items():
             self.files.setdefault(name, FileCoverage()).add(coverage)
 
     def to_data(self) -> dict[str, Any]:
-        """As plain lists, for another process."""
+        """The counts as lists, for another process."""
         return {name: [[[*spot, count] for spot, count in each.statements.items()],
                        [[*spot, *way, count] for spot, ways in each.branches.items() for way, count in ways.items()]]
                 for name, each in self.files.items()}  # fmt: skip
 
     @classmethod
     def from_data(cls, data: Mapping[str, Any]) -> Coverage:
-        """What `to_data` gave."""
+        """The counts that `to_data` has returned."""
         made = cls()
         for name, (rows, ways) in data.items():
             each = made.files[name] = FileCoverage({(line, column): count for line, column, count in rows})
@@ -100,7 +100,7 @@ class Coverage:
 
 
 class Counter:
-    """Listens to one PLC and counts."""
+    """A listener that counts the executions of one PLC."""
 
     def __init__(self, coverage: Coverage, subject: Subject) -> None:
         image = subject.image
@@ -138,7 +138,7 @@ class Counter:
             self._decide(event.frame, -1)
 
     def _decide(self, frame: Frame, site: int) -> None:
-        """A statement that chose is followed by another of the same body, or by its end."""
+        """Counts the branch of the last IF or CASE of a body: to the statement `site`, or to none."""
         chose = self._open.pop(frame, None)
         if chose is None:
             return

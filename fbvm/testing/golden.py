@@ -1,4 +1,4 @@
-"""Golden traces: what variables did in a run that somebody looked at and found good, as text to keep under version control.
+"""Golden traces: the changes of variables in a run that was checked by its author, as text for version control.
 
     Running
       scan 0     0s     FALSE

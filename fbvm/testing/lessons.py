@@ -1,7 +1,7 @@
-"""The lessons that `fbvm learn` gives, what a learner makes of them, and a teacher's run over many learners.
+"""The lessons of `fbvm learn`, the check of a learner's files, and a teacher's check of all learners.
 
 A lesson is a folder of `examples/lessons/`: `lesson.md` is its text, `given.st` a program, `answers.toml` asks for a prediction,
-`test_lesson.py` checks it and the learner's `program.st`; `solution/` is kept apart.
+`test_lesson.py` checks it and the learner's `program.st`; `solution/` is not copied.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def run_pytest(arguments: Sequence[str], cwd: Path | None = None, quiet: bool = 
 
 
 def check(lesson: Lesson, folder: Path) -> int:
-    """Checks what a learner made of a lesson, and remembers if all was right; pytest's status."""
+    """Checks a learner's files of a lesson; returns pytest's status, and marks the lesson as done if the status is 0."""
     target = folder / lesson.slug
     status = run_pytest([*QUIET, "--rootdir", str(target), "-c", str(_ini(target)), str(target)])
     if status == 0:
@@ -102,7 +102,7 @@ def check(lesson: Lesson, folder: Path) -> int:
 
 
 def is_done(lesson: Lesson, folder: Path) -> bool:
-    """True if a check found all right."""
+    """True if a check has passed."""
     return (folder / lesson.slug / DONE).exists()
 
 
@@ -118,7 +118,7 @@ def _ini(folder: Path) -> Path:
 
 @dataclass
 class Result:
-    """What a learner made of one lesson: the prediction, checks of the program, and what failed with a first line of why."""
+    """The result of one lesson: whether the prediction is right, checks of the program, and failed tests with their messages."""
 
     prediction: bool = False
     passed: int = 0

@@ -23,7 +23,7 @@ MS = 1_000_000
 
 
 def faults() -> st.SearchStrategy[list[Fault]]:
-    """What may be wrong with the way to a peer: nothing, slow, cut in pieces, dead."""
+    """Faults of the network to a peer: none, latency, segments, silence, refusal."""
     row = st.one_of(
         st.builds(Fault, latency_ns=st.integers(0, 3000).map(lambda ms: ms * MS)),
         st.builds(Fault, segment_bytes=st.integers(1, 20), random_cut=st.booleans()),
@@ -33,8 +33,8 @@ def faults() -> st.SearchStrategy[list[Fault]]:
     return st.lists(row, max_size=1)
 
 
-class _Said:
-    """The report of a rig, worked out when Hypothesis shows what failed."""
+class _LazyReport:
+    """The report of a rig, which is made when Hypothesis prints the failure."""
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -71,7 +71,7 @@ def block_machine(make: Callable[[], Rig], always: Sequence[Callable[[Rig], obje
             self.rig.power_on()
 
         @rule(rows=faults())
-        def change_the_way(self, rows: list[Fault]) -> None:
+        def change_faults(self, rows: list[Fault]) -> None:
             self.rig.network.faults[:] = rows
 
         @invariant()
@@ -82,7 +82,7 @@ def block_machine(make: Callable[[], Rig], always: Sequence[Callable[[Rig], obje
                 try:
                     assert condition(rig) is not False, f"{getattr(condition, '__name__', condition)} does not hold"
                 except AssertionError:
-                    note(_Said(rig))
+                    note(_LazyReport(rig))
                     raise
 
     case: type[TestCase] = Machine.TestCase

@@ -1,6 +1,6 @@
-"""The page of a failed test: its last scans are done again, recorded with every statement, and written as one HTML file.
+"""The page of a failed test: its last scans are executed again, recorded with every statement, and written as HTML.
 
-What draws it is loaded when a test has failed."""
+The modules that draw it are imported when a test has failed."""
 
 from __future__ import annotations
 
@@ -23,20 +23,22 @@ MOST_SCANS = 400
 
 
 def page_path(root: Path, test: str) -> Path:
-    """Where the page of a test lies: `.fbvm/tests.test_pump.test_it_waits.html`."""
+    """The path of the page of a test: `.fbvm/tests.test_pump.test_it_waits.html`."""
     return root / FOLDER / f"{file_name(test)}.html"
 
 
 def file_name(test: str) -> str:
-    """A name for a file about a test, without its ending."""
+    """The name of a file about a test, without its suffix."""
     return re.sub(r"[^\w\-\[\].]+", ".", re.sub(r"\.(py|st)::", ".", test))[:150]
 
 
 def write_page(path: Path, title: str, history: History, subject: Subject, units: Plc, asked: Sequence[Place],
                packets: Sequence[tuple[int, Packet]] = (), unfinished: bool = False) -> bool:  # fmt: skip
-    """Writes the page of a run of a PLC with units; False if there was no scan.  Raises OSError.
+    """Writes the page of the scans that `history` holds; returns False if there are none.  Raises OSError.
 
-    `unfinished` if the last scan was not done to its end; the page shows it as it would have gone on."""
+    `units` is the PLC whose units describe addresses, `asked` are the variables that the page shows first, `packets` those
+    of the network with the numbers of their scans.  `unfinished`: the last scan was interrupted, and the page shows how it
+    would have ended."""
     scans = range(history.scans.start, history.scans.stop + unfinished)
     if not scans:
         return False
@@ -55,7 +57,7 @@ def write_page(path: Path, title: str, history: History, subject: Subject, units
 
     history.replay_with(range(max(scans.start, scans.stop - MOST_SCANS), scans.stop), recorded)
     trace = Trace(io.BytesIO(file.getvalue()))
-    trace.described, trace.meanings = descriptions(units), meanings(units)  # those that did it again had no units
+    trace.described, trace.meanings = descriptions(units), meanings(units)  # the PLC of the replay has no units
     data = page_data(trace, title=title, prefix=subject.prefix, pinned=[place.name for place in asked])
     data["frames"] = frame_rows([row for row in packets if row[0] in trace.scans])
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""A network of PLCs from a project file, moved together in virtual time and asked by name.
+"""A rig for all PLCs of a project file, which run together in virtual time.
 
     plant = plant()                                    # fbvm.toml near the test
     plant.until("client.Main.Done", max="5s")
@@ -24,7 +24,7 @@ from fbvm.watch.values import Value, show_time
 
 
 class PlantRig:
-    """The PLCs of a project, each a `Rig`: `plant.pump`, `plant["pump[3]"]`; `network` is what they share.
+    """The PLCs of a project, each a `Rig`: `plant.pump`, `plant["pump[3]"]`; `network` is their network.
 
     Times are text ("50ms") or integers of nanoseconds."""
 
@@ -81,7 +81,7 @@ class PlantRig:
         return self
 
     def run(self, time: str | int) -> PlantRig:
-        """Everybody scans for a time.  Raises Trapped."""
+        """Executes scans of all PLCs for a time.  Raises Trapped."""
         __tracebackhide__ = True
         end_ns = self.elapsed_ns + to_ns(time)
         while self.elapsed_ns < end_ns:
@@ -89,7 +89,7 @@ class PlantRig:
         return self
 
     def until(self, condition: str | Callable[[PlantRig], object], /, *, max: str | int = DEFAULT_LIMIT) -> PlantRig:
-        """Everybody scans until a condition holds: a function, or names behind those of their PLCs, `pump.Main.Done`.
+        """Executes scans of all PLCs until a condition holds: a function, or names behind those of their PLCs, `pump.Main.Done`.
 
         Raises AssertionError if it does not hold within `max`, Trapped after a trap."""
         __tracebackhide__ = True

@@ -36,7 +36,7 @@ RIGS: pytest.StashKey[list[Rig]] = pytest.StashKey()
 
 
 class RigMaker(Protocol):
-    """What the fixtures `fb` and `plc` are: called, they give a rig."""
+    """The type of the fixtures `fb` and `plc`: functions that return a rig."""
 
     def __call__(self, what: str, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
                  sources: Sequence[str] = (), text: str = "", libraries: Sequence[str] = (), dialect: str = "",
@@ -44,13 +44,13 @@ class RigMaker(Protocol):
 
 
 class Tracer(Protocol):
-    """What the fixture `trace` is."""
+    """The type of the fixture `trace`."""
 
     def __call__(self, rig: Rig, *patterns: str, depth: str = "statements") -> Recorded: ...
 
 
 class PlantMaker(Protocol):
-    """What the fixture `plant` is."""
+    """The type of the fixture `plant`."""
 
     def __call__(self, project: str = "fbvm.toml") -> PlantRig: ...
 
@@ -82,10 +82,10 @@ def pytest_configure(config: pytest.Config) -> None:
 def fb(request: pytest.FixtureRequest) -> RigMaker:
     """One function block, function or program on a test rig: `fb("src/pump.st::Pump", cycle="10ms")`, `fb("TON")`.
 
-    `stubs` put ST or a Python function in place of blocks by name; `text` is ST to compile with it, `sources` are more
-    files, `libraries` folders with blocks in files of their names; `dialect` is whose
-    answers are taken (else the ini option fbvm_dialect); `etn21` is the address of an Ethernet unit,
-    `network` what it is on, `units` are other units."""
+    `stubs` replace blocks, by name, with ST or a Python function; `text` is ST that is compiled with the file, `sources`
+    are further files, `libraries` folders with blocks in files of their names; `dialect` is the dialect of the compiler
+    (default: the ini option fbvm_dialect); `etn21` is the IPv4 address of an Ethernet unit, `network` its network, `units`
+    are other units."""
     return _maker(request, block=True)
 
 
@@ -100,7 +100,7 @@ def plant(request: pytest.FixtureRequest) -> Iterator[PlantMaker]:
     """The PLCs of a project file, on one network in memory: `plant()` is that of fbvm.toml near the test.
 
     Each is a rig: `plant().pump.Running`, `made["pump[3]"]`; `run("1s")`, `scan()` and `until("pump.Main.Done", max="5s")` move
-    all of them, `made.network` is what they share."""
+    all of them, `made.network` is their network."""
     from fbvm.testing.plant_rig import PlantRig, project_near
 
     made: list[PlantRig] = []
@@ -110,7 +110,7 @@ def plant(request: pytest.FixtureRequest) -> Iterator[PlantMaker]:
         made.append(PlantRig(project_near(search_folders(request.path, request.config.rootpath), project)))
         _rigs(request.node).extend(made[-1].rigs.values())
         for rig in made[-1].rigs.values():
-            _attend(request, rig)
+            _instrument(request, rig)
         return made[-1]
 
     yield make
@@ -134,7 +134,7 @@ def network() -> Iterator[LoopNetwork]:
 def trace(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Tracer]:
     """Records a rig: `run = trace(pump)`, then `run.chart("Start", "Running")`, `run.table(...)`, `run.why("Running")`.
 
-    `run.golden("golden/start.txt", "Running")` holds it to a file beside the test, which `--fbvm-golden` writes.
+    `run.golden("golden/start.txt", "Running")` compares it with a file beside the test, which `--fbvm-golden` writes.
 
     `trace(pump, "Delay.*", depth="scans")` keeps less; `run.path` is the file, for `fbvm chart` and `fbvm why`."""
     from fbvm.testing.recorded import Recorded
@@ -170,24 +170,24 @@ def _maker(request: pytest.FixtureRequest, *, block: bool) -> RigMaker:
                      dialect=dialect or request.config.getini("fbvm_dialect"), **given)
         warnings.add(rig.subject)
         rigs.append(rig)
-        _attend(request, rig)
+        _instrument(request, rig)
         return rig
 
     return make
 
 
-def _attend(request: pytest.FixtureRequest, rig: Rig) -> None:
-    """Counts what a rig executes and records it, if somebody wants that, until the test is over."""
-    attending = ExitStack()
-    attending.enter_context(count_coverage(request.config, rig.plc, rig.subject))
+def _instrument(request: pytest.FixtureRequest, rig: Rig) -> None:
+    """Attaches coverage and the trace of --fbvm-traces to a rig, as far as they are asked for, until the end of the test."""
+    attached = ExitStack()
+    attached.enter_context(count_coverage(request.config, rig.plc, rig.subject))
     if folder := request.config.getoption("fbvm_traces"):
         from fbvm.testing.pages import file_name
         from fbvm.testing.recorded import Recorded
 
         Path(folder).mkdir(parents=True, exist_ok=True)
         name = f"{file_name(request.node.nodeid)}.{_rigs(request.node).index(rig)}.fbtrace"
-        attending.callback(Recorded(rig, Path(folder) / name).close)
-    request.addfinalizer(attending.close)
+        attached.callback(Recorded(rig, Path(folder) / name).close)
+    request.addfinalizer(attached.close)
 
 
 # --- failures ---------------------------------------------------------------------------------------------------------
@@ -207,12 +207,12 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, None, None]:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """A failed test says what became of the variables that it asked for."""
+    """Adds a report about the variables that a failed test has read."""
     if call.excinfo is not None and RIGS in item.stash and not item.config.option.fulltrace:
         _shorten(call.excinfo.value)
     report = yield
     if report.failed and call.when == "call" and call.excinfo is not None:
-        for rig, lines in _asking(call.excinfo, _rigs(item)):
+        for rig, lines in _rigs_read(call.excinfo, _rigs(item)):
             text = "\n\n".join(part for part in (rig.explain(lines), _page(item, rig, lines)) if part)
             if text:
                 report.sections.append((f"fbvm {rig!r}", text))
@@ -220,13 +220,13 @@ def pytest_runtest_makereport(
 
 
 def _shorten(error: BaseException) -> None:
-    """A misspelt name or a value that does not fit is the test's affair: its traceback ends where the test called fbvm."""
+    """Cuts frames of fbvm off the traceback of an error that the test has caused, such as a misspelt name."""
     own = type(error).__module__.startswith("fbvm.")
     if not own and not isinstance(error, LookupError | TypeError | ValueError | AttributeError | AssertionError | OSError):
         return
     entry, last = error.__traceback__, None
     while entry is not None:
-        if not Path(entry.tb_frame.f_code.co_filename).is_relative_to(PACKAGE):  # our own frames say nothing of the test
+        if not Path(entry.tb_frame.f_code.co_filename).is_relative_to(PACKAGE):  # frames of fbvm do not explain the test
             last = entry
         entry = entry.tb_next
     if last is not None:
@@ -234,23 +234,23 @@ def _shorten(error: BaseException) -> None:
 
 
 def _page(item: pytest.Item, rig: Rig, lines: tuple[str, range] | None) -> str:
-    """Writes the page of one of the rigs of a failed test, and says where it is; "" without one."""
+    """Writes the page of a rig of a failed test; returns the line of the report that names the page, or ""."""
     number = "" if len(_rigs(item)) == 1 else f".{_rigs(item).index(rig)}"
     return failure_page(item, number, lambda path: rig.write_page(path, item.nodeid, lines))
 
 
-def _asking(excinfo: pytest.ExceptionInfo[BaseException], rigs: Sequence[Rig]) -> list[tuple[Rig, tuple[str, range] | None]]:
-    """Rigs that the failed statement asked for something, with its file and lines; all rigs if it asked none."""
+def _rigs_read(excinfo: pytest.ExceptionInfo[BaseException], rigs: Sequence[Rig]) -> list[tuple[Rig, tuple[str, range] | None]]:
+    """The rigs whose variables the failed statement has read, with its file and lines; without such rigs, all rigs."""
     for entry in reversed(excinfo.traceback):
         file, lines = str(entry.path), _statement(str(entry.path), entry.lineno + 1)
-        asked = [rig for rig in rigs if any(name == file and line in lines for name, line, _ in rig.reads)]
-        if asked:
-            return [(rig, (file, lines)) for rig in asked]
+        found = [rig for rig in rigs if any(name == file and line in lines for name, line, _ in rig.reads)]
+        if found:
+            return [(rig, (file, lines)) for rig in found]
     return [(rig, None) for rig in rigs]
 
 
 def _statement(file: str, line: int) -> range:
-    """The lines of the smallest statement around a line."""
+    """The lines of the smallest statement that contains a line."""
     try:
         tree = ast.parse(Path(file).read_text(encoding="utf-8"))
     except (OSError, SyntaxError, ValueError):

@@ -1,4 +1,4 @@
-"""A rig's run as a trace in a file: charts, scan tables and causes by the names of the test."""
+"""A trace of a rig in a file: charts, scan tables and causes, with names as in the test."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from fbvm.watch.paths import Place
 
 
 class Recorded:
-    """Records a rig into `path` from its next scan.  Names are those of the rig; patterns choose what is kept."""
+    """Records a rig into `path` from its next scan.  Names are those of the rig; `patterns` select
+    the variables of the trace, `depth` is that of `TraceWriter`, `folder` that of golden files, which `write_golden` writes."""
 
     def __init__(self, rig: Rig, path: Path, patterns: tuple[str, ...] = (), depth: str = "statements",
                  folder: Path = Path(), write_golden: bool = False) -> None:  # fmt: skip
@@ -36,13 +37,13 @@ class Recorded:
             self._file.close()
 
     def open(self) -> Trace:
-        """The trace so far, to be read; the reader closes it."""
+        """Opens the trace of all scans so far; the caller closes it."""
         if not self._file.closed:
             self._writer.flush()
         return Trace.open(self.path)
 
     def chart(self, *names: str) -> Chart:
-        """The time chart; without names, of what changed."""
+        """The time chart of some variables; without names of those that have changed."""
         with self.open() as trace:
             return draw(self._recording(trace, names))
 
@@ -55,16 +56,16 @@ class Recorded:
         return table.draw(band for band in table.bands if band.has_changes)
 
     def golden(self, file: str, *names: str) -> None:
-        """Holds the run to a file beside the test; `--fbvm-golden` writes it.  Without names, what changed.
+        """Compares the changes of some variables with a golden file beside the test; `--fbvm-golden` writes the file.
 
-        Raises AssertionError with what differs."""
+        Without names the variables that have changed are compared.  Raises AssertionError with the differences."""
         __tracebackhide__ = True
         with self.open() as trace:
             made = self._recording(trace, names)
         check(self._folder / file, made, self._write_golden)
 
     def why(self, name: str, scan: int | None = None) -> str:
-        """Why a variable has its value at the end of a scan, or of the last one."""
+        """The causes of a variable's value at the end of a scan, by default the last one."""
         place = self._rig.find(name)
         if not isinstance(place, Place):
             raise ValueError(f"{name} is a range; name one place")

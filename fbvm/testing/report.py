@@ -1,4 +1,4 @@
-"""What a failed test shows: when each variable changed last and by which line, and the scan table around the end."""
+"""The report of a failed test: the last change of each variable and its statement, and the scan table before the failure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fbvm.watch.paths import Place
 from fbvm.watch.values import show_time
 
 LOOKED_BACK = 400
-"""Scans that are done again to find who changed a variable."""
+"""Scans that are executed again to find the last change of a variable."""
 BANDS = 4
 """Scans with changes that the table shows."""
 MOST_COLUMNS = 8
@@ -28,22 +28,22 @@ class Report:
         self.names = Names.of(plc.image, plc.memory.areas)
 
     def names_in(self, prefix: str) -> list[str]:
-        """The variables of the block or program whose path, with its dot, is `prefix`."""
+        """The names of the variables of the block or program at the path `prefix`, which ends with a dot."""
         kind = self._plc.find(prefix.rstrip(".")) if prefix else None
         fields = kind.type.fields.values() if isinstance(kind, Place) and isinstance(kind.type, StructType) else ()
         return [field.name for field in fields]
 
     def text(self, lines: tuple[str, range] | None = None) -> str:
-        """The report for the variables that some lines asked for, "" if they asked for none."""
+        """The report about the variables that some lines of a file have read; without `lines`, all that the test has read."""
         places = self._reads.places(*lines) if lines else self._reads.places()
         signals = self._signals(places)
         if not signals or not self._plc.scans:
             return ""
         table = self._again(signals, LOOKED_BACK)
-        told = "\n".join([*(self._told(table, signal) for signal in signals), *self._blocks(table, signals)])
+        changes = "\n".join([*(self._last_change(table, signal) for signal in signals), *self._blocks(table, signals)])
         moved = [band for band in table.bands if band.has_changes][-BANDS:]
         last = table.bands[-1:] if table.bands and table.bands[-1] not in moved else []
-        return f"{told}\n\n{table.draw([*moved, *last])}" if table.bands else told
+        return f"{changes}\n\n{table.draw([*moved, *last])}" if table.bands else changes
 
     def table(self, places: list[Place], scans: int) -> str:
         """The scan table of the last scans."""
@@ -59,8 +59,8 @@ class Report:
         self._history.replay(range(max(0, end - scans), end), table)
         return table
 
-    def _told(self, table: ScanTable, signal: Signal) -> str:
-        """`Running is TRUE since scan 5 (50ms), by pump.st:12: Running := Delay.Q;  with Delay.Q = TRUE`"""
+    def _last_change(self, table: ScanTable, signal: Signal) -> str:
+        """The last change of a variable: `Running is TRUE since scan 5 (50ms), by pump.st:12:  Running := Delay.Q;  with ...`."""
         value = self.names.read(self._plc.read, signal.place)
         now = f"{signal.label} is {signal.text(value)}"
         change, writer = table.last_change(signal), table.writers.get(signal)

@@ -1,4 +1,4 @@
-"""The test rig: a block or a program on a PLC in virtual time, moved and asked by name.
+"""The test rig: a block or a program on a PLC in virtual time, whose variables are written and read by name.
 
     pump = fb("src/pump.st::Pump", cycle="10ms")
     pump.scan(Start=True)
@@ -42,11 +42,11 @@ MOST_PACKETS = 10_000
 MOST_SHOWN = 6
 """Packets that the report of a failure lists."""
 DEFAULT_LIMIT = "1m"
-"""How long `until` waits if nobody says, in virtual time."""
+"""The default of `max` of `until`, in virtual time."""
 
 
 class Trapped(AssertionError):
-    """The program was stopped; `trap` says where and why."""
+    """A trap has stopped the program; `trap` has its position and reason."""
 
     def __init__(self, trap: Trap, message: str = "") -> None:
         super().__init__(message or trap.message)
@@ -67,7 +67,7 @@ class Forced:
 
 
 class Ambiguous:
-    """A word of the rig that is the name of a variable, too: it can be called, and is no value."""
+    """A method of the rig whose name a variable has, too: it can be called; a use as a value raises TypeError."""
 
     def __init__(self, method: Callable[..., Any], name: str) -> None:
         self._method, self._said = method, f"a variable is called {name}, too: write rig[{name!r}] for its value"
@@ -85,10 +85,10 @@ class Ambiguous:
 
 
 class Rig:
-    """One PLC with a subject.  Names are looked for in the block, or the program, first, then in the whole PLC.
+    """One PLC with a block or a program under test.  Names are looked up there first, then in the whole PLC.
 
     Variables are attributes (`rig.Done`, `rig.Start = True`) and items (`rig["m.ET"]`, `rig["D200"]`); an item is
-    needed where the name is a word of this class.  Times are text ("50ms") or integers of nanoseconds."""
+    needed for a name that is a method of this class.  Times are text ("50ms") or integers of nanoseconds."""
 
     plc: Plc
     subject: Subject
@@ -130,8 +130,9 @@ class Rig:
            **given: Any) -> Rig:  # fmt: skip
         """A rig by text: `"src/pump.st::Pump"`, `"src/pump.st"`, or `"TON"` from a library.
 
-        Files are looked for in `folders`, or where Python runs; without `block` it is the whole program of the file.
-        `wanted` says which warnings are, `dialect` whose answers are taken where compilers disagree."""
+        Files are looked for in `folders`, or in the current folder; without `block` the rig runs the whole program of the
+        file.  `libraries`, `sources`, `text` and `stubs` are as for the fixture `fb`; `wanted` selects the warnings,
+        `dialect` is the dialect of the compiler.  Raises SubjectError with all diagnostics."""
         __tracebackhide__ = True
         file, mark, name = what.partition("::")
         if not mark and block and not file.lower().endswith(".st"):
@@ -166,7 +167,7 @@ class Rig:
     # --- values
 
     def find(self, name: str) -> Place | Span:
-        """The place that a name means.  Raises UnknownPlace."""
+        """The place or span that a name denotes.  Raises UnknownPlace."""
         symbols, areas = self.plc.image.symbols, self.plc.memory.areas
         try:
             return find_place(symbols, areas, self.subject.path(name.strip()))
@@ -202,7 +203,7 @@ class Rig:
             raise type(error)(self.subject.plain(str(error))) from None
 
     def write(self, inputs: Mapping[str, object] | None = None, /, **named: object) -> Rig:
-        """Writes variables by name; those whose name is no word of Python by a mapping: `{"CIO 0.00": True}`."""
+        """Writes variables by name; names that are no Python identifiers by a mapping: `{"CIO 0.00": True}`."""
         for name, value in {**(inputs or {}), **named}.items():
             self[name] = value
         return self
@@ -210,14 +211,14 @@ class Rig:
     # --- time
 
     def scan(self, inputs: Mapping[str, object] | None = None, /, **named: object) -> Rig:
-        """Writes inputs, then one scan.  Raises Trapped."""
+        """Writes inputs, then executes one scan.  Raises Trapped."""
         __tracebackhide__ = True
         self.write(inputs, **named)
         self._scan()
         return self
 
     def run(self, time: str | int | None = None, /, *, scans: int | None = None, **named: object) -> Rig:
-        """Writes inputs, then scans for a time, or so many times.  Raises Trapped."""
+        """Writes inputs, then executes scans for `time` ("1s", or nanoseconds), or `scans` scans.  Raises Trapped."""
         __tracebackhide__ = True
         self.write(named)
         if (time is None) == (scans is None):
@@ -229,7 +230,7 @@ class Rig:
         return self
 
     def until(self, condition: str | Callable[[Rig], object], /, *, max: str | int = DEFAULT_LIMIT, **named: object) -> Rig:
-        """Writes inputs, then scans until a condition holds after a scan: `"m.Done AND Count > 5"` or a function.
+        """Writes inputs, then executes scans until a condition holds after one: `"m.Done AND Count > 5"` or a function.
 
         Raises AssertionError if it does not hold within `max`, Trapped after a trap."""
         __tracebackhide__ = True
@@ -245,7 +246,7 @@ class Rig:
                 raise AssertionError(f"{said} does not hold within {show_time(to_ns(max))[2:]}")
 
     def at(self, time: str | int, inputs: Mapping[str, object] | None = None, /, **named: object) -> Rig:
-        """Writes inputs later: before the first scan at or after a time since power-on."""
+        """Schedules a write before the first scan at or after `time`, which counts from power-on."""
         for name, value in {**(inputs or {}), **named}.items():
             self.find(name)
             self._timed.append((to_ns(time), name, value))
@@ -277,36 +278,37 @@ class Rig:
 
     @property
     def scans(self) -> int:
-        """Scans since power-on."""
+        """The number of scans since power-on."""
         return self.plc.scans
 
     @property
     def elapsed_ns(self) -> int:
-        """Time since power-on."""
+        """The time since power-on in nanoseconds."""
         return self.plc.elapsed_ns
 
     # --- power, mode, forces
 
     def power_on(self) -> Rig:
-        """Power off and on: what is retained keeps its values."""
+        """Switches power off and on; retained variables keep their values."""
         self._history.mark_changed()
         self.plc.warm_start()
         return self
 
     def cold_start(self) -> Rig:
-        """Power on as new: everything has its initial value."""
+        """Switches power on as for a new PLC: all variables have their initial values."""
         self._history.mark_changed()
         self.plc.cold_start()
         return self
 
     def mode(self, mode: str) -> Rig:
-        """"PROGRAM": units are refreshed, the program stands.  "RUN" after it clears what is not retained."""
+        """Sets the operating mode.  "PROGRAM": units are refreshed, the program is not executed; "RUN" after it clears variables
+        that are not retained."""
         self._history.mark_changed()
         self.plc.mode = Mode(mode.upper())
         return self
 
     def force(self, values: Mapping[str, object] | None = None, /, **named: object) -> Forced:
-        """Holds variables until `unforce`, or to the end of a `with` block.  What is left forced fails the test."""
+        """Forces variables until `unforce`, or to the end of a `with` block.  A test that leaves a force fails."""
         given = {**(values or {}), **named}
         self._history.mark_changed()
         for name, value in given.items():
@@ -324,10 +326,10 @@ class Rig:
             self.plc.unforce()
         return self
 
-    # --- pictures
+    # --- charts and reports
 
     def chart(self, *signals: str, scans: int) -> Chart:
-        """Runs so many scans and draws the signals, as `fbvm.chart` does."""
+        """Executes `scans` scans and draws the signals, as `fbvm.chart` does."""
         places = [self.find(name) for name in signals]
         recorder = Recorder(self.plc, [place.name for place in places])
         try:
@@ -337,19 +339,19 @@ class Rig:
         return draw(recorder.relabelled(self.subject.prefix))
 
     def table(self, *signals: str, scans: int = 10) -> str:
-        """The scan table of the last scans: what changed these variables, statement by statement."""
+        """The scan table of the last `scans` scans: the changes of these variables, statement by statement."""
         places = [self.find(name) for name in signals]
         return self._report.table([place for place in places if isinstance(place, Place)], scans)
 
     @property
     def reads(self) -> list[tuple[str, int, Place]]:
-        """What the test asked for since the last scan: file, line, place."""
+        """The variables that the test has read since the last scan: file, line, place."""
         return self._reads.rows
 
     def explain(self, lines: tuple[str, range] | None = None) -> str:
-        """What a failed test wants to know: the variables it asked for, when they changed last and by which line.
+        """The report of a failed test: the variables that it has read, their last changes and the statements of these.
 
-        `lines` are a file and the lines in it that asked; without, all that was asked for since the last scan."""
+        `lines` are a file and lines of it; without them all variables are reported that were read since the last scan."""
         said = self._report.text(lines)
         if said and self._packets:
             rows = [f"  scan {scan:<4} {packet}" for scan, packet in list(self._packets)[-MOST_SHOWN:]]
@@ -357,7 +359,7 @@ class Rig:
         return said
 
     def write_page(self, path: Path, title: str, lines: tuple[str, range] | None = None) -> bool:
-        """Writes the last scans as one HTML file, which shows what `lines` asked for; False if there was no scan."""
+        """Writes the last scans as one HTML file, which shows the variables that `lines` have read; False without a scan."""
         return write_page(path, title, self._history, self.subject, self.plc, self._reads.places(*(lines or ())),
                           self._packets)
 
@@ -371,5 +373,5 @@ def _file(path: str, folders: Sequence[Path]) -> Path:
 
 
 def to_ns(time: str | int) -> int:
-    """Nanoseconds of "50ms", or of an integer that is some."""
+    """The nanoseconds of a time: text such as "50ms", or an integer of nanoseconds."""
     return parse_time_ns(time) if isinstance(time, str) else time

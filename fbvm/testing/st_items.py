@@ -36,7 +36,7 @@ BANDS, LOOKED_BACK = 4, 100
 
 
 class AssertFailed(AssertionError):
-    """An ASSERT found its condition FALSE: where, in which scan, what it read, and the scan table before it."""
+    """The condition of an ASSERT was FALSE: its position, the scan, the values that it had read, the scan table before it."""
 
     def __init__(self, site: Site, scan: int, now_ns: int, values: list[tuple[Signal, Value]]) -> None:
         super().__init__(f"{site}: ASSERT failed in scan {scan}")
@@ -108,7 +108,7 @@ class StItem(pytest.Item):
 
 
 def _run(plc: Plc, history: History, done: str) -> None:
-    """One scan, or as many as it takes until Done."""
+    """Executes one scan, or, for a program with Done, scans until Done is TRUE."""
     program = plc.find(done.rpartition(".")[0])
     assert isinstance(program, Place)
     field = program.type.member("Done")  # type: ignore[attr-defined]
@@ -125,7 +125,7 @@ def _run(plc: Plc, history: History, done: str) -> None:
 
 
 class Assertions:
-    """Listens to a test and raises AssertFailed at the first ASSERT that fails."""
+    """A listener that raises AssertFailed at the first ASSERT whose condition is FALSE."""
 
     def __init__(self, plc: Plc, prefix: str) -> None:
         self.asserted = 0

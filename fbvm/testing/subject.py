@@ -1,4 +1,4 @@
-"""What a test runs: one POU with a program around it, or a whole program, with stubs in place of blocks.
+"""The program of a test: one POU with a generated program around it, or a whole program, with stubs in place of blocks.
 
 A stub in ST takes the place of the whole declaration, or of the body alone if it declares nothing.
 """
@@ -30,25 +30,27 @@ Stub: TypeAlias = "str | Callable[[Any], None]"
 WRAPPER, INSTANCE = "Test", "Block"
 """The program around a block, and the instance in it."""
 LIBRARY = Path(__file__).parent / "library"
-"""What tests in ST call."""
+"""The library with ASSERT, which tests in ST call."""
 _DECLARES = re.compile(r"\s*(FUNCTION|FUNCTION_BLOCK|PROGRAM)\b", re.I)
 _FIRST = re.compile(r"\w+")
 _OPEN = re.compile(r"\[\s*\*|^\s*ANY(_\w+)?\s*$", re.I)
-"""Types of in-outs that take many: arrays of any length, ANY and its like."""
+"""Types of in-outs that accept several types: arrays of any length, ANY and other generic types."""
 UNKNOWN = ("S0201", "S0204", "S0401")
-"""Codes of names that mean nothing."""
+"""Codes of diagnostics about unknown names."""
 MOST_FILES = 300
-"""In which such a name is looked for."""
+"""Files in which an unknown name is looked for."""
 _images: dict[tuple[object, ...], Subject] = {}
 
 
 class SubjectError(Exception):
-    """What a test wants to run cannot be run; the message says why, with all diagnostics."""
+    """The program of a test cannot be compiled; the message has all diagnostics."""
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A compiled program, what is tested, where names of a test begin (`prefix`, with its dot), the sources by name."""
+    """A compiled program and the POU under test.
+
+    `prefix` is the path of the POU with a dot, in front of all names of the test; `sources` are texts by name."""
 
     name: str
     image: Image
@@ -56,23 +58,23 @@ class Subject:
     sources: Mapping[str, Source]
     libraries: tuple[Path, ...] = ()
     warnings: tuple[Diagnostic, ...] = ()
-    """What the user's own sources are warned of."""
+    """Warnings about the user's own sources."""
     in_outs: frozenset[str] = frozenset()
     """In-outs of a block by folded name: the test sees the variables of the program that are passed."""
 
     def path(self, name: str) -> str:
-        """Where a name of the test leads if it is one of the subject."""
+        """The path in the PLC of a name of the test."""
         first = _FIRST.match(name)
         if first and fold(first[0]) in self.in_outs:
             return f"{WRAPPER}.{INSTANCE}_{name}"
         return f"{self.prefix}{name}"
 
     def plain(self, text: str) -> str:
-        """A message without the names of the program that was put around a block."""
+        """A message without the names of the generated program."""
         return text.replace(self.prefix, "").replace(self.prefix.rstrip("."), self.name) if self.prefix else text
 
     def line(self, file: str, number: int) -> str:
-        """A line of the source without its margin, "" if it is not known."""
+        """A line of a source without its margin, "" if the source is unknown."""
         rows = self.texts.get(file, "").split("\n")
         return rows[number - 1].strip() if 0 < number <= len(rows) else ""
 
@@ -84,10 +86,10 @@ class Subject:
 
 def subject(files: Sequence[Path], name: str | None, libraries: Sequence[Path] = (), stubs: Mapping[str, Stub] | None = None,
             text: str = "", wanted: Wanted = ANY, dialect: str = "standard") -> Subject:  # fmt: skip
-    """The POU `name` of some files (or of a library, without files); the only one if it is "", the program if None.
+    """Compiles the POU `name` of some files, or, without files, of a library; "" is the only POU, None the whole program.
 
-    `text` is ST that is compiled with them; `wanted` says which warnings are, `dialect` whose answers are taken.  Raises
-    SubjectError, and ValueError for a dialect that there is not."""
+    `text` is ST that is compiled with the files, `stubs` are ST or Python functions by the name of a block, `wanted` selects
+    the warnings, `dialect` is the dialect of the compiler.  Raises SubjectError, and ValueError for an unknown dialect."""
     __tracebackhide__ = True
     sources = [_read(path) for path in files] + ([Source("test.st", text)] if text else [])
     stubs = stubs or {}
@@ -120,7 +122,7 @@ def _build(sources: list[Source], name: str | None, libraries: Sequence[Path], s
 
 
 def _only(sources: Sequence[Source]) -> str:
-    """The name of the only POU of some sources, or of that which is called like the first file."""
+    """The name of the only POU of some sources, or of the POU with the name of the first file."""
     names = [node.name.text for source in sources for node in pous(source)]
     stem = fold(Path(sources[0].name).stem) if sources else ""
     chosen = names if len(names) == 1 else [name for name in names if fold(name) == stem]
@@ -136,7 +138,7 @@ def _compiled(sources: list[Source], program: str | None, prefix: str, name: str
                            warnings_as_errors=wanted.as_errors)  # fmt: skip
     if made.image is None:
         said = [message.render() for message in made.errors]
-        raise SubjectError("\n".join([*said, *_elsewhere(made.errors, sources, libraries)]))
+        raise SubjectError("\n".join([*said, *_hints(made.errors, sources, libraries)]))
     if not prefix and len(made.image.tasks) == 1 and len(made.image.tasks[0].programs) == 1:
         prefix = f"{made.image.tasks[0].programs[0].name}."
     return Subject(name or prefix.rstrip(".") or "PLC", made.image, prefix,
@@ -144,12 +146,12 @@ def _compiled(sources: list[Source], program: str | None, prefix: str, name: str
                    tuple(each for each in made.diagnostics if not each.source.name.startswith("<")))  # fmt: skip
 
 
-def _elsewhere(wrong: Sequence[Diagnostic], sources: Sequence[Source], libraries: Sequence[Path]) -> Iterator[str]:
-    """Where what is not known is declared after all: in a file of another name, or beside the test."""
+def _hints(wrong: Sequence[Diagnostic], sources: Sequence[Source], libraries: Sequence[Path]) -> Iterator[str]:
+    """Hints for unknown names that are declared in a file of another name, or beside the test."""
     names = dict.fromkeys(each.source.text[each.start:each.end] for each in wrong if each.code in UNKNOWN)
-    beside = dict.fromkeys(Path(source.name).parent for source in sources)
+    folders = dict.fromkeys(Path(source.name).parent for source in sources)
     files = [*(file for folder in libraries for file in folder.rglob("*.st")),
-             *(file for folder in beside for file in folder.glob("*.st"))] if names else []  # fmt: skip
+             *(file for folder in folders for file in folder.glob("*.st"))] if names else []  # fmt: skip
     for name in names:
         declared = re.compile(rf"^[ \t]*(?:FUNCTION_BLOCK|FUNCTION|TYPE)\s+{re.escape(name)}\b", re.I | re.M)
         for file in files[:MOST_FILES]:
@@ -168,7 +170,7 @@ def _read(path: Path) -> Source:
 
 
 def pous(source: Source) -> list[tree.Pou]:
-    """The POUs that a text declares.  Raises SubjectError if it cannot be read."""
+    """The POUs that a text declares.  Raises SubjectError for syntax errors."""
     text, diagnostics = parse(source)
     if wrong := errors(diagnostics):
         raise SubjectError("\n".join(message.render() for message in wrong))
@@ -207,9 +209,9 @@ def _variables(pou: tree.Pou, kind: str, source: Source) -> list[tuple[str, str]
 
 
 def _wrapper(pou: tree.Pou, source: Source) -> str:
-    """A program that calls a block, or a function with inputs and outputs of the same names.
+    """The text of a program that calls a block, or a function with variables of the names of its inputs and outputs.
 
-    In-outs are connected to variables of the program, which the block shows under its own names."""
+    In-outs are connected to variables of the program, which a test names as the in-outs."""
     name = pou.name.text
     in_outs = _variables(pou, "VAR_IN_OUT", source)
     if open_ones := [f"{each} : {kind}" for each, kind in in_outs if _OPEN.search(kind)]:
@@ -234,7 +236,7 @@ def _wrapper(pou: tree.Pou, source: Source) -> str:
 
 
 def _stubbed(sources: list[Source], name: str, stub: str, libraries: Sequence[Path]) -> list[Source]:
-    """The sources with another POU, or another body, under a name.  Lines of the rest keep their numbers."""
+    """The sources with a stub in place of the POU, or of its body, of a name.  All other lines keep their numbers."""
     node, source = _declared(sources, name, libraries)
     whole = source.text[node.start : node.end]
     text = stub

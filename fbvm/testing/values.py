@@ -11,11 +11,11 @@ from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.values import Value, parse_value, sort_of
 
 OnRead = Callable[[Place], None]
-"""Who is told that a variable was read."""
+"""Called with the place of each variable that is read."""
 
 
 def write(plc: Plc, place: Place | Span, value: object) -> None:
-    """Writes a value; text is read as the program would write it (`"50ms"`, `"16#FF"`).
+    """Writes a Python value; text is parsed as a literal of the variable's type (`"50ms"`, `"16#FF"`).
 
     Raises ValueError (out of range) or TypeError (a value of another kind)."""
     if isinstance(place, Place) and isinstance(value, str) and sort_of(place.type) != "text":
@@ -26,7 +26,7 @@ def write(plc: Plc, place: Place | Span, value: object) -> None:
 class Values:
     """The variables of one structure or instance.  Structures in it are `Values` again, arrays are lists.
 
-    Where a variable is called like something of Python's, write `values["name"]`."""
+    A variable whose name is no attribute in Python is `values["name"]`."""
 
     __slots__ = ("_changed", "_place", "_plc", "_read")
     _place: Place
@@ -91,6 +91,6 @@ def value_of(plc: Plc, found: Place | Span, read: OnRead, changed: Callable[[], 
 
 
 def as_dict(values: Values) -> Value:
-    """All variables of an instance as Python's own values."""
+    """All variables of an instance as a dictionary of Python values."""
     return values._plc.read(values._place)
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fbvm.testing.subject import Subject
 
 NAME = "fbvm_warned"
-"""Under which the plugin is registered."""
+"""The name of the plugin in pytest."""
 
 
 def add_options(parser: pytest.Parser, group: pytest.OptionGroup) -> None:
@@ -30,7 +30,7 @@ def add_options(parser: pytest.Parser, group: pytest.OptionGroup) -> None:
 
 
 class WarningPlugin:
-    """Which warnings are wanted in a session, and those that there were."""
+    """The options about warnings of a session, and the warnings of all programs."""
 
     def __init__(self, config: pytest.Config) -> None:
         codes = [*config.getini("fbvm_no_warn"), *config.getoption("fbvm_no_warn")]
@@ -42,7 +42,7 @@ class WarningPlugin:
         self._shown: dict[str, None] = {}
 
     def add(self, subject: Subject) -> None:
-        """Remember what a subject is warned of."""
+        """Adds the warnings of a compiled program."""
         self._shown.update(dict.fromkeys(each.render() for each in subject.warnings))
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
@@ -65,7 +65,7 @@ class WarningPlugin:
 
 
 def warning_plugin(config: pytest.Config) -> WarningPlugin:
-    """The warnings of a session."""
+    """The warning plugin of a session."""
     plugin: WarningPlugin | None = config.pluginmanager.get_plugin(NAME)
     assert plugin is not None, "it is registered when pytest starts"
     return plugin
