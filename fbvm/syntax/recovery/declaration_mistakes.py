@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 
 from fbvm.syntax.recovery.frames import anchor, cut, frames
-from fbvm.syntax.recovery.lookahead import advance, symbols
 from fbvm.syntax.recovery.repair import Mend
 from fbvm.syntax.recovery.wording import found
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.literals import ELEMENTARY
+from fbvm.syntax.st.lookahead import advance, symbols
 from fbvm.syntax.tree import Name
 
 ARRAY = "an array is written ARRAY [0..9] OF INT"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 
-from fbvm.syntax.recovery.lookahead import advance, expected
 from fbvm.syntax.recovery.repair import Mend
 from fbvm.syntax.recovery.wording import found, sign
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.literals import ELEMENTARY
+from fbvm.syntax.st.lookahead import advance, expected
 from fbvm.syntax.tree import NameRef, Node
 
 OPERANDS = {"NAME", "NUMBER", "TYPED_LITERAL", "DATE_LITERAL", "STRING_LITERAL", "TRUE", "FALSE", "LPAR", "DIRECT", "NOT"}

@@ -7,8 +7,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from fbvm.syntax.recovery.lookahead import State, symbols
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.lookahead import State, symbols
 from fbvm.syntax.st.tables import tables
 from fbvm.syntax.tree import Binary, EnumLiteral, Literal, NullLiteral, Unary
 

@@ -9,13 +9,13 @@ from fbvm.syntax.ladder.pasted import INSTRUCTION_LIST, ladder_lines
 from fbvm.syntax.recovery.declaration_mistakes import alias, braces, function_head, misnamed, sized_text, two_names, written_type
 from fbvm.syntax.recovery.foreign_forms import bare_function, bare_point, decimal_comma, doubled_quote, infix
 from fbvm.syntax.recovery.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, cut, frames
-from fbvm.syntax.recovery.lookahead import advance, symbols
 from fbvm.syntax.recovery.repair import Mend
 from fbvm.syntax.recovery.word_mistakes import colon_behind, comment_signs, foreign_word, networks, statement_as_value, until
 from fbvm.syntax.recovery.wording import found
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token, lexis, meant
 from fbvm.syntax.st.literals import ELEMENTARY
+from fbvm.syntax.st.lookahead import advance, symbols
 from fbvm.syntax.tree import Deref, Name
 
 ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}

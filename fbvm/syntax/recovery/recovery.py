@@ -22,7 +22,6 @@ from fbvm.syntax.recovery.frames import (
     reopen,
 )
 from fbvm.syntax.recovery.indentation import BLOCKS, advice, ends_alike
-from fbvm.syntax.recovery.lookahead import advance, expected
 from fbvm.syntax.recovery.mistakes import open_bracket
 from fbvm.syntax.recovery.repair import Mend
 from fbvm.syntax.recovery.repairs import BRACKETS, best_mend
@@ -30,6 +29,7 @@ from fbvm.syntax.recovery.wording import found, hint, sign, unlike
 from fbvm.syntax.st.automaton import ELEMENTS, NESTING_LIMIT, Automaton
 from fbvm.syntax.st.builder import CHAIN_LIMIT, Builder, Stop
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.lookahead import advance, expected
 
 LOOK = 4
 """Tokens by which a mend is judged."""

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 from fbvm.syntax.recovery.chart_mistakes import chart_slip
 from fbvm.syntax.recovery.frames import OPENERS, UNITS, anchor, frames
-from fbvm.syntax.recovery.lookahead import State, advance, expected
 from fbvm.syntax.recovery.mistakes import open_bracket, slip
 from fbvm.syntax.recovery.repair import Mend
 from fbvm.syntax.recovery.wording import found, hint, quoted, sign, unlike
 from fbvm.syntax.st.automaton import ELEMENTS, Automaton
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.lookahead import State, advance, expected
 from fbvm.syntax.tree import EnumLiteral, Literal
 
 INSERTED = ("SEMICOLON", "RPAR", "RSQB", "THEN", "DO", "OF", "COLON", "ASSIGN", "COMMA", "END_REPEAT")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from fbvm.syntax.recovery.frames import ENDS, POUS, UNITS, anchor, frames
-from fbvm.syntax.recovery.lookahead import advance
 from fbvm.syntax.recovery.repair import Mend
 from fbvm.syntax.recovery.wording import found
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.lookahead import advance
 
 DROPPED = {"LET": "an assignment has no word in front of it: x := 5;", "SET": "write x := TRUE;",
            "CALL": "a block is called by the name of its instance: timer(IN := a);",

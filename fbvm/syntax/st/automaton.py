@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import chain, repeat
 from typing import Any, Protocol
 
-from fbvm.syntax.recovery.lookahead import advance
-from fbvm.syntax.recovery.refused import whole
 from fbvm.syntax.st.builder import TooDeep
 from fbvm.syntax.st.lexer import Token, lexis, meant
+from fbvm.syntax.st.lookahead import advance
+from fbvm.syntax.st.refused import whole
 from fbvm.syntax.st.tables import Tables, tables
 
 NESTING_LIMIT = 200

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.syntax.recovery.refused import refused_what
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.refused import refused_what
 from fbvm.syntax.tree import Expr, Name, Refused, Statement
 from fbvm.syntax.tree.ladder import Ladder
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fbvm.syntax.recovery.refused import refused_what
 from fbvm.syntax.sfc.elements import Part, SfcElements
 from fbvm.syntax.st.expressions import Item
 from fbvm.syntax.st.jumps import Jumps, Tangled
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.refused import refused_what
 from fbvm.syntax.st.statements import Items
 from fbvm.syntax.tree import (
     Access,
