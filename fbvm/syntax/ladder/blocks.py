@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from fbvm.syntax.ladder.drawing.diagram import WIRE
-from fbvm.syntax.ladder.instruction_set import Instruction, instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import Instruction, instruction_set
 from fbvm.syntax.ladder.mnemonics import RungText
 from fbvm.syntax.ladder.operands import SYMBOLS, Wrong
 from fbvm.syntax.tree import (

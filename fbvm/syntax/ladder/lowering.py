@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.blocks import LadderBlocks
-from fbvm.syntax.ladder.instruction_set import Instruction, instruction_set, spelling
+from fbvm.syntax.ladder.instructions.instruction_set import Instruction, instruction_set, spelling
 from fbvm.syntax.ladder.mnemonics import Line, RungText, is_input, read_rungs
 from fbvm.syntax.ladder.operands import Operands, Wrong
 from fbvm.syntax.ladder.sequences import Steps

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from fbvm.syntax.ladder.drawing.grid import Bad
 from fbvm.syntax.ladder.drawing.reading import Picture, Placed, is_drawn, read_drawing, remark_of
-from fbvm.syntax.ladder.instruction_set import NO_INSTRUCTIONS, Instruction, instruction_set, meant, spelling
+from fbvm.syntax.ladder.instructions.instruction_set import NO_INSTRUCTIONS, Instruction, instruction_set, meant, spelling
 from fbvm.syntax.st.automaton import Automaton, Mender
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.tables import tables

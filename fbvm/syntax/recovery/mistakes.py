@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from fbvm.syntax.ladder.pasted import INSTRUCTION_LIST, ladder_lines
+from fbvm.syntax.ladder.instructions.pasted import INSTRUCTION_LIST, ladder_lines
 from fbvm.syntax.recovery.declaration_mistakes import alias, braces, function_head, misnamed, sized_text, two_names, written_type
 from fbvm.syntax.recovery.foreign_forms import bare_function, bare_point, decimal_comma, doubled_quote, infix
 from fbvm.syntax.recovery.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, cut, frames

@@ -8,7 +8,7 @@ import re
 from fbvm.interchange.plcopen.read.diagram import Object, Pin, Wire
 from fbvm.interchange.plcopen.read.networks import Network
 from fbvm.interchange.plcopen.read.scope import Scope
-from fbvm.syntax.ladder.instruction_set import Instruction, instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import Instruction, instruction_set
 from fbvm.syntax.ladder.operands import Operands, Wrong
 from fbvm.syntax.ladder.text import instruction_text
 from fbvm.syntax.tree import Index, Member, NameRef

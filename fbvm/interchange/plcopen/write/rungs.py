@@ -17,7 +17,7 @@ from fbvm.interchange.plcopen.write.layout import Drawing, End, Ends, own_data
 from fbvm.interchange.plcopen.write.types import Types, Unsayable
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.drawing.diagram import WIRE
-from fbvm.syntax.ladder.instruction_set import JOINS, Instruction, instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import JOINS, Instruction, instruction_set
 from fbvm.syntax.ladder.mnemonics import Symbol, read_rungs
 from fbvm.syntax.ladder.operands import SYMBOLS, Operands, Wrong
 from fbvm.syntax.ladder.symbols import number

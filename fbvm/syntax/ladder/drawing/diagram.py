@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from fbvm.syntax.ladder.instruction_set import instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import instruction_set
 
 StepText = tuple[str, str, tuple[str, ...]]
 """Prefix, mnemonic and operands of an instruction."""

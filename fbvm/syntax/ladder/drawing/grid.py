@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from fbvm.syntax.ladder.drawing.box_lines import DOWN, LEFT, RIGHT, UP, WAY_WORDS
-from fbvm.syntax.ladder.instruction_set import instruction_set, spelling
+from fbvm.syntax.ladder.instructions.instruction_set import instruction_set, spelling
 
 Cell = tuple[int, int]
 WAYS = {LEFT: (-1, 0), RIGHT: (1, 0), UP: (0, -1), DOWN: (0, 1)}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.ladder.instruction_set import instruction_set, spelling
+from fbvm.syntax.ladder.instructions.instruction_set import instruction_set, spelling
 
 INSTRUCTION_LIST = frozenset((
     "LD", "LDN", "ST", "STN", "S", "R", "AND", "ANDN", "OR", "ORN", "XOR", "XORN", "NOT", "ADD", "SUB", "MUL", "DIV", "MOD", "GT",
