@@ -14,9 +14,9 @@ from fbvm.syntax.formatter.comments import Comments
 from fbvm.syntax.formatter.declarations import DeclarationLayout
 from fbvm.syntax.formatter.layout import Doc, Printer
 from fbvm.syntax.formatter.names import NOTHING, Outside, Spelling
+from fbvm.syntax.parser import parse
 from fbvm.syntax.st.automaton import Automaton, Mender
 from fbvm.syntax.st.lexer import Lexer
-from fbvm.syntax.st.parser import parse
 
 REFUSED = {"S0901", "S0902"}
 """Errors of texts that are understood, so that they can be written too."""

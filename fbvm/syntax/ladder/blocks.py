@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from fbvm.syntax.ladder.drawing.diagram import WIRE
-from fbvm.syntax.ladder.instructions.instruction_set import Instruction, instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import Instruction
 from fbvm.syntax.ladder.mnemonics import RungText
-from fbvm.syntax.ladder.operands import SYMBOLS, Wrong
+from fbvm.syntax.ladder.operands import Wrong
 from fbvm.syntax.tree import (
     Argument,
     Assign,
@@ -22,9 +21,7 @@ from fbvm.syntax.tree import (
     NameRef,
     Statement,
     VarDecl,
-    VarSection,
 )
-from fbvm.syntax.tree.ladder import Ladder
 
 if TYPE_CHECKING:
     from fbvm.syntax.ladder.lowering import Rungs
@@ -210,33 +207,6 @@ class LadderBlocks:
             raise Wrong(f"{text} is no pin", "write PIN:=operand for an input or PIN=>operand for an output")
         at = start + len(name) + 2
         return _named(start, end, name, sign, self.rungs.value(value, at, end))
-
-
-def begin(ladders: Sequence[Ladder]) -> None:
-    """Let the first LADDER of a PROGRAM turn the condition flags OFF if its rungs use them."""
-    rows = instruction_set().rows
-    for ladder in ladders:
-        for step in (step for rung in ladder.rungs for step in rung.steps):
-            reads = any(SYMBOLS.get(operand.upper(), "").startswith("CF0") for operand in step.operands)
-            if reads or rows[step.mnemonic].does.startswith("CX_"):
-                first, at = ladders[0], ladders[0].start
-                first.body = (CallStatement(at, at, Call(at, at, NameRef(at, at, "CX_Begin"), ())), *first.body)
-                return
-
-
-def undeclared(instances: Iterable[VarDecl], sections: Iterable[VarSection],
-               report: Callable[..., None]) -> list[VarDecl]:
-    """Those instances that no section declares; one that is declared with another type has a diagnostic."""
-    known = {name.text.upper(): variable for section in sections for variable in section.variables for name in variable.names}
-    made: list[VarDecl] = []
-    for instance in instances:
-        name, spec = instance.names[0], instance.spec
-        other = known.setdefault(name.text.upper(), instance)
-        if other is instance:
-            made.append(instance)
-        elif isinstance(other.spec, NamedType) and isinstance(spec, NamedType) and other.spec.text.upper() != spec.text.upper():
-            report("S0110", spec.start, name.end, f"{name.text} is an instance of {other.spec.text}, not of {spec.text}", "")
-    return made
 
 
 def _named(start: int, end: int, name: str, sign: str, value: Expr) -> Argument:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from fbvm.base.diagnostics import Source
+from fbvm.syntax.st.declarations import Declarations
 from fbvm.syntax.st.lexer import Token
-from fbvm.syntax.st.statements import Items, Statements
+from fbvm.syntax.st.statements import Items
 from fbvm.syntax.tree import Action, Block, Call, CallStatement, Expr, Name, NameRef
 from fbvm.syntax.tree.sfc import QUALIFIERS, Association, Step, Transition
 
 Part = Step | Transition
 
 
-class SfcElements(Statements):
+class SfcElements(Declarations):
     """The functions of the rules of steps and transitions."""
 
     def __init__(self, source: Source) -> None:

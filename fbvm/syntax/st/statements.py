@@ -29,7 +29,6 @@ from fbvm.syntax.tree import (
     Statement,
     While,
 )
-from fbvm.syntax.tree.ladder import Ladder
 
 Value = tuple[Expr, Expr | None]
 Branch = tuple[Expr, Block]
@@ -155,14 +154,6 @@ class Statements(Expressions):
         return RefusedStatement(token.start, token.end, *refused_what(token.text))
 
     # --- compound statements ---
-
-    def ladder(self, token: Token) -> Ladder:
-        """LADDER .. END_LADDER, which has a front end of its own."""
-        from fbvm.syntax.ladder.lowering import read_ladder
-
-        made = read_ladder(self, token)
-        self.ladders.append(made)
-        return made
 
     def if_statement(self, word: Token, condition: Expr, then: Token, items: Items, more: list[Branch],
                      other: Token | None, otherwise: Items | None, end: Token) -> Statement:

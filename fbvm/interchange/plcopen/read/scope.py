@@ -17,7 +17,7 @@ from fbvm.interchange.plcopen.read.diagram import Object, Wire
 from fbvm.interchange.plcopen.read.document import Document, Pou, Variable
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.operands import Operands, Wrong
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 
 SHARED = "%"

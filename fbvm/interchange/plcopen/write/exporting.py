@@ -12,7 +12,7 @@ from fbvm.interchange.plcopen.read.markup import Element, element, written
 from fbvm.interchange.plcopen.write.pous import pou
 from fbvm.interchange.plcopen.write.types import Types, Unsayable
 from fbvm.syntax import tree
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.st.pragmas import harmless
 from fbvm.syntax.text import read
 
