@@ -18,7 +18,8 @@ class SfcElements(Declarations):
     def __init__(self, source: Source) -> None:
         super().__init__(source)
         self.charted: dict[Action, list[Part]] = {}
-        """Actions of the POU that is being read whose body is a chart of its own, which needs to know all actions."""
+        """Actions of the POU that is being read whose bodies are charts, with the elements of these.  Charts are lowered when
+        the POU is complete, since they need to know all its actions."""
 
     def step(self, word: Token, token: Token, colon: Token, associations: list[Association], end: Token) -> Step:
         self.refuse_selves()
