@@ -10,9 +10,9 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from fbvm.interchange.plcopen.markup import Element
 from fbvm.interchange.plcopen.read.diagram import Diagram, Object, placed, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Pou, Reading
-from fbvm.interchange.plcopen.read.markup import Element
 from fbvm.interchange.plcopen.read.networks import LARGEST, Network, networks
 from fbvm.interchange.plcopen.read.scope import Scope
 from fbvm.interchange.plcopen.read.statements import Statements

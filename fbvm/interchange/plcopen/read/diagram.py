@@ -10,9 +10,10 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import NamedTuple
 
+from fbvm.interchange.plcopen.markup import Element
 from fbvm.interchange.plcopen.read.document import Reading
-from fbvm.interchange.plcopen.read.markup import Element
-from fbvm.interchange.plcopen.read.types import MNEMONIC, own_text
+from fbvm.interchange.plcopen.read.types import own_text
+from fbvm.interchange.plcopen.schema import MNEMONIC
 
 OBJECTS = {"leftPowerRail", "rightPowerRail", "contact", "coil", "block", "inVariable", "outVariable", "inOutVariable",
            "label", "jump", "return"}

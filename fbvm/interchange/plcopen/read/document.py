@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.interchange.plcopen.read.markup import Element
+from fbvm.interchange.plcopen.markup import Element
 
 
 @dataclass

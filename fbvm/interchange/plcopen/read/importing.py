@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.interchange.plcopen.markup import parse_markup, read_markup
 from fbvm.interchange.plcopen.read.document import Reading
-from fbvm.interchange.plcopen.read.markup import parse_markup, read_markup
 from fbvm.interchange.plcopen.read.project import read_project
 from fbvm.interchange.plcopen.read.sources import sources
 

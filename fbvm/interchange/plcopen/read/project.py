@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from fbvm.interchange.plcopen.markup import Element
 from fbvm.interchange.plcopen.read.document import (
     Body,
     Configuration,
@@ -22,16 +23,12 @@ from fbvm.interchange.plcopen.read.document import (
     Variable,
     VarList,
 )
-from fbvm.interchange.plcopen.read.markup import Element
-from fbvm.interchange.plcopen.read.types import LOCATION, MNEMONIC, duration, location, note, type_text, value_text
+from fbvm.interchange.plcopen.read.types import duration, location, note, type_text, value_text
+from fbvm.interchange.plcopen.schema import KINDS, LOCATION, MNEMONIC, QUALIFIERS, SECTIONS
 
 TC6 = "http://www.plcopen.org/xml/tc6"
 IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"
 """Namespace of IEC 61131-10, another schema (from memory of the family, assumed)."""
-KINDS = {"function": "FUNCTION", "functionBlock": "FUNCTION_BLOCK", "program": "PROGRAM"}
-SECTIONS = {"localVars": "VAR", "tempVars": "VAR_TEMP", "inputVars": "VAR_INPUT", "outputVars": "VAR_OUTPUT",
-            "inOutVars": "VAR_IN_OUT", "externalVars": "VAR_EXTERNAL", "globalVars": "VAR_GLOBAL"}
-QUALIFIERS = {"constant": "CONSTANT", "retain": "RETAIN", "nonretain": "NON_RETAIN", "persistent": "PERSISTENT"}
 LANGUAGES = ("ST", "IL", "LD", "FBD", "SFC")
 OBJECT_ORIENTED = {"method", "property", "interface", "getaccessor", "setaccessor", "pouinheritance", "itf", "namespace"}
 """Last words of names of `addData` that hold parts of programs (CODESYS)."""

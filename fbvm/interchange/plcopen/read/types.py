@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import re
 
+from fbvm.interchange.plcopen.markup import Element
 from fbvm.interchange.plcopen.read.document import Reading
-from fbvm.interchange.plcopen.read.markup import Element
+from fbvm.interchange.plcopen.schema import ELEMENTARY, LOCATION
 
-_NAMES = ("BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD "
-          "ANY ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE")
-ELEMENTARY = frozenset(_NAMES.split())
-"""Types that are empty elements of their name (TC6 2.01 elementaryTypes)."""
 _LATER = frozenset(("LTIME", "LDATE", "LDT", "LTOD", "CHAR", "WCHAR"))
 """Types of edition 3, that documents have in the same way, and that are not written."""
-LOCATION = "urn:fbvm:location"
-"""Our `addData`: an address that is no IEC location."""
-MNEMONIC = "urn:fbvm:mnemonic"
-"""The same: which instruction a block is."""
 _NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _DURATION = re.compile(r"P(?:(\d{1,12})D)?(?:T(?:(\d{1,12})H)?(?:(\d{1,12})M)?(?:(\d{1,12}(?:\.\d+)?)S)?)?")
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fbvm.interchange.plcopen.read.markup import Element, element
-from fbvm.interchange.plcopen.read.types import MNEMONIC
+from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.plcopen.schema import MNEMONIC
 
 LEFT, COLUMN, ROW, GAP = 20, 110, 60, 40
 """Places in the drawing, in its units: where the rail stands, and how far apart columns, rows and networks are."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 
-from fbvm.interchange.plcopen.read.markup import Element, element
+from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.plcopen.schema import KINDS
 from fbvm.interchange.plcopen.write.charts import ChartWriter
 from fbvm.interchange.plcopen.write.layout import Drawing
 from fbvm.interchange.plcopen.write.rungs import RungWriter
@@ -14,7 +15,7 @@ from fbvm.syntax import tree
 from fbvm.syntax.tree.ladder import Ladder
 from fbvm.syntax.tree.sfc import Sfc
 
-KINDS = {"FUNCTION": "function", "FUNCTION_BLOCK": "functionBlock", "PROGRAM": "program"}
+TYPES_OF_POUS = {kind: name for name, kind in KINDS.items()}
 _END = re.compile(r"(?i)END_(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|ACTION)\s*$")
 _COLON = re.compile(r"\s*:(?!=)")
 _JUMP = re.compile(r"(?i)\bJMP\b")
@@ -44,7 +45,7 @@ def pou(types: Types, declared: tree.Pou) -> Element:
     result = element("returnType", types.spec(declared.result)) if declared.result is not None else None
     return element("pou", element("interface", result, *lists), element("actions", *actions) if actions else None,
                    element("transitions", *transitions) if transitions else None, element("body", inner),
-                   name=declared.name.text, pouType=KINDS[declared.kind])
+                   name=declared.name.text, pouType=TYPES_OF_POUS[declared.kind])
 
 
 def _chart(types: Types, chart: Sfc, taken: set[str]) -> tuple[Element, list[Element], dict[str, Element]]:

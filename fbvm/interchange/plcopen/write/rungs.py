@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from fbvm.base.areas import parse_address
-from fbvm.interchange.plcopen.read.markup import Element, element
-from fbvm.interchange.plcopen.read.types import LOCATION
+from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.plcopen.schema import LOCATION
 from fbvm.interchange.plcopen.write.layout import Drawing, End, Ends, own_data
 from fbvm.interchange.plcopen.write.types import Types, Unsayable
 from fbvm.syntax import tree

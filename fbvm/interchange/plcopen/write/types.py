@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
-from fbvm.interchange.plcopen.read.markup import Element, element
-from fbvm.interchange.plcopen.read.project import QUALIFIERS, SECTIONS
-from fbvm.interchange.plcopen.read.types import ELEMENTARY, LOCATION
+from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.plcopen.schema import ELEMENTARY, LOCATION, QUALIFIERS, SECTIONS
 from fbvm.interchange.plcopen.write.layout import own_data
 from fbvm.syntax import tree
 
