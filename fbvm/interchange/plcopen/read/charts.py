@@ -1,7 +1,7 @@
 """Sequential function charts of a document as steps, transitions and actions of the textual form.
 
-A chart is found by its wires: upwards from a transition to the steps that must be active, downwards to those that follow.
-Divergences, convergences and jumps are wires, and are gone behind this.
+Wires lead upwards from a transition to the steps that must be active, and downwards to the steps that follow.
+Divergences, convergences and jumps only pass wires on: the textual form has none.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class Incomplete(Exception):
 
 @dataclass(eq=False)
 class Arrow:
-    """A transition with the steps before and behind it."""
+    """A transition with the names of the steps that it leaves and of those that it enters."""
 
     element: Element
     sources: list[str]
@@ -38,7 +38,7 @@ class Arrow:
 
 
 class Chart:
-    """One chart on its way.  `write` makes the lines of a body, for inline actions."""
+    """Writes one chart.  `write` makes the lines of the body of an inline action or a transition."""
 
     def __init__(self, reading: Reading, scope: Scope, pou: Pou, write: Callable[[Body], list[str]]) -> None:
         self.reading, self.scope, self.pou, self.write = reading, scope, pou, write
@@ -46,33 +46,43 @@ class Chart:
 
     def lines(self, body: Element) -> list[str]:
         """Steps, transitions and inline actions.  Raises Incomplete."""
-        self.known = {child.get("localId"): child for child in body.children if child.get("localId")}
-        self.followers: dict[str, list[Element]] = {}
-        for child in body.children:
-            for reference in _references(child):
-                self.followers.setdefault(reference, []).append(child)
-        for child in body.all("macroStep"):
-            raise Incomplete(child, f"the macro step {child.get('name')} is not taken over", "draw its steps in the chart")
+        self._index(body)
+        self._check(body)
         steps = body.all("step")
-        if not any(step.get("initialStep") == "true" for step in steps):
-            raise Incomplete(body, "the chart has no initial step", "")
         self.scope.taken |= {step.get("name").upper() for step in steps}
         diagram = read_diagram(self.reading, body, chart=True)
         if len(body.children) > LARGEST:
             raise Incomplete(body, f"the chart has more than {LARGEST} elements", "")
         arrows = [self._arrow(transition) for transition in body.all("transition")]
         blocks = {reference: block for block in body.all("actionBlock") for reference in _references(block)}
-        lines = []
-        for step in steps:
-            lines += self._step(step, blocks.get(step.get("localId")))
-        for arrow in sorted(arrows, key=_order(arrows)):
-            lines += self._transition(arrow, diagram)
-        used = {item for asked in diagram.objects if asked.kind == "condition" for item in _feeding(asked)}
+        lines = [line for step in steps for line in self._step(step, blocks.get(step.get("localId")))]
+        lines += [line for arrow in sorted(arrows, key=_order(arrows)) for line in self._transition(arrow, diagram)]
+        self._report_unused(diagram)
+        return [*lines, *self.actions]
+
+    def _index(self, body: Element) -> None:
+        """Note the elements by localId, and by localId the elements to which wires lead from each."""
+        self.known = {child.get("localId"): child for child in body.children if child.get("localId")}
+        self.followers: dict[str, list[Element]] = {}
+        for child in body.children:
+            for reference in _references(child):
+                self.followers.setdefault(reference, []).append(child)
+
+    def _check(self, body: Element) -> None:
+        """Refuse a chart with macro steps, or without an initial step."""
+        for child in body.all("macroStep"):
+            raise Incomplete(child, f"the macro step {child.get('name')} is not taken over", "draw its steps in the chart")
+        if not any(step.get("initialStep") == "true" for step in body.all("step")):
+            raise Incomplete(body, "the chart has no initial step", "")
+
+    def _report_unused(self, diagram: Diagram) -> None:
+        """Report what is drawn in the chart and feeds no condition of a transition."""
+        conditions = (item for item in diagram.objects if item.kind == "condition")
+        used = {item for condition in conditions for item in _feeding(condition)}
         for item in diagram.objects:
             if item not in used and item.kind != "rightPowerRail":
                 self.reading.report("X0203", item.element, f"{item.text or item.kind} belongs to no transition of the chart, "
                                     "and is not taken over")
-        return [*lines, *self.actions]
 
     # --- steps ---
 
@@ -126,7 +136,7 @@ class Chart:
         return self._steps(element, lambda here: [self.known[r] for r in _references(here) if r in self.known])
 
     def _below(self, element: Element) -> list[str]:
-        """Names of the steps to which wires lead from an element; a jump is one to its target."""
+        """Names of the steps to which wires lead from an element; a jump leads to its target."""
         return self._steps(element, lambda here: self.followers.get(here.get("localId"), []))
 
     def _steps(self, element: Element, beside: Callable[[Element], list[Element]]) -> list[str]:
@@ -167,7 +177,7 @@ class Chart:
         return [f"TRANSITION{way} := {condition};", "END_TRANSITION"]
 
     def _condition(self, element: Element, diagram: Diagram) -> tuple[str, str, list[str]]:
-        """A name, and either an expression or the lines that assign to the name."""
+        """The name of a transition, and its condition: an expression, or lines that assign to the name."""
         condition = element.one("condition")
         negated = condition is not None and condition.get("negated") == "true"
         name = self._free(f"T{element.get('localId')}")
@@ -230,7 +240,7 @@ def _names(names: list[str]) -> str:
 
 
 def _references(element: Element) -> list[str]:
-    """Where the wires into an element of a chart come from, those of a condition left out."""
+    """The localIds from which wires lead into an element of a chart, not counting the wires of its condition."""
     return [wire.get("refLocalId") for point in element.all("connectionPointIn") for wire in point.all("connection")]
 
 
@@ -240,7 +250,8 @@ def _place(element: Element) -> tuple[float, float]:
 
 
 def _order(arrows: list[Arrow]) -> Callable[[Arrow], tuple[float, tuple[str, ...], float, int]]:
-    """From top to bottom; those of one step from left to right, which is their order if none has a priority."""
+    """The key that sorts transitions from top to bottom, and those that leave one step from left to right: without
+    priorities that is the order in which they are tested."""
     top = {tuple(arrow.sources): min(_place(other.element)[0] for other in arrows if other.sources == arrow.sources)
            for arrow in arrows}
 
