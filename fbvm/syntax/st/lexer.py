@@ -100,6 +100,8 @@ class Lexis(NamedTuple):
     """Word in capitals -> terminal."""
     conditions: dict[str, re.Pattern[str]]
     """Terminal -> what must follow the word."""
+    in_context: frozenset[str]
+    """Terminals of words whose meaning depends on the text behind them."""
     reserved: frozenset[str]
     operand_ends: frozenset[str]
     """Terminals with which an operand may end."""
@@ -139,14 +141,28 @@ def lexis() -> Lexis:
     patterns["SIGN"] = "|".join(re.escape(sign) for sign in sorted(signs, key=len, reverse=True))
     alternatives = "|".join(f"(?P<{name}>{patterns[name]})" for name in _ORDER)
     known = re.escape("".join(sorted(set("".join(signs) + "'\"{%"))))
-    return Lexis(words, conditions, frozenset(reserved), frozenset(OPERAND_ENDS | set(words.values()) - reserved), signs,
-                 re.compile(rf"\s*(?:{alternatives})"),
-                 re.compile(r"\s*(" + patterns["LOCATION"] + ")"), re.compile(rf"[^\s\w{known}]+"), re.compile(r"[^\W0-9]\w*"),
-                 re.compile(patterns["SET_ASSIGN"]))
+    return Lexis(
+        words, conditions, frozenset({*conditions, "MISSPELT", "LADDER"}), frozenset(reserved),
+        frozenset(OPERAND_ENDS | set(words.values()) - reserved), signs,
+        re.compile(rf"\s*(?:{alternatives})"), re.compile(r"\s*(" + patterns["LOCATION"] + ")"),
+        re.compile(rf"[^\s\w{known}]+"), re.compile(r"[^\W0-9]\w*"), re.compile(patterns["SET_ASSIGN"]))
 
 
 def _pattern(terminal: Terminal) -> str:
     return f"(?i:{terminal.pattern})" if terminal.ignore_case else f"(?:{terminal.pattern})"
+
+
+class Kinds(dict[str, str]):
+    """Word as written -> terminal, for the words of one text as they are met."""
+
+    def __init__(self, words: dict[str, str]) -> None:
+        super().__init__()
+        self.words = words
+
+    def __missing__(self, word: str) -> str:
+        upper = word.upper()
+        kind = self[word] = self.words.get(upper) or ("MISSPELT" if upper[:4] == "VAR_" else "NAME")
+        return kind
 
 
 class Lexer:
@@ -159,9 +175,7 @@ class Lexer:
     def tokens(self) -> Iterator[Token]:
         """Every token, then one of type "$END"."""
         text, at, lex = self.text, 0, lexis()
-        match, signs, words, conditions = lex.master.match, lex.signs, lex.words, lex.conditions
-        known: dict[str, str] = {}
-        ends = lex.operand_ends
+        match, signs, kinds, in_context, ends = lex.master.match, lex.signs, Kinds(lex.words), lex.in_context, lex.operand_ends
         before, length, new = "", len(text), tuple.__new__
         while True:
             found = match(text, at)
@@ -179,17 +193,9 @@ class Lexer:
             if kind == "SIGN":
                 kind = signs[word]
             elif kind == "NAME":
-                kind = known.get(word, "")
-                if not kind:
-                    kind = known[word] = words.get(word.upper()) or _unknown_word(word)
-                if kind in conditions and not conditions[kind].match(text, at):
-                    kind = "NAME"
-                if kind == "MISSPELT" and len(word) == 3:
-                    end_of = _END_OF.match(text, at)
-                    kind, at = (kind, end_of.end()) if end_of else ("NAME", at)
-                    word = text[start:at]
-                elif kind == "LADDER":
-                    at = self._ladder(start, at)
+                kind = kinds[word]
+                if kind in in_context:
+                    kind, at = self._word_in_context(lex, before, kind, start, at)
                     word = text[start:at]
                 elif before == "AT" or (before in ends and text.startswith("=", at)):
                     kind, at = self._special(lex, before, kind, start, at)
@@ -208,6 +214,20 @@ class Lexer:
             yield new(Token, (kind, word, start, at))
             before = kind
         yield Token("$END", "", length, length)
+
+    def _word_in_context(self, lex: Lexis, before: str, kind: str, start: int, end: int) -> tuple[str, int]:
+        """The terminal of a word that depends on the text behind the word, and where its token ends."""
+        condition = lex.conditions.get(kind)
+        if condition is not None and not condition.match(self.text, end):
+            kind = "NAME"
+        if kind == "MISSPELT" and end - start == len("END"):
+            end_of = _END_OF.match(self.text, end)
+            return (kind, end_of.end()) if end_of else ("NAME", end)
+        if kind == "LADDER":
+            return kind, self._ladder(start, end)
+        if before == "AT" or (before in lex.operand_ends and self.text.startswith("=", end)):
+            return self._special(lex, before, kind, start, end)
+        return kind, end
 
     def _special(self, lex: Lexis, before: str, kind: str, start: int, end: int) -> tuple[str, int]:
         """LOCATION behind AT, `S=` behind an operand; else what it was."""
@@ -309,11 +329,6 @@ class Lexer:
             depth += 1 if found[0] == opener else -1
             at = found.end()
         return at
-
-
-def _unknown_word(word: str) -> str:
-    """The terminal of a word that is none of ours."""
-    return "MISSPELT" if word[:4].upper() == "VAR_" else "NAME"
 
 
 def _short(text: str) -> str:
