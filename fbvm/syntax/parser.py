@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.syntax.pous import SourceBuilder
-from fbvm.syntax.st.automaton import Automaton, Mender
+from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
 from fbvm.syntax.st.builder import Stop
 from fbvm.syntax.st.lexer import Lexer, Token
 from fbvm.syntax.tree import SourceText
@@ -51,8 +51,8 @@ OFTEN = 5000
 """Tokens between two words to the caller: a tenth of a second."""
 
 
-def _recovery(automaton: Automaton, builder: SourceBuilder) -> Mender:
-    """Who mends; loaded when there is something to mend."""
+def _recovery(automaton: Automaton, builder: SourceBuilder) -> ErrorRecovery:
+    """Who repairs; loaded when there is something to repair."""
     from fbvm.syntax.recovery.recovery import Recovery
 
     return Recovery(automaton, builder)

@@ -15,7 +15,7 @@ from fbvm.syntax.formatter.declarations import DeclarationLayout
 from fbvm.syntax.formatter.layout import Doc, Printer
 from fbvm.syntax.formatter.names import NOTHING, Outside, Spelling
 from fbvm.syntax.parser import parse
-from fbvm.syntax.st.automaton import Automaton, Mender
+from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
 from fbvm.syntax.st.lexer import Lexer
 
 REFUSED = {"S0901", "S0902"}
@@ -57,5 +57,5 @@ def _silent(*message: Any) -> None:
     """What there is to say was said by the parser."""
 
 
-def _no_mender(stuck: Automaton) -> Mender:
+def _no_mender(stuck: Automaton) -> ErrorRecovery:
     raise _NeedsMending

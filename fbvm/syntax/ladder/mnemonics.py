@@ -11,7 +11,7 @@ from typing import NamedTuple
 from fbvm.syntax.ladder.drawing.grid import Bad
 from fbvm.syntax.ladder.drawing.reading import Picture, Placed, is_drawn, read_drawing, remark_of
 from fbvm.syntax.ladder.instructions.instruction_set import NO_INSTRUCTIONS, Instruction, instruction_set, meant, spelling
-from fbvm.syntax.st.automaton import Automaton, Mender
+from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.tables import tables
 from fbvm.syntax.tree.ladder import Step
@@ -176,7 +176,7 @@ def instruction(prefix: str, mnemonic: str, start: int, end: int) -> Instruction
     return row
 
 
-def _stuck(automaton: Automaton) -> Mender:
+def _stuck(automaton: Automaton) -> ErrorRecovery:
     raise Refusal(automaton.before.start, automaton.before.end, "this is no instruction", "")
 
 

@@ -75,9 +75,9 @@ class ChartLowering(ChartContext):
 
     def _begin_or_proceed(self) -> Statement:
         begun = self.begun
-        evolved = (*map(self._update_time, self.steps), *self._test_all())
+        proceed = (*map(self._update_time, self.steps), *self._test_all())
         first = (self.put(begun, True), *(self.put(self.entered(s), True) for s in self.steps if s.initial))
-        return self.when(begun, evolved, first)
+        return self.when(begun, proceed, first)
 
     def _update_time(self, step: Step) -> Statement:
         self.at = step.start
