@@ -29,7 +29,7 @@ SYMBOLS = {
     "P_LT": "CF007", "P_N": "CF008", "P_OF": "CF009", "P_UF": "CF010", "P_AER": "CF011", "P_0_1S": "CF100", "P_0_2S": "CF101",
     "P_1S": "CF102", "P_0_02S": "CF103", "P_1MIN": "CF104", "P_ON": "CF113", "P_OFF": "CF114", "P_FIRST_CYCLE": "A200.11",
     "P_FIRST_CYCLE_TASK": "A200.15", "P_MAX_CYCLE_TIME": "A262", "P_CYCLE_TIME_VALUE": "A264", "P_OUTPUT_OFF_BIT": "A500.15"}
-"""Symbols that every program knows (W473 6-21 p6-43; numbers of flags from memory of the family, assumed)."""
+"""Symbols that every program has (W473 6-21 p6-43; numbers of flags from memory of the family, assumed)."""
 
 _TYPES = {"w": "WORD", "W": "WORD", "d": "DWORD", "q": "LWORD", "n": "UINT"}
 _REALS = {"r": "REAL", "l": "LREAL"}
@@ -40,20 +40,21 @@ _REAL = re.compile(r"[+-]\d+[.,]\d+(?:[Ee][+-]?\d+)?")
 _TASK = re.compile(r"TK\d+", re.I)
 _REGISTER = re.compile(r"([ID]R)(\d+)", re.I)
 _POINTED = re.compile(r"([+-]?\d+|DR\d+)?,(-{0,2})IR(\d+)(\+{0,2})", re.I)
-"""An index register that points: with an offset in front, counted down before its use or up after it."""
+"""An operand by index register: `5,IR0` with an offset, `,-IR0` counted down before its use, `,IR0+` counted up after it."""
 REGISTERS = 16
-"""Index registers, and data registers."""
+"""Number of index registers, and of data registers."""
 BCD = {"z": "w", "Z": "d"}
-"""Kinds whose constants are BCD, and what they are besides."""
+"""Letter for a BCD operand -> the letter for the same operand in binary."""
 WORDS = {"d": 2, "r": 2, "q": 4, "l": 4}
-"""How many words an instruction reads where it wants more than one."""
+"""Letter -> number of words of the operand, if more than one."""
 
 Reach = Callable[[Expr, int, bool], NameRef]
-"""Keeps a PLC memory address that a step works out, for so many words, read or written; gives its name."""
+"""Takes a PLC memory address that a step computes, the number of words there and whether they are written; returns the
+variable that keeps the address."""
 
 
 class Wrong(Exception):
-    """An operand that cannot stand where it stands; the arguments are a message and a hint, `place` is where it is."""
+    """An operand that the instruction cannot take; the arguments are a message and a hint, `place` its start and end."""
 
     place: tuple[int, int] | None = None
 
@@ -63,8 +64,8 @@ def _nowhere(address: Expr, words: int, written: bool) -> NameRef:
 
 
 class Operands:
-    """Makes expressions of the operands of one LADDER.  `located` fills with the variables that they need at addresses
-    of the PLC's memory: (area and number, letter) -> declaration.  `numbered` are symbols of timers and counters."""
+    """Makes expressions of the operands of one LADDER.  `located` grows by the variables that these need at addresses of PLC
+    memory: (address, letter) -> declaration.  `numbered` are symbols of timers and counters, in capitals."""
 
     def __init__(self, reach: Reach = _nowhere, numbered: Mapping[str, str] | None = None) -> None:
         self.reach = reach
@@ -98,7 +99,7 @@ class Operands:
         return self._direct(_address(known or text, wanted), wanted, start, end)
 
     def pin(self, text: str, start: int, end: int) -> Expr:
-        """What a pin of a block takes or gives: its type is the pin's, so that a constant has none of its own."""
+        """The expression for a pin of a function block; a constant has no type, so that it takes that of the pin."""
         if text[0] in "#&+-":
             real = _REAL.fullmatch(text)
             value = float(text.replace(",", ".")) if real else _number(text, 64)
@@ -138,7 +139,7 @@ class Operands:
         return NameRef(start, end, self._at(address, wanted, start, end))
 
     def _at(self, address: Address, wanted: str, start: int, end: int) -> str:
-        """The name of a variable at an address, for what is longer than a word."""
+        """The name of the variable at an address for an operand that is longer than a word."""
         wanted = wanted.upper() if wanted == "a" else wanted
         key = str(address), wanted
         if key not in self.located:
@@ -148,8 +149,8 @@ class Operands:
         return self.located[key].names[0].text
 
     def _indirect(self, text: str, wanted: str, start: int, end: int) -> Expr:
-        """`@D100`: the word of D whose number is in D100, behind the last the words of E bank 0; `*D100`: likewise in
-        BCD.  What is no number of a word leads nowhere."""
+        """`@D100`: the word of D whose number is in D100; numbers beyond D go on in E bank 0.  `*D100`: the same with a number in
+        BCD.  With another number the step is not executed."""
         pointer = _address(text[1:], "w")
         if pointer.area not in ("D", *E_NAMES):
             raise Wrong(f"{text} does not point anywhere: only D and E words do", "write @D.. or *D..")
@@ -174,7 +175,7 @@ class Operands:
         return Index(start, end, NameRef(start, end, f"CX_{kind}"), (self._index(number, start, end),))
 
     def _pointed(self, text: str, wanted: str, start: int, end: int) -> Expr:
-        """`,IR0` and its forms: what lies where an index register points; of a bit the register counts bits."""
+        """`,IR0` and its forms: the word, or the bit, at the address in an index register; the address of a bit counts bits."""
         found = _POINTED.fullmatch(text)
         if not found or int(found[3]) >= REGISTERS:
             raise Wrong(f"{text} is no operand", f"write ,IR0 +5,IR0 DR0,IR0 ,IR0+ or ,-IR0, with IR0 to IR{REGISTERS - 1}")
@@ -200,7 +201,7 @@ class Operands:
         return self._memory(place, wanted, start, end)
 
     def _memory(self, address: Expr, wanted: str, start: int, end: int) -> Expr:
-        """What an instruction wants at a PLC memory address that is worked out."""
+        """The operand at a PLC memory address that the step computes."""
         if wanted in "bB":
             return Memory(start, end, self.reach(address, 0, wanted == "B"), "BOOL")
         if wanted == "v":
@@ -261,12 +262,12 @@ def _check_decimal(text: str, wanted: str, role: str) -> None:
 
 
 def _is_address(text: str) -> bool:
-    """Whether a word that could be a symbol is the address of an area: D100, W5, TR0 is none."""
+    """Whether a word that could be a symbol is an address such as D100 or W5."""
     return bool(re.fullmatch(r"(?:CIO|DM|D|W|H|A|T|C|E[0-9A-F]_)\d+", text, re.I))
 
 
 def _address(text: str, wanted: str) -> Address:
-    """The address that a text means where `wanted` is wanted.  Raises Wrong."""
+    """The address that a text means for an operand of the kind `wanted`.  Raises Wrong."""
     if _OLD.fullmatch(text) and wanted in "bB":
         text = f"{int(text[:-2])}.{text[-2:]}"
     if wanted in "bBv" and re.fullmatch(r"[TC]\d+", text, re.I):

@@ -65,7 +65,7 @@ class Statements(Expressions):
         return items
 
     def block(self, items: Items) -> Block:
-        """A list as it stands outside CASE: a label of one name is one for JMP, another one is misplaced."""
+        """The statements of a list outside CASE: a label of one name is a label for JMP, another one is reported."""
         made: list[Statement] = []
         for item, behind in zip_longest(items, items[1:]):
             if not isinstance(item, Label):
@@ -75,7 +75,7 @@ class Statements(Expressions):
         return tuple(made)
 
     def _no_label(self, label: Label, behind: Label | Statement | None) -> bool:
-        """Whether `a : INT;` or `a : 5;` stands there, which is told; a label has nothing behind it, or what is executed."""
+        """Whether a label is none, since `a : INT;` or `a : 5;` is written; that is reported."""
         value, high = label.values[0]
         first = behind.targets[0] if isinstance(behind, Assign) else behind.call if isinstance(behind, CallStatement) else None
         if high is not None or first is None or not isinstance(value, NameRef):
@@ -103,7 +103,7 @@ class Statements(Expressions):
         return Empty(label.start, label.end)
 
     def checked(self, statement: Statement) -> Statement:
-        """The statement itself, or its refusal if it spoke of THIS or SUPER."""
+        """The statement itself, or its refusal if it contains THIS or SUPER."""
         mine = [token for token in self.selves if token.start >= statement.start] if self.selves else None
         if not mine:
             return statement
@@ -111,7 +111,7 @@ class Statements(Expressions):
         return RefusedStatement(statement.start, statement.end, mine[0].text.upper(), "S0902")
 
     def refuse_selves(self) -> None:
-        """Report THIS and SUPER that stand where no statement could carry the refusal."""
+        """Report THIS and SUPER outside of statements, which have no statement to refuse."""
         for token in self.selves:
             word = token.text.upper()
             self.report("S0902", token.start, token.end, f"{word} is object-oriented text, which is refused", "")

@@ -1,4 +1,4 @@
-"""Import of PLCopen TC6 XML: a document in, source files of ours and a list of what was not taken over out."""
+"""Import of PLCopen TC6 XML: a document in, source files and diagnostics out; nothing is left out without a diagnostic."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from fbvm.interchange.plcopen.read.sources import sources
 
 @dataclass(frozen=True)
 class Imported:
-    """What became of a document: texts by the names of their files, and messages in order of place."""
+    """The result of an import: source texts by file name, and diagnostics in the order of the document."""
 
     files: dict[str, str]
     diagnostics: list[Diagnostic]
 
     @property
     def errors(self) -> list[Diagnostic]:
-        """Those about what the program lacks now."""
+        """Diagnostics about parts of the program that were not taken over."""
         return errors(self.diagnostics)
 
 

@@ -9,7 +9,7 @@ from fbvm.interchange.plcopen.read.document import Reading
 from fbvm.interchange.plcopen.schema import ELEMENTARY, LOCATION
 
 _LATER = frozenset(("LTIME", "LDATE", "LDT", "LTOD", "CHAR", "WCHAR"))
-"""Types of edition 3, that documents have in the same way, and that are not written."""
+"""Types of edition 3, which some documents have in the same way; they are read and not written."""
 _NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _DURATION = re.compile(r"P(?:(\d{1,12})D)?(?:T(?:(\d{1,12})H)?(?:(\d{1,12})M)?(?:(\d{1,12}(?:\.\d+)?)S)?)?")
 
@@ -93,18 +93,22 @@ def value_text(holder: Element | None) -> str:
 
 
 def location(element: Element) -> str:
-    """Where a variable lies: its address, or one that is no IEC location, which we keep as data of our own."""
+    """The address of a variable, from `address` or, if it is no IEC location, from fbvm's own data; "" if it has none."""
     return own_text(element, LOCATION) or element.get("address").strip()
 
 
 def own_text(element: Element, name: str) -> str:
-    """What data of our own says about an element."""
+    """The text of fbvm's own data of a name at an element; "" if there is none."""
     added = element.one("addData")
     return next((data.text.strip() for data in added.all("data") if data.get("name") == name), "") if added else ""
 
 
 def duration(text: str) -> str:
-    """An interval as a literal: `T#20ms`, `PT0.02S` (CODESYS) and `20ms` (OpenPLC) are found; "" for a name."""
+    """A duration as a literal, from `T#20ms`, `PT0.02S` (CODESYS) or `20ms` (OpenPLC); "" for another text, such as a name.
+
+    >>> duration("PT0.02S")
+    'T#20ms'
+    """
     text = text.strip()
     iso = _DURATION.fullmatch(text)
     if iso and any(iso.groups()):

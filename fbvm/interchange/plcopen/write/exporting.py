@@ -19,7 +19,7 @@ from fbvm.syntax.text import read
 NAMESPACE = "http://www.plcopen.org/xml/tc6_0201"
 XHTML = "http://www.w3.org/1999/xhtml"
 BEGINNING = "1970-01-01T00:00:00"
-"""When a document was made, if nobody says it."""
+"""The creation time in a document, if none is given."""
 _NAME = re.compile(r"[^\W\d]\w*")
 
 
@@ -32,13 +32,13 @@ class Exported:
 
     @property
     def errors(self) -> list[Diagnostic]:
-        """Those about what the document lacks."""
+        """Diagnostics about parts of the sources that the document lacks."""
         return errors(self.diagnostics)
 
 
 @dataclass
 class _Parts:
-    """What goes where in the document."""
+    """The elements of the document, by the place that they go to."""
 
     types: list[Element] = field(default_factory=list)
     pous: list[Element] = field(default_factory=list)
@@ -105,7 +105,7 @@ def _declaration(parts: _Parts, types: Types, declared: tree.Declaration, name: 
 
 
 def _matters(pragma: str) -> bool:
-    """Whether the program means something else without a pragma in front of a declaration."""
+    """Whether a pragma in front of a declaration changes the meaning of the program."""
     return not harmless(pragma) or bool(re.search(r"(?i)'(pack_mode|qualified_only|strict)'", pragma))
 
 
@@ -141,7 +141,7 @@ def _task(types: Types, task: tree.Task, programs: Iterable[Element]) -> Element
 
 
 def _project(parts: _Parts, name: str, created: str) -> Element:
-    """The frame, in the order of the schema."""
+    """The element `project`, its parts in the order of the schema."""
     if parts.globals and not parts.configurations:
         parts.configurations.append(element("configuration", element("resource", name="Res0"), name="Config0"))
     if parts.globals:

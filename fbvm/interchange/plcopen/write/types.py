@@ -23,11 +23,11 @@ _REMARK = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\n]*)")
 
 
 class Unsayable(Exception):
-    """The format has no way to say it; the arguments are the node, a message and a hint."""
+    """The format has no form for something; the arguments are the node, a message and a hint."""
 
 
 class Types:
-    """Writes the types of one source; `foreign` are (node, message) of what only we understand."""
+    """Writes types, values and sections of one source; `foreign` grows by (node, message) for what only fbvm understands."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -35,12 +35,12 @@ class Types:
         self.kept: list[tuple[int, int]] = []
         """Parts of the text that are exported as they are."""
         self.numbered: dict[str, str] = {}
-        """Timers and counters by the names of variables that lie at them, in capitals."""
+        """Variable in capitals -> the timer or counter that it is declared AT."""
         self.instances: dict[str, str] = {}
-        """Types of the variables of the POU at work that have a type by name, by names in capitals."""
+        """Variable of the POU at work, in capitals -> the name of its type."""
 
     def text(self, node: tree.Node) -> str:
-        """What was written, with the brackets around parts of it, which the tree does not have."""
+        """The text of a node, with the brackets around parts of it, which the tree does not have."""
         text, start, end = self.source.text, node.start, node.end
         while any(open_ends := _brackets(text[start:end])):
             if open_ends[1]:
@@ -50,7 +50,7 @@ class Types:
         return _squeezed(text[start:end])
 
     def note(self, sections: Iterable[tree.VarSection]) -> None:
-        """Look for variables that lie at timers and counters."""
+        """Note the variables of these sections that are declared AT timers and counters."""
         for variable in (variable for section in sections for variable in section.variables):
             if variable.location is not None and (found := _NUMBERED.fullmatch(variable.location.text.strip())):
                 self.numbered |= {name.text.upper(): f"{found[1].upper()}{int(found[2])}" for name in variable.names}
@@ -132,7 +132,7 @@ class Types:
         made.content.append(own_data(LOCATION, text))
 
     def section(self, section: tree.VarSection, name: str = "") -> Element:
-        """The list that a section is."""
+        """The element of a section.  Raises Unsayable."""
         kind = LISTS.get(section.kind)
         if kind is None:
             raise Unsayable(section, f"the format has no {section.kind}", "")
@@ -147,7 +147,7 @@ class Types:
 
 
 def _brackets(text: str) -> tuple[int, int]:
-    """How many brackets are open at the end of a text, and how many are closed that nothing opened."""
+    """How many brackets a text opens and does not close, and how many it closes and does not open."""
     opened = closed = 0
     for match in _SIGNS.finditer(text):
         if match[0] == "(":
@@ -160,10 +160,10 @@ def _brackets(text: str) -> tuple[int, int]:
 
 
 def _squeezed(text: str) -> str:
-    """One blank for many and for line ends, but not within strings; without comments."""
+    """A text without comments, with one blank for each run of blanks and line ends outside of strings."""
     return _BLANKS.sub(lambda match: match[1] if match[1] and match[1][0] in "'\"" else " ", text).strip()
 
 
 def documentation(text: str) -> Element:
-    """Text for people."""
+    """An element `documentation`."""
     return element("documentation", element("xhtml:p", text))

@@ -1,4 +1,4 @@
-"""Nets to a diagram: what hangs together in a drawing, as series, branches and points from which outputs leave."""
+"""Nets to a diagram: the elements of a drawing as series, branches, and points from which outputs leave."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from fbvm.syntax.ladder.drawing.grid import Bad, Drawn, DrawnBox, Grid
 from fbvm.syntax.ladder.drawing.wires import BUS, SINK, Net, Order, Wires, border
 
 INLINE = ("NOT", "UP", "DOWN")
-"""Instructions that are boxes on a line."""
+"""Instructions that are drawn as boxes on a line."""
 Source = Drawn | DrawnBox
 
 
 @dataclass(eq=False)
 class _Edge:
-    """What lies between two nets."""
+    """The elements between two nets."""
 
     start: Hashable
     end: Hashable
@@ -35,7 +35,7 @@ class _Leaf:
 
 
 class Network:
-    """The diagram of a drawing.  `sources` says as what each of its elements was drawn."""
+    """Makes the diagram of a drawing.  `sources` maps each element of the diagram to what was drawn for it."""
 
     def __init__(self, grid: Grid) -> None:
         self.grid = grid
@@ -46,14 +46,14 @@ class Network:
         self.edges: list[_Edge] = []
         self.leaves: dict[Hashable, list[_Leaf]] = {}
         self._rows: dict[int, list[tuple[Order, Series]]] = {}
-        """Branches with their places, by the parallel connection that they are of."""
+        """By parallel connection, its branches with their positions."""
         for element in grid.elements:
             self._element(element)
         for box in grid.boxes:
             self._box(box)
 
     def diagram(self) -> Point:
-        """The bus bar with all that hangs on it.  Raises Bad."""
+        """The bus bar with all elements that follow it.  Raises Bad."""
         while self._merge_branches() or self._merge_series():
             pass
         self._check()
@@ -104,7 +104,7 @@ class Network:
     # --- reduction --------------------------------------------------------------------------------------------------
 
     def _merge_branches(self) -> bool:
-        """Join what lies between the same two nets."""
+        """Join the edges between the same two nets to parallel connections."""
         found: dict[tuple[Hashable, Hashable], list[_Edge]] = {}
         for edge in self.edges:
             if edge.end != SINK:
@@ -119,14 +119,14 @@ class Network:
         return bool(groups)
 
     def _branches(self, edge: _Edge) -> list[tuple[Order, Series]]:
-        """An edge as branches with their places: one that is nothing else is taken apart."""
+        """The branches of an edge with their positions; one branch if the edge is no parallel connection."""
         first = edge.parts[0]
         if len(edge.parts) == 1 and isinstance(first, Parallel):
             return self._rows[id(first)]
         return [(edge.order, Series(edge.parts))]
 
     def _merge_series(self) -> bool:
-        """Join two edges at a net on which nothing else hangs."""
+        """Join two edges to a series at a net that has no other edge."""
         kept = {BUS, SINK, *self.leaves, *(net.name for leaves in self.leaves.values() for leaf in leaves for net in leaf.others)}
         for before in self.edges:
             behind = [edge for edge in self.edges if edge.start == before.end]
@@ -165,14 +165,14 @@ class Network:
         return {net.name: net for leaves in self.leaves.values() for leaf in leaves for net in leaf.others}
 
     def _bad(self, part: Part | Coil, message: str, hint: str) -> None:
-        """Say what is wrong at an element; of branches at the first one."""
+        """The error at an element; for branches, at the first one."""
         while isinstance(part, Parallel):
             part = part.branches[0].parts[0]
         drawn = self.sources[id(part)]
         raise Bad(drawn.x, drawn.y, drawn.until + 1 - drawn.x, message, hint)
 
     def _hang(self, point: Point, net: Hashable) -> None:
-        """Hang on a point what its net has, from above."""
+        """Add to a point what follows its net, from above."""
         others = self._others()
         outs: list[tuple[Order, Coil | Box | Point]] = []
         for leaf in self.leaves.get(net, ()):
@@ -209,7 +209,7 @@ _WAYS = {LEFT: "enters", RIGHT: "leaves"}
 
 
 def _block(drawn: DrawnBox, entry: int, leaving: int) -> Box:
-    """A box of a function block: pins at its sides; the condition enters in one row and leaves in one."""
+    """A box of a function block: pins at its sides; power enters in one row and leaves in one."""
     assert drawn.title
     pins: list[Pin] = []
     wired = {LEFT: "EN", RIGHT: "ENO"}
