@@ -65,7 +65,7 @@ class SourceBuilder(SfcElements):
         refused += [_out_of_place(part) for part in (*sections, *elements)
                     if part not in accesses and not isinstance(part, VarSection | Action | Step | Transition)]
         body = self.block(_without_blocks(items, refused))
-        self.refuse_selves()
+        self.refuse_self_references()
         declared = [each for each in sections if isinstance(each, VarSection)]
         actions = [each for each in elements if isinstance(each, Action)]
         self._add_ladders(word, actions, declared)
@@ -128,7 +128,7 @@ class SourceBuilder(SfcElements):
     def action(self, word: Token, owner: Token | None, dot: Token | None, token: Token, colon: Token | None, items: Items,
                end: Token) -> Action:
         body = self.block(items)
-        self.refuse_selves()
+        self.refuse_self_references()
         return Action(word.start, end.end, self.name(owner) if owner else None, self.declared(token), body)
 
     def action_chart(self, word: Token, token: Token, colon: Token, items: Items, parts: list[Part], end: Token) -> Action:

@@ -8,7 +8,7 @@ from fbvm.syntax.ladder.context import RungContext
 from fbvm.syntax.ladder.drawing.diagram import WIRE
 from fbvm.syntax.ladder.instructions.instruction_set import Instruction
 from fbvm.syntax.ladder.mnemonics import RungText
-from fbvm.syntax.ladder.operands import Wrong
+from fbvm.syntax.ladder.operands import OperandError
 from fbvm.syntax.tree import (
     Argument,
     Assign,
@@ -107,8 +107,8 @@ class LadderBlocks:
         number = self._timer(text, letter)
         if number is None:
             what = "timer" if letter == "t" else "counter"
-            raise Wrong(f"{text} is no number of a {what}",
-                        f"numbers are 0 to {TIMERS - 1}; a symbol is declared AT {letter.upper()}0005 before the rungs")
+            raise OperandError(f"{text} is no number of a {what}",
+                               f"numbers are 0 to {TIMERS - 1}; a symbol is declared AT {letter.upper()}0005 before the rungs")
         return number
 
     def _timer(self, text: str, letter: str = "t") -> int | None:
@@ -129,7 +129,7 @@ class LadderBlocks:
         context, number = self.context, self._number("t")
         row = self._timers.get(number)
         if row is None:
-            raise Wrong(f"there is no timer {number} in these rungs", "TRSET stands in the rungs of its timer")
+            raise OperandError(f"there is no timer {number} in these rungs", "TRSET stands in the rungs of its timer")
         instance = context.variable(self._named(row, number), row.does)
         pins = {"In": False, "Reset": True} if row.inputs == 2 else {"In": False}
         context.emit(context.when(context.variation(context.power()), self._update(instance, self._numbered("t"), **pins)))
@@ -140,8 +140,8 @@ class LadderBlocks:
         texts = [context.operands.numbered.get(text.upper(), text).upper() for text in context.line.step.operands]
         kinds, digits = {text[0] for text in texts}, [text[1:] for text in texts]
         if len(kinds) > 1 or not kinds <= {"T", "C"} or not all(each.isdigit() and int(each) < TIMERS for each in digits):
-            raise Wrong(f"{' and '.join(context.line.step.operands)} are no timers and no counters",
-                        f"write T0000 T0009 or C0000 C0009, up to {TIMERS - 1}")
+            raise OperandError(f"{' and '.join(context.line.step.operands)} are no timers and no counters",
+                               f"write T0000 T0009 or C0000 C0009, up to {TIMERS - 1}")
         highest = 0x9999 if context.line.step.mnemonic == "CNR" else 0xFFFF
         values = [context.truth(kinds == {"C"}), *(context.number(int(each)) for each in digits), context.number(highest)]
         context.emit(context.when(context.variation(context.power()), context.call_of("CX_CNR", *values)))
@@ -164,7 +164,7 @@ class LadderBlocks:
         digits = number.lstrip("#&")
         least = 0 if function == "CX_FAL" else 1
         if not digits.isdigit() or not least <= int(digits) < FAILURES:
-            raise Wrong(f"{number} is no number of a failure", f"numbers are {least} to {FAILURES - 1}")
+            raise OperandError(f"{number} is no number of a failure", f"numbers are {least} to {FAILURES - 1}")
         code, done = context.number(int(digits)), []
         if message[0] in "#&":
             done.append(context.call_of(function, code, context.operand(1)))
@@ -184,8 +184,8 @@ class LadderBlocks:
         from ENO, or from the output that is written `PIN=>*`.  Omron has no text form for this; this one is fbvm's own."""
         context, line = self.context, self.context.line
         if len(line.step.operands) < 2 or any("=" in text for text in line.step.operands[:2]):
-            raise Wrong("FBCALL names the type of a function block and its instance",
-                        "write FBCALL TON Delay IN:=Start PT:=T#5s")
+            raise OperandError("FBCALL names the type of a function block and its instance",
+                               "write FBCALL TON Delay IN:=Start PT:=T#5s")
         (start, end), (at, until) = line.places[:2]
         block, instance = line.step.operands[:2]
         eno = context.temporary(context.name("ENO"))
@@ -209,7 +209,7 @@ class LadderBlocks:
         sign = ":=" if ":=" in text else "=>"
         name, found, value = text.partition(sign)
         if not found or not value:
-            raise Wrong(f"{text} is no pin", "write PIN:=operand for an input or PIN=>operand for an output")
+            raise OperandError(f"{text} is no pin", "write PIN:=operand for an input or PIN=>operand for an output")
         at = start + len(name) + 2
         return _named(start, end, name, sign, self.context.value(value, at, end))
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.mnemonics import Line
-from fbvm.syntax.ladder.operands import Operands, Wrong
+from fbvm.syntax.ladder.operands import OperandError, Operands
 from fbvm.syntax.st.expressions import Expressions
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import Assign, Binary, Block, Expr, If, NameRef, Statement, Unary
@@ -96,8 +96,8 @@ class RungContext:
         return self.line.step.end
 
     def operand(self, position: int) -> Expr:
-        """Operand number `position` of the step as an expression of the type that the instruction wants there.  Raises Wrong
-        with the place of the operand."""
+        """Operand number `position` of the step as an expression of the type that the instruction wants there.  Raises
+        OperandError with the place of the operand."""
         row, (start, end) = self.line.row, self.line.places[position]
         text, wanted = self.line.step.operands[position], row.operands[position]
         self._position = position
@@ -105,7 +105,7 @@ class RungContext:
             if wanted == "k":
                 return self._words(text, start, end, row.role(position))
             return self.operands.expression(text, wanted, start, end, row.role(position))
-        except Wrong as wrong:
+        except OperandError as wrong:
             wrong.place = start, end
             raise
 

@@ -11,7 +11,7 @@ from fbvm.syntax.ladder.blocks import LadderBlocks
 from fbvm.syntax.ladder.context import RungContext, StepRefused
 from fbvm.syntax.ladder.instructions.instruction_set import Instruction, instruction_set, spelling
 from fbvm.syntax.ladder.mnemonics import RungText, is_input, read_rungs
-from fbvm.syntax.ladder.operands import Wrong
+from fbvm.syntax.ladder.operands import OperandError
 from fbvm.syntax.ladder.sequences import Sequences
 from fbvm.syntax.ladder.spans import Spans
 from fbvm.syntax.ladder.symbols import declaration, number
@@ -65,8 +65,8 @@ class LadderLowering:
             context.begin_step(step, line)
             try:
                 self._step(line.row)
-            except (StepRefused, Wrong) as refusal:
-                place = refusal.place if isinstance(refusal, Wrong) and refusal.place else (context.start, context.end)
+            except (StepRefused, OperandError) as refusal:
+                place = refusal.place if isinstance(refusal, OperandError) and refusal.place else (context.start, context.end)
                 context.report("S0110", *place, *refusal.args)
                 text.damaged = True
                 if is_input(line.row):

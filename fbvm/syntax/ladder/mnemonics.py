@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple
 
-from fbvm.syntax.ladder.drawing.grid import Bad
+from fbvm.syntax.ladder.drawing.grid import DrawingError
 from fbvm.syntax.ladder.drawing.reading import Picture, Placed, is_drawn, read_drawing, remark_of
 from fbvm.syntax.ladder.instructions.instruction_set import NO_INSTRUCTIONS, Instruction, instruction_set, meant, spelling
 from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
@@ -143,7 +143,7 @@ def _read_drawing(rungs: list[RungText], lines: list[tuple[int, str]], report: R
     try:
         placed, rung.picture = read_drawing([line for _, line in lines], [at for at, _ in lines])
         rung.lines = [_line(one) for one in placed]
-    except Bad as bad:
+    except DrawingError as bad:
         x, y, width, message, hint = bad.args
         start = lines[min(y, len(lines) - 1)][0] + x
         report("S0113", start, start + width, message, hint)

@@ -53,14 +53,14 @@ Reach = Callable[[Expr, int, bool], NameRef]
 variable that keeps the address."""
 
 
-class Wrong(Exception):
+class OperandError(Exception):
     """An operand that the instruction cannot take; the arguments are a message and a hint, `place` its start and end."""
 
     place: tuple[int, int] | None = None
 
 
 def _nowhere(address: Expr, words: int, written: bool) -> NameRef:
-    raise Wrong("an address that is worked out cannot stand here", "")
+    raise OperandError("an address that is worked out cannot stand here", "")
 
 
 class Operands:
@@ -74,7 +74,7 @@ class Operands:
         self.located: dict[tuple[str, str], tree.VarDecl] = {}
 
     def expression(self, text: str, wanted: str, start: int, end: int, role: str = "a pin") -> Expr:
-        """What `text` stands for where an instruction wants `wanted`, as its operand `role`.  Raises Wrong."""
+        """What `text` stands for where an instruction wants `wanted`, as its operand `role`.  Raises OperandError."""
         self.role = role
         if wanted in BCD:
             wanted = BCD[wanted]
@@ -82,9 +82,9 @@ class Operands:
                 _check_decimal(text, wanted, role)
         text = self.numbered.get(text.upper(), text)
         if wanted == "x" and not _REGISTER.fullmatch(text):
-            raise Wrong(f"{text} cannot be {role}", "write IR0 to IR15")
+            raise OperandError(f"{text} cannot be {role}", "write IR0 to IR15")
         if _TASK.fullmatch(text):
-            raise Wrong(f"{text} is understood and not executed", "tasks have names here, and no flags")
+            raise OperandError(f"{text} is understood and not executed", "tasks have names here, and no flags")
         if register := _REGISTER.fullmatch(text):
             return self._register(register, wanted, start, end)
         if "," in text and not _REAL.fullmatch(text):
@@ -115,10 +115,10 @@ class Operands:
     def _constant(self, text: str, wanted: str, start: int, end: int) -> Expr:
         kind = _REALS.get(wanted) or _TYPES.get(wanted)
         if kind is None or wanted == "W":
-            raise Wrong(f"the constant {text} cannot be {self.role}", "write an address or a symbol")
+            raise OperandError(f"the constant {text} cannot be {self.role}", "write an address or a symbol")
         if wanted in _REALS:
             if not _REAL.fullmatch(text):
-                raise Wrong(f"{text} is no REAL constant", "write its sign and a point, as in +1.5")
+                raise OperandError(f"{text} is no REAL constant", "write its sign and a point, as in +1.5")
             return Literal(start, end, "real", float(text.replace(",", ".")), kind, text)
         return Literal(start, end, "int", _number(text, _BITS[kind]), kind, text)
 
@@ -128,11 +128,11 @@ class Operands:
         is_bit = address.bit is not None or address.area in FLAG_AREAS
         if wanted == "m":
             if address.area not in ("T", "C"):
-                raise Wrong(f"{address} is no present value", "write T0005 or C0005")
+                raise OperandError(f"{address} is no present value", "write T0005 or C0005")
             wanted = "w"
         if is_bit != (wanted in "bB") and wanted != "v":
-            raise Wrong(f"{address} is a {'bit' if is_bit else 'word'}, and {self.role} is a "
-                        f"{'bit' if wanted in 'bB' else 'word'}", "a bit is written as word.bit, as in 0.05 or W3.15")
+            raise OperandError(f"{address} is a {'bit' if is_bit else 'word'}, and {self.role} is a "
+                               f"{'bit' if wanted in 'bB' else 'word'}", "a bit is written as word.bit, as in 0.05 or W3.15")
         if wanted in "bBwWnv":
             shown = f"{address.area}{address.number}" if address.area in FLAG_AREAS else str(address).replace(" ", "")
             return Direct(start, end, f"%{shown}")
@@ -153,9 +153,9 @@ class Operands:
         BCD.  With another number the step is not executed."""
         pointer = _address(text[1:], "w")
         if pointer.area not in ("D", *E_NAMES):
-            raise Wrong(f"{text} does not point anywhere: only D and E words do", "write @D.. or *D..")
+            raise OperandError(f"{text} does not point anywhere: only D and E words do", "write @D.. or *D..")
         if wanted in "bBtcm":
-            raise Wrong(f"{text} is a word, and {self.role} is a {'bit' if wanted in 'bB' else 'number'}", "")
+            raise OperandError(f"{text} is a word, and {self.role} is a {'bit' if wanted in 'bB' else 'number'}", "")
         base = PLC_ADDRESSES["D"] if pointer.area == "D" else E_PLC_ADDRESS + E_WORDS * E_NAMES.index(pointer.area)
         name = "CX_Decimal" if text[0] == "*" else "WORD_TO_UDINT"
         number = self._called(name, start, end, self._direct(pointer, "w", start, end))
@@ -167,9 +167,9 @@ class Operands:
         """IR0 as two words, DR0 as one."""
         kind, number = register[1].upper(), int(register[2])
         if number >= REGISTERS:
-            raise Wrong(f"there is no {register[0]}", f"{kind}0 to {kind}{REGISTERS - 1} are there")
+            raise OperandError(f"there is no {register[0]}", f"{kind}0 to {kind}{REGISTERS - 1} are there")
         if wanted not in ("dAax" if kind == "IR" else "wWAa"):
-            raise Wrong(f"{register[0]} cannot be {self.role}", "an index register has two words, a data register one")
+            raise OperandError(f"{register[0]} cannot be {self.role}", "an index register has two words, a data register one")
         if wanted in "dw":
             return self._called("CX_Pointed" if kind == "IR" else "CX_Offset", start, end, self._index(number, start, end))
         return Index(start, end, NameRef(start, end, f"CX_{kind}"), (self._index(number, start, end),))
@@ -178,12 +178,14 @@ class Operands:
         """`,IR0` and its forms: the word, or the bit, at the address in an index register; the address of a bit counts bits."""
         found = _POINTED.fullmatch(text)
         if not found or int(found[3]) >= REGISTERS:
-            raise Wrong(f"{text} is no operand", f"write ,IR0 +5,IR0 DR0,IR0 ,IR0+ or ,-IR0, with IR0 to IR{REGISTERS - 1}")
+            raise OperandError(f"{text} is no operand",
+                               f"write ,IR0 +5,IR0 DR0,IR0 ,IR0+ or ,-IR0, with IR0 to IR{REGISTERS - 1}")
         if wanted in "tcmx":
-            raise Wrong(f"{text} cannot be {self.role}", "numbers of timers and counters are known before the program runs")
+            raise OperandError(f"{text} cannot be {self.role}",
+                               "numbers of timers and counters are known before the program runs")
         offset, down, register, up = found[1] or "", len(found[2]), int(found[3]), len(found[4])
         if down and up or offset and (down or up):
-            raise Wrong(f"{text} has more than one offset", "a register is counted up, or down, or has an offset")
+            raise OperandError(f"{text} has more than one offset", "a register is counted up, or down, or has an offset")
         if down or up:
             step = [Literal(start, end, "int", value, "DINT", str(value)) for value in (-down, up)]
             stepped = self._called("CX_Step", start, end, self._index(register, start, end), *step)
@@ -196,7 +198,7 @@ class Operands:
             place = Binary(start, end, "+", place, more, start)
         elif offset:
             if not -2048 <= int(offset) <= 2047:
-                raise Wrong(f"{text} leads too far", "offsets are -2048 to +2047")
+                raise OperandError(f"{text} leads too far", "offsets are -2048 to +2047")
             place = Binary(start, end, "+", place, self._number(int(offset) & 0xFFFF_FFFF, start, end), start)
         return self._memory(place, wanted, start, end)
 
@@ -205,7 +207,7 @@ class Operands:
         if wanted in "bB":
             return Memory(start, end, self.reach(address, 0, wanted == "B"), "BOOL")
         if wanted == "v":
-            raise Wrong("the address of what is pointed at is in the register already", "copy that with MOVL")
+            raise OperandError("the address of what is pointed at is in the register already", "copy that with MOVL")
         kept = self.reach(address, WORDS.get(wanted, 1), wanted in "WA")
         return Memory(start, end, kept, "" if wanted in "aA" else _REALS.get(wanted) or _TYPES[wanted])
 
@@ -240,15 +242,15 @@ def _number(text: str, bits: int) -> int:
     digits = text[1:]
     if text[0] == "#":
         if not re.fullmatch(r"[0-9A-Fa-f]+", digits):
-            raise Wrong(f"{text} is no constant", "behind # stand hexadecimal digits")
+            raise OperandError(f"{text} is no constant", "behind # stand hexadecimal digits")
         value = int(digits, 16)
     else:
         if not digits.isdigit():
-            raise Wrong(f"{text} is no constant", "behind &, + and - stand decimal digits")
+            raise OperandError(f"{text} is no constant", "behind &, + and - stand decimal digits")
         value = int(digits) * (-1 if text[0] == "-" else 1)
     low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if text[0] in "+-" else (0, (1 << bits) - 1)
     if not low <= value <= high:
-        raise Wrong(f"{text} does not fit in {bits} bits", "")
+        raise OperandError(f"{text} does not fit in {bits} bits", "")
     return value & (1 << bits) - 1
 
 
@@ -257,8 +259,8 @@ def _check_decimal(text: str, wanted: str, role: str) -> None:
     bits = _BITS[_TYPES[wanted]]
     digits = f"{_number(text, bits):0{bits // 4}X}"
     if not digits.isdigit():
-        raise Wrong(f"{text} is {digits} hex, and {role} is read as BCD",
-                    f"write #{text[1:]}" if text[1:].isdigit() else "BCD has the digits 0 to 9")
+        raise OperandError(f"{text} is {digits} hex, and {role} is read as BCD",
+                           f"write #{text[1:]}" if text[1:].isdigit() else "BCD has the digits 0 to 9")
 
 
 def _is_address(text: str) -> bool:
@@ -267,7 +269,7 @@ def _is_address(text: str) -> bool:
 
 
 def _address(text: str, wanted: str) -> Address:
-    """The address that a text means for an operand of the kind `wanted`.  Raises Wrong."""
+    """The address that a text means for an operand of the kind `wanted`.  Raises OperandError."""
     if _OLD.fullmatch(text) and wanted in "bB":
         text = f"{int(text[:-2])}.{text[-2:]}"
     if wanted in "bBv" and re.fullmatch(r"[TC]\d+", text, re.I):
@@ -275,7 +277,7 @@ def _address(text: str, wanted: str) -> Address:
     try:
         return parse_address(text)
     except AddressError as error:
-        raise Wrong(str(error), "") from error
+        raise OperandError(str(error), "") from error
 
 
 def _spec(address: Address, wanted: str, start: int, end: int) -> tree.TypeSpec:

@@ -50,7 +50,7 @@ class Builder:
         """Whether a comment or pragma without end reaches to the end of the text."""
         self.full = False
         """Whether ERROR_LIMIT is reached."""
-        self.selves: list[Token] = []
+        self.self_references: list[Token] = []
         """THIS and SUPER seen since the last statement."""
         self.ladders: list[Ladder] = []
         """LADDERs of the POU that is being read."""

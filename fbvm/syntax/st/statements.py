@@ -104,18 +104,18 @@ class Statements(Expressions):
 
     def checked(self, statement: Statement) -> Statement:
         """The statement itself, or its refusal if it contains THIS or SUPER."""
-        mine = [token for token in self.selves if token.start >= statement.start] if self.selves else None
+        mine = [token for token in self.self_references if token.start >= statement.start] if self.self_references else None
         if not mine:
             return statement
-        del self.selves[-len(mine):]
+        del self.self_references[-len(mine):]
         return RefusedStatement(statement.start, statement.end, mine[0].text.upper(), "S0902")
 
-    def refuse_selves(self) -> None:
+    def refuse_self_references(self) -> None:
         """Report THIS and SUPER outside of statements, which have no statement to refuse."""
-        for token in self.selves:
+        for token in self.self_references:
             word = token.text.upper()
             self.report("S0902", token.start, token.end, f"{word} is object-oriented text, which is refused", "")
-        self.selves.clear()
+        self.self_references.clear()
 
     # --- simple statements ---
 

@@ -3,7 +3,7 @@ statements, charts in their textual form."""
 
 from __future__ import annotations
 
-from fbvm.interchange.plcopen.read.charts import Chart, Incomplete
+from fbvm.interchange.plcopen.read.charts import Chart, NotImportable
 from fbvm.interchange.plcopen.read.diagram import Diagram, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Document, Pou, Reading
 from fbvm.interchange.plcopen.read.networks import Network, networks
@@ -41,7 +41,7 @@ class Bodies:
             self._lose_places(body)
         try:
             return Chart(self.reading, self.scope, self.pou, self.lines).lines(body.element)
-        except Incomplete as refusal:
+        except NotImportable as refusal:
             self.reading.report("X0203", *refusal.args)
             return [f"{NOTE} the sequential function chart was not taken over: {refusal.args[1]}"]
 

@@ -24,7 +24,7 @@ PASSING = ("selectionDivergence", "selectionConvergence", "simultaneousDivergenc
 _ASSIGNED = re.compile(r"(?s)\s*([^\W\d]\w*)?\s*:=\s*(.*?);?\s*\Z")
 
 
-class Incomplete(Exception):
+class NotImportable(Exception):
     """The chart cannot be taken over; the arguments are an element, a message and a hint."""
 
 
@@ -45,14 +45,14 @@ class Chart:
         self.actions: list[str] = []
 
     def lines(self, body: Element) -> list[str]:
-        """Steps, transitions and inline actions.  Raises Incomplete."""
+        """Steps, transitions and inline actions.  Raises NotImportable."""
         self._index(body)
         self._check(body)
         steps = body.all("step")
         self.scope.taken |= {step.get("name").upper() for step in steps}
         diagram = read_diagram(self.reading, body, chart=True)
         if len(body.children) > LARGEST:
-            raise Incomplete(body, f"the chart has more than {LARGEST} elements", "")
+            raise NotImportable(body, f"the chart has more than {LARGEST} elements", "")
         arrows = [self._arrow(transition) for transition in body.all("transition")]
         blocks = {reference: block for block in body.all("actionBlock") for reference in _references(block)}
         lines = [line for step in steps for line in self._step(step, blocks.get(step.get("localId")))]
@@ -71,9 +71,9 @@ class Chart:
     def _check(self, body: Element) -> None:
         """Refuse a chart with macro steps, or without an initial step."""
         for child in body.all("macroStep"):
-            raise Incomplete(child, f"the macro step {child.get('name')} is not taken over", "draw its steps in the chart")
+            raise NotImportable(child, f"the macro step {child.get('name')} is not taken over", "draw its steps in the chart")
         if not any(step.get("initialStep") == "true" for step in body.all("step")):
-            raise Incomplete(body, "the chart has no initial step", "")
+            raise NotImportable(body, "the chart has no initial step", "")
 
     def _report_unused(self, diagram: Diagram) -> None:
         """Report what is drawn in the chart and feeds no condition of a transition."""
@@ -89,7 +89,7 @@ class Chart:
     def _step(self, step: Element, block: Element | None) -> list[str]:
         word = "INITIAL_STEP" if step.get("initialStep") == "true" else "STEP"
         if not step.get("name"):
-            raise Incomplete(step, "a step has no name", "")
+            raise NotImportable(step, "a step has no name", "")
         associations = []
         for number, action in enumerate(block.all("action") if block else [], 1):
             associations.append(self._association(step, action, number))
@@ -98,14 +98,14 @@ class Chart:
     def _association(self, step: Element, action: Element, number: int) -> str:
         qualifier = action.get("qualifier") or "N"
         if qualifier not in QUALIFIERS:
-            raise Incomplete(action, f"the qualifier {qualifier} is not executed", f"there are {', '.join(QUALIFIERS)}")
+            raise NotImportable(action, f"the qualifier {qualifier} is not executed", f"there are {', '.join(QUALIFIERS)}")
         reference, inline = action.one("reference"), action.one("inline")
         name = reference.get("name").strip() if reference else ""
         if inline is not None and (language := _language(inline)) is not None:
             name = self._free(f"{step.get('name')}_{number}")
             self.actions += [f"ACTION {name}:", *self.write(Body(language.name, language)), "END_ACTION"]
         if not name:
-            raise Incomplete(action, f"an action of step {step.get('name')} names nothing", "")
+            raise NotImportable(action, f"an action of step {step.get('name')} names nothing", "")
         given = [qualifier]
         if QUALIFIERS[qualifier]:
             given.append(duration(action.get("duration")) or action.get("duration") or "T#0s")
@@ -128,7 +128,7 @@ class Chart:
         targets = self._below(transition)
         for found, where in ((sources, "above"), (targets, "below")):
             if not found:
-                raise Incomplete(transition, f"no step stands {where} transition {transition.get('localId')}", "")
+                raise NotImportable(transition, f"no step stands {where} transition {transition.get('localId')}", "")
         return Arrow(transition, sources, targets)
 
     def _above(self, element: Element) -> list[str]:
@@ -160,7 +160,7 @@ class Chart:
         for element in self.known.values():
             if element.get("name").upper() == name:
                 return [element.get("name")] if element.name == "step" else self._divided(element)
-        raise Incomplete(jump, f"there is no step {jump.get('targetName')} to jump to", "")
+        raise NotImportable(jump, f"there is no step {jump.get('targetName')} to jump to", "")
 
     def _divided(self, divergence: Element) -> list[str]:
         """The steps directly behind a simultaneous divergence."""
@@ -182,7 +182,7 @@ class Chart:
         negated = condition is not None and condition.get("negated") == "true"
         name = self._free(f"T{element.get('localId')}")
         if condition is None:
-            raise Incomplete(element, f"transition {element.get('localId')} has no condition", "")
+            raise NotImportable(element, f"transition {element.get('localId')} has no condition", "")
         if (reference := condition.one("reference")) is not None:
             name = reference.get("name").strip()
             body = next((body for known, body in self.pou.transitions if known.upper() == name.upper()), None)
@@ -191,7 +191,7 @@ class Chart:
             name = inline.get("name") if re.fullmatch(r"[^\W\d]\w*", inline.get("name")) else name
             language = _language(inline)
             if language is None:
-                raise Incomplete(inline, "the condition is empty", "")
+                raise NotImportable(inline, "the condition is empty", "")
             return self._bodied(name, Body(language.name, language), negated)
         return self._drawn(name, element, diagram, negated)
 
@@ -209,19 +209,19 @@ class Chart:
     def _drawn(self, name: str, element: Element, diagram: Diagram, negated: bool) -> tuple[str, str, list[str]]:
         """A condition that is drawn: the objects that feed it."""
         number = element.get("localId")
-        asked = next((item for item in diagram.objects if item.kind == "condition" and item.id == number), None)
-        if asked is None or not asked.inputs[0].connected:
-            raise Incomplete(element, f"transition {number} has no condition", "")
-        asked.text, asked.negated = name, negated
-        part = networks(Diagram(_feeding(asked), []))
+        condition = next((item for item in diagram.objects if item.kind == "condition" and item.id == number), None)
+        if condition is None or not condition.inputs[0].connected:
+            raise NotImportable(element, f"transition {number} has no condition", "")
+        condition.text, condition.negated = name, negated
+        part = networks(Diagram(_feeding(condition), []))
         network = Network([item for one in part for item in one.objects], {wire for one in part for wire in one.cut})
         if network.broken:
-            raise Incomplete(element, f"the condition of transition {number} was not understood", "")
+            raise NotImportable(element, f"the condition of transition {number} was not understood", "")
         try:
             lines = Statements(self.reading, self.scope).write(network)
         except Unexecutable as refusal:
             item, message, hint = refusal.args
-            raise Incomplete(item.element, message, hint) from None
+            raise NotImportable(item.element, message, hint) from None
         if len(lines) == 1:
             return name, lines[0].removeprefix(f"{name} := ").removesuffix(";"), []
         return name, "", lines
@@ -261,10 +261,10 @@ def _order(arrows: list[Arrow]) -> Callable[[Arrow], tuple[float, tuple[str, ...
     return key
 
 
-def _feeding(asked: Object) -> list[Object]:
+def _feeding(condition: Object) -> list[Object]:
     """An object and all that feeds it, in the order of writing."""
-    found = {asked}
-    todo = [asked]
+    found = {condition}
+    todo = [condition]
     while todo:
         for pin in todo.pop().pins:
             for wire in pin.wires:

@@ -9,7 +9,7 @@ from fbvm.interchange.plcopen.read.diagram import Object, Pin, Wire
 from fbvm.interchange.plcopen.read.networks import Network
 from fbvm.interchange.plcopen.read.scope import Scope
 from fbvm.syntax.ladder.instructions.instruction_set import Instruction, instruction_set
-from fbvm.syntax.ladder.operands import Operands, Wrong
+from fbvm.syntax.ladder.operands import OperandError, Operands
 from fbvm.syntax.ladder.text import instruction_text
 from fbvm.syntax.tree import Index, Member, NameRef
 
@@ -38,11 +38,11 @@ class Parts:
 
     def __init__(self, network: Network, scope: Scope) -> None:
         self.network, self.scope = network, scope
-        self.asked: dict[Object, list[tuple[Object, Wire]]] = {}
+        self.consumers: dict[Object, list[tuple[Object, Wire]]] = {}
         for item in network.objects:
             for pin in item.pins:
                 for wire in pin.wires:
-                    self.asked.setdefault(wire.source, []).append((item, wire))
+                    self.consumers.setdefault(wire.source, []).append((item, wire))
         self.joined = {item: test for item in network.objects if (test := self._joiner(item))}
         self.calls = {item for item in network.objects if self._is_call(item)}
         self.outputs = [item for item in network.objects if self._is_output(item)]
@@ -64,14 +64,14 @@ class Parts:
             return None
         wires = item.inputs[1].wires
         test = wires[0].source if len(wires) == 1 else None
-        return test if test is not None and self._is_test(test) and len(self.asked.get(test, ())) == 1 else None
+        return test if test is not None and self._is_test(test) and len(self.consumers.get(test, ())) == 1 else None
 
     def _is_call(self, item: Object) -> bool:
         """Whether a block can be an FBCALL: power goes through EN and ENO, all other pins have operands."""
         if item.kind != "block" or not item.instance or item.mnemonic or item.in_outs or not item.pin("EN"):
             return False
         plain = all(self._operand_of(pin) for pin in item.inputs if pin.connected and pin.name.upper() != "EN")
-        outputs = [consumer for consumer, wire in self.asked.get(item, ()) if wire.pin.upper() != "ENO"]
+        outputs = [consumer for consumer, wire in self.consumers.get(item, ()) if wire.pin.upper() != "ENO"]
         return plain and not any(pin.negated or pin.edge for pin in (*item.inputs, *item.outputs)) \
             and all(self._is_plain_variable(consumer) for consumer in outputs)
 
@@ -93,13 +93,13 @@ class Parts:
             return True
         row = instruction(item)
         if item in self.calls:
-            return not any(wire.pin.upper() == "ENO" for _, wire in self.asked.get(item, ()))
+            return not any(wire.pin.upper() == "ENO" for _, wire in self.consumers.get(item, ()))
         return row is not None and row.kind != "?" and row.does != ".not"
 
     def _belongs(self, item: Object) -> bool:
         """Whether an object is a value at the pin of a block that is written with it."""
         if item.kind == "inVariable":
-            return all(consumer in self.calls or instruction(consumer) for consumer, _ in self.asked.get(item, ()))
+            return all(consumer in self.calls or instruction(consumer) for consumer, _ in self.consumers.get(item, ()))
         return self._is_plain_variable(item) and item.inputs[0].wires[0].source in self.calls
 
     # --- power ---
@@ -151,7 +151,7 @@ class Parts:
             return "NOT"
         pins = [f"{pin.name}:={_constant(self._operand_of(pin))}" for pin in item.inputs
                 if pin.connected and pin.name.upper() != "EN"]
-        pins += [f"{wire.pin}=>{consumer.text}" for consumer, wire in self.asked.get(item, ()) if wire.pin.upper() != "ENO"]
+        pins += [f"{wire.pin}=>{consumer.text}" for consumer, wire in self.consumers.get(item, ()) if wire.pin.upper() != "ENO"]
         if any(" " in pin for pin in pins):
             raise Inexact
         return instruction_text("FBCALL", item.text, item.instance, *pins)
@@ -176,7 +176,7 @@ class Parts:
             raise Inexact
         try:
             meant = Operands().expression(text, "b", 0, 0)
-        except Wrong:
+        except OperandError:
             raise Inexact from None
         if not isinstance(meant, (NameRef, Member, Index)) and self.scope.declares(text):
             raise Inexact

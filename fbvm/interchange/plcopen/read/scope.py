@@ -16,7 +16,7 @@ from fbvm.check.calls.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, co
 from fbvm.interchange.plcopen.read.diagram import Object, Wire
 from fbvm.interchange.plcopen.read.document import Document, Pou, Variable
 from fbvm.syntax import tree
-from fbvm.syntax.ladder.operands import Operands, Wrong
+from fbvm.syntax.ladder.operands import OperandError, Operands
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 
@@ -76,7 +76,7 @@ class Scope:
             return text
         try:
             meant = Operands().expression(text, "b", 0, 0)
-        except Wrong:
+        except OperandError:
             return text
         return meant.text if isinstance(meant, tree.Direct) else text
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.interchange.plcopen.markup import Element, element, written
 from fbvm.interchange.plcopen.write.pous import pou
-from fbvm.interchange.plcopen.write.types import Types, Unsayable
+from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.st.pragmas import harmless
@@ -73,8 +73,8 @@ def _source(parts: _Parts, source: Source) -> None:
     for declared in text.declarations:
         try:
             _declaration(parts, types, declared, named if _NAME.fullmatch(named) else "")
-        except Unsayable as unsayable:
-            node, message, hint = unsayable.args
+        except NotExportable as unexportable:
+            node, message, hint = unexportable.args
             what = f"{declared.name.text}: " if isinstance(declared, tree.Pou | tree.TypeDecl | tree.Configuration) else ""
             parts.diagnostics.append(Diagnostic("X0301", source, node.start, node.end, f"{what}{message}", hint))
     for pragma in text.pragmas:
@@ -99,9 +99,9 @@ def _declaration(parts: _Parts, types: Types, declared: tree.Declaration, name: 
     elif isinstance(declared, tree.Configuration):
         parts.configurations.append(_configuration(types, declared))
     elif isinstance(declared, tree.Refused):
-        raise Unsayable(declared, f"{declared.what} is not exported", "")
+        raise NotExportable(declared, f"{declared.what} is not exported", "")
     else:
-        raise Unsayable(declared, "what stands outside of its POU is not exported", "put ACTIONs into their POU")
+        raise NotExportable(declared, "what stands outside of its POU is not exported", "put ACTIONs into their POU")
 
 
 def _matters(pragma: str) -> bool:
@@ -114,7 +114,7 @@ def _matters(pragma: str) -> bool:
 
 def _configuration(types: Types, declared: tree.Configuration) -> Element:
     for unsaid in (*declared.refused, *declared.settings):
-        raise Unsayable(unsaid, "VAR_ACCESS and VAR_CONFIG are not exported", "")
+        raise NotExportable(unsaid, "VAR_ACCESS and VAR_CONFIG are not exported", "")
     resources = [_resource(types, resource) for resource in declared.resources]
     lists = [types.section(section) for section in declared.sections]
     return element("configuration", *resources, *lists, name=declared.name.text)
@@ -122,11 +122,11 @@ def _configuration(types: Types, declared: tree.Configuration) -> Element:
 
 def _resource(types: Types, resource: tree.Resource) -> Element:
     for unsaid in (*resource.refused, *resource.settings):
-        raise Unsayable(unsaid, "this part of a RESOURCE is not exported", "")
+        raise NotExportable(unsaid, "this part of a RESOURCE is not exported", "")
     instances: dict[str, list[Element]] = {}
     for program in resource.programs:
         if program.connections or program.blocks or program.qualifiers:
-            raise Unsayable(program, "connections and qualifiers of programs are not exported", "assign in the program")
+            raise NotExportable(program, "connections and qualifiers of programs are not exported", "assign in the program")
         task = program.task.text.upper() if program.task else ""
         instances.setdefault(task, []).append(element("pouInstance", name=program.name.text, typeName=program.type_name.text))
     tasks = [_task(types, task, instances.get(task.name.text.upper(), [])) for task in resource.tasks]

@@ -10,7 +10,7 @@ from fbvm.interchange.plcopen.write.charts import ChartWriter
 from fbvm.interchange.plcopen.write.layout import Drawing
 from fbvm.interchange.plcopen.write.rungs import RungWriter
 from fbvm.interchange.plcopen.write.statements import StatementWriter
-from fbvm.interchange.plcopen.write.types import Types, Unsayable
+from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
 from fbvm.syntax.tree.ladder import Ladder
 from fbvm.syntax.tree.sfc import Sfc
@@ -23,11 +23,11 @@ _LABEL = re.compile(r"(?m)^[ \t]*[^\W\d]\w*[ \t]*:(?!=)")
 
 
 def pou(types: Types, declared: tree.Pou) -> Element:
-    """The element of a POU.  Raises Unsayable if the POU has something for which the format has no form."""
+    """The element of a POU.  Raises NotExportable if the POU has something for which the format has no form."""
     for refused in declared.refused:
-        raise Unsayable(refused, f"{refused.what} is not exported", "")
+        raise NotExportable(refused, f"{refused.what} is not exported", "")
     if declared.accesses:
-        raise Unsayable(declared.accesses[0], "VAR_ACCESS of a POU is not exported", "")
+        raise NotExportable(declared.accesses[0], "VAR_ACCESS of a POU is not exported", "")
     sections = [section for section in declared.sections if not section.hidden]
     variables = [variable for section in sections for variable in section.variables]
     types.note(sections)
@@ -99,16 +99,16 @@ def _action(types: Types, action: tree.Action, taken: set[str], instances: dict[
 
 
 def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str]) -> tuple[Element, dict[str, Element]]:
-    """The element of a body, and the variables that the POU must declare for it, by name.  Raises Unsayable."""
+    """The element of a body, and the variables that the POU must declare for it, by name.  Raises NotExportable."""
     for statement in body:
         if isinstance(statement, tree.RefusedStatement):
-            raise Unsayable(statement, f"{statement.what} is not exported", "")
+            raise NotExportable(statement, f"{statement.what} is not exported", "")
     text = types.source.text[start:end]
     if not any(isinstance(statement, Ladder) for statement in body):
         types.kept.append((start, end))
         return element("ST", element("xhtml:p", _dedented(text))), {}
     if len(body) > 1 and (_JUMP.search(text) or _LABEL.search(_without_ladder(text))):
-        raise Unsayable(body[0], "jumps between rungs are not exported", "put the statements into a POU of Structured Text")
+        raise NotExportable(body[0], "jumps between rungs are not exported", "put the statements into a POU of Structured Text")
     drawing = Drawing()
     rungs = RungWriter(drawing, types, taken)
     statements = StatementWriter(drawing, types)

@@ -14,12 +14,12 @@ from fbvm.base.areas import parse_address
 from fbvm.interchange.plcopen.markup import Element, element
 from fbvm.interchange.plcopen.schema import LOCATION
 from fbvm.interchange.plcopen.write.layout import Drawing, End, Ends, own_data
-from fbvm.interchange.plcopen.write.types import Types, Unsayable
+from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.drawing.diagram import WIRE
 from fbvm.syntax.ladder.instructions.instruction_set import JOINS, Instruction, instruction_set
 from fbvm.syntax.ladder.mnemonics import Symbol, read_rungs
-from fbvm.syntax.ladder.operands import SYMBOLS, Operands, Wrong
+from fbvm.syntax.ladder.operands import SYMBOLS, OperandError, Operands
 from fbvm.syntax.ladder.symbols import number
 from fbvm.syntax.tree.ladder import Ladder, Rung, Step
 
@@ -79,7 +79,7 @@ class RungWriter:
         """Symbols that mean timers and counters, and their numbers."""
 
     def ladder(self, ladder: Ladder) -> None:
-        """Draw LADDER .. END_LADDER.  Raises Unsayable."""
+        """Draw LADDER .. END_LADDER.  Raises NotExportable."""
         for symbol in self._symbols(ladder):
             if timer := number(symbol):
                 self.numbered[symbol.name.upper()] = timer
@@ -147,8 +147,8 @@ class RungWriter:
         else:
             self._instruction(step, row)
 
-    def _unsayable(self, what: str) -> Unsayable:
-        return Unsayable(self.step, f"ladder of PLCopen XML has no {what}", "write that rung in Structured Text")
+    def _not_exportable(self, what: str) -> NotExportable:
+        return NotExportable(self.step, f"ladder of PLCopen XML has no {what}", "write that rung in Structured Text")
 
     @property
     def power(self) -> Power:
@@ -181,7 +181,7 @@ class RungWriter:
         marks = dict(EDGES.get(edge, {}))
         if negated:
             if edge:
-                raise self._unsayable("contact that is negated and has an edge")
+                raise self._not_exportable("contact that is negated and has an edge")
             marks["negated"] = "true"
         return [Contact(self._symbol(name), marks)]
 
@@ -190,8 +190,8 @@ class RungWriter:
         name = self.numbered.get(name.upper(), name)
         try:
             meant = Operands().expression(name, "b", self.step.start, self.step.end)
-        except Wrong as wrong:
-            raise Unsayable(self.step, wrong.args[0], "") from None
+        except OperandError as wrong:
+            raise NotExportable(self.step, wrong.args[0], "") from None
         if not isinstance(meant, tree.NameRef | tree.Member | tree.Index) or name.upper() in SYMBOLS:
             self.foreign(self.step, f"{name} is an address, for which other tools have no name; declare a variable AT it")
         return name
@@ -201,7 +201,7 @@ class RungWriter:
         power = self.power
         if power.ends is None and other.ends is None:
             if not power.series or not other.series:
-                raise self._unsayable("wire that bridges contacts")
+                raise self._not_exportable("wire that bridges contacts")
             known = power.series[0] if len(power.series) == 1 and isinstance(power.series[0], Ways) else None
             ways = known.series if known else [power.series]
             self.now = Power(None, [Ways([*ways, other.series])])
@@ -218,7 +218,7 @@ class RungWriter:
             self.now = first
             self._beside(second)
         elif second.ends is not None:
-            raise self._unsayable("AND of two places from which something else hangs")
+            raise self._not_exportable("AND of two places from which something else hangs")
         else:
             first.series += second.series
             self.now = first
@@ -309,7 +309,7 @@ class RungWriter:
         name = self._symbol(self.step.operands[0])
         reset, set_ = self.power, self.saved.pop()
         if name.upper() in {c.variable.upper() for c in _contacts(reset.series)} or reset.ends is not None:
-            raise self._unsayable("KEEP whose reset asks for its own bit")
+            raise self._not_exportable("KEEP whose reset asks for its own bit")
         self.now = set_
         self._draw_coil(name, COILS["SET"])
         self.now = Power(None, reset.series, 0, self.rows)
@@ -322,7 +322,7 @@ class RungWriter:
         self.now = Power((made[output],), [], column + 1, row)
 
     def _refuse(self) -> None:
-        raise self._unsayable(self.step.mnemonic)
+        raise self._not_exportable(self.step.mnemonic)
 
     def _up(self) -> None:
         """UP: an R_TRIG that the power goes through.  DOWN is refused: F_TRIG also has an edge in its first call."""

@@ -22,7 +22,7 @@ _NUMBERED = re.compile(r"([TtCc])(\d+)")
 _REMARK = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\n]*)")
 
 
-class Unsayable(Exception):
+class NotExportable(Exception):
     """The format has no form for something; the arguments are the node, a message and a hint."""
 
 
@@ -58,7 +58,7 @@ class Types:
     # --- types ---
 
     def spec(self, spec: tree.TypeSpec) -> Element:
-        """The element of a type.  Raises Unsayable."""
+        """The element of a type.  Raises NotExportable."""
         if isinstance(spec, tree.NamedType):
             name = LONG.get(spec.text.upper(), spec.text.upper())
             return element(name) if name in ELEMENTARY else element("derived", name=spec.text)
@@ -79,13 +79,13 @@ class Types:
             return element("struct", *(made for member in spec.members for made in self.variables(member)))
         if isinstance(spec, tree.RefSpec) and spec.kind == "POINTER TO":
             return element("pointer", element("baseType", self.spec(spec.target)))
-        raise Unsayable(spec, f"the format has no type for {self.text(spec).split('(')[0][:40]}", "")
+        raise NotExportable(spec, f"the format has no type for {self.text(spec).split('(')[0][:40]}", "")
 
     def _array(self, spec: tree.ArraySpec) -> Element:
         dimensions = []
         for dimension in spec.dimensions:
             if dimension is None:
-                raise Unsayable(spec, "the format has no arrays of any length", "")
+                raise NotExportable(spec, "the format has no arrays of any length", "")
             low, high = dimension
             dimensions.append(element("dimension", lower=self.text(low), upper=self.text(high)))
         return element("array", *dimensions, element("baseType", self.spec(spec.element)))
@@ -99,7 +99,7 @@ class Types:
             for times, inner in value.items:
                 repeated = {"repetitionValue": self.text(times)} if times is not None else {}
                 if inner is None:
-                    raise Unsayable(value, "the format cannot repeat a default value", "")
+                    raise NotExportable(value, "the format cannot repeat a default value", "")
                 items.append(element("value", self.value(inner), **repeated))
             return element("arrayValue", *items)
         if isinstance(value, tree.StructInit):
@@ -112,7 +112,7 @@ class Types:
     def variables(self, declared: tree.VarDecl) -> Iterator[Element]:
         """One element for each name of a declaration."""
         if declared.edge:
-            raise Unsayable(declared, "the format has no R_EDGE and F_EDGE", "use R_TRIG or F_TRIG")
+            raise NotExportable(declared, "the format has no R_EDGE and F_EDGE", "use R_TRIG or F_TRIG")
         for name in declared.names:
             made = element("variable", element("type", self.spec(declared.spec)), name=name.text)
             if declared.location is not None:
@@ -132,15 +132,15 @@ class Types:
         made.content.append(own_data(LOCATION, text))
 
     def section(self, section: tree.VarSection, name: str = "") -> Element:
-        """The element of a section.  Raises Unsayable."""
+        """The element of a section.  Raises NotExportable."""
         kind = LISTS.get(section.kind)
         if kind is None:
-            raise Unsayable(section, f"the format has no {section.kind}", "")
+            raise NotExportable(section, f"the format has no {section.kind}", "")
         marks = {}
         for qualifier in section.qualifiers:
             word = qualifier.text.upper()
             if word not in WORDS:
-                raise Unsayable(qualifier, f"the format has no {word}", "")
+                raise NotExportable(qualifier, f"the format has no {word}", "")
             marks[WORDS[word]] = "true"
         named = {"name": name} if name else {}
         return element(kind, *(made for declared in section.variables for made in self.variables(declared)), **named, **marks)

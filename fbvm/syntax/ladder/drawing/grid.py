@@ -40,12 +40,12 @@ _TEXT = re.compile(r"= [^\s─-╿|]+(?:, [^\s─-╿|]+)*|[^\s─-╿|]+")
 """A text of a row: one word, or the values that stand below a comparison."""
 
 
-class Bad(Exception):
+class DrawingError(Exception):
     """The drawing cannot be read; the arguments are column, row, width, message and hint."""
 
 
 @dataclass(eq=False)
-class Drawn:
+class DrawnElement:
     """A contact or a coil: the columns of its strokes or brackets."""
 
     x: int
@@ -92,17 +92,17 @@ class Grid:
         self.lines = lines
         self.taken: set[Cell] = set()
         self.boxes: list[DrawnBox] = []
-        self.elements: list[Drawn] = []
+        self.elements: list[DrawnElement] = []
         self.links: list[tuple[int, int, int, int]] = []
         """Arrows: column, row, width, number."""
         self.places: dict[str, str] = {}
         """By operands of an element, the text in the row below the element: the addresses of its symbols."""
-        self.problems: list[Bad] = []
+        self.problems: list[DrawingError] = []
         """Errors of texts.  They are raised after those of wires: a misplaced text often comes of a wrong wire."""
         for y, line in enumerate(lines):
             if "\t" in line.rstrip():
-                raise Bad(line.index("\t"), y, 1, "there is a tab in the drawing",
-                          "columns are only known of spaces: write spaces")
+                raise DrawingError(line.index("\t"), y, 1, "there is a tab in the drawing",
+                                   "columns are only known of spaces: write spaces")
         self.left = min((x for line in lines if (x := _first(line)) is not None and line[x] in RAIL), default=0)
         self.right = self._right_rail()
         self._find_boxes()
@@ -147,7 +147,7 @@ class Grid:
                     self.taken |= {(column, row) for column in range(x, box.until + 1) for row in range(y, box.bottom + 1)}
 
     def _box(self, x: int, y: int) -> DrawnBox | None:
-        """The box with this upper left corner, if it is one.  Raises Bad."""
+        """The box with this upper left corner, if it is one.  Raises DrawingError."""
         upper = _UPPER_SIDE.match(self.lines[y], x + 1)
         if not upper or (until := upper.end() - 1) - x < 2:
             return None
@@ -167,8 +167,8 @@ class Grid:
     def _check_open(self, x: int, y: int, until: int, bottom: int) -> None:
         """Refuse what begins as a box and has no lower side."""
         if bottom > y + 1 or self._is_side(x, y + 1) and _BOX_TEXT.match(self.lines[y + 1], x + 1):
-            raise Bad(x, bottom, until - x + 1, f"the box that begins in column {x + 1} is open in this row",
-                      f"its sides stand in the columns {x + 1} and {until + 1} down to its lower corners")
+            raise DrawingError(x, bottom, until - x + 1, f"the box that begins in column {x + 1} is open in this row",
+                               f"its sides stand in the columns {x + 1} and {until + 1} down to its lower corners")
 
     def _title(self, x: int, y: int, text: str | None) -> tuple[str, str] | None:
         """Instance and type from the text in the upper side of a box; None if there is no text."""
@@ -176,7 +176,7 @@ class Grid:
             return None
         found, bare = _TITLE.search(text), text.strip()
         if not found:
-            raise Bad(x + 2, y, len(bare), f"`{bare}` is no title of a block", "write instance : type")
+            raise DrawingError(x + 2, y, len(bare), f"`{bare}` is no title of a block", "write instance : type")
         return found[1], found[2]
 
     def _headed(self, box: DrawnBox) -> DrawnBox:
@@ -189,9 +189,9 @@ class Grid:
         elif len(box.rows) > 1 and (typed := _HEAD.fullmatch(first)) and spelling(first.split()[0]) not in instruction_set().rows:
             above = _NAME.fullmatch(self.lines[box.y - 1][box.x:box.until + 1]) if box.y else None
             if not above:
-                raise Bad(box.x, box.y, box.until + 1 - box.x,
-                          f"`{first.split()[0]}` is no instruction, and as a block this box has no instance",
-                          "write the name of the instance above the box, or instance : type in its upper side")
+                raise DrawingError(box.x, box.y, box.until + 1 - box.x,
+                                   f"`{first.split()[0]}` is no instruction, and as a block this box has no instance",
+                                   "write the name of the instance above the box, or instance : type in its upper side")
             box.title, box.heads = (above[1], typed[2] or typed[4]), (box.y - 1, row)
             self._take(box.x + above.start(1), box.x + above.end(1), box.y - 1)
             box.rows[row] = f"{typed[1]} {typed[3]}"
@@ -257,7 +257,7 @@ class Grid:
                 self.elements.append(found_next)
         self.elements.sort(key=lambda element: (element.y, element.x))
 
-    def _next_element(self, line: str, at: int, y: int) -> Drawn | None:
+    def _next_element(self, line: str, at: int, y: int) -> DrawnElement | None:
         for x in range(at, len(line)):
             if named := self._named(line, x, y):
                 return named
@@ -269,13 +269,13 @@ class Grid:
                     continue
                 if not known.fullmatch(found[1]):
                     what, hint = _UNKNOWN[is_coil]
-                    raise Bad(x, y, found.end() - x, f"`{found[0]}` is no {what}", hint)
+                    raise DrawingError(x, y, found.end() - x, f"`{found[0]}` is no {what}", hint)
                 self._take(x, found.end(), y)
-                return Drawn(x, found.end() - 1, y, found[1].strip() or " ", is_coil)
+                return DrawnElement(x, found.end() - 1, y, found[1].strip() or " ", is_coil)
         return None
 
-    def _named(self, line: str, x: int, y: int) -> Drawn | None:
-        """The contact or coil with its operand inside that begins in a column, if there is one.  Raises Bad."""
+    def _named(self, line: str, x: int, y: int) -> DrawnElement | None:
+        """The contact or coil with its operand inside that begins in a column, if there is one.  Raises DrawingError."""
         for is_coil, shape in _NAMED.items():
             found = shape.match(line, x)
             if not found or self._is_taken(x, found.end(), y) or not self._is_on_wire(x, found.end() - 1, y, is_coil):
@@ -286,11 +286,12 @@ class Grid:
             if not is_coil and any(self._is_crossed(column, y) for column in (x, found.end() - 1)):
                 continue
             self._take(x, found.end(), y)
-            return Drawn(x, found.end() - 1, y, found[1] or found[2] or " ", is_coil, (found[3],), [found.span(3)], True)
+            return DrawnElement(x, found.end() - 1, y, found[1] or found[2] or " ", is_coil, (found[3],), [found.span(3)], True)
         other = _BRACKETS.match(line, x)
         if other and not self._is_taken(x, other.end(), y) and self._is_on_wire(x, other.end() - 1, y, False):
-            raise Bad(x, y, other.end() - x, f"`{other[0]}` is no contact",
-                      "a comparison is ┤>├ with its two operands above; an instruction or a block is a box of several rows")
+            raise DrawingError(x, y, other.end() - x, f"`{other[0]}` is no contact",
+                               "a comparison is ┤>├ with its two operands above; "
+                               "an instruction or a block is a box of several rows")
         return None
 
     def _is_on_wire(self, x: int, until: int, y: int, is_coil: bool) -> bool:
@@ -328,14 +329,14 @@ class Grid:
                 if not above:
                     text = self.lines[y][start:end]
                     self._take(start, end, y)
-                    self.problems.append(Bad(start, y, end - start, f"`{text}` belongs to no contact, coil or box",
-                                             "operands stand above contacts and coils, in the row next to theirs"))
+                    self.problems.append(DrawingError(start, y, end - start, f"`{text}` belongs to no contact, coil or box",
+                                                      "operands stand above contacts and coils, in the row next to theirs"))
                     continue
                 near = min(above, key=lambda e: abs(e.x + e.until - start - end))
                 self.places[" ".join(near.operands)] = self.lines[y][start:end]
                 self._take(start, end, y)
 
-    def _label(self, element: Drawn, wanted: int) -> list[tuple[int, int]]:
+    def _label(self, element: DrawnElement, wanted: int) -> list[tuple[int, int]]:
         """The columns of the operands of a contact or coil: the `wanted` texts of the row above that are nearest to it."""
         texts = [text for text in self._texts(element.y - 1) if not self.lines[element.y - 1].startswith("= ", text[0])]
         choices = [texts[at:at + wanted] for at in range(len(texts) - wanted + 1)
@@ -343,7 +344,7 @@ class Grid:
         near = [c for c in choices if c[0][0] <= element.until + 2 and c[-1][1] >= element.x - 1]
         if not near:
             what = "coil" if element.is_coil else "contact"
-            self.problems.append(Bad(
+            self.problems.append(DrawingError(
                 element.x, element.y, element.until + 1 - element.x, f"above this {what} stands no operand",
                 f"write {f'{wanted} operands with one space between them' if wanted > 1 else 'it'} in the row above, "
                 f"over column {(element.x + element.until) // 2 + 1}"))

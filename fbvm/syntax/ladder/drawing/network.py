@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 from fbvm.syntax.ladder.drawing.box_lines import LEFT, RIGHT
 from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Part, Pin, Point, Series
-from fbvm.syntax.ladder.drawing.grid import Bad, Drawn, DrawnBox, Grid
+from fbvm.syntax.ladder.drawing.grid import DrawingError, DrawnBox, DrawnElement, Grid
 from fbvm.syntax.ladder.drawing.wires import BUS, SINK, Net, Order, Wires, border
 
 INLINE = ("NOT", "UP", "DOWN")
 """Instructions that are drawn as boxes on a line."""
-Source = Drawn | DrawnBox
+Source = DrawnElement | DrawnBox
 
 
 @dataclass(eq=False)
@@ -53,7 +53,7 @@ class Network:
             self._box(box)
 
     def diagram(self) -> Point:
-        """The bus bar with all elements that follow it.  Raises Bad."""
+        """The bus bar with all elements that follow it.  Raises DrawingError."""
         while self._merge_branches() or self._merge_series():
             pass
         self._check()
@@ -63,7 +63,7 @@ class Network:
 
     # --- elements ---------------------------------------------------------------------------------------------------
 
-    def _element(self, drawn: Drawn) -> None:
+    def _element(self, drawn: DrawnElement) -> None:
         start = self.wires.net(border(drawn.x, drawn.y, LEFT))
         if drawn.is_coil:
             coil = Coil(-1, drawn.mark, drawn.operands)
@@ -76,8 +76,8 @@ class Network:
 
     def _edge(self, start: Net, end: Net, part: Part, drawn: Source) -> None:
         if start.name == end.name:
-            raise Bad(drawn.x, drawn.y, drawn.until + 1 - drawn.x, "a wire leads around this, so it has no effect",
-                      "take the wire away, or let it begin in front of another contact")
+            raise DrawingError(drawn.x, drawn.y, drawn.until + 1 - drawn.x, "a wire leads around this, so it has no effect",
+                               "take the wire away, or let it begin in front of another contact")
         self.edges.append(_Edge(start.name, end.name, start.order, [part]))
 
     def _box(self, drawn: DrawnBox) -> None:
@@ -85,12 +85,14 @@ class Network:
         entries = [y for y in rows if (LEFT, y) not in drawn.stubs and self.wires.is_used(border(drawn.x, y, LEFT))]
         exits = [y for y in rows if (RIGHT, y) not in drawn.stubs and self.wires.is_used(border(drawn.until, y, RIGHT))]
         if not entries:
-            raise Bad(drawn.x, drawn.y, 1, "no wire leads to this box", "draw ─ to its left side, in the row of its first line")
+            raise DrawingError(drawn.x, drawn.y, 1, "no wire leads to this box",
+                               "draw ─ to its left side, in the row of its first line")
         if drawn.title:
             for side, used in ((LEFT, entries), (RIGHT, exits)):
                 if len(used) > 1:
-                    raise Bad(drawn.x if side == LEFT else drawn.until, used[1], 1, f"a second wire {_WAYS[side]} this block",
-                              "one wire leads through a block; at its other pins stand operands, such as a variable")
+                    raise DrawingError(drawn.x if side == LEFT else drawn.until, used[1], 1,
+                                       f"a second wire {_WAYS[side]} this block",
+                                       "one wire leads through a block; at its other pins stand operands, such as a variable")
         box = _block(drawn, entries[0], exits[0] if exits else -1) if drawn.title else _instruction(drawn)
         self.sources[id(box)] = drawn
         start, *others = (self.wires.net(border(drawn.x, y, LEFT)) for y in entries)
@@ -169,7 +171,7 @@ class Network:
         while isinstance(part, Parallel):
             part = part.branches[0].parts[0]
         drawn = self.sources[id(part)]
-        raise Bad(drawn.x, drawn.y, drawn.until + 1 - drawn.x, message, hint)
+        raise DrawingError(drawn.x, drawn.y, drawn.until + 1 - drawn.x, message, hint)
 
     def _hang(self, point: Point, net: Hashable) -> None:
         """Add to a point what follows its net, from above."""
@@ -220,8 +222,8 @@ def _block(drawn: DrawnBox, entry: int, leaving: int) -> Box:
         for side, name in ((LEFT, left), (RIGHT, right)):
             if operand := drawn.stubs.get((side, y)):
                 if not name:
-                    raise Bad(drawn.x if side == LEFT else drawn.until, y, 1, f"`{operand}` stands at no pin",
-                              "write the name of the pin inside of the box, at this side")
+                    raise DrawingError(drawn.x if side == LEFT else drawn.until, y, 1, f"`{operand}` stands at no pin",
+                                       "write the name of the pin inside of the box, at this side")
                 pins.append(Pin(name, operand, side == RIGHT))
     return Box(-1, drawn.title[1], (), (), True, drawn.title[0], tuple(pins), (wired[LEFT],), wired[RIGHT])
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from fbvm.syntax.ladder.drawing.box_lines import LEFT
 from fbvm.syntax.ladder.drawing.diagram import Box, Point
-from fbvm.syntax.ladder.drawing.grid import Bad, DrawnBox, Grid
+from fbvm.syntax.ladder.drawing.grid import DrawingError, DrawnBox, Grid
 from fbvm.syntax.ladder.drawing.network import Network
 from fbvm.syntax.ladder.drawing.steps import Coded, steps
 
@@ -50,16 +50,16 @@ def remark_of(line: str) -> str:
 
 
 def read_drawing(lines: Sequence[str], offsets: Sequence[int]) -> tuple[list[Placed], Picture]:
-    """The instructions of a drawing; `offsets` are the places of its lines in the text.  Raises Bad."""
+    """The instructions of a drawing; `offsets` are the places of its lines in the text.  Raises DrawingError."""
     bare = next((row for row, line in enumerate(lines) if _BARE.match(line)), None)
     if bare is not None:
-        raise Bad(len(lines[bare]) - len(lines[bare].lstrip()), bare, 1, "the left rail is missing",
-                  "each row of a drawing begins with │ or |")
+        raise DrawingError(len(lines[bare]) - len(lines[bare].lstrip()), bare, 1, "the left rail is missing",
+                           "each row of a drawing begins with │ or |")
     grid = Grid([_REMARK.sub("", line).rstrip() for line in lines])
     network = Network(grid)
     bar = network.diagram()
     if not bar.outs:
-        raise Bad(grid.left, 0, 1, "nothing hangs on the bus bar", "draw a wire from it, with contacts and a coil")
+        raise DrawingError(grid.left, 0, 1, "nothing hangs on the bus bar", "draw a wire from it, with contacts and a coil")
     width = max(map(len, grid.lines)) - grid.left
     return _placed(steps(bar), network, offsets), Picture(bar, width, bool(grid.links), grid.places)
 

@@ -6,7 +6,7 @@ from collections.abc import Hashable
 from typing import NamedTuple
 
 from fbvm.syntax.ladder.drawing.box_lines import LEFT, RIGHT, UP
-from fbvm.syntax.ladder.drawing.grid import RAIL, WAYS, Bad, Cell, Grid
+from fbvm.syntax.ladder.drawing.grid import RAIL, WAYS, Cell, DrawingError, Grid
 
 BUS, SINK = "bus", "sink"
 """The nets of the left and of the right rail."""
@@ -94,8 +94,9 @@ class Wires:
                     continue
                 side = border(x, y, way)
                 if net == SINK and side in self._users and self._root(side) == BUS:
-                    raise Bad(grid.left, y, grid.right - grid.left + 1, "this wire leads from rail to rail with nothing on it",
-                              "draw contacts and a coil, or take the wire away")
+                    raise DrawingError(grid.left, y, grid.right - grid.left + 1,
+                                       "this wire leads from rail to rail with nothing on it",
+                                       "draw contacts and a coil, or take the wire away")
                 if side in self._users or way in grid.ways(x, y) and grid.at(x, y) not in "|+":
                     self._use(side, (x, y))
                     self._join(side, net)
@@ -109,7 +110,7 @@ class Wires:
         for y, x, end in ends:
             if not self.grid.right and end == border(len(self.grid.lines[y].rstrip()) - 1, y, RIGHT):
                 continue  # a drawing without a right rail
-            raise Bad(x, y, 1, *self._said(x, y, end))
+            raise DrawingError(x, y, 1, *self._said(x, y, end))
 
     def _said(self, x: int, y: int, end: Border) -> tuple[str, str]:
         """The message and the hint for a wire that ends at nothing."""
@@ -137,12 +138,13 @@ class Wires:
         for x, y, wide, number in sorted(self.grid.links, key=lambda link: link[1]):
             known = ends if border(x, y, LEFT) in self._users else begun
             if number in known:
-                raise Bad(x, y, wide, f"there is another arrow with the number {number}", "give each pair of arrows its number")
+                raise DrawingError(x, y, wide, f"there is another arrow with the number {number}",
+                                   "give each pair of arrows its number")
             known[number] = x, y, wide
         for number in sorted({*ends} ^ {*begun}):
             x, y, wide = ends.get(number) or begun[number]
-            raise Bad(x, y, wide, f"there is one arrow with the number {number}",
-                      f"►{number} stands at the end of a line, and at the beginning of the one that goes on")
+            raise DrawingError(x, y, wide, f"there is one arrow with the number {number}",
+                               f"►{number} stands at the end of a line, and at the beginning of the one that goes on")
         for number, (x, y, _) in sorted(ends.items(), key=lambda item: item[1][1]):
             at, row, wide = begun[number]
             leaving, going = border(x, y, LEFT), border(at + wide - 1, row, RIGHT)
