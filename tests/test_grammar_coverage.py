@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from fbvm.base.diagnostics import Source
+from fbvm.syntax.pous import SourceBuilder
 from fbvm.syntax.recovery.recovery import Recovery
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.builder import Stop
 from fbvm.syntax.st.lexer import Lexer
 from fbvm.syntax.st.tables import Rule, tables
-from fbvm.syntax.st.types import Types
 
 HOUSE = Path(__file__).resolve().parent.parent
 LONGEST = 20_000
@@ -39,13 +39,13 @@ def used() -> frozenset[int]:
     """Numbers of the rules by which the programs were reduced."""
     seen: set[int] = set()
 
-    def noting(number: int, action: Callable[..., Any] | None, builder: Types, *children: Any) -> Any:
+    def noting(number: int, action: Callable[..., Any] | None, builder: SourceBuilder, *children: Any) -> Any:
         seen.add(number)
         return action(builder, *children) if action else children[0]
 
     for text in programs():
         source = Source("program.st", text)
-        builder = Types(source)
+        builder = SourceBuilder(source)
         automaton = Automaton(builder, Lexer(text, builder.report).tokens())
         automaton.text = text
         automaton.actions = [partial(noting, number, action) for number, action in enumerate(automaton.actions)]

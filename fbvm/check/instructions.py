@@ -7,7 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from fbvm.base.data import data_folder
-from fbvm.syntax.ladder.instruction_set import KINDS, Instruction, instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import KINDS, Instruction, instruction_set
 
 FLAGS = ("P_ER", "P_CY", "P_GT", "P_GE", "P_EQ", "P_NE", "P_LE", "P_LT", "P_N", "P_OF", "P_UF")
 _CALLED = re.compile(r"\b(CX_\w+|P_[A-Z]{1,2})\b")

@@ -34,7 +34,7 @@ from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.types import fold
 from fbvm.check.facts import Report
 from fbvm.syntax import tree
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 
 

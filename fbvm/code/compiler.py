@@ -29,7 +29,7 @@ from fbvm.code.lowering.program import Program
 from fbvm.code.store import cache as image_cache
 from fbvm.code.store.object_code import Shelf, shelf_of
 from fbvm.syntax import tree
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 
 LONG = 50_000

@@ -22,7 +22,7 @@ from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.syntax import tree
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 
 Stub: TypeAlias = "str | Callable[[Any], None]"

@@ -106,7 +106,7 @@ def measured(lines: int) -> dict[str, float]:
     """Times and memory of one check."""
     from fbvm.base.diagnostics import Source
     from fbvm.code.compiler import compile_sources
-    from fbvm.syntax.st.parser import parse
+    from fbvm.syntax.parser import parse
 
     text = program(lines)
     compile_sources([Source("warm.st", program(100))])

@@ -13,7 +13,7 @@ from rows import first_quick
 
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
-from fbvm.syntax.ladder.instruction_set import instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import instruction_set
 
 FLAGS = {"ER": "CF3", "CY": "CF4", "GT": "CF5", "EQ": "CF6", "LT": "CF7", "N": "CF8", "OF": "CF9", "UF": "CF10"}
 MS = 1_000_000

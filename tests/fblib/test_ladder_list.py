@@ -11,7 +11,7 @@ from rows import each_of
 from fbvm.base.data import data_folder
 from fbvm.check.instructions import find, flags, meaning, page
 from fbvm.cli.main import main
-from fbvm.syntax.ladder.instruction_set import ELSEWHERE, instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import ELSEWHERE, instruction_set
 
 LIST = Path(__file__).parents[2] / "fblib/omron/ladder/INSTRUCTIONS.md"
 HEAD = """# The instructions of Omron CS/CJ ladder

@@ -9,7 +9,7 @@ from pathlib import Path
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.tree.outline import dump
 
 HERE = Path(__file__).resolve().parent

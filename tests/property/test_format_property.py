@@ -19,8 +19,8 @@ from fbvm.code.compiler import compile_text
 from fbvm.syntax.formatter.comments import Comments
 from fbvm.syntax.formatter.formatter import REFUSED, formatted
 from fbvm.syntax.formatter.names import Spelling
+from fbvm.syntax.parser import parse
 from fbvm.syntax.st.lexer import Lexer, Token, lexis
-from fbvm.syntax.st.parser import parse
 from fbvm.syntax.tree import Literal, Node
 from fbvm.syntax.tree.node import names_of
 

@@ -11,8 +11,8 @@ from fbvm.base.diagnostics import Source
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.syntax.formatter.formatter import formatted
-from fbvm.syntax.ladder.instruction_set import Instruction, instruction_set
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.ladder.instructions.instruction_set import Instruction, instruction_set
+from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Pou
 from fbvm.syntax.tree.ladder import Ladder, Step
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Node
 from fbvm.syntax.tree.node import names_of
 from fbvm.syntax.tree.outline import dump

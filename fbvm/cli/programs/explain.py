@@ -8,7 +8,7 @@ from fbvm.base import dialects
 from fbvm.base.codes import CODES
 from fbvm.base.pages import UnknownCode, page
 from fbvm.check import block_pages, instructions
-from fbvm.syntax.ladder.instruction_set import meant, spelling
+from fbvm.syntax.ladder.instructions.instruction_set import meant, spelling
 
 
 @click.command("explain")

@@ -21,7 +21,7 @@ from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.sources import show_diagnostic
 from fbvm.syntax.formatter.formatter import formatted
 from fbvm.syntax.formatter.names import Outside
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.text import MARKS, decode, read
 from fbvm.syntax.tree import Declaration, Pou, TypeDecl
 

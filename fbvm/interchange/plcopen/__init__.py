@@ -1,1 +1,1 @@
-"""Programs from and to other tools: PLCopen TC6 XML."""
+"""PLCopen XML (TC6 2.01): `read/` makes source files of documents, `write/` documents of source files."""

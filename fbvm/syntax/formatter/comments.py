@@ -17,7 +17,7 @@ _MARKS = {"(*": re.compile(r"\(\*|\*\)"), "/*": re.compile(r"/\*|\*/")}
 
 @dataclass(frozen=True, slots=True)
 class Comment:
-    """A comment or pragma.  `column` is where it began; `own` tells that lines end before and behind it, `blank` that an
+    """A comment or pragma.  `column` is its column in the source; `own` says that it has lines of its own, `blank` that an
     empty line stands before it."""
 
     text: str
@@ -54,7 +54,7 @@ class Comments:
             end = token.end
 
     def _between(self, start: int, end: int, last: bool) -> None:
-        """Take what stands between two tokens."""
+        """Assign the comments between two tokens to one of them."""
         found = list(_comments(self.text, start, end))
         gap = found[-1][1] if found else start
         if self.text.count("\n", gap, end) > 1:
@@ -91,7 +91,7 @@ class Comments:
     # --- moving ---
 
     def claim(self, start: int) -> list[Comment]:
-        """Those that stand on lines of their own in front of a token; they are no longer at the token."""
+        """Take the comments on lines of their own in front of a token away from the token."""
         ahead = self.ahead.pop(start, [])
         count = next((at for at, comment in enumerate(ahead) if not comment.own), len(ahead))
         if ahead[count:]:
@@ -108,7 +108,7 @@ class Comments:
             self._set_behind(token.end, [*self.behind.pop(before, []), *ahead, *self.behind.pop(token.end, [])])
 
     def _set_behind(self, end: int, comments: list[Comment]) -> None:
-        """Put comments behind a token; only one that goes to the line's end fits there, and it is the last."""
+        """Put comments behind a token, up to the first that reaches to the end of the line."""
         count = next((at + 1 for at, comment in enumerate(comments) if comment.to_line_end), len(comments))
         self.behind[end] = [replace(comment, own=False) for comment in comments[:count]]
         if rest := [replace(comment, own=True, blank=False) for comment in comments[count:]]:

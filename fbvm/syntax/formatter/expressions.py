@@ -20,7 +20,7 @@ Spell = Callable[[int, str], str]
 
 
 class Phrase:
-    """What a rule has made: where it starts, and its parts.
+    """The layout that a rule has made: where it starts, and its parts.
 
     `level` is the production of an operator chain, whose parts are its operands, "sign" or "list" for what its
     surroundings write differently, else ""."""
@@ -60,12 +60,12 @@ class ExpressionLayout:
         return Leaf(text, token.start, token.end)
 
     def closer(self, token: Token, text: str | None = None) -> Leaf:
-        """A sign or word that stands directly behind what it closes; a comment between them goes behind it."""
+        """A sign or word directly behind the text that it closes; a comment between them goes behind the sign."""
         self.comments.draw(token)
         return self.leaf(token, text)
 
     def refused(self, token: Token) -> Phrase:
-        """A text that is understood as a whole and refused: it stays as it is."""
+        """A refused text, such as a METHOD: it stays as it is."""
         inside = Verbatim(token.text, self.comments.column(token.start))
         return Phrase(token.start, Leaf("", token.start, -1), inside, Leaf("", -1, token.end), level="refused")
 

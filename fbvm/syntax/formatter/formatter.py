@@ -14,12 +14,12 @@ from fbvm.syntax.formatter.comments import Comments
 from fbvm.syntax.formatter.declarations import DeclarationLayout
 from fbvm.syntax.formatter.layout import Doc, Printer
 from fbvm.syntax.formatter.names import NOTHING, Outside, Spelling
-from fbvm.syntax.st.automaton import Automaton, Mender
+from fbvm.syntax.parser import parse
+from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
 from fbvm.syntax.st.lexer import Lexer
-from fbvm.syntax.st.parser import parse
 
 REFUSED = {"S0901", "S0902"}
-"""Errors of texts that are understood, so that they can be written too."""
+"""Errors of texts that are parsed all the same, and can therefore be formatted."""
 
 
 def formatted(source: Source, outside: Outside = NOTHING) -> tuple[str, list[Diagnostic]]:
@@ -41,11 +41,11 @@ def formatted(source: Source, outside: Outside = NOTHING) -> tuple[str, list[Dia
 
 
 class _NeedsMending(Exception):
-    """The text is understood as a whole only, as an instruction list is."""
+    """The text is not parsed in detail, as an instruction list."""
 
 
 def _printed(source: Source, spelling: Spelling) -> str:
-    """The canonical text of one without errors."""
+    """The canonical text of a text without errors."""
     tokens = list(Lexer(source.text, _silent).tokens())
     comments = Comments(source.text, tokens)
     layout = DeclarationLayout(comments, spelling)
@@ -54,8 +54,8 @@ def _printed(source: Source, spelling: Spelling) -> str:
 
 
 def _silent(*message: Any) -> None:
-    """What there is to say was said by the parser."""
+    """Errors of the lexer were reported by the parser."""
 
 
-def _no_mender(stuck: Automaton) -> Mender:
+def _no_mender(stuck: Automaton) -> ErrorRecovery:
     raise _NeedsMending

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fbvm.syntax.formatter.comments import Comment, Comments
 
 WIDTH = 100
-"""Columns of a line, where it can be helped."""
+"""Columns of a line, if the text can be broken so."""
 STEP = 4
 """Columns of one level of indentation."""
 HANG_LIMIT = 40
@@ -42,7 +42,7 @@ class Verbatim:
 
 @dataclass(frozen=True, slots=True)
 class Break:
-    """A place for a line end: `flat` stands there if none is needed."""
+    """A place for a line end; `flat` is written there if the line goes on."""
 
     flat: str
 
@@ -78,7 +78,7 @@ class Indent:
 
 @dataclass(frozen=True, slots=True)
 class Hang:
-    """Lines of it begin below its first character."""
+    """A piece whose further lines begin below its first character."""
 
     doc: Doc
 
@@ -90,7 +90,7 @@ Work = tuple[int, bool, Doc]
 
 
 def flat_width(doc: Doc, comments: Comments) -> int | None:
-    """Columns of a piece on one line; None if it cannot stand on one."""
+    """Columns of a piece on one line; None if it needs several lines."""
     width, todo = 0, [doc]
     while todo:
         part = todo.pop()
@@ -199,7 +199,7 @@ class Printer:
     # --- lines ---
 
     def begin(self, text: str, indent: int) -> None:
-        """Make ready for a text: a line end behind a comment that is the last on its line, a space behind others."""
+        """Separate a text from a comment before it: by a line end if the comment reaches to the line's end, else by a space."""
         if self.full and text.strip(" "):
             self.end_line(indent)
         if self.apart and text:

@@ -46,7 +46,7 @@ Shape = TypeSpec | Pou | None
 
 
 class Outside(NamedTuple):
-    """What a text may use without declaring it."""
+    """Names from outside that a text may use."""
 
     declaration: Callable[[str], Declaration | None]
     """The declaration of a block, function or type of a library."""
@@ -75,7 +75,7 @@ class Spelling:
     # --- the walk ---
 
     def _walk(self, tree: SourceText) -> None:
-        """Visit every node; those of a POU in its scope."""
+        """Visit every node, those of a POU in the scope of the POU."""
         todo: list[tuple[Node, Scope]] = [(tree, {})]
         while todo:
             node, scope = todo.pop()
@@ -178,7 +178,7 @@ class Spelling:
     # --- types ---
 
     def _named(self, text: str) -> Shape:
-        """What a type's name stands for."""
+        """The type that a name stands for."""
         entry = self.globals.get(fold(text))
         if entry:
             return entry.shape
@@ -200,7 +200,7 @@ class Spelling:
         return self.members[shape]
 
     def _called(self, callee: Expr, scope: Scope) -> Shape:
-        """Whose parameters a call has: those of an instance's block, or of a function."""
+        """The parameters of the function or block that is called."""
         shape = self._resolved(self._shape(callee, scope))
         if isinstance(shape, Pou) or not isinstance(callee, NameRef):
             return shape

@@ -1,4 +1,4 @@
-"""What names a text declares, and what is known of the types of their values; for the spelling of names."""
+"""The names that a text declares, and the types of their values, for the spelling of names."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Scope = dict[str, Entry]
 
 
 def global_scope(tree: SourceText) -> Scope:
-    """What the whole text knows: types, POUs, global variables, members of enumerations, tasks."""
+    """The names of the whole text: types, POUs, global variables, members of enumerations, tasks."""
     scope: Scope = {}
     for declaration in tree.declarations:
         if isinstance(declaration, TypeDecl):
@@ -59,7 +59,7 @@ def _configuration(scope: Scope, configuration: Configuration) -> None:
 
 
 def declared_in(pou: Pou, outer: Scope) -> Scope:
-    """What a POU knows beside that: its own name and its variables; a VAR_EXTERNAL is spelt as the global variable."""
+    """The names of a POU besides: its own name and its variables; a VAR_EXTERNAL is spelt as the global variable."""
     scope: Scope = {fold(pou.name.text): Entry(pou.name.text, pou.result or pou)}
     _variables(scope, (section for section in pou.sections if section.kind != "VAR_EXTERNAL"))
     for section in pou.sections:
@@ -93,7 +93,7 @@ def _enumerated(scope: Scope, spec: TypeSpec | None) -> None:
 
 
 def members(shape: TypeSpec | Pou | None) -> Scope:
-    """What may stand behind a dot, and as arguments of a call."""
+    """The names that may follow a dot or name an argument."""
     scope: Scope = {}
     if isinstance(shape, (StructSpec, UnionSpec)):
         _declare(scope, shape.members)

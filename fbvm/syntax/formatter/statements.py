@@ -17,7 +17,7 @@ Branch = tuple[Token, Phrase, Token, list[Phrase]]
 
 
 class Row(NamedTuple):
-    """What begins a line of its own; `blank` wants an empty line before it."""
+    """A piece that begins a line of its own; `blank` asks for an empty line before it."""
 
     blank: bool
     doc: Doc
@@ -61,7 +61,7 @@ class StatementLayout(ExpressionLayout):
         return rows
 
     def block(self, items: Iterable[Phrase], end: Token) -> Doc:
-        """What stands further in, up to a word that ends it."""
+        """The items of a block, indented, up to the word that ends the block."""
         return Indent(lines(self.rows(items) + self.before_end(end)))
 
     # --- lists ---
@@ -75,7 +75,7 @@ class StatementLayout(ExpressionLayout):
         return items
 
     def close(self, items: list[Phrase], semicolon: Token) -> list[Phrase]:
-        """A `;` behind END_IF and its like, which have brought one already."""
+        """A `;` behind END_IF and the like, which are written with one already."""
         if items[-1].level == "refused":
             items[-1].parts.append(self.closer(semicolon))
         else:
@@ -83,7 +83,7 @@ class StatementLayout(ExpressionLayout):
         return items
 
     def dropped(self, token: Token) -> Leaf:
-        """A token that need not be written; its comments need."""
+        """A token that need not be written; its comments must be."""
         self.comments.draw(token, always=True)
         return self.leaf(token, "")
 
@@ -187,7 +187,7 @@ class StatementLayout(ExpressionLayout):
         return phrase
 
     def branches(self, items: list[Phrase]) -> list[Row]:
-        """Each label of a CASE, and further in what stands behind it."""
+        """Each label of a CASE, and indented the statements behind it."""
         rows: list[Row] = []
         starts = [at for at, item in enumerate(items) if item.level == "label"]
         for at, until in pairwise([*starts, len(items)]):

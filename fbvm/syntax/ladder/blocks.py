@@ -1,14 +1,14 @@
-"""What a step does that a function or a block of a library does for it: instructions, timers, counters, FB calls."""
+"""Instructions that a function or a function block of a library executes: data instructions, timers, counters, FBCALL."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
+from fbvm.syntax.ladder.context import RungContext
 from fbvm.syntax.ladder.drawing.diagram import WIRE
-from fbvm.syntax.ladder.instruction_set import Instruction, instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import Instruction
 from fbvm.syntax.ladder.mnemonics import RungText
-from fbvm.syntax.ladder.operands import SYMBOLS, Wrong
+from fbvm.syntax.ladder.operands import OperandError
 from fbvm.syntax.tree import (
     Argument,
     Assign,
@@ -22,31 +22,31 @@ from fbvm.syntax.tree import (
     NameRef,
     Statement,
     VarDecl,
-    VarSection,
 )
-from fbvm.syntax.tree.ladder import Ladder
-
-if TYPE_CHECKING:
-    from fbvm.syntax.ladder.lowering import Rungs
 
 TIMERS = 4096
-"""Numbers of timers, and of counters."""
+"""Timer numbers and counter numbers are below this."""
 REFRESHED = 2048
-"""Timers below this number count on while a jump passes over them (etn21 9.4, from memory of the family)."""
+"""Timers below this number are updated while a jump passes over them (etn21 9.4, from memory of the family)."""
 FAILURES = 512
-"""Numbers of failures."""
+"""Numbers of FAL and FALS are below this."""
 
 
 class LadderBlocks:
-    """Writes calls for the step at work."""
+    """Lowers the step at work to a call of a function, or of an instance that the POU keeps."""
 
-    def __init__(self, rungs: Rungs) -> None:
-        self.rungs = rungs
+    def __init__(self, context: RungContext) -> None:
+        self.context = context
+        self.instructions: dict[str, Callable[[], None]] = {
+            ".call": self.call, ".reset_numbers": self.reset_numbers, ".reset_timer": self.reset_timer,
+            ".address": self.address, ".value_address": self.address,
+            ".failure": lambda: self.failure("CX_FAL"), ".fatal_failure": lambda: self.failure("CX_FALS"),
+        }  # fmt: skip
         self._timers: dict[int, Instruction] = {}
-        """Timers of this LADDER by their numbers."""
+        """By number, the row of the instruction that defines a timer in the LADDER."""
 
-    def look(self, texts: list[RungText]) -> None:
-        """Find out which timers there are."""
+    def find_timers(self, texts: list[RungText]) -> None:
+        """Note the timers that the rungs define; called before the first rung is lowered."""
         for line in (line for text in texts for line in text.lines):
             if line.row.operands[:1] == "t" and line.row.kind and line.step.operands:
                 number = self._timer(line.step.operands[0])
@@ -54,189 +54,164 @@ class LadderBlocks:
                     self._timers.setdefault(number, line.row)
 
     def execute(self, row: Instruction) -> None:
-        """A step that the table gives to a function or block."""
+        """Lower an instruction for which the table names a function or a function block."""
         if row.kind:
             self._instance(row)
             return
-        rungs = self.rungs
-        call = rungs.call()
-        done = rungs.reaching(CallStatement(call.start, call.end, call))
-        rungs.emit(rungs.when(rungs.variation(rungs.power()), *done))
+        context = self.context
+        call = context.call()
+        done = context.if_reachable(CallStatement(call.start, call.end, call))
+        context.emit(context.when(context.variation(context.power()), *done))
 
-    # --- blocks that have a state -----------------------------------------------------------------------------------
+    # --- blocks that have a state ---
 
     def _instance(self, row: Instruction) -> None:
-        """A block that is called in every cycle with its conditions: of a timer or counter by its number, else of the
-        step.  In an interlock a block of kind FB has its conditions OFF, one of kind FB- stands still."""
-        rungs = self.rungs
+        """Call a function block in every cycle with the conditions of the step.  A timer or counter has one instance for its
+        number, every other instruction one for the step.  While an interlock inhibits, a block of kind FB is called with
+        its conditions OFF, a block of kind FB- is not called."""
+        context = self.context
         first = row.operands[:1]
         numbered = first in ("t", "c")
-        operands = self._numbered(first) if numbered else [rungs.operand(0)]
-        operands += [rungs.operand(position) for position in range(1, len(row.operands))]
-        name = self._named(row, self._number(first)) if numbered else rungs.name("block")
-        conditions = rungs.inputs(row.inputs)
-        instance = rungs.variable(name, row.does)
-        off = (rungs.truth(False),) * row.inputs
-        inhibited = rungs.reaching(self._called(instance, [*off, *operands])) if row.kind == "FB" else ()
+        operands = self._numbered(first) if numbered else [context.operand(0)]
+        operands += [context.operand(position) for position in range(1, len(row.operands))]
+        name = self._named(row, self._number(first)) if numbered else context.name("block")
+        conditions = context.inputs(row.inputs)
+        instance = context.variable(name, row.does)
+        off = (context.truth(False),) * row.inputs
+        inhibited = context.if_reachable(self._called(instance, [*off, *operands])) if row.kind == "FB" else ()
         passed: tuple[Statement, ...] = ()
         if first == "t" and row.kind == "FB" and self._number(first) < REFRESHED:
-            passed = (self._gone_on(instance, operands[:2]),)
-        rungs.emit(*rungs.reaching(self._called(instance, [*conditions, *operands])), inhibited=inhibited, passed=passed)
+            passed = (self._update(instance, operands[:2]),)
+        context.emit(*context.if_reachable(self._called(instance, [*conditions, *operands])), inhibited=inhibited, passed=passed)
 
-    def _gone_on(self, instance: Expr, flag_and_value: list[Expr], **pins: bool) -> CallStatement:
-        """A call of a timer with these conditions, everything else as it was."""
-        rungs = self.rungs
-        start, end = rungs.start, rungs.end
-        arguments = [_named(start, end, pin, ":=", rungs.truth(value)) for pin, value in pins.items()]
+    def _update(self, instance: Expr, flag_and_value: list[Expr], **pins: bool) -> CallStatement:
+        """A call of a timer with its flag and present value and these pins; its other inputs keep their values."""
+        context = self.context
+        start, end = context.start, context.end
+        arguments = [_named(start, end, pin, ":=", context.truth(value)) for pin, value in pins.items()]
         arguments += [_named(start, end, pin, ":=", value)
                       for pin, value in zip(("Flag", "PV"), flag_and_value, strict=True)]
         return CallStatement(start, end, Call(start, end, instance, tuple(arguments)))
 
     def _named(self, row: Instruction, number: int) -> str:
-        """The instance of a timer or counter: what defines a number twice has two."""
+        """The name of the instance of a timer or counter; two mnemonics with one number have an instance each."""
         return f"${row.mnemonic}{number}"
 
     def _called(self, instance: Expr, arguments: list[Expr]) -> CallStatement:
-        rungs = self.rungs
-        call = Call(rungs.start, rungs.end, instance, tuple(Argument(a.start, a.end, "", None, a) for a in arguments))
-        return CallStatement(rungs.start, rungs.end, call)
+        context = self.context
+        call = Call(context.start, context.end, instance, tuple(Argument(a.start, a.end, "", None, a) for a in arguments))
+        return CallStatement(context.start, context.end, call)
 
     def _number(self, letter: str) -> int:
-        text = self.rungs.line.step.operands[0]
+        text = self.context.line.step.operands[0]
         number = self._timer(text, letter)
         if number is None:
             what = "timer" if letter == "t" else "counter"
-            raise Wrong(f"{text} is no number of a {what}",
-                        f"numbers are 0 to {TIMERS - 1}; a symbol is declared AT {letter.upper()}0005 before the rungs")
+            raise OperandError(f"{text} is no number of a {what}",
+                               f"numbers are 0 to {TIMERS - 1}; a symbol is declared AT {letter.upper()}0005 before the rungs")
         return number
 
     def _timer(self, text: str, letter: str = "t") -> int | None:
-        """The number of a timer or counter as it is written, or of its symbol; None if there is none."""
-        text = self.rungs.operands.numbered.get(text.upper(), text)
+        """The number of a timer or counter, written as a number or as a symbol; None if `text` is neither."""
+        text = self.context.operands.numbered.get(text.upper(), text)
         digits = text[1:] if text[:1].upper() == letter.upper() else text
         return int(digits) if digits.isdigit() and int(digits) < TIMERS else None
 
     def _numbered(self, letter: str) -> list[Expr]:
-        """Completion flag and present value of the timer or counter."""
-        start, end = self.rungs.line.places[0]
+        """The completion flag and the present value of the timer or counter in the first operand."""
+        start, end = self.context.line.places[0]
         flag, value = ("TF", "T") if letter == "t" else ("CNF", "C")
         number = self._number(letter)
         return [Direct(start, end, f"%{flag}{number}"), Direct(start, end, f"%{value}{number}")]
 
     def reset_timer(self) -> None:
-        """TRSET: the timer begins again, as if its condition had been OFF for a moment."""
-        rungs, number = self.rungs, self._number("t")
+        """TRSET: restarts the timer, as if its condition had been OFF for one cycle."""
+        context, number = self.context, self._number("t")
         row = self._timers.get(number)
         if row is None:
-            raise Wrong(f"there is no timer {number} in these rungs", "TRSET stands in the rungs of its timer")
-        instance = rungs.variable(self._named(row, number), row.does)
+            raise OperandError(f"there is no timer {number} in these rungs", "TRSET stands in the rungs of its timer")
+        instance = context.variable(self._named(row, number), row.does)
         pins = {"In": False, "Reset": True} if row.inputs == 2 else {"In": False}
-        rungs.emit(rungs.when(rungs.variation(rungs.power()), self._gone_on(instance, self._numbered("t"), **pins)))
+        context.emit(context.when(context.variation(context.power()), self._update(instance, self._numbered("t"), **pins)))
 
     def reset_numbers(self) -> None:
-        """CNR and CNRX: timers or counters from one number to another are OFF, with the highest present value."""
-        rungs = self.rungs
-        texts = [rungs.operands.numbered.get(text.upper(), text).upper() for text in rungs.line.step.operands]
+        """CNR and CNRX: turn the timers or counters of a range of numbers OFF and set their present values to the maximum."""
+        context = self.context
+        texts = [context.operands.numbered.get(text.upper(), text).upper() for text in context.line.step.operands]
         kinds, digits = {text[0] for text in texts}, [text[1:] for text in texts]
         if len(kinds) > 1 or not kinds <= {"T", "C"} or not all(each.isdigit() and int(each) < TIMERS for each in digits):
-            raise Wrong(f"{' and '.join(rungs.line.step.operands)} are no timers and no counters",
-                        f"write T0000 T0009 or C0000 C0009, up to {TIMERS - 1}")
-        highest = 0x9999 if rungs.line.step.mnemonic == "CNR" else 0xFFFF
-        values = [rungs.truth(kinds == {"C"}), *(rungs.number(int(each)) for each in digits), rungs.number(highest)]
-        rungs.emit(rungs.when(rungs.variation(rungs.power()), rungs.called("CX_CNR", *values)))
+            raise OperandError(f"{' and '.join(context.line.step.operands)} are no timers and no counters",
+                               f"write T0000 T0009 or C0000 C0009, up to {TIMERS - 1}")
+        highest = 0x9999 if context.line.step.mnemonic == "CNR" else 0xFFFF
+        values = [context.truth(kinds == {"C"}), *(context.number(int(each)) for each in digits), context.number(highest)]
+        context.emit(context.when(context.variation(context.power()), context.call_of("CX_CNR", *values)))
 
-    # --- addresses and failures -------------------------------------------------------------------------------------
+    # --- addresses and failures ---
 
     def address(self) -> None:
-        """MOVR and MOVRW: where a bit, a word or a present value lies, for an index register."""
-        rungs = self.rungs
-        place, register = rungs.operand(0), rungs.line.step.operands[1]
-        rungs.operand(1)
-        at = Call(rungs.start, rungs.end, NameRef(rungs.start, rungs.end, "__PLC_ADDRESS"),
+        """MOVR and MOVRW: put the PLC memory address of a bit, a word or a present value into an index register."""
+        context = self.context
+        place, register = context.operand(0), context.line.step.operands[1]
+        context.operand(1)
+        at = Call(context.start, context.end, NameRef(context.start, context.end, "__PLC_ADDRESS"),
                   (Argument(place.start, place.end, "", None, place),))
-        rungs.emit(rungs.when(rungs.variation(rungs.power()), rungs.called("CX_Point", rungs.number(int(register[2:])), at)))
+        point = context.call_of("CX_Point", context.number(int(register[2:])), at)
+        context.emit(context.when(context.variation(context.power()), point))
 
     def failure(self, function: str) -> None:
-        """FAL and FALS: the number of a failure, and a constant or the words of a message."""
-        rungs, (number, message) = self.rungs, self.rungs.line.step.operands
+        """FAL and FALS: report the failure of a number, with a constant or with a message of eight words."""
+        context, (number, message) = self.context, self.context.line.step.operands
         digits = number.lstrip("#&")
         least = 0 if function == "CX_FAL" else 1
         if not digits.isdigit() or not least <= int(digits) < FAILURES:
-            raise Wrong(f"{number} is no number of a failure", f"numbers are {least} to {FAILURES - 1}")
-        code, done = rungs.number(int(digits)), []
+            raise OperandError(f"{number} is no number of a failure", f"numbers are {least} to {FAILURES - 1}")
+        code, done = context.number(int(digits)), []
         if message[0] in "#&":
-            done.append(rungs.called(function, code, rungs.operand(1)))
+            done.append(context.call_of(function, code, context.operand(1)))
         else:
-            words = rungs.operands.expression(message, "a", *rungs.line.places[1], rungs.line.row.role(1))
-            done += [rungs.called("CX_MSG", rungs.number(8), words), rungs.called(function, code, rungs.number(0))]
+            words = context.operands.expression(message, "a", *context.line.places[1], context.line.row.role(1))
+            done += [context.call_of("CX_MSG", context.number(8), words), context.call_of(function, code, context.number(0))]
         if function == "CX_FALS":
-            done.append(rungs.called("__STOP"))
-        rungs.emit(rungs.when(rungs.variation(rungs.power()), *rungs.reaching(*done)))
+            done.append(context.call_of("__STOP"))
+        context.emit(context.when(context.variation(context.power()), *context.if_reachable(*done)))
 
-    # --- function blocks of the user --------------------------------------------------------------------------------
+    # --- function blocks of the user ---
 
     def call(self) -> None:
-        """FBCALL Type instance PIN:=operand PIN=>operand: the condition is EN, and ENO is the condition behind it; an input
-        `:=*` takes the condition in place of EN, an output `=>*` gives the one behind in place of ENO.
+        """FBCALL Type instance PIN:=operand PIN=>operand: calls a function block of the user.
 
-        No text form of Omron's own was found; this one is ours."""
-        rungs, line = self.rungs, self.rungs.line
+        The execution condition goes to EN, or to the input that is written `PIN:=*`; the condition behind the step comes
+        from ENO, or from the output that is written `PIN=>*`.  Omron has no text form for this; this one is fbvm's own."""
+        context, line = self.context, self.context.line
         if len(line.step.operands) < 2 or any("=" in text for text in line.step.operands[:2]):
-            raise Wrong("FBCALL names the type of a function block and its instance",
-                        "write FBCALL TON Delay IN:=Start PT:=T#5s")
+            raise OperandError("FBCALL names the type of a function block and its instance",
+                               "write FBCALL TON Delay IN:=Start PT:=T#5s")
         (start, end), (at, until) = line.places[:2]
         block, instance = line.step.operands[:2]
-        eno = rungs.temporary(rungs.name("ENO"))
+        eno = context.temporary(context.name("ENO"))
         wired = {text[:-3]: text[-3:] for text in line.step.operands[2:] if text[-3:] in (f":={WIRE}", f"=>{WIRE}")}
         entry = next((name for name, sign in wired.items() if sign[0] == ":"), "EN")
         leaving = next((name for name, sign in wired.items() if sign[0] == "="), "")
-        arguments = [_named(start, end, entry, ":=", rungs.power())]
+        arguments = [_named(start, end, entry, ":=", context.power())]
         arguments += [self._pin(position) for position, text in enumerate(line.step.operands) if position > 1
                       and text[:-3] not in wired]
         if not leaving:
             arguments.append(_named(start, end, "ENO", "=>", eno))
-        call = Call(start, rungs.end, NameRef(at, until, instance), tuple(arguments))
+        call = Call(start, context.end, NameRef(at, until, instance), tuple(arguments))
         behind = Member(at, until, NameRef(at, until, instance), Name(at, until, leaving)) if leaving else eno
-        seen = Assign(start, start, (eno,), ":=", rungs.contact(behind))  # of no length: for those who see power
-        rungs.emit(rungs.assign(eno, rungs.truth(False)), CallStatement(rungs.start, rungs.end, call), seen)
-        rungs.instances.append(VarDecl(at, until, (Name(at, until, instance),), None, NamedType(start, end, block), None))
-        rungs.condition = rungs.temporary(rungs.name("ENO"))
+        seen = Assign(start, start, (eno,), ":=", context.element(behind))  # of no length: for those who see power
+        context.emit(context.assign(eno, context.truth(False)), CallStatement(context.start, context.end, call), seen)
+        context.instances.append(VarDecl(at, until, (Name(at, until, instance),), None, NamedType(start, end, block), None))
+        context.condition = context.temporary(context.name("ENO"))
 
     def _pin(self, position: int) -> Argument:
-        text, (start, end) = self.rungs.line.step.operands[position], self.rungs.line.places[position]
+        text, (start, end) = self.context.line.step.operands[position], self.context.line.places[position]
         sign = ":=" if ":=" in text else "=>"
         name, found, value = text.partition(sign)
         if not found or not value:
-            raise Wrong(f"{text} is no pin", "write PIN:=operand for an input or PIN=>operand for an output")
+            raise OperandError(f"{text} is no pin", "write PIN:=operand for an input or PIN=>operand for an output")
         at = start + len(name) + 2
-        return _named(start, end, name, sign, self.rungs.value(value, at, end))
-
-
-def begin(ladders: Sequence[Ladder]) -> None:
-    """Let the first LADDER of a PROGRAM turn the condition flags OFF if its rungs use them."""
-    rows = instruction_set().rows
-    for ladder in ladders:
-        for step in (step for rung in ladder.rungs for step in rung.steps):
-            reads = any(SYMBOLS.get(operand.upper(), "").startswith("CF0") for operand in step.operands)
-            if reads or rows[step.mnemonic].does.startswith("CX_"):
-                first, at = ladders[0], ladders[0].start
-                first.body = (CallStatement(at, at, Call(at, at, NameRef(at, at, "CX_Begin"), ())), *first.body)
-                return
-
-
-def undeclared(instances: Iterable[VarDecl], sections: Iterable[VarSection],
-               report: Callable[..., None]) -> list[VarDecl]:
-    """Those instances that no section declares; one that is declared with another type has a diagnostic."""
-    known = {name.text.upper(): variable for section in sections for variable in section.variables for name in variable.names}
-    made: list[VarDecl] = []
-    for instance in instances:
-        name, spec = instance.names[0], instance.spec
-        other = known.setdefault(name.text.upper(), instance)
-        if other is instance:
-            made.append(instance)
-        elif isinstance(other.spec, NamedType) and isinstance(spec, NamedType) and other.spec.text.upper() != spec.text.upper():
-            report("S0110", spec.start, name.end, f"{name.text} is an instance of {other.spec.text}, not of {spec.text}", "")
-    return made
+        return _named(start, end, name, sign, self.context.value(value, at, end))
 
 
 def _named(start: int, end: int, name: str, sign: str, value: Expr) -> Argument:

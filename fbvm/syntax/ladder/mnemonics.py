@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple
 
-from fbvm.syntax.ladder.drawing.grid import Bad
+from fbvm.syntax.ladder.drawing.grid import DrawingError
 from fbvm.syntax.ladder.drawing.reading import Picture, Placed, is_drawn, read_drawing, remark_of
-from fbvm.syntax.ladder.instruction_set import NO_INSTRUCTIONS, Instruction, instruction_set, meant, spelling
-from fbvm.syntax.st.automaton import Automaton, Mender
+from fbvm.syntax.ladder.instructions.instruction_set import NO_INSTRUCTIONS, Instruction, instruction_set, meant, spelling
+from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.tables import tables
 from fbvm.syntax.tree.ladder import Step
@@ -45,7 +45,7 @@ class Symbol(NamedTuple):
 
 @dataclass
 class RungText:
-    """The lines of one rung, before anybody asked what they do."""
+    """The lines of one rung, with their instructions looked up."""
 
     start: int
     number: int | None = None
@@ -57,7 +57,7 @@ class RungText:
     damaged: bool = False
     """Whether a line of it could not be read."""
     picture: Picture | None = None
-    """What its drawing says besides, if it was drawn."""
+    """What its drawing has besides instructions, if it is drawn."""
     section: str = ""
     """The line SECTION in front of it."""
     symbols: list[Symbol] = field(default_factory=list)
@@ -65,17 +65,17 @@ class RungText:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing of it was read yet."""
+        """Whether no line of it has been read yet."""
         return not (self.lines or self.declared or self.notes or self.section or self.symbols)
 
     @property
     def may_end(self) -> bool:
-        """Whether an instruction at the bus bar begins another rung; of one that is damaged nobody knows its conditions."""
+        """Whether an instruction at the bus bar begins another rung; the conditions of a damaged rung are not known."""
         return closes(self.lines) or self.damaged and not is_input(self.lines[-1].row)
 
     @property
     def wants_more(self) -> bool:
-        """Whether the last instruction has less operands than it takes."""
+        """Whether the last instruction has fewer operands than it takes."""
         if not self.lines:
             return False
         line = self.lines[-1]
@@ -83,7 +83,7 @@ class RungText:
 
 
 ALONE = (".end", ".jump_end", ".for", ".next", ".step", ".subroutine", ".return")
-"""What begins or ends more than a rung, and is therefore one of its own, whatever a line RUNG says."""
+"""Instructions that begin or end more than a rung, and are therefore rungs of their own, whatever a line RUNG says."""
 
 
 class Refusal(Exception):
@@ -116,11 +116,11 @@ def read_rungs(text: str, start: int, end: int, report: Report) -> list[RungText
 
 
 APART = ("RUNG", "NOTE", "REMARK", "SECTION", "SYMBOL")
-"""Lines that are no part of a drawing."""
+"""Terminals of lines that belong to no drawing."""
 
 
 def _groups(text: str, start: int, end: int) -> Iterator[list[tuple[int, str]]]:
-    """Lines that stand together, with their places: up to an empty line, one of a comment, or RUNG."""
+    """Lines that belong together, with their offsets: up to an empty line, a comment, or RUNG."""
     patterns, group = _patterns(), []  # type: dict[str, re.Pattern[str]], list[tuple[int, str]]
     for line in text[start:end].splitlines(keepends=True):
         bare = line.strip()
@@ -143,7 +143,7 @@ def _read_drawing(rungs: list[RungText], lines: list[tuple[int, str]], report: R
     try:
         placed, rung.picture = read_drawing([line for _, line in lines], [at for at, _ in lines])
         rung.lines = [_line(one) for one in placed]
-    except Bad as bad:
+    except DrawingError as bad:
         x, y, width, message, hint = bad.args
         start = lines[min(y, len(lines) - 1)][0] + x
         report("S0113", start, start + width, message, hint)
@@ -176,13 +176,13 @@ def instruction(prefix: str, mnemonic: str, start: int, end: int) -> Instruction
     return row
 
 
-def _stuck(automaton: Automaton) -> Mender:
+def _stuck(automaton: Automaton) -> ErrorRecovery:
     raise Refusal(automaton.before.start, automaton.before.end, "this is no instruction", "")
 
 
 def _tokens(text: str, at: int, end: int, more: bool) -> Iterator[Token]:
-    """The tokens of one line: what may stand where is said by the place.  If the instruction in front wants `more`
-    operands, a line without a mnemonic has them."""
+    """The tokens of one line; which terminal is tried depends on the position in the line.  If the instruction in front wants
+    `more` operands, a line without a mnemonic has them."""
     patterns = _patterns()
     bare = text[at:end].lstrip()
     plain = patterns["RUNG"].match(bare) or patterns["SYMBOL"].match(bare) or patterns["SECTION"].match(bare)
@@ -272,7 +272,7 @@ class _LineReader:
         line.remark = line.remark or (remark.text.strip() if remark else "")
 
     def _fresh(self, token: Token) -> RungText:
-        """The rung that what stands in front of rungs belongs to: another one if one has begun."""
+        """The rung behind a SECTION or a table of symbols: a new one if the last one has begun."""
         last = self.rungs[-1]
         if last.lines or last.declared or last.notes or last.section:
             self.rungs.append(RungText(token.start))
@@ -305,7 +305,7 @@ class _LineReader:
                                          code is not None, remark.text.strip() if remark else ""))
 
     def _refuse_statement(self, mnemonic: Token, operands: list[Token]) -> None:
-        """Say so where signs of Structured Text stand."""
+        """Refuse a line with signs of Structured Text."""
         if operands and operands[0].text.startswith(":="):
             raise Refusal(mnemonic.start, operands[-1].end, "this is a statement of Structured Text",
                           "it stands behind END_LADDER; a rung writes a bit by OUT, a word by MOV")
@@ -324,12 +324,12 @@ class _LineReader:
 
 
 def is_input(row: Instruction) -> bool:
-    """Whether an instruction makes the execution condition, and does nothing with it."""
+    """Whether an instruction makes the execution condition and does not use it."""
     return row.kind == "?" or row.does in (".load", ".and", ".or", ".and_block", ".or_block", ".not", ".up", ".down")
 
 
 def closes(lines: list[Line]) -> bool:
-    """Whether a rung may end behind these lines: the last one does something, and no condition is left for another."""
+    """Whether a rung may end behind these lines: the last one is an output, and no condition is left over."""
     if is_input(lines[-1].row):
         return False
     left = 0

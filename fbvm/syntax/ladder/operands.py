@@ -29,7 +29,7 @@ SYMBOLS = {
     "P_LT": "CF007", "P_N": "CF008", "P_OF": "CF009", "P_UF": "CF010", "P_AER": "CF011", "P_0_1S": "CF100", "P_0_2S": "CF101",
     "P_1S": "CF102", "P_0_02S": "CF103", "P_1MIN": "CF104", "P_ON": "CF113", "P_OFF": "CF114", "P_FIRST_CYCLE": "A200.11",
     "P_FIRST_CYCLE_TASK": "A200.15", "P_MAX_CYCLE_TIME": "A262", "P_CYCLE_TIME_VALUE": "A264", "P_OUTPUT_OFF_BIT": "A500.15"}
-"""Symbols that every program knows (W473 6-21 p6-43; numbers of flags from memory of the family, assumed)."""
+"""Symbols that every program has (W473 6-21 p6-43; numbers of flags from memory of the family, assumed)."""
 
 _TYPES = {"w": "WORD", "W": "WORD", "d": "DWORD", "q": "LWORD", "n": "UINT"}
 _REALS = {"r": "REAL", "l": "LREAL"}
@@ -40,31 +40,32 @@ _REAL = re.compile(r"[+-]\d+[.,]\d+(?:[Ee][+-]?\d+)?")
 _TASK = re.compile(r"TK\d+", re.I)
 _REGISTER = re.compile(r"([ID]R)(\d+)", re.I)
 _POINTED = re.compile(r"([+-]?\d+|DR\d+)?,(-{0,2})IR(\d+)(\+{0,2})", re.I)
-"""An index register that points: with an offset in front, counted down before its use or up after it."""
+"""An operand by index register: `5,IR0` with an offset, `,-IR0` counted down before its use, `,IR0+` counted up after it."""
 REGISTERS = 16
-"""Index registers, and data registers."""
+"""Number of index registers, and of data registers."""
 BCD = {"z": "w", "Z": "d"}
-"""Kinds whose constants are BCD, and what they are besides."""
+"""Letter for a BCD operand -> the letter for the same operand in binary."""
 WORDS = {"d": 2, "r": 2, "q": 4, "l": 4}
-"""How many words an instruction reads where it wants more than one."""
+"""Letter -> number of words of the operand, if more than one."""
 
 Reach = Callable[[Expr, int, bool], NameRef]
-"""Keeps a PLC memory address that a step works out, for so many words, read or written; gives its name."""
+"""Takes a PLC memory address that a step computes, the number of words there and whether they are written; returns the
+variable that keeps the address."""
 
 
-class Wrong(Exception):
-    """An operand that cannot stand where it stands; the arguments are a message and a hint, `place` is where it is."""
+class OperandError(Exception):
+    """An operand that the instruction cannot take; the arguments are a message and a hint, `place` its start and end."""
 
     place: tuple[int, int] | None = None
 
 
 def _nowhere(address: Expr, words: int, written: bool) -> NameRef:
-    raise Wrong("an address that is worked out cannot stand here", "")
+    raise OperandError("an address that is worked out cannot stand here", "")
 
 
 class Operands:
-    """Makes expressions of the operands of one LADDER.  `located` fills with the variables that they need at addresses
-    of the PLC's memory: (area and number, letter) -> declaration.  `numbered` are symbols of timers and counters."""
+    """Makes expressions of the operands of one LADDER.  `located` grows by the variables that these need at addresses of PLC
+    memory: (address, letter) -> declaration.  `numbered` are symbols of timers and counters, in capitals."""
 
     def __init__(self, reach: Reach = _nowhere, numbered: Mapping[str, str] | None = None) -> None:
         self.reach = reach
@@ -73,7 +74,7 @@ class Operands:
         self.located: dict[tuple[str, str], tree.VarDecl] = {}
 
     def expression(self, text: str, wanted: str, start: int, end: int, role: str = "a pin") -> Expr:
-        """What `text` stands for where an instruction wants `wanted`, as its operand `role`.  Raises Wrong."""
+        """What `text` stands for where an instruction wants `wanted`, as its operand `role`.  Raises OperandError."""
         self.role = role
         if wanted in BCD:
             wanted = BCD[wanted]
@@ -81,9 +82,9 @@ class Operands:
                 _check_decimal(text, wanted, role)
         text = self.numbered.get(text.upper(), text)
         if wanted == "x" and not _REGISTER.fullmatch(text):
-            raise Wrong(f"{text} cannot be {role}", "write IR0 to IR15")
+            raise OperandError(f"{text} cannot be {role}", "write IR0 to IR15")
         if _TASK.fullmatch(text):
-            raise Wrong(f"{text} is understood and not executed", "tasks have names here, and no flags")
+            raise OperandError(f"{text} is understood and not executed", "tasks have names here, and no flags")
         if register := _REGISTER.fullmatch(text):
             return self._register(register, wanted, start, end)
         if "," in text and not _REAL.fullmatch(text):
@@ -98,7 +99,7 @@ class Operands:
         return self._direct(_address(known or text, wanted), wanted, start, end)
 
     def pin(self, text: str, start: int, end: int) -> Expr:
-        """What a pin of a block takes or gives: its type is the pin's, so that a constant has none of its own."""
+        """The expression for a pin of a function block; a constant has no type, so that it takes that of the pin."""
         if text[0] in "#&+-":
             real = _REAL.fullmatch(text)
             value = float(text.replace(",", ".")) if real else _number(text, 64)
@@ -114,10 +115,10 @@ class Operands:
     def _constant(self, text: str, wanted: str, start: int, end: int) -> Expr:
         kind = _REALS.get(wanted) or _TYPES.get(wanted)
         if kind is None or wanted == "W":
-            raise Wrong(f"the constant {text} cannot be {self.role}", "write an address or a symbol")
+            raise OperandError(f"the constant {text} cannot be {self.role}", "write an address or a symbol")
         if wanted in _REALS:
             if not _REAL.fullmatch(text):
-                raise Wrong(f"{text} is no REAL constant", "write its sign and a point, as in +1.5")
+                raise OperandError(f"{text} is no REAL constant", "write its sign and a point, as in +1.5")
             return Literal(start, end, "real", float(text.replace(",", ".")), kind, text)
         return Literal(start, end, "int", _number(text, _BITS[kind]), kind, text)
 
@@ -127,18 +128,18 @@ class Operands:
         is_bit = address.bit is not None or address.area in FLAG_AREAS
         if wanted == "m":
             if address.area not in ("T", "C"):
-                raise Wrong(f"{address} is no present value", "write T0005 or C0005")
+                raise OperandError(f"{address} is no present value", "write T0005 or C0005")
             wanted = "w"
         if is_bit != (wanted in "bB") and wanted != "v":
-            raise Wrong(f"{address} is a {'bit' if is_bit else 'word'}, and {self.role} is a "
-                        f"{'bit' if wanted in 'bB' else 'word'}", "a bit is written as word.bit, as in 0.05 or W3.15")
+            raise OperandError(f"{address} is a {'bit' if is_bit else 'word'}, and {self.role} is a "
+                               f"{'bit' if wanted in 'bB' else 'word'}", "a bit is written as word.bit, as in 0.05 or W3.15")
         if wanted in "bBwWnv":
             shown = f"{address.area}{address.number}" if address.area in FLAG_AREAS else str(address).replace(" ", "")
             return Direct(start, end, f"%{shown}")
         return NameRef(start, end, self._at(address, wanted, start, end))
 
     def _at(self, address: Address, wanted: str, start: int, end: int) -> str:
-        """The name of a variable at an address, for what is longer than a word."""
+        """The name of the variable at an address for an operand that is longer than a word."""
         wanted = wanted.upper() if wanted == "a" else wanted
         key = str(address), wanted
         if key not in self.located:
@@ -148,13 +149,13 @@ class Operands:
         return self.located[key].names[0].text
 
     def _indirect(self, text: str, wanted: str, start: int, end: int) -> Expr:
-        """`@D100`: the word of D whose number is in D100, behind the last the words of E bank 0; `*D100`: likewise in
-        BCD.  What is no number of a word leads nowhere."""
+        """`@D100`: the word of D whose number is in D100; numbers beyond D go on in E bank 0.  `*D100`: the same with a number in
+        BCD.  With another number the step is not executed."""
         pointer = _address(text[1:], "w")
         if pointer.area not in ("D", *E_NAMES):
-            raise Wrong(f"{text} does not point anywhere: only D and E words do", "write @D.. or *D..")
+            raise OperandError(f"{text} does not point anywhere: only D and E words do", "write @D.. or *D..")
         if wanted in "bBtcm":
-            raise Wrong(f"{text} is a word, and {self.role} is a {'bit' if wanted in 'bB' else 'number'}", "")
+            raise OperandError(f"{text} is a word, and {self.role} is a {'bit' if wanted in 'bB' else 'number'}", "")
         base = PLC_ADDRESSES["D"] if pointer.area == "D" else E_PLC_ADDRESS + E_WORDS * E_NAMES.index(pointer.area)
         name = "CX_Decimal" if text[0] == "*" else "WORD_TO_UDINT"
         number = self._called(name, start, end, self._direct(pointer, "w", start, end))
@@ -166,23 +167,25 @@ class Operands:
         """IR0 as two words, DR0 as one."""
         kind, number = register[1].upper(), int(register[2])
         if number >= REGISTERS:
-            raise Wrong(f"there is no {register[0]}", f"{kind}0 to {kind}{REGISTERS - 1} are there")
+            raise OperandError(f"there is no {register[0]}", f"{kind}0 to {kind}{REGISTERS - 1} are there")
         if wanted not in ("dAax" if kind == "IR" else "wWAa"):
-            raise Wrong(f"{register[0]} cannot be {self.role}", "an index register has two words, a data register one")
+            raise OperandError(f"{register[0]} cannot be {self.role}", "an index register has two words, a data register one")
         if wanted in "dw":
             return self._called("CX_Pointed" if kind == "IR" else "CX_Offset", start, end, self._index(number, start, end))
         return Index(start, end, NameRef(start, end, f"CX_{kind}"), (self._index(number, start, end),))
 
     def _pointed(self, text: str, wanted: str, start: int, end: int) -> Expr:
-        """`,IR0` and its forms: what lies where an index register points; of a bit the register counts bits."""
+        """`,IR0` and its forms: the word, or the bit, at the address in an index register; the address of a bit counts bits."""
         found = _POINTED.fullmatch(text)
         if not found or int(found[3]) >= REGISTERS:
-            raise Wrong(f"{text} is no operand", f"write ,IR0 +5,IR0 DR0,IR0 ,IR0+ or ,-IR0, with IR0 to IR{REGISTERS - 1}")
+            raise OperandError(f"{text} is no operand",
+                               f"write ,IR0 +5,IR0 DR0,IR0 ,IR0+ or ,-IR0, with IR0 to IR{REGISTERS - 1}")
         if wanted in "tcmx":
-            raise Wrong(f"{text} cannot be {self.role}", "numbers of timers and counters are known before the program runs")
+            raise OperandError(f"{text} cannot be {self.role}",
+                               "numbers of timers and counters are known before the program runs")
         offset, down, register, up = found[1] or "", len(found[2]), int(found[3]), len(found[4])
         if down and up or offset and (down or up):
-            raise Wrong(f"{text} has more than one offset", "a register is counted up, or down, or has an offset")
+            raise OperandError(f"{text} has more than one offset", "a register is counted up, or down, or has an offset")
         if down or up:
             step = [Literal(start, end, "int", value, "DINT", str(value)) for value in (-down, up)]
             stepped = self._called("CX_Step", start, end, self._index(register, start, end), *step)
@@ -195,16 +198,16 @@ class Operands:
             place = Binary(start, end, "+", place, more, start)
         elif offset:
             if not -2048 <= int(offset) <= 2047:
-                raise Wrong(f"{text} leads too far", "offsets are -2048 to +2047")
+                raise OperandError(f"{text} leads too far", "offsets are -2048 to +2047")
             place = Binary(start, end, "+", place, self._number(int(offset) & 0xFFFF_FFFF, start, end), start)
         return self._memory(place, wanted, start, end)
 
     def _memory(self, address: Expr, wanted: str, start: int, end: int) -> Expr:
-        """What an instruction wants at a PLC memory address that is worked out."""
+        """The operand at a PLC memory address that the step computes."""
         if wanted in "bB":
             return Memory(start, end, self.reach(address, 0, wanted == "B"), "BOOL")
         if wanted == "v":
-            raise Wrong("the address of what is pointed at is in the register already", "copy that with MOVL")
+            raise OperandError("the address of what is pointed at is in the register already", "copy that with MOVL")
         kept = self.reach(address, WORDS.get(wanted, 1), wanted in "WA")
         return Memory(start, end, kept, "" if wanted in "aA" else _REALS.get(wanted) or _TYPES[wanted])
 
@@ -239,15 +242,15 @@ def _number(text: str, bits: int) -> int:
     digits = text[1:]
     if text[0] == "#":
         if not re.fullmatch(r"[0-9A-Fa-f]+", digits):
-            raise Wrong(f"{text} is no constant", "behind # stand hexadecimal digits")
+            raise OperandError(f"{text} is no constant", "behind # stand hexadecimal digits")
         value = int(digits, 16)
     else:
         if not digits.isdigit():
-            raise Wrong(f"{text} is no constant", "behind &, + and - stand decimal digits")
+            raise OperandError(f"{text} is no constant", "behind &, + and - stand decimal digits")
         value = int(digits) * (-1 if text[0] == "-" else 1)
     low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if text[0] in "+-" else (0, (1 << bits) - 1)
     if not low <= value <= high:
-        raise Wrong(f"{text} does not fit in {bits} bits", "")
+        raise OperandError(f"{text} does not fit in {bits} bits", "")
     return value & (1 << bits) - 1
 
 
@@ -256,17 +259,17 @@ def _check_decimal(text: str, wanted: str, role: str) -> None:
     bits = _BITS[_TYPES[wanted]]
     digits = f"{_number(text, bits):0{bits // 4}X}"
     if not digits.isdigit():
-        raise Wrong(f"{text} is {digits} hex, and {role} is read as BCD",
-                    f"write #{text[1:]}" if text[1:].isdigit() else "BCD has the digits 0 to 9")
+        raise OperandError(f"{text} is {digits} hex, and {role} is read as BCD",
+                           f"write #{text[1:]}" if text[1:].isdigit() else "BCD has the digits 0 to 9")
 
 
 def _is_address(text: str) -> bool:
-    """Whether a word that could be a symbol is the address of an area: D100, W5, TR0 is none."""
+    """Whether a word that could be a symbol is an address such as D100 or W5."""
     return bool(re.fullmatch(r"(?:CIO|DM|D|W|H|A|T|C|E[0-9A-F]_)\d+", text, re.I))
 
 
 def _address(text: str, wanted: str) -> Address:
-    """The address that a text means where `wanted` is wanted.  Raises Wrong."""
+    """The address that a text means for an operand of the kind `wanted`.  Raises OperandError."""
     if _OLD.fullmatch(text) and wanted in "bB":
         text = f"{int(text[:-2])}.{text[-2:]}"
     if wanted in "bBv" and re.fullmatch(r"[TC]\d+", text, re.I):
@@ -274,7 +277,7 @@ def _address(text: str, wanted: str) -> Address:
     try:
         return parse_address(text)
     except AddressError as error:
-        raise Wrong(str(error), "") from error
+        raise OperandError(str(error), "") from error
 
 
 def _spec(address: Address, wanted: str, start: int, end: int) -> tree.TypeSpec:

@@ -1,293 +1,274 @@
-"""What covers several rungs: jumps, interlocks and loops (C200HS p107, CPM1 p175; omissions of the manuals assumed).
+"""Instructions that cover several rungs: jumps, interlocks, loops and subroutines (C200HS p107, CPM1 p175; omissions of
+the manuals assumed).
 
-A jump over rungs is a variable that is ON while they are passed over; a jump back and FOR are loops around them; an
-interlock is a variable that says to each output whether it is inhibited.
+A jump over rungs is a variable that is TRUE while the rungs are passed over; a jump back and FOR are loops around rungs; an
+interlock is a variable that is TRUE while the outputs under the interlock are inhibited.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from fbvm.syntax import tree
+from fbvm.syntax.ladder.context import Interlock, RungContext, StepRefused
 from fbvm.syntax.ladder.mnemonics import RungText
-from fbvm.syntax.tree import Action, Block, Continue, Exit, Expr, For, If, NameRef, Repeat, Return, Statement
+from fbvm.syntax.tree import Action, Block, Continue, Exit, Expr, For, NameRef, Repeat, Return, Statement
 from fbvm.syntax.tree.ladder import Rung
-
-if TYPE_CHECKING:
-    from fbvm.syntax.ladder.lowering import Rungs
 
 INTERLOCK = "$IL"
 INTERLOCKS = 16
-"""Numbers of MILH and MILR."""
+"""Interlock numbers of MILH and MILR are below this."""
 NUMBERS = 1024
-"""Of jumps, and of subroutines."""
+"""Jump numbers and subroutine numbers are below this."""
 DEEPEST_LOOPS = 15
 WITHOUT_NUMBER = "0 without number"
 """The number of JMP0 and JME0."""
 
 
-class StepRefused(Exception):
-    """A step cannot be executed; the arguments are a message and a hint."""
-
-
 @dataclass
-class Frame:
-    """A loop that is open: what began it, and what stands in it so far."""
+class Span:
+    """A loop or a subroutine whose end has not been read."""
 
     what: str
+    """FOR, or JME or SBN with the number; "" for the whole LADDER."""
     rung: Rung | None = None
+    """The rung that begins it."""
     statements: list[Statement] = field(default_factory=list)
+    """The rungs in it that have been read."""
     count: Expr | None = None
+    """How often the rungs of a FOR are executed."""
     counter: NameRef | None = None
+    """The variable that counts the executions of a FOR."""
     again: NameRef | None = None
-    around: tuple[str, ...] = ()
-    """What it stands in."""
-
-
-@dataclass
-class Interlock:
-    """An interlock that is open: the variable that is ON while it inhibits; whether edges in the meantime are forgotten."""
-
-    inhibits: str
-    start: int
-    end: int
-    forgets: bool = False
+    """The variable that a jump back to a JME sets."""
+    enclosing: tuple[str, ...] = ()
+    """The interlocks and jumps that cover the FOR."""
 
 
 class Spans:
-    """Keeps what covers the rung at work, and puts rungs where they belong."""
+    """Lowers the instructions whose effect goes beyond their rung, and puts rungs into the loops that they belong to."""
 
-    def __init__(self, rungs: Rungs) -> None:
-        self.rungs = rungs
-        self.frames = [Frame("")]
-        self.interlocks: dict[str, Interlock] = {}
-        """Those that may inhibit the rung at work, by number; IL has none."""
-        self.jumps: dict[str, NameRef] = {}
-        """Jumps that may be passing over the rung at work, by number."""
-        self._around: dict[str, tuple[str, ...]] = {}
-        """What each of them stands in."""
-        self._landings: dict[str, list[int]] = {}
-        self._takeoffs: dict[str, list[int]] = {}
-        self._visited: dict[str, tuple[int, int]] = {}
-        self._begun: set[str] = set()
+    def __init__(self, context: RungContext) -> None:
+        self.context = context
+        self.open = [Span("")]
+        """Loops and subroutines whose end has not been read, the innermost last; the first is the whole LADDER."""
         self.subroutines: list[Action] = []
-        self._opening: Frame | None = None
+        self._enclosing: dict[str, tuple[str, ...]] = {}
+        """By number of a jump over rungs, the loops and interlocks that its JMP stands in."""
+        self._jump_ends: dict[str, list[int]] = {}
+        """By number, where the JMEs stand."""
+        self._jump_starts: dict[str, list[int]] = {}
+        """By number, where the JMPs, CJPs and CJPNs stand."""
+        self._called: dict[str, tuple[int, int]] = {}
+        """Numbers of subroutines that are called, with the place of the first call."""
+        self._defined: set[str] = set()
+        """Numbers of subroutines that are defined."""
+        self._opening: Span | None = None
+        """The loop or subroutine that begins behind the rung at work."""
         self._closing: str = ""
+        """FOR, JMP or RET if the rung at work ends the innermost loop or subroutine."""
+        self.instructions: dict[str, Callable[[], None]] = {
+            ".end": self.end,
+            ".interlock": self.interlock, ".interlock_clear": self.interlock_clear,
+            ".interlock_number": self.interlock_number, ".interlock_end": self.interlock_end,
+            ".jump": self.jump, ".jump_end": self.jump_end,
+            ".for": self.begin_loop, ".next": self.end_loop, ".break": self.break_loop,
+            ".call_subroutine": self.call_subroutine, ".macro": self.macro,
+            ".subroutine": self.subroutine, ".return": self.end_subroutine,
+        }  # fmt: skip
 
     @property
-    def forgetful(self) -> bool:
-        """Whether an interlock is open that forgets edges."""
-        return any(lock.forgets for lock in self.interlocks.values())
+    def is_inside(self) -> bool:
+        """Whether the step at work stands in a loop, a subroutine, an interlock or under a jump."""
+        return len(self.open) > 1 or bool(self.context.jumps or self.context.interlocks)
 
-    def look(self, texts: list[RungText]) -> None:
-        """Find out where jumps lead."""
+    def find_jumps(self, texts: list[RungText]) -> None:
+        """Note where the jumps and jump ends of all rungs stand; called before the first rung is lowered."""
         for text in texts:
             for line in text.lines:
                 if line.row.does in (".jump", ".jump_end"):
-                    table = self._landings if line.row.does == ".jump_end" else self._takeoffs
+                    table = self._jump_ends if line.row.does == ".jump_end" else self._jump_starts
                     number = _number(line.step.operands[0]) if line.step.operands else WITHOUT_NUMBER
                     table.setdefault(number, []).append(line.step.start)
 
-    # --- putting rungs together -------------------------------------------------------------------------------------
+    # --- putting rungs together ---
 
-    def guarded(self, statements: Block, inhibited: Block, passed: Block = (), always: bool = False) -> list[Statement]:
-        """Statements as they stand under the jumps and the interlocks of this place."""
-        rungs, whole = self.rungs, list(statements)
-        locks = [lock for lock in self.interlocks.values() if not (always and lock.forgets)]
-        if locks:
-            here = self._any([rungs.temporary(lock.inhibits) for lock in locks])
-            whole = [self._guard(here, inhibited, statements) if inhibited else
-                     self._guard(rungs.negated(here), statements)]
-        if self.jumps:
-            passing = rungs.negated(self._any([rungs.temporary(jump.text) for jump in self.jumps.values()]))
-            whole = [self._guard(passing, tuple(whole), passed or None)]
-        return whole
-
-    def _any(self, conditions: Sequence[Expr]) -> Expr:
-        first, *more = conditions
-        for one in more:
-            first = self.rungs.binary("OR", first, one)
-        return first
-
-    def _guard(self, condition: Expr, statements: Block, otherwise: Block | None = None) -> Statement:
-        """A condition that nobody has written: of no length, so that it is not seen as a statement of its own."""
-        return If(self.rungs.start, self.rungs.start, ((condition, statements),), otherwise)
-
-    def place(self, rung: Rung) -> None:
-        """Put a rung where it belongs, and open or close the loops that it begins or ends."""
+    def add_rung(self, rung: Rung) -> None:
+        """Put a lowered rung into the innermost loop, and open or close the loop or subroutine that the rung begins or ends."""
         if self._closing == "FOR":
             self._close_loop()
-        self.frames[-1].statements.append(rung)
+        self.open[-1].statements.append(rung)
         if self._closing == "JMP":
-            self._close_again()
+            self._close_jump_back()
         elif self._closing == "RET":
             self._close_subroutine()
         if self._opening is not None:
             self._opening.rung = rung
-            self.frames.append(self._opening)
+            self.open.append(self._opening)
         self._closing, self._opening = "", None
 
-    def close(self, end: int) -> Block:
-        """All rungs; loops and interlocks with a number that are still open have a diagnostic."""
-        self.rungs.steps.close()
-        for number, lock in self.interlocks.items():
+    def finish(self) -> Block:
+        """The body of the LADDER: all rungs.  Reports loops, numbered interlocks and calls without their counterparts."""
+        report = self.context.report
+        for number, lock in self.context.interlocks.items():
             if number != "IL":
-                self.rungs.report("S0110", lock.start, lock.end, f"there is no MILC {number}",
+                report("S0110", lock.start, lock.end, f"there is no MILC {number}",
                                   "an interlock with a number ends with the MILC of its number")
-        for frame in self.frames[1:]:
-            assert frame.rung is not None
-            message, hint = _OPEN.get(frame.what[:3], ("the jump back to this JME leads into a loop", "jumps stay inside"))
-            self.rungs.report("S0110", frame.rung.start, frame.rung.end, message, hint)
-        for number, (start, end) in self._visited.items():
-            if number not in self._begun:
-                self.rungs.report("S0110", start, end, f"there is no SBN {number}",
+        for span in self.open[1:]:
+            assert span.rung is not None
+            message, hint = _OPEN.get(span.what[:3], ("the jump back to this JME leads into a loop", "jumps stay inside"))
+            report("S0110", span.rung.start, span.rung.end, message, hint)
+        for number, (start, end) in self._called.items():
+            if number not in self._defined:
+                report("S0110", start, end, f"there is no SBN {number}",
                                   "a subroutine stands between SBN and RET, before END")
-        return tuple(self.frames[0].statements)
+        return tuple(self.open[0].statements)
 
-    # --- subroutines ------------------------------------------------------------------------------------------------
+    # --- subroutines ---
 
-    def visit(self) -> None:
-        """SBS: the subroutine is executed when the condition is ON."""
-        self.rungs.emit(self.rungs.when(self.rungs.variation(self.rungs.power()), self._visit()))
+    def call_subroutine(self) -> None:
+        """SBS: executes the subroutine when the condition is ON."""
+        context = self.context
+        context.emit(context.when(context.variation(context.power()), self._call()))
 
-    def visit_with_words(self) -> None:
-        """MCRO: likewise, with four words into A600 to A603 before and four out of A604 to A607 behind."""
-        rungs = self.rungs
-        whole = (rungs.called("CX_MCRO_In", rungs.operand(1)), self._visit(), rungs.called("CX_MCRO_Out", rungs.operand(2)))
-        rungs.emit(rungs.when(rungs.variation(rungs.power()), *rungs.reaching(*whole)))
+    def macro(self) -> None:
+        """MCRO: as SBS, with four words copied to A600..A603 before the call and four copied from A604..A607 after the call."""
+        context = self.context
+        copy_in, call = context.call_of("CX_MCRO_In", context.operand(1)), self._call()
+        whole = copy_in, call, context.call_of("CX_MCRO_Out", context.operand(2))
+        context.emit(context.when(context.variation(context.power()), *context.if_reachable(*whole)))
 
-    def _visit(self) -> Statement:
-        rungs = self.rungs
-        number = self._number(rungs.line.step.operands[0], "subroutine")
-        if any(frame.what == f"SBN{number}" for frame in self.frames):
+    def _call(self) -> Statement:
+        context = self.context
+        number = self._number(context.line.step.operands[0], "subroutine")
+        if any(span.what == f"SBN{number}" for span in self.open):
             raise StepRefused(f"subroutine {number} calls itself", "FOR and NEXT repeat rungs")
-        self._visited.setdefault(number, (rungs.start, rungs.end))
-        return rungs.called(f"$SBN{number}")
+        self._called.setdefault(number, (context.start, context.end))
+        return context.call_of(f"$SBN{number}")
 
     def subroutine(self) -> None:
-        """SBN: what follows, up to RET, is executed by SBS only."""
-        number = self._number(self.rungs.line.step.operands[0], "subroutine")
-        if len(self.frames) > 1 or self.jumps or self.interlocks:
+        """SBN: the rungs up to RET are executed by SBS and MCRO only."""
+        number = self._number(self.context.line.step.operands[0], "subroutine")
+        if self.is_inside:
             raise StepRefused("SBN stands inside of a loop, a jump, an interlock or another subroutine",
                               "subroutines stand by themselves, before END")
-        if number in self._begun:
+        if number in self._defined:
             raise StepRefused(f"there is another SBN {number}", "")
-        self._begun.add(number)
-        self._opening = Frame(f"SBN{number}")
+        self._defined.add(number)
+        self._opening = Span(f"SBN{number}")
 
-    def go_back(self) -> None:
+    def end_subroutine(self) -> None:
         """RET ends a subroutine."""
-        if not self.frames[-1].what.startswith("SBN"):
+        if not self.open[-1].what.startswith("SBN"):
             raise StepRefused("RET without SBN", "")
         self._closing = "RET"
 
     def _close_subroutine(self) -> None:
-        frame, rungs = self.frames.pop(), self.rungs
-        name = tree.Name(rungs.start, rungs.end, f"${frame.what}")
-        self.subroutines.append(Action(rungs.start, rungs.end, None, name, tuple(frame.statements)))
+        context, span = self.context, self.open.pop()
+        name = tree.Name(context.start, context.end, f"${span.what}")
+        self.subroutines.append(Action(context.start, context.end, None, name, tuple(span.statements)))
 
-    # --- the end ----------------------------------------------------------------------------------------------------
+    # --- the end ---
 
     def end(self) -> None:
-        """END: what follows is not executed."""
-        self.rungs.steps.close()
-        self.rungs.out.append(Return(self.rungs.start, self.rungs.end))
+        """END: the rungs that follow are not executed."""
+        self.context.out.append(Return(self.context.start, self.context.end))
 
-    # --- interlocks -------------------------------------------------------------------------------------------------
+    # --- interlocks ---
 
     def interlock(self) -> None:
-        """IL: from here to ILC outputs are inhibited unless the condition is ON."""
-        rungs = self.rungs
-        off = rungs.negated(rungs.power())
-        on = rungs.assign(rungs.temporary(INTERLOCK), rungs.truth(True))
-        rungs.emit(rungs.assign(rungs.temporary(INTERLOCK), off), inhibited=(on,))
-        self.interlocks["IL"] = Interlock(INTERLOCK, rungs.start, rungs.end)
+        """IL: outputs up to ILC are inhibited unless the condition is ON."""
+        context = self.context
+        off = context.negated(context.power())
+        on = context.assign(context.temporary(INTERLOCK), context.truth(True))
+        context.emit(context.assign(context.temporary(INTERLOCK), off), inhibited=(on,))
+        context.interlocks["IL"] = Interlock(INTERLOCK, context.start, context.end)
 
-    def clear(self) -> None:
+    def interlock_clear(self) -> None:
         """ILC ends all interlocks of IL."""
-        self.interlocks.pop("IL", None)
-        self.rungs.out.append(self.rungs.assign(self.rungs.temporary(INTERLOCK), self.rungs.truth(False)))
+        context = self.context
+        context.interlocks.pop("IL", None)
+        context.out.append(context.assign(context.temporary(INTERLOCK), context.truth(False)))
 
     def interlock_number(self) -> None:
-        """MILH and MILR: from here to the MILC of the number outputs are inhibited unless the condition is ON, which a bit
-        shows.  They may stand in each other."""
-        rungs = self.rungs
-        number = self._number(rungs.line.step.operands[0], "interlock", INTERLOCKS)
-        if number in self.interlocks:
+        """MILH and MILR: outputs up to the MILC of the same number are inhibited unless the condition is ON.  The second
+        operand is a bit that shows the condition.  Numbered interlocks may be nested."""
+        context = self.context
+        number = self._number(context.line.step.operands[0], "interlock", INTERLOCKS)
+        if number in context.interlocks:
             raise StepRefused(f"there is an interlock {number} already", f"MILC {number} ends it")
-        power, inhibits = rungs.power(), f"$MIL{number}"
-        shown, hidden = rungs.operand(1), rungs.operand(1)
-        rungs.emit(*rungs.reaching(rungs.assign(shown, power)),
-                   rungs.assign(rungs.temporary(inhibits), rungs.negated(rungs.temporary(power.text))),
-                   inhibited=(*rungs.reaching(rungs.assign(hidden, rungs.truth(False))),
-                              rungs.assign(rungs.temporary(inhibits), rungs.truth(True))))
-        self.interlocks[number] = Interlock(inhibits, rungs.start, rungs.end, rungs.line.step.mnemonic == "MILR")
+        power, inhibits = context.power(), f"$MIL{number}"
+        shown, hidden = context.operand(1), context.operand(1)
+        context.emit(*context.if_reachable(context.assign(shown, power)),
+                   context.assign(context.temporary(inhibits), context.negated(context.temporary(power.text))),
+                   inhibited=(*context.if_reachable(context.assign(hidden, context.truth(False))),
+                              context.assign(context.temporary(inhibits), context.truth(True))))
+        context.interlocks[number] = Interlock(inhibits, context.start, context.end, context.line.step.mnemonic == "MILR")
 
-    def clear_number(self) -> None:
+    def interlock_end(self) -> None:
         """MILC ends the interlock of its number."""
-        number = self._number(self.rungs.line.step.operands[0], "interlock", INTERLOCKS)
-        if self.interlocks.pop(number, None) is None:
+        number = self._number(self.context.line.step.operands[0], "interlock", INTERLOCKS)
+        if self.context.interlocks.pop(number, None) is None:
             raise StepRefused(f"MILC {number} without MILH or MILR", "it ends the interlock of its number")
 
-    # --- jumps ------------------------------------------------------------------------------------------------------
+    # --- jumps ---
 
     def jump(self) -> None:
         """JMP and JMP0 (they jump when OFF), CJP (when ON), CJPN (when OFF)."""
-        rungs = self.rungs
+        context = self.context
         number = self._jump_number()
-        power = rungs.power()
-        leaves = power if rungs.line.step.mnemonic == "CJP" else rungs.negated(power)
-        if any(at > rungs.start for at in self._landings.get(number, ())):
+        power = context.power()
+        leaves = power if context.line.step.mnemonic == "CJP" else context.negated(power)
+        if any(at > context.start for at in self._jump_ends.get(number, ())):
             self._jump_over(number, leaves)
-        elif number in self._landings:
+        elif number in self._jump_ends:
             self._jump_back(number, leaves)
         else:
             raise StepRefused(f"there is no JME {number}", "a jump leads to the JME of its number")
 
     def _jump_over(self, number: str, leaves: Expr) -> None:
-        rungs = self.rungs
-        passing = rungs.temporary(f"$JMP{number}")
-        rungs.emit(rungs.assign(passing, leaves), inhibited=(rungs.assign(passing, rungs.truth(True)),))
-        self.jumps[number] = passing
-        self._around[number] = self._inside()
+        context = self.context
+        passing = context.temporary(f"$JMP{number}")
+        context.emit(context.assign(passing, leaves), inhibited=(context.assign(passing, context.truth(True)),))
+        context.jumps[number] = passing
+        self._enclosing[number] = self._enclosing_here()
 
-    def _inside(self) -> tuple[str, ...]:
-        """The loops and interlocks of this place."""
-        return (*(f"{frame.what} {frame.rung.start if frame.rung else ''}" for frame in self.frames), *self.interlocks)
+    def _enclosing_here(self) -> tuple[str, ...]:
+        """The loops and interlocks that the step at work stands in."""
+        return (*(f"{span.what} {span.rung.start if span.rung else ''}" for span in self.open), *self.context.interlocks)
 
     def _jump_back(self, number: str, leaves: Expr) -> None:
-        rungs, frame = self.rungs, self.frames[-1]
-        if frame.what != f"JME{number}" or frame.again is None:
+        context, span = self.context, self.open[-1]
+        if span.what != f"JME{number}" or span.again is None:
             raise StepRefused(f"the jump back to JME {number} leads into or out of a loop", "")
-        again = rungs.temporary(f"$JME{number}")
-        rungs.emit(rungs.when(leaves, rungs.assign(again, rungs.truth(True)), Continue(rungs.start, rungs.end)))
-        if rungs.start == max(self._takeoffs[number]):
+        again = context.temporary(f"$JME{number}")
+        context.emit(context.when(leaves, context.assign(again, context.truth(True)), Continue(context.start, context.end)))
+        if context.start == max(self._jump_starts[number]):
             self._closing = "JMP"
 
-    def land(self) -> None:
-        """JME and JME0."""
-        rungs = self.rungs
+    def jump_end(self) -> None:
+        """JME and JME0: where a jump over rungs ends, or where a loop begins that a jump back closes."""
+        context = self.context
         number = self._jump_number()
-        passing = self.jumps.pop(number, None)
+        passing = context.jumps.pop(number, None)
         if passing is not None:
-            if self._inside() != self._around[number]:
+            if self._enclosing_here() != self._enclosing[number]:
                 raise StepRefused(f"a loop or an interlock begins or ends between JMP {number} and JME {number}",
                                   "it stands inside of a jump, or around it")
-            rungs.out.append(rungs.assign(rungs.temporary(f"$JMP{number}"), rungs.truth(False)))
-        elif self._comes_back(number):
-            again = rungs.temporary(f"$JME{number}")
-            self._opening = Frame(f"JME{number}", again=again)
+            context.out.append(context.assign(context.temporary(f"$JMP{number}"), context.truth(False)))
+        elif self._is_jumped_back_to(number):
+            again = context.temporary(f"$JME{number}")
+            self._opening = Span(f"JME{number}", again=again)
 
-    def _comes_back(self, number: str) -> bool:
-        """Whether a jump behind this JME leads back to it."""
-        here = self.rungs.start
-        later = [at for at in self._landings[number] if at > here]
-        return any(at > here and not any(landing > at for landing in later) for at in self._takeoffs.get(number, ()))
+    def _is_jumped_back_to(self, number: str) -> bool:
+        """Whether a jump below the JME at work leads back to it: one that no other JME of the number follows."""
+        here = self.context.start
+        later = [at for at in self._jump_ends[number] if at > here]
+        return any(at > here and not any(landing > at for landing in later) for at in self._jump_starts.get(number, ()))
 
     def _jump_number(self) -> str:
-        operands = self.rungs.line.step.operands
+        operands = self.context.line.step.operands
         return self._number(operands[0], "jump") if operands else WITHOUT_NUMBER
 
     def _number(self, operand: str, what: str, numbers: int = NUMBERS) -> str:
@@ -297,55 +278,54 @@ class Spans:
                               f"numbers are 0 to {numbers - 1}")
         return number
 
-    def _close_again(self) -> None:
-        frame = self.frames.pop()
-        rungs = self.rungs
-        assert frame.again is not None
-        first = rungs.assign(frame.again, rungs.truth(False))
-        self.frames[-1].statements.append(Repeat(rungs.start, rungs.end, (first, *frame.statements),
-                                                 rungs.negated(rungs.temporary(frame.again.text))))
+    def _close_jump_back(self) -> None:
+        context, span = self.context, self.open.pop()
+        assert span.again is not None
+        first = context.assign(span.again, context.truth(False))
+        self.open[-1].statements.append(Repeat(context.start, context.end, (first, *span.statements),
+                                                 context.negated(context.temporary(span.again.text))))
 
-    # --- FOR and NEXT -----------------------------------------------------------------------------------------------
+    # --- FOR and NEXT ---
 
-    def loop(self) -> None:
-        """FOR: what follows is executed so many times, up to NEXT."""
-        rungs = self.rungs
-        if sum(frame.what == "FOR" for frame in self.frames) >= DEEPEST_LOOPS:
+    def begin_loop(self) -> None:
+        """FOR: the rungs up to NEXT are executed as often as the operand says."""
+        context = self.context
+        if sum(span.what == "FOR" for span in self.open) >= DEEPEST_LOOPS:
             raise StepRefused(f"loops stand in each other more than {DEEPEST_LOOPS} deep", "")
-        count = tree.Call(rungs.start, rungs.end, NameRef(rungs.start, rungs.end, "TO_UINT"),
-                          (tree.Argument(rungs.start, rungs.end, "", None, rungs.operand(0)),))
-        kept = rungs.temporary(rungs.name("times"), "UINT")
-        found = rungs.reaching(rungs.assign(kept, count))
-        rungs.out += [rungs.assign(rungs.temporary(kept.text), rungs.number(0)), *self.guarded(found, found)]
-        self._opening = Frame("FOR", count=rungs.temporary(kept.text), counter=rungs.temporary(rungs.name("count"), "UDINT"),
-                              around=(*self.interlocks, *self.jumps))
+        count = tree.Call(context.start, context.end, NameRef(context.start, context.end, "TO_UINT"),
+                          (tree.Argument(context.start, context.end, "", None, context.operand(0)),))
+        kept = context.temporary(context.name("times"), "UINT")
+        found = context.if_reachable(context.assign(kept, count))
+        context.out += [context.assign(context.temporary(kept.text), context.number(0)), *context.guarded(found, found)]
+        self._opening = Span("FOR", count=context.temporary(kept.text), counter=context.temporary(context.name("count"), "UDINT"),
+                              enclosing=(*context.interlocks, *context.jumps))
 
-    def next(self) -> None:
-        """NEXT."""
-        if self.frames[-1].what != "FOR":
+    def end_loop(self) -> None:
+        """NEXT: the end of the innermost FOR."""
+        if self.open[-1].what != "FOR":
             raise StepRefused("NEXT without FOR", "")
         self._closing = "FOR"
-        if self.frames[-1].around != (*self.interlocks, *self.jumps):
+        if self.open[-1].enclosing != (*self.context.interlocks, *self.context.jumps):
             raise StepRefused("a jump or an interlock begins or ends between FOR and NEXT", "it stands inside, or around them")
 
-    def leave(self) -> None:
-        """BREAK: with the condition ON the innermost loop is left."""
-        rungs = self.rungs
-        if self.frames[-1].what != "FOR":
+    def break_loop(self) -> None:
+        """BREAK: leaves the innermost FOR when the condition is ON."""
+        context = self.context
+        if self.open[-1].what != "FOR":
             raise StepRefused("BREAK stands outside FOR and NEXT", "")
-        rungs.emit(rungs.when(rungs.power(), Exit(rungs.start, rungs.end)))
+        context.emit(context.when(context.power(), Exit(context.start, context.end)))
 
     def _close_loop(self) -> None:
-        frame, rungs = self.frames.pop(), self.rungs
-        assert frame.counter is not None and frame.count is not None
-        one = tree.Literal(rungs.start, rungs.end, "int", 1, None, "1")
-        self.frames[-1].statements.append(
-            For(rungs.start, rungs.end, frame.counter, one, frame.count, None, tuple(frame.statements)))
+        context, span = self.context, self.open.pop()
+        assert span.counter is not None and span.count is not None
+        one = tree.Literal(context.start, context.end, "int", 1, None, "1")
+        self.open[-1].statements.append(
+            For(context.start, context.end, span.counter, one, span.count, None, tuple(span.statements)))
 
 
 _OPEN = {"FOR": ("FOR without NEXT", "FOR and NEXT stand in pairs"),
          "SBN": ("SBN without RET", "RET ends a subroutine")}
-"""What is wrong with a frame that nothing has closed."""
+"""By the beginning of `Span.what`, message and hint for a span without its end."""
 
 
 def _number(operand: str) -> str:

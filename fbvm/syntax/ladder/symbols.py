@@ -13,13 +13,13 @@ from fbvm.syntax.ladder.mnemonics import Symbol
 from fbvm.syntax.tree import ArraySpec, Literal, Location, Name, NamedType, TypeSpec, VarDecl
 
 _TYPES = {"CHANNEL": "WORD", "UINT_BCD": "WORD", "UDINT_BCD": "DWORD", "ULINT_BCD": "LWORD"}
-"""Types of the tool that are others here."""
+"""Types of CX-Programmer -> types of IEC 61131-3."""
 NUMBERED = ("TIMER", "COUNTER")
 _ARRAY = re.compile(r"([A-Z_]+)\[(\d+)\]")
 
 
 def number(symbol: Symbol) -> str:
-    """The timer or counter that a symbol means, as T5 or C5; "" if it means none."""
+    """The timer or counter that a symbol names, as T5 or C5; "" if it names none."""
     if symbol.type not in NUMBERED:
         return ""
     digits = symbol.address.lstrip("TtCc")
@@ -27,7 +27,7 @@ def number(symbol: Symbol) -> str:
 
 
 def declaration(symbol: Symbol) -> VarDecl:
-    """The variable that a row declares; without an address it lies where there is room."""
+    """The variable that a row declares; without an address its place is chosen by the compiler."""
     start, end = symbol.start, symbol.start + len(symbol.name)
     place = Location(start, end, symbol.address) if symbol.address else None
     return VarDecl(start, end, (Name(start, end, symbol.name),), place, _spec(symbol.type, start, end), None)

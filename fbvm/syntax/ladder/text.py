@@ -1,4 +1,4 @@
-"""Rungs to text: instructions as everybody would write them, drawings as everybody would draw them."""
+"""Rungs to canonical text, for `fbvm fmt`: instructions in columns, drawings drawn anew."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from fbvm.syntax.ladder.drawing.widths import Sight
 from fbvm.syntax.ladder.mnemonics import Line, RungText, Symbol
 
 STEP = "    "
-"""What instructions stand further in than their RUNG."""
+"""Indentation of instructions below RUNG."""
 UNLIMITED = 10_000
-"""Columns for a drawing that was not made to go on below."""
+"""Columns for a drawing without lines that go on below."""
 OPERANDS_AT = 8
-"""Where operands begin, counted from the instruction."""
+"""Column of the operands, counted from the beginning of the instruction."""
 
 
 def rung_lines(rungs: list[RungText]) -> list[str]:

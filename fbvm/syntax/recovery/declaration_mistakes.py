@@ -5,19 +5,19 @@ from __future__ import annotations
 import re
 
 from fbvm.syntax.recovery.frames import anchor, cut, frames
-from fbvm.syntax.recovery.lookahead import advance, symbols
-from fbvm.syntax.recovery.repair import Mend
+from fbvm.syntax.recovery.repair import Repair
 from fbvm.syntax.recovery.wording import found
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.literals import ELEMENTARY
+from fbvm.syntax.st.lookahead import advance, symbols
 from fbvm.syntax.tree import Name
 
 ARRAY = "an array is written ARRAY [0..9] OF INT"
 SECTIONS = {"INPUT": "VAR_INPUT", "OUTPUT": "VAR_OUTPUT", "IN_OUT": "VAR_IN_OUT", "INOUT": "VAR_IN_OUT", "TEMP": "VAR_TEMP",
             "GLOBAL": "VAR_GLOBAL", "EXTERNAL": "VAR_EXTERNAL", "CONST": "VAR CONSTANT", "FINAL": "VAR CONSTANT",
             "READONLY": "VAR CONSTANT", "RETENTIVE": "VAR RETAIN"}
-"""Words behind VAR that are none, and what is meant."""
+"""Word behind VAR -> the section to write."""
 TYPES = {*ELEMENTARY, "STRING", "WSTRING"}
 _HEAD = re.compile(r"(?i)FUNCTION[ \t]+(\w+)[ \t]+(\w+)")
 
@@ -27,7 +27,7 @@ def _in_names(automaton: Automaton) -> bool:
     return symbols()[automaton.states[-1]] == "names" and automaton.before.type == "NAME"
 
 
-def two_names(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def two_names(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`VAR INPUT a : INT;`, `INT a;`, `my name : INT;`"""
     word = automaton.before
     if token.type not in ("NAME", "STRING", "WSTRING") or not _in_names(automaton) or len(following) < 2:
@@ -39,57 +39,58 @@ def two_names(automaton: Automaton, token: Token, following: list[Token]) -> Men
         return _section_word(automaton, word, token)
     if text in TYPES and behind in ("SEMICOLON", "ASSIGN", "EQUAL"):
         tokens = [token, Token("COLON", ":", token.end, token.end), Token("NAME", word.text, word.start, word.end)]
-        return Mend(tokens, word.start, token.end, "the type stands in front of the name",
-                    f"write {token.text} : {text};", cut=True, lossless=True)
+        return Repair(tokens, word.start, token.end, "the type stands in front of the name",
+                      f"write {token.text} : {text};", cut=True, lossless=True)
     if behind == "COLON":
-        return Mend([Token("NAME", f"{word.text}_{token.text}", word.start, token.end)], word.start, token.end,
-                    f"`{word.text} {token.text}` is no name", f"a name has no spaces: {word.text}_{token.text}", cut=True,
-                    lossless=False)
+        return Repair([Token("NAME", f"{word.text}_{token.text}", word.start, token.end)], word.start, token.end,
+                      f"`{word.text} {token.text}` is no name", f"a name has no spaces: {word.text}_{token.text}", cut=True,
+                      lossless=False)
     return None
 
 
-def _section_word(automaton: Automaton, word: Token, token: Token) -> Mend | None:
+def _section_word(automaton: Automaton, word: Token, token: Token) -> Repair | None:
     meant = SECTIONS.get(word.text.upper())
     if meant is None or automaton.text[:word.start].rstrip()[-3:].upper() != "VAR":
         return None
-    return Mend([token], word.start, word.end, f"`VAR {word.text}` begins no section", f"write {meant}", cut=True, lossless=True)
+    return Repair([token], word.start, word.end, f"`VAR {word.text}` begins no section", f"write {meant}", cut=True,
+                  lossless=True)
 
 
-def misnamed(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def misnamed(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`1a : INT;`, `a-b : INT;`, `a[10] : INT;`, `a %QX0.0 : BOOL;`"""
     before = automaton.before
     if token.type == "NUMBER" and advance(automaton.states, "NAME") and not advance(automaton.states, "NUMBER") and (
             len(following) > 1 and following[1].type in ("COLON", "COMMA", "AT")):
-        return Mend([Token("NAME", f"_{token.text}", token.start, token.end)], token.start, token.end,
-                    f"{found(token)} cannot be a name", "a name begins with a letter", lossless=False)
+        return Repair([Token("NAME", f"_{token.text}", token.start, token.end)], token.start, token.end,
+                      f"{found(token)} cannot be a name", "a name begins with a letter", lossless=False)
     if not _in_names(automaton) or anchor(automaton.states).symbol != "var_decls":
         return None
     if token.type == "MINUS" and len(following) > 1 and following[1].type in ("NAME", "NUMBER"):
         whole = automaton.text[before.start:automaton.next().end]
-        return Mend([], before.start, before.start + len(whole), f"`{whole}` is no name",
-                    f"a name has letters, digits and `_`: {re.sub(r'[^A-Za-z0-9]+', '_', whole)}", lossless=False)
+        return Repair([], before.start, before.start + len(whole), f"`{whole}` is no name",
+                      f"a name has letters, digits and `_`: {re.sub(r'[^A-Za-z0-9]+', '_', whole)}", lossless=False)
     if token.type == "LSQB":
         while token.type not in ("RSQB", "SEMICOLON", "$END"):
             token = automaton.next()
-        return Mend([] if token.type == "RSQB" else [token], before.start, token.end, "the size stands behind the name",
-                    f"write {before.text} : ARRAY [0..9] OF INT", lossless=False)
+        return Repair([] if token.type == "RSQB" else [token], before.start, token.end, "the size stands behind the name",
+                      f"write {before.text} : ARRAY [0..9] OF INT", lossless=False)
     if token.type == "DIRECT":
         at = Token("AT", "AT", token.start, token.start)
-        return Mend([at, Token("LOCATION", token.text, token.start, token.end)], token.start, token.end,
-                    f"`AT` expected before {found(token)}", f"write {before.text} AT {token.text} : ...", lossless=True)
+        return Repair([at, Token("LOCATION", token.text, token.start, token.end)], token.start, token.end,
+                      f"`AT` expected before {found(token)}", f"write {before.text} AT {token.text} : ...", lossless=True)
     return None
 
 
-def sized_text(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def sized_text(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`STRING 20`"""
     word = automaton.before
     if token.type != "NUMBER" or word.type not in ("STRING", "WSTRING"):
         return None
-    return Mend([], token.start, token.end, f"the length of a {word.type} stands in brackets",
-                f"write {word.type}[{token.text}]", lossless=False)
+    return Repair([], token.start, token.end, f"the length of a {word.type} stands in brackets",
+                  f"write {word.type}[{token.text}]", lossless=False)
 
 
-def function_head(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def function_head(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`FUNCTION INT f`, `FUNCTION BLOCK f`"""
     open_ = frames(automaton.states, automaton.values)
     written = _HEAD.match(automaton.text, open_[0].word.start) if open_ and open_[0].word.type == "FUNCTION" else None
@@ -107,22 +108,22 @@ def function_head(automaton: Automaton, token: Token, following: list[Token]) ->
     else:
         return None
     cut(automaton.states, automaton.values, anchor(automaton.states, open_[0].at))
-    return Mend([*head, token], start, end, message, advice, lossless=True)
+    return Repair([*head, token], start, end, message, advice, lossless=True)
 
 
-def alias(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def alias(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`x AT y : INT;`, another name for a variable in RuSTy"""
     if automaton.before.type != "AT" or token.type != "NAME" or len(following) < 3 or following[1].type != "COLON":
         return None
     names = [value[-1] for value in automaton.values if isinstance(value, list) and value and isinstance(value[-1], Name)]
     name, kind = names[-1].text if names else "x", following[2].text
-    return Mend([Token("LOCATION", "%M*", token.start, token.end)], token.start, token.end,
-                f"AT binds to an address, and {token.text} is none",
-                "write %MW10, D100 or CIO 1519.03; another name for a variable is a reference: "
-                f"{name} : REFERENCE TO {kind} REF= {token.text};", lossless=False)
+    return Repair([Token("LOCATION", "%M*", token.start, token.end)], token.start, token.end,
+                  f"AT binds to an address, and {token.text} is none",
+                  "write %MW10, D100 or CIO 1519.03; another name for a variable is a reference: "
+                  f"{name} : REFERENCE TO {kind} REF= {token.text};", lossless=False)
 
 
-def written_type(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def written_type(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`SIZEOF(ARRAY [0..9] OF INT)`"""
     if token.type not in ("ARRAY", "STRUCT", "STRING", "WSTRING", "POINTER", "REF_TO") or automaton.before.type != "LPAR":
         return None
@@ -132,11 +133,11 @@ def written_type(automaton: Automaton, token: Token, following: list[Token]) -> 
     while depth and token.type not in ("SEMICOLON", "$END"):
         token = automaton.next()
         depth += {"LPAR": 1, "RPAR": -1}.get(token.type, 0)
-    return Mend([token], first.start, first.end, "a type that is written out is no argument",
-                "give the type a name: TYPE Row : ARRAY [0..9] OF INT; END_TYPE, and then SIZEOF(Row)", lossless=False)
+    return Repair([token], first.start, first.end, "a type that is written out is no argument",
+                  "give the type a name: TYPE Row : ARRAY [0..9] OF INT; END_TYPE, and then SIZEOF(Row)", lossless=False)
 
 
-def braces(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def braces(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`x := {1, 2};`, `TYPE Colour : {Red, Green};`"""
     between = automaton.text[automaton.before.end:token.start]
     if token.type != "SEMICOLON" or "{" not in between:
@@ -145,6 +146,6 @@ def braces(automaton: Automaton, token: Token, following: list[Token]) -> Mend |
                                ("NAME", "INT", "the members of an enumeration stand in ( )")):
         if advance(automaton.states, kind):
             at = automaton.before.end + between.index("{")
-            return Mend([Token(kind, text, token.start, token.start), token], at, at + 1, "what stands in braces is a pragma",
-                        advice, lossless=False)
+            return Repair([Token(kind, text, token.start, token.start), token], at, at + 1, "what stands in braces is a pragma",
+                          advice, lossless=False)
     return None

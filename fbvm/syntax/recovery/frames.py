@@ -1,14 +1,14 @@
-"""What is open at a place of the parse: blocks without their END yet, and the lists in which one can go on.
+"""The blocks that are open at an error, and the lists in which parsing can go on.
 
-Read off the stack of states alone; each state is reached by one grammar symbol."""
+Both are found from the stack of states alone, since each state is reached by one grammar symbol."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
 
-from fbvm.syntax.recovery.lookahead import State, symbols
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.lookahead import State, symbols
 from fbvm.syntax.st.tables import tables
 from fbvm.syntax.tree import Binary, EnumLiteral, Literal, NullLiteral, Unary
 
@@ -21,17 +21,17 @@ ENDS = {
 """Word that opens -> word that ends it."""
 
 OPENERS: dict[str, set[str]] = {"ELSIF": {"IF"}, "ELSE": {"IF", "CASE"}, "UNTIL": {"REPEAT"}}
-"""Word that ends or divides -> those which it can belong to."""
+"""Word that ends or divides a block -> the words that may open that block."""
 for _opener, _end in ENDS.items():
     OPENERS.setdefault(_end, set()).add(_opener)
 
 UNITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "TYPE", "VAR_GLOBAL", "CONFIGURATION", "$END"}
-"""Words that begin something new at the outermost level."""
+"""Tokens that begin a declaration at the outermost level, and the end of the text."""
 
 POUS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM"}
 STATEMENT_WORDS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "EXIT", "CONTINUE", "RETURN"}
 HEADS = {"IF": "THEN", "ELSIF": "THEN", "WHILE": "DO", "FOR": "DO", "CASE": "OF", "UNTIL": "END_REPEAT"}
-"""Words behind which a head stands, and the word that ends the head."""
+"""Word that begins a head -> the word that ends the head."""
 
 LISTS = ("ended_list", "var_decls", "type_decls", "declarations", "config_items", "resource_items", "some_actions",
          "access_decls", "config_decls", "associations")
@@ -40,14 +40,14 @@ STATEMENT_LISTS = {"ended_list", "open_list", "statement_list"}
 
 @dataclass(frozen=True)
 class Anchor:
-    """A place where a list can go on: `size` states of the stack remain, `symbol` names the list."""
+    """A list that can go on: `size` is the number of states that remain on the stack, `symbol` the production of the list."""
 
     size: int
     symbol: str
 
 
 def anchor(states: State, below: int | None = None) -> Anchor:
-    """The innermost list of the stack, or of its first `below` states."""
+    """The innermost list that is open on the stack, or on its first `below` states."""
     names, actions = symbols(), tables("st").actions
     for at in range((len(states) if below is None else below) - 1, -1, -1):
         row = actions[states[at]]
@@ -63,13 +63,13 @@ LEVELS = {"OR": "expression", "OR_ELSE": "expression", "XOR": "xor_expr", "AND":
           "=": "compare_expr", "<>": "compare_expr", "<": "equ_expr", ">": "equ_expr", "<=": "equ_expr",
           ">=": "equ_expr", "+": "add_expr", "-": "add_expr", "*": "term", "/": "term", "MOD": "term",
           "**": "power_expr"}
-"""Operator -> production of an expression that ends with it."""
+"""Operator -> production of an expression whose outermost operator it is."""
 
 OPERANDS = set(LEVELS.values()) | {"unary_expr", "primary_expr", "variable"}
 
 
 def reopen(states: State, values: list[Any]) -> None:
-    """Let an expression on top of the stack go on, in place: the wrong token behind it has closed it too early."""
+    """Let the expression on top of the stack take further operators, in place: settling at the error has closed it."""
     if symbols()[states[-1]] not in OPERANDS:
         return
     value = values[-1]
@@ -83,8 +83,8 @@ def reopen(states: State, values: list[Any]) -> None:
 
 
 def cut(states: State, values: list[Any], place: Anchor) -> None:
-    """Give up what stands behind an anchor, in place; its list stays and is open again.  An empty list of statements
-    goes too, since VAR sections may stand in its place."""
+    """Remove what stands behind an anchor from the stacks, in place; the list of the anchor is open again.  An empty list of
+    statements is removed too, since VAR sections may stand in its place."""
     del states[place.size:]
     del values[place.size - 1:]
     if values and values[-1] == [] and symbols()[states[-1]] in STATEMENT_LISTS:
@@ -95,14 +95,14 @@ def cut(states: State, values: list[Any], place: Anchor) -> None:
 
 @dataclass(frozen=True)
 class Frame:
-    """A word that waits for its END; it is number `at` of the states."""
+    """A block without its END: the word that opens it, which is number `at` on the stack of states."""
 
     at: int
     word: Token
 
 
 def frames(states: State, values: list[Any]) -> list[Frame]:
-    """Everything that is open, outermost first."""
+    """All open blocks, the outermost first."""
     names = symbols()
     return [Frame(at, values[at - 1]) for at in range(1, len(states))
             if names[states[at]] in ENDS and isinstance(values[at - 1], Token)

@@ -1,4 +1,4 @@
-"""Finds the block whose END was forgotten when only the outermost one seems open: the indentation tells."""
+"""Finds the block whose END is missing by the indentation, when only the outermost block seems open."""
 
 from __future__ import annotations
 
@@ -9,14 +9,15 @@ from fbvm.syntax.recovery.frames import ENDS, OPENERS
 from fbvm.syntax.st.lexer import Lexer, Token
 
 LONGEST = 200_000
-"""Characters of a block beyond which nobody looks for the culprit."""
+"""Longest block in characters that is searched."""
 
 BLOCKS = {"IF", "CASE", "FOR", "WHILE", "REPEAT"}
 
 
 def advice(source: Source, opener: Token, until: Token) -> str:
-    """Which END is missing, if `opener` has none before `until`: one behind ELSE IF, or that of the first word whose
-    END stands further left than itself.  "" if nothing can be told."""
+    """A hint which END is missing, if `opener` has none before `until`; "" if the text gives none.
+
+    The block is an IF behind ELSE, or the first block whose END stands further left than its beginning."""
     if opener.type not in BLOCKS or until.start - opener.start > LONGEST:
         return ""
     open_: list[Token] = []
@@ -38,14 +39,14 @@ def advice(source: Source, opener: Token, until: Token) -> str:
 
 
 def ends_alike(source: Source, opener: Token, end: Token) -> bool:
-    """Whether an END stands where that of a block is looked for: on its line, or as far in on a line of its own."""
+    """Whether an END is where the END of a block is expected: on its line, or as far indented on a line of its own."""
     if _line(source, opener) == _line(source, end):
         return True
     return _first(source, end) and _column(source, end) == _column(source, opener)
 
 
 def _silent(*message: Any) -> None:
-    """What is wrong with these characters was told before."""
+    """Errors of the lexer were reported before."""
 
 
 def _moved(token: Token, by: int) -> Token:
@@ -61,6 +62,6 @@ def _column(source: Source, token: Token) -> int:
 
 
 def _first(source: Source, token: Token) -> bool:
-    """Whether a token is the first of its line."""
+    """Whether a token is the first on its line."""
     line, column = source.place(token.start)
     return not source.line(line)[:column - 1].strip()

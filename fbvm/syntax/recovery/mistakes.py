@@ -1,35 +1,39 @@
-"""Mistakes that everybody makes now and then, each with a mend of its own: `ENDIF`, `ELSE:`, `END_VAR;` ..."""
+"""Common mistakes, each with a repair of its own: `ENDIF`, `FOR := 1;`, parameters behind the name of a POU and the like.
+
+A function of the table takes the automaton at the error, the token that cannot stand there, and the next tokens (that one
+first); it returns the repair, or None if the mistake is another one.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable
 
-from fbvm.syntax.ladder.pasted import INSTRUCTION_LIST, ladder_lines
+from fbvm.syntax.ladder.instructions.pasted import INSTRUCTION_LIST, ladder_lines
 from fbvm.syntax.recovery.declaration_mistakes import alias, braces, function_head, misnamed, sized_text, two_names, written_type
 from fbvm.syntax.recovery.foreign_forms import bare_function, bare_point, decimal_comma, doubled_quote, infix
 from fbvm.syntax.recovery.frames import ENDS, OPENERS, POUS, STATEMENT_WORDS, UNITS, Anchor, anchor, cut, frames
-from fbvm.syntax.recovery.lookahead import advance, symbols
-from fbvm.syntax.recovery.repair import Mend
+from fbvm.syntax.recovery.repair import Repair
 from fbvm.syntax.recovery.word_mistakes import colon_behind, comment_signs, foreign_word, networks, statement_as_value, until
 from fbvm.syntax.recovery.wording import found
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token, lexis, meant
 from fbvm.syntax.st.literals import ELEMENTARY
+from fbvm.syntax.st.lookahead import advance, symbols
 from fbvm.syntax.tree import Deref, Name
 
 ACCESS = {"PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
 POU_ENDS = {ENDS[word] for word in POUS}
 BODY_ENDS = POU_ENDS | {"END_ACTION", "END_TRANSITION"}
-"""Words behind which no statement of the same body stands."""
+"""Words that end a body."""
 
 
-def slip(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """The mend of a slip that is known; None if it is none.  `following` begins with `token`."""
-    for known in SLIPS:
-        mend = known(automaton, token, following)
-        if mend:
-            return mend
+def known_mistake(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
+    """The repair of a common mistake; None if it is none.  `following` are the next tokens, `token` first."""
+    for known in MISTAKES:
+        repair = known(automaton, token, following)
+        if repair:
+            return repair
     return None
 
 
@@ -38,47 +42,47 @@ def open_bracket(automaton: Automaton, kind: str | None) -> Token | None:
     return next((v for v in reversed(automaton.values) if isinstance(v, Token) and v.type == kind), None)
 
 
-def _misspelt(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """`ENDIF`, `ELSEIF`; the automaton has seen that the right word fits."""
+def _misspelt(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
+    """`ENDIF`, `ELSEIF`: the lexer knows them, and the automaton has found that the right word fits."""
     if token.type != "MISSPELT":
         return None
     kind = meant(token.text)
     inside = [frame.word.type for frame in frames(automaton.states, automaton.values)]
     around = next((word for word in reversed(inside) if word in ("CASE", "FOR", "WHILE", "REPEAT")), "")
     if kind == "EXIT" and around == "CASE":
-        return Mend([], token.start, token.end, f"{found(token)} is no word of Structured Text",
-                    "leave it out: a branch of CASE ends where the next one begins", lossless=True)
+        return Repair([], token.start, token.end, f"{found(token)} is no word of Structured Text",
+                      "leave it out: a branch of CASE ends where the next one begins", lossless=True)
     advice = "write VAR, VAR_INPUT, VAR_OUTPUT, VAR_IN_OUT, VAR_TEMP or VAR_EXTERNAL" if kind == "VAR" else f"write {kind}"
-    return Mend([Token(kind, kind, token.start, token.end)], token.start, token.end,
-                f"{found(token)} is no word of Structured Text", advice)
+    return Repair([Token(kind, kind, token.start, token.end)], token.start, token.end,
+                  f"{found(token)} is no word of Structured Text", advice)
 
 
-def _statement_word(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _statement_word(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`FOR := 1;`"""
     word = automaton.before
     if token.type != "ASSIGN" or word.type not in STATEMENT_WORDS or automaton.values[-1] is not word:
         return None
     name = Token("NAME", word.text, word.start, word.end)
-    return Mend([name, token], word.start, word.end, f"{found(word)} is a reserved word and cannot be a name",
-                "choose another name", cut=True, lossless=False)
+    return Repair([name, token], word.start, word.end, f"{found(word)} is a reserved word and cannot be a name",
+                  "choose another name", cut=True, lossless=False)
 
 
-def _reserved_name(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _reserved_name(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`VAR if : INT;`"""
     if token.type not in lexis().reserved or len(following) < 2 or advance(automaton.states, "NAME") is None:
         return None
     sign = following[1].type
     if sign != "ASSIGN" and (sign not in ("COLON", "COMMA") or advance(automaton.states, "NUMBER")):
         return None
-    return Mend([Token("NAME", token.text, token.start, token.end)], token.start, token.end,
-                f"{found(token)} is a reserved word and cannot be a name", "choose another name", lossless=sign != "ASSIGN")
+    return Repair([Token("NAME", token.text, token.start, token.end)], token.start, token.end,
+                  f"{found(token)} is a reserved word and cannot be a name", "choose another name", lossless=sign != "ASSIGN")
 
 
 NEXT_WORD = re.compile(r"(?i)\b(?:(END_VAR)|VAR\w*|END_\w+|FUNCTION\w*|PROGRAM)\b")
 
 
-def _end_of_section(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """`VAR x : INT; x := 5;`: the END_VAR is missing in front of the first statement, unless one stands behind it."""
+def _end_of_section(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
+    """`VAR x : INT; x := 5;`: END_VAR is missing in front of the first statement, unless it follows behind that."""
     states, before = automaton.states, automaton.before
     if token.type not in ("ASSIGN", "LPAR", "LSQB", "DOT", "CARET", "PART") or symbols()[states[-1]] != "names":
         return None
@@ -88,23 +92,23 @@ def _end_of_section(automaton: Automaton, token: Token, following: list[Token]) 
     next_word = NEXT_WORD.search(automaton.text, token.end)
     if next_word and next_word[1]:
         return None
-    return Mend([Token("END_VAR", "END_VAR", before.start, before.start), before, token], before.start, before.end,
-                f"END_VAR expected before {found(before)}, which begins a statement", "", word, cut=True, lossless=True)
+    return Repair([Token("END_VAR", "END_VAR", before.start, before.start), before, token], before.start, before.end,
+                  f"END_VAR expected before {found(before)}, which begins a statement", "", word, cut=True, lossless=True)
 
 
-def _semicolon_in_call(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """`fb(IN := a; PT := b);`: a comma is meant if the bracket is closed behind it."""
+def _semicolon_in_call(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
+    """`fb(IN := a; PT := b);`: a comma is meant if the bracket is closed behind the `;`."""
     if token.type != "SEMICOLON" or not open_bracket(automaton, "LPAR") or advance(automaton.states, "COMMA") is None:
         return None
     end = automaton.text.find(";", token.end)
     rest = automaton.text[token.end:end if end >= 0 else token.end]
     if rest.count(")") <= rest.count("("):
         return None
-    return Mend([Token("COMMA", ",", token.start, token.end)], token.start, token.end,
-                "`,` expected, but `;` found", "arguments are separated by commas")
+    return Repair([Token("COMMA", ",", token.start, token.end)], token.start, token.end,
+                  "`,` expected, but `;` found", "arguments are separated by commas")
 
 
-def _parameters_in_head(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _parameters_in_head(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`PROGRAM Main() ..`, `FUNCTION f(x : INT) ..`"""
     opener = open_bracket(automaton, "LPAR")
     head = next((v[0] for v in reversed(automaton.values) if isinstance(v, tuple) and hasattr(v[0], "end")), None)
@@ -118,11 +122,11 @@ def _parameters_in_head(automaton: Automaton, token: Token, following: list[Toke
         if rest[0].type == "COLON":  # the type of the result goes with them
             automaton.next()
             rest = []
-    return Mend(rest, opener.start, opener.end,
-                f"`(` behind the name `{head.text}` of a POU", "parameters are declared in VAR_INPUT .. END_VAR", cut=True)
+    return Repair(rest, opener.start, opener.end,
+                  f"`(` behind the name `{head.text}` of a POU", "parameters are declared in VAR_INPUT .. END_VAR", cut=True)
 
 
-def _nameless(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _nameless(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`PROGRAM VAR ..`, `FUNCTION : INT`"""
     word = automaton.before
     if word.type not in POUS or automaton.values[-1:] == [] or advance(automaton.states, "NAME") is None:
@@ -130,21 +134,21 @@ def _nameless(automaton: Automaton, token: Token, following: list[Token]) -> Men
     if token.type not in ("COLON", "VAR", "VAR_GLOBAL", *STATEMENT_WORDS):
         return None
     kind = word.text.upper()
-    return Mend([Token("NAME", "?", word.end, word.end), token], word.start, word.end, f"the {kind} has no name",
-                f"write it behind {kind}", lossless=False)
+    return Repair([Token("NAME", "?", word.end, word.end), token], word.start, word.end, f"the {kind} has no name",
+                  f"write it behind {kind}", lossless=False)
 
 
-def _access_in_front(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _access_in_front(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`PUBLIC METHOD Stop ..`"""
     access, word = automaton.before, token.text.upper()
     if word not in ("METHOD", "PROPERTY", "ACTION") or access.text.upper() not in ACCESS or len(following) < 2:
         return None
-    return Mend([Token("REFUSED_BLOCK", token.text, token.start, token.end)], access.start, access.end,
-                f"{found(access)} stands in front of {word}", f"write {word} {access.text.upper()} {following[1].text}", cut=True,
-                lossless=True)
+    return Repair([Token("REFUSED_BLOCK", token.text, token.start, token.end)], access.start, access.end,
+                  f"{found(access)} stands in front of {word}", f"write {word} {access.text.upper()} {following[1].text}",
+                  cut=True, lossless=True)
 
 
-def _no_instance(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _no_instance(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`(IN := a, PT := b);`"""
     opener = open_bracket(automaton, "LPAR")
     if token.type not in ("ASSIGN", "OUTPUT") or opener is None or automaton.before.type != "NAME":
@@ -157,11 +161,11 @@ def _no_instance(automaton: Automaton, token: Token, following: list[Token]) -> 
     while depth and token.type not in ("SEMICOLON", "$END"):
         token = automaton.next()
         depth += {"LPAR": 1, "RPAR": -1}.get(token.type, 0)
-    return Mend([] if not depth else [token], opener.start, opener.end, "the name of an instance is missing in front of `(`",
-                "write the name of the instance that is called", cut=True, lossless=True)
+    return Repair([] if not depth else [token], opener.start, opener.end, "the name of an instance is missing in front of `(`",
+                  "write the name of the instance that is called", cut=True, lossless=True)
 
 
-def _other_end(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _other_end(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`PROGRAM Main .. END_FUNCTION`"""
     open_ = frames(automaton.states, automaton.values)
     if token.type not in POU_ENDS or not open_ or open_[0].word.type not in POUS or len(following) < 2:
@@ -170,22 +174,22 @@ def _other_end(automaton: Automaton, token: Token, following: list[Token]) -> Me
     if following[1].type not in UNITS or any(frame.word.type in OPENERS[token.type] for frame in open_):
         return None
     end = ENDS[word.type]
-    return Mend([Token(end, end, token.start, token.end)], token.start, token.end,
-                f"{end} expected, but {found(token)} found", f"a {word.text.upper()} ends with {end}", word)
+    return Repair([Token(end, end, token.start, token.end)], token.start, token.end,
+                  f"{end} expected, but {found(token)} found", f"a {word.text.upper()} ends with {end}", word)
 
 
-def _location_behind_type(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _location_behind_type(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`x : INT AT D5;`"""
     if token.type != "AT" or anchor(automaton.states).symbol != "var_decls" or len(following) < 2:
         return None
     location = automaton.next()
     names = [v[-1] for v in automaton.values if isinstance(v, list) and v and isinstance(v[-1], Name)]
     name = names[-1].text if names else "x"
-    return Mend([], token.start, location.end, "AT stands behind the type",
-                f"write it in front of the colon: {name} AT {location.text} : ...", lossless=True)
+    return Repair([], token.start, location.end, "AT stands behind the type",
+                  f"write it in front of the colon: {name} AT {location.text} : ...", lossless=True)
 
 
-def _caret(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _caret(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`a ^ 3` for XOR."""
     caret = automaton.before
     if caret.type != "CARET" or token.type not in ("NAME", "NUMBER", "TYPED_LITERAL", "LPAR") or not automaton.values:
@@ -194,22 +198,22 @@ def _caret(automaton: Automaton, token: Token, following: list[Token]) -> Mend |
     if not isinstance(value, Deref) or advance(automaton.states, "XOR") is None:
         return None
     automaton.values[-1] = value.of
-    return Mend([Token("XOR", "XOR", caret.start, caret.end), token], caret.start, caret.end,
-                "`^` stands behind a reference and leads to what it refers to", "write XOR for exclusive or, a ** b for powers")
+    return Repair([Token("XOR", "XOR", caret.start, caret.end), token], caret.start, caret.end,
+                  "`^` stands behind a reference and leads to what it refers to", "write XOR for exclusive or, a ** b for powers")
 
 
-def _begin(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _begin(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`BEGIN` of other languages in front of the statements."""
     word, place = automaton.before, anchor(automaton.states)
     if word.text.upper() != "BEGIN" or place.symbol != "ended_list" or len(automaton.states) != place.size + 1:
         return None
     if token.type not in ("NAME", "VAR", *STATEMENT_WORDS):
         return None
-    return Mend([token], word.start, word.end, f"{found(word)} is no word of Structured Text",
-                "leave it out: statements follow the VAR sections", cut=True, lossless=True)
+    return Repair([token], word.start, word.end, f"{found(word)} is no word of Structured Text",
+                  "leave it out: statements follow the VAR sections", cut=True, lossless=True)
 
 
-def _c_loop(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _c_loop(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`for (i = 0; i < 10; i++)`"""
     opener = open_bracket(automaton, "LPAR")
     open_ = frames(automaton.states, automaton.values)
@@ -224,15 +228,15 @@ def _c_loop(automaton: Automaton, token: Token, following: list[Token]) -> Mend 
     place = anchor(automaton.states, automaton.values.index(word) + 1)
     cut(automaton.states, automaton.values, place)
     head = [Token(*each, token.end, token.end) for each in HEAD]
-    return Mend([word, *head, *([token] if depth else [])], word.start, opener.end,
-                "a FOR loop has no brackets and semicolons", "write FOR i := 0 TO 9 DO .. END_FOR;", lossless=False)
+    return Repair([word, *head, *([token] if depth else [])], word.start, opener.end,
+                  "a FOR loop has no brackets and semicolons", "write FOR i := 0 TO 9 DO .. END_FOR;", lossless=False)
 
 
 HEAD = (("NAME", "i"), ("ASSIGN", ":="), ("NUMBER", "0"), ("TO", "TO"), ("NUMBER", "0"), ("DO", "DO"))
-"""What is read in place of the head of a loop that is none of ours."""
+"""The tokens that are read in place of the head of a loop of C."""
 
 
-def _declared_in_body(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _declared_in_body(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`int i;`, `i : INT;` among statements."""
     name = automaton.before
     states = automaton.states
@@ -245,20 +249,20 @@ def _declared_in_body(automaton: Automaton, token: Token, following: list[Token]
     while token.type not in ("SEMICOLON", "$END"):
         token = automaton.next()
     ours = C_TYPES[name.text.upper()]
-    return Mend([] if token.type == "SEMICOLON" else [token], name.start, name.end,
-                f"{found(name)} begins a declaration, which stands in front of all statements",
-                f"write in a VAR section: {following[0].text} : {ours};", cut=True)
+    return Repair([] if token.type == "SEMICOLON" else [token], name.start, name.end,
+                  f"{found(name)} begins a declaration, which stands in front of all statements",
+                  f"write in a VAR section: {following[0].text} : {ours};", cut=True)
 
 
 C_TYPES = {name: name for name in ELEMENTARY if len(name) > 2} | {
     "INTEGER": "INT", "BOOLEAN": "BOOL", "FLOAT": "REAL", "DOUBLE": "LREAL", "LONG": "DINT", "SHORT": "INT",
     "UNSIGNED": "UDINT", "INT8_T": "SINT", "UINT8_T": "BYTE", "INT16_T": "INT", "UINT16_T": "WORD", "INT32_T": "DINT",
     "UINT32_T": "DWORD", "AUTO": "INT", "CONST": "INT", "STATIC": "INT"}
-"""Words that begin a declaration in other languages, and what is declared here."""
+"""Word that begins a declaration in other languages -> the type to write."""
 
 
-def _ladder(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """`LD 0.00`, `OUT 100.00` among statements: rungs, without the words around them."""
+def _ladder(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
+    """`LD 0.00`, `OUT 100.00` among statements: rungs without LADDER and END_LADDER."""
     symbol = anchor(automaton.states).symbol
     first = {"declarations": token, "ended_list": automaton.before}.get(symbol)
     if first is None or not ladder_lines(automaton.text, first.start):
@@ -266,11 +270,11 @@ def _ladder(automaton: Automaton, token: Token, following: list[Token]) -> Mend 
     while token.type not in UNITS and token.type not in POU_ENDS:
         token = automaton.next()
     where = "in the body of a PROGRAM or FUNCTION_BLOCK, " if symbol == "declarations" else ""
-    return Mend([token], first.start, first.end, "these lines are ladder as mnemonics",
-                f"rungs stand {where}between LADDER and END_LADDER", cut=True, silent=token.start)
+    return Repair([token], first.start, first.end, "these lines are ladder as mnemonics",
+                  f"rungs stand {where}between LADDER and END_LADDER", cut=True, silent=token.start)
 
 
-def _instruction_list(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def _instruction_list(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`LD a` at the beginning of a line: the whole body is an instruction list."""
     word = automaton.before
     line = automaton.text[:word.start].rpartition("\n")[2].strip()
@@ -280,14 +284,14 @@ def _instruction_list(automaton: Automaton, token: Token, following: list[Token]
         return None
     while token.type not in BODY_ENDS and token.type != "$END":
         token = automaton.next()
-    return Mend([token], word.start, word.end, "the instruction list is understood but not executed by this version",
-                "write the body in Structured Text", cut=True, code="S0901", silent=token.start)
+    return Repair([token], word.start, word.end, "the instruction list is understood but not executed by this version",
+                  "write the body in Structured Text", cut=True, code="S0901", silent=token.start)
 
 
-SLIPS: tuple[Callable[[Automaton, Token, list[Token]], Mend | None], ...] = (
+MISTAKES: tuple[Callable[[Automaton, Token, list[Token]], Repair | None], ...] = (
     networks, _ladder, _misspelt, _statement_word, function_head, _nameless, _reserved_name, _end_of_section,
     colon_behind, _semicolon_in_call, _parameters_in_head, _access_in_front, _no_instance, _other_end,
     _location_behind_type, _caret, _begin, infix, decimal_comma, bare_point, doubled_quote, bare_function, _c_loop,
     _declared_in_body, _instruction_list, foreign_word, comment_signs, until, statement_as_value,
     two_names, misnamed, sized_text, alias, written_type, braces)
-"""Asked one after the other; the first that knows the mistake mends it."""
+"""In the order in which they are asked; the first repair counts."""

@@ -1,7 +1,7 @@
-"""Reports a syntax error and finds where to go on, so that one mistake hides nothing and is told once.
+"""Reports a syntax error and finds where parsing can go on, so that one mistake hides no other and is reported once.
 
-First a small mend is tried (`mends`): one word put in, taken away or replaced, if the parse then goes on well.  Next
-comes what stands open: an END that is missing or has no beginning.  At last the statement or declaration is given up."""
+Three ways are tried in this order: a repair (`repairs`): a known mistake, or one token inserted, removed or replaced; the
+blocks that are open: an END that is missing or has no beginning; giving up the statement or declaration."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from fbvm.syntax.recovery.frames import (
     reopen,
 )
 from fbvm.syntax.recovery.indentation import BLOCKS, advice, ends_alike
-from fbvm.syntax.recovery.lookahead import advance, expected
 from fbvm.syntax.recovery.mistakes import open_bracket
-from fbvm.syntax.recovery.repair import Mend
-from fbvm.syntax.recovery.repairs import BRACKETS, best_mend
+from fbvm.syntax.recovery.repair import Repair
+from fbvm.syntax.recovery.repairs import BRACKETS, best_repair
 from fbvm.syntax.recovery.wording import found, hint, sign, unlike
 from fbvm.syntax.st.automaton import ELEMENTS, NESTING_LIMIT, Automaton
 from fbvm.syntax.st.builder import CHAIN_LIMIT, Builder, Stop
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.lookahead import advance, expected
 
 LOOK = 4
-"""Tokens by which a mend is judged."""
+"""Tokens of look-ahead by which a repair is judged."""
 
 HOLES = {"IF": ("TRUE",), "ELSIF": ("TRUE",), "WHILE": ("TRUE",), "UNTIL": ("TRUE",), "CASE": ("NUMBER",),
          "FOR": ("NAME", "ASSIGN", "NUMBER", "TO", "NUMBER")}
-"""What is read in the place of a head that cannot be understood, so that its block can."""
+"""Word -> the terminals that are read in place of a head that cannot be parsed, so that its block can be parsed."""
 
 PARTS = {*ELEMENTS, "ACTION"}
-"""Words that begin a part of a chart."""
+"""Words that begin an element of a chart."""
 
 HOLE_TEXTS = {"NUMBER": "0", "NAME": "i"}
 
@@ -51,16 +51,16 @@ class Recovery:
         self.automaton, self.builder = automaton, builder
         self.states, self.values = automaton.states, automaton.values
         self.last = -1
-        """Where the last error was told; another one there or in front of it is its shadow."""
+        """Where the last error was reported; an error there or in front of it is a consequence and not reported."""
         self.mute = False
-        """Whether the cause was told: a comment that swallowed the rest of the text, an unknown character."""
+        """Whether the cause of the error was reported already: a comment without end, an unknown character."""
         self.seen: set[tuple[int, int]] = set()
-        """Places of the text, with the height of the stack, at which this token was refused."""
+        """Where the token was refused: offsets in the text with the height of the stack, to notice an endless loop."""
 
     # --- what the automaton calls ---
 
     def unexpected(self, token: Token) -> list[Token]:
-        """`token` cannot stand here: say so, mend the stacks, return the tokens to feed instead of it."""
+        """Report that `token` cannot stand here and correct the stacks; returns the tokens to feed in its place.  Raises Stop."""
         if self.builder.full:
             raise Stop
         if self.turns_in_circles(token):
@@ -69,9 +69,9 @@ class Recovery:
         self.mute = self.swallowed(token) or self.unclosed(token) or any(
             self.automaton.before.end <= odd <= token.start for odd in self.builder.odd)
         reopen(self.states, self.values)
-        mend = best_mend(self.automaton, token, following)
-        if mend:
-            return self.mended(mend, token)
+        repair = best_repair(self.automaton, token, following)
+        if repair:
+            return self.repaired(repair, token)
         if token.type in UNITS and self.amid(token):
             self.tell(token)
             return self.give_up(self.following())
@@ -81,16 +81,16 @@ class Recovery:
         return self.give_up(token)
 
     def swallowed(self, token: Token) -> bool:
-        """Whether a comment without end has swallowed all that could stand here."""
+        """Whether the text ends here because of a comment without end."""
         return token.type == "$END" and self.builder.cut_short
 
     def unclosed(self, token: Token) -> bool:
-        """Whether a string without end stands on the line of a token or behind it there: quotes are mixed up."""
+        """Whether a string without end ends on the line of a token, at or behind the token: quotes are mixed up."""
         line_end = self.automaton.text.find("\n", token.start)
         return any(token.start <= end and (end <= line_end or line_end < 0) for end in self.builder.unclosed)
 
     def turns_in_circles(self, token: Token) -> bool:
-        """Whether the same token was refused at the same height before: then it must go, whatever it means."""
+        """Whether the same token was refused at the same height before: then it is dropped, whatever it means."""
         if token.type == "$END":
             if len(self.states) == 1 or (token.start, len(self.states)) in self.seen:
                 raise Stop
@@ -103,7 +103,9 @@ class Recovery:
         return False
 
     def too_deep(self, token: Token, why: str) -> list[Token]:
-        """Give up the statement, or for blocks the whole declaration."""
+        """Report that the nesting is too deep and give up the statement or, for blocks, the whole declaration.
+
+        `why` is "operators" or "levels".  Returns the tokens to go on with."""
         if self.builder.full:
             raise Stop
         self.mute = False
@@ -124,7 +126,7 @@ class Recovery:
     def without_end(self, opener: Token, end: Token) -> None:
         self.report("S0101", opener.start, opener.end, f"{opener.text.upper()} has no end before {found(end)}", "")
 
-    # --- telling ---
+    # --- messages ---
 
     def report(self, code: str, start: int, end: int, message: str, help_: str, opener: Token | None = None,
                lossless: bool = False) -> None:
@@ -136,7 +138,7 @@ class Recovery:
         self.builder.tell(Diagnostic(code, source, start, end, message, help_, related, lossless=lossless))
 
     def tell(self, token: Token) -> None:
-        """What is expected here, what was found."""
+        """Report what is expected and what was found."""
         kinds = expected(self.states)
         message = unlike(token, kinds)
         if token.type in BRACKETS and not open_bracket(self.automaton, BRACKETS[token.type]):
@@ -144,24 +146,24 @@ class Recovery:
         self.report("S0101", self.place(token), token.end, message, hint(token, kinds))
 
     def place(self, token: Token) -> int:
-        """Where to point for a token: at its beginning; for the end of the text behind the last word."""
+        """Where a message about a token points: at its beginning; for the end of the text behind the last token."""
         return self.automaton.before.end if token.type == "$END" else token.start
 
-    def mended(self, mend: Mend, token: Token) -> list[Token]:
-        """Do what `best_mend` found, and say it."""
-        lossless = bool(mend.tokens) and not mend.cut if mend.lossless is None else mend.lossless
-        self.report(mend.code, mend.start, mend.end, mend.message, mend.hint, mend.opener, lossless)
-        self.last = max(self.last, mend.start)
-        if mend.silent:
-            self.builder.forget(mend.end, mend.silent)
-        if mend.cut:
+    def repaired(self, repair: Repair, token: Token) -> list[Token]:
+        """Report and execute a repair; returns the tokens to feed."""
+        lossless = bool(repair.tokens) and not repair.cut if repair.lossless is None else repair.lossless
+        self.report(repair.code, repair.start, repair.end, repair.message, repair.hint, repair.opener, lossless)
+        self.last = max(self.last, repair.start)
+        if repair.silent:
+            self.builder.forget(repair.end, repair.silent)
+        if repair.cut:
             cut(self.states, self.values, anchor(self.states))
-        return mend.tokens
+        return repair.tokens
 
     # --- tokens ---
 
     def peek(self, token: Token) -> list[Token]:
-        """The next tokens, `token` first; they stay where they are."""
+        """The next tokens, `token` first, without taking them."""
         tokens = [token]
         while len(tokens) < LOOK and tokens[-1].type != "$END":
             tokens.append(self.automaton.next())
@@ -169,7 +171,7 @@ class Recovery:
         return tokens
 
     def following(self) -> Token:
-        """The next token, where one is given up."""
+        """Take the next token in place of one that is given up."""
         token = self.automaton.next()
         if token.type != "$END":
             self.automaton.before = token
@@ -178,18 +180,19 @@ class Recovery:
     # --- ends that are missing or too many ---
 
     def shows_end_of_section(self, token: Token) -> bool:
-        """Whether a token in a VAR section or TYPE shows that its END is missing."""
+        """Whether a token shows that the END of the VAR section or TYPE around it is missing."""
         place = anchor(self.states)
         return place.symbol in ("var_decls", "type_decls") and (token.type in STATEMENT_WORDS or token.type == "VAR")
 
     def open_element(self, token: Token) -> list[Frame]:
-        """What is open of the part of a chart in front of a STEP, TRANSITION or ACTION, which shows that its END is missing."""
+        """The open blocks from the element of a chart on, if a STEP, TRANSITION or ACTION shows that the END of the element is
+        missing; else none."""
         open_ = frames(self.states, self.values) if token.type in PARTS else []
         first = next((at for at, frame in enumerate(open_) if frame.word.type in PARTS), len(open_))
         return open_[first:]
 
     def closing(self, token: Token) -> list[Token]:
-        """A word that ends something or begins something new: close what is still open inside, or drop the word."""
+        """A word that ends a block or begins something new: close the blocks that are still open inside, or drop the word."""
         open_ = frames(self.states, self.values)
         inner = open_
         if token.type in OPENERS:
@@ -213,7 +216,7 @@ class Recovery:
         return self.behind_then() if token.type == "ELSIF" else []
 
     def behind_then(self) -> list[Token]:
-        """Pass over the head of an ELSIF that follows ELSE."""
+        """Pass over the head of an ELSIF that follows an ELSE."""
         token = self.following()
         while token.type != "THEN":
             if token.type == "SEMICOLON" or self.stops(token):
@@ -222,14 +225,14 @@ class Recovery:
         return []
 
     def amid(self, token: Token) -> bool:
-        """Whether a word that begins a declaration stands in the middle of a line and of something else."""
+        """Whether a word that begins a declaration stands in the middle of a line and of a statement."""
         before = self.automaton.before
         if token.type == "$END" or before.type == "SEMICOLON" or before.type in OPENERS:
             return False
         return bool(self.values) and "\n" not in self.builder.source.text[before.end:token.start]
 
     def other_end(self, word: Token, token: Token) -> list[Token]:
-        """`IF .. END_FOR`: the END of another block, where the indentation says that it ends this one."""
+        """`IF .. END_FOR`: take the END of another block for the right one if the indentation says so."""
         end = ENDS[word.type]
         if not ends_alike(self.builder.source, word, token) or word.type not in BLOCKS:
             return self.no_opener(token)
@@ -244,7 +247,7 @@ class Recovery:
         return [] if following.type == "SEMICOLON" else [following]
 
     def close(self, inner: list[Frame], token: Token) -> list[Token]:
-        """End the open blocks, innermost first, and tell of each."""
+        """End the open blocks, innermost first, and report each."""
         for frame in reversed(inner):
             place = anchor(self.states)
             self.tell_open(frame, token, place.size >= len(self.states))
@@ -273,7 +276,7 @@ class Recovery:
     # --- giving up a part ---
 
     def give_up(self, token: Token) -> list[Token]:
-        """Leave the statement or declaration; keep its block if only the block's head is wrong."""
+        """Give up the statement or declaration; keep the block if only its head is wrong."""
         head = open_head(self.states, self.values)
         if head:
             return self.skip_head(head, token)
@@ -309,7 +312,7 @@ class Recovery:
         return token.type in OPENERS or token.type in UNITS or token.type in STATEMENT_WORDS
 
     def skip(self, token: Token) -> list[Token]:
-        """Pass over tokens to the next `;` or to a word that begins or ends something."""
+        """Pass over tokens up to and including the next `;`, or up to a word that begins or ends a block."""
         symbol = anchor(self.states).symbol
         while True:
             kind = token.type

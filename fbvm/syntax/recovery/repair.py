@@ -1,4 +1,4 @@
-"""A mend: what a mistake in the text is taken for, so that the rest of it can be read."""
+"""A repair: how parsing goes on after a syntax error, and the diagnostic that says so."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from fbvm.syntax.st.lexer import Token
 
 
 @dataclass(frozen=True)
-class Mend:
-    """What to say and which tokens to go on with; `cut` gives up the statement's beginning first."""
+class Repair:
+    """The diagnostic for a mistake, and the tokens to feed to the parser in place of the one that cannot stand there."""
 
     tokens: list[Token]
     start: int
@@ -17,9 +17,13 @@ class Mend:
     message: str
     hint: str = ""
     opener: Token | None = None
+    """The word or bracket to which the message refers."""
+    """The word or bracket to which the message refers."""
     cut: bool = False
+    """Whether what has been read of the statement or declaration is given up first."""
+    """Whether what has been read of the statement or declaration is given up first."""
     code: str = "S0101"
     lossless: bool | None = None
-    """Whether all that was written is read; None if that is so unless `cut`, or there being no tokens, says no."""
+    """Whether nothing that was written is lost for the tree; None: if there are tokens and nothing is `cut`."""
     silent: int = 0
-    """Up to where nothing else is told, since the text is none of ours."""
+    """End of the text in which other errors are not reported, since it is in another language; 0 if there is none."""

@@ -1,43 +1,46 @@
-"""The small mends of a syntax error: a word more, another word, a word less, judged by how well the parse goes on."""
+"""Repairs of a syntax error by one token: inserted, replaced or removed, judged by how many tokens can be read then."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fbvm.syntax.recovery.chart_mistakes import chart_slip
+from fbvm.syntax.recovery.chart_mistakes import chart_mistake
 from fbvm.syntax.recovery.frames import OPENERS, UNITS, anchor, frames
-from fbvm.syntax.recovery.lookahead import State, advance, expected
-from fbvm.syntax.recovery.mistakes import open_bracket, slip
-from fbvm.syntax.recovery.repair import Mend
+from fbvm.syntax.recovery.mistakes import known_mistake, open_bracket
+from fbvm.syntax.recovery.repair import Repair
 from fbvm.syntax.recovery.wording import found, hint, quoted, sign, unlike
 from fbvm.syntax.st.automaton import ELEMENTS, Automaton
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.lookahead import State, advance, expected
 from fbvm.syntax.tree import EnumLiteral, Literal
 
 INSERTED = ("SEMICOLON", "RPAR", "RSQB", "THEN", "DO", "OF", "COLON", "ASSIGN", "COMMA", "END_REPEAT")
-"""Words that may be put in, the most likely first."""
+"""Terminals that may be inserted, the most likely first."""
 
 REPLACED = {"EQUAL": ("ASSIGN", "COLON"), "OUTPUT": ("GREATER_EQUAL",),
             "ASSIGN": ("EQUAL", "COLON"), "COLON": ("SEMICOLON", "ASSIGN"),
             "SEMICOLON": ("COLON",), "COMMA": ("SEMICOLON",), "DOT": ("SEMICOLON",)}
-"""Signs that are mistaken for others."""
+"""Terminal -> the terminals for which people write it by mistake."""
 
 BRACKETS = {"RPAR": "LPAR", "RSQB": "LSQB"}
 GOOD = 3
-"""Tokens that must be read well after a word was taken away or replaced, or all that are left."""
+"""Tokens that must be readable after a removal or replacement; fewer only at the end of the text."""
 
 
-def best_mend(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
-    """The mend after which the most of `following` (which begins with `token`) can be read; None if none is good."""
-    known = chart_slip(automaton, token, following) or slip(automaton, token, following)
+def best_repair(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
+    """The repair for a token that cannot stand in its place; None if no repair is good enough.
+
+    A known mistake has a repair of its own; otherwise the repair wins after which the most of `following` (the next tokens,
+    `token` first) can be read."""
+    known = chart_mistake(automaton, token, following) or known_mistake(automaton, token, following)
     if known:
         return known
     trials = [*_insertions(automaton, following), *_replacements(automaton, following), *_removal(automaton, following)]
     return max(trials, key=lambda trial: trial[:2])[2] if trials else None
 
 
-Trial = tuple[int, int, Mend]
-"""How many tokens are read well, how likely the mend is, the mend."""
+Trial = tuple[int, int, Repair]
+"""How many tokens can be read after a repair, how likely the repair is, and the repair."""
 
 
 def _score(automaton: Automaton, states: State | None, tokens: list[Token]) -> int:
@@ -69,12 +72,12 @@ def _insertions(automaton: Automaton, following: list[Token]) -> Iterator[Trial]
         where = f"before {found(token)}"
         if kind == "SEMICOLON":
             where = f"after the {_unended(automaton)}"
-        yield score, -rank, Mend([Token(kind, sign(kind), at, at), token], at, at, f"{quoted(kind)} expected {where}",
-                                 "", open_bracket(automaton, BRACKETS.get(kind)))
+        yield score, -rank, Repair([Token(kind, sign(kind), at, at), token], at, at, f"{quoted(kind)} expected {where}",
+                                   "", open_bracket(automaton, BRACKETS.get(kind)))
 
 
 def _unended(automaton: Automaton) -> str:
-    """What it is that a `;` is to end."""
+    """What a missing `;` should end, for the message."""
     place, open_ = anchor(automaton.states), frames(automaton.states, automaton.values)
     if open_ and open_[-1].word.type == "TRANSITION" and place.size <= open_[-1].at:
         return "condition"
@@ -82,7 +85,7 @@ def _unended(automaton: Automaton) -> str:
 
 
 def _after_label(automaton: Automaton) -> bool:
-    """Whether a literal that may be a label of CASE begins the statement."""
+    """Whether the statement begins with a literal that may be a label of CASE."""
     open_ = frames(automaton.states, automaton.values)
     literal = isinstance(automaton.values[-1], (Literal, EnumLiteral)) if automaton.values else False
     return literal and bool(open_) and open_[-1].word.type == "CASE" and (
@@ -99,7 +102,7 @@ def _replacements(automaton: Automaton, following: list[Token]) -> Iterator[Tria
             message = f"{quoted(kind)} expected, but {found(token)} found"
             advice = hint(token, {kind})
             other = Token(kind, sign(kind), token.start, token.end)
-            yield score, 1 - rank, Mend([other], token.start, token.end, message, advice)
+            yield score, 1 - rank, Repair([other], token.start, token.end, message, advice)
 
 
 def _removal(automaton: Automaton, following: list[Token]) -> Iterator[Trial]:
@@ -112,5 +115,5 @@ def _removal(automaton: Automaton, following: list[Token]) -> Iterator[Trial]:
         opener = BRACKETS.get(token.type)
         why = f"{found(token)} without `{sign(opener)}`" if opener and not open_bracket(automaton, opener) else ""
         kinds = expected(automaton.states)
-        yield score, -len(INSERTED), Mend([], token.start, token.end, why or unlike(token, kinds), hint(token, kinds))
+        yield score, -len(INSERTED), Repair([], token.start, token.end, why or unlike(token, kinds), hint(token, kinds))
 

@@ -1,30 +1,30 @@
-"""Words of other languages where a statement begins, and signs that stand for comments: `CALL t1();`, `GOTO a;`, `-- b`."""
+"""Words of other languages at the beginning of a statement, and their signs of comments: `CALL t1();`, `GOTO a;`, `-- b`."""
 
 from __future__ import annotations
 
 from fbvm.syntax.recovery.frames import ENDS, POUS, UNITS, anchor, frames
-from fbvm.syntax.recovery.lookahead import advance
-from fbvm.syntax.recovery.repair import Mend
+from fbvm.syntax.recovery.repair import Repair
 from fbvm.syntax.recovery.wording import found
 from fbvm.syntax.st.automaton import Automaton
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.lookahead import advance
 
 DROPPED = {"LET": "an assignment has no word in front of it: x := 5;", "SET": "write x := TRUE;",
            "CALL": "a block is called by the name of its instance: timer(IN := a);",
            "CAL": "a block is called by the name of its instance: timer(IN := a);",
            "WHEN": "a label of CASE has no word in front of it"}
-"""Words that are left out, and the rest is read."""
+"""Word that is dropped -> hint; the rest of the statement is read."""
 SKIPPED = {"LOOP": "a loop without a condition is WHILE TRUE DO .. END_WHILE; EXIT leaves it",
            "UNLESS": "write IF NOT condition THEN .. END_IF", "DIM": "variables are declared in VAR .. END_VAR",
            "CONST": "constants are declared in VAR CONSTANT .. END_VAR", "TRY": "there are no exceptions: check before",
            "INPUT": "inputs are declared in VAR_INPUT .. END_VAR", "OUTPUT": "outputs are declared in VAR_OUTPUT .. END_VAR"}
-"""Words whose statement cannot be read."""
+"""Word whose whole statement is passed over -> hint."""
 ENDED = {"LOOP": "END_LOOP", "CONST": "END_CONST", "TRY": "END_TRY", "INPUT": "END_INPUT", "OUTPUT": "END_OUTPUT"}
-"""Words of these with an end of their own."""
+"""Those of them with an END of their own -> that END."""
 BODIES = {ENDS[word] for word in POUS} | {"END_ACTION", "END_TRANSITION"}
 
 
-def foreign_word(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def foreign_word(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`CALL timer();`, `GOTO over;`, `CONST a : INT := 5; END_CONST`"""
     word, place = automaton.before, anchor(automaton.states)
     if place.symbol != "ended_list" or len(automaton.states) != place.size + 1 or word.type != "NAME":
@@ -34,18 +34,18 @@ def foreign_word(automaton: Automaton, token: Token, following: list[Token]) -> 
     text = word.text.upper()
     message = f"{found(word)} begins no statement"
     if text == "GOTO":
-        return Mend([Token("JMP", "JMP", word.start, word.end), token], word.start, word.end, message,
-                    f"write JMP {token.text};", cut=True, lossless=True)
+        return Repair([Token("JMP", "JMP", word.start, word.end), token], word.start, word.end, message,
+                      f"write JMP {token.text};", cut=True, lossless=True)
     if text in DROPPED:
-        return Mend([token], word.start, word.end, message, DROPPED[text], cut=True, lossless=True)
+        return Repair([token], word.start, word.end, message, DROPPED[text], cut=True, lossless=True)
     if text not in SKIPPED:
         return None
-    return Mend(_behind(automaton, token, ENDED.get(text, ";")), word.start, word.end, message, SKIPPED[text], cut=True,
-                lossless=False)
+    return Repair(_behind(automaton, token, ENDED.get(text, ";")), word.start, word.end, message, SKIPPED[text], cut=True,
+                  lossless=False)
 
 
 def _behind(automaton: Automaton, token: Token, end: str) -> list[Token]:
-    """What stands behind an end, or where the body ends."""
+    """Pass over tokens to the one behind `end`, or to the end of the body; returns the token to go on with."""
     while token.type not in UNITS and token.type not in BODIES:
         if token.text.upper() == end:
             token = automaton.next() if end != ";" else token
@@ -54,7 +54,7 @@ def _behind(automaton: Automaton, token: Token, end: str) -> list[Token]:
     return [token]
 
 
-def networks(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def networks(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`NETWORK .. END_NETWORK`: rungs or lines of an instruction list as other tools write them."""
     symbol = anchor(automaton.states).symbol
     word = {"declarations": token, "ended_list": automaton.before}.get(symbol)
@@ -70,17 +70,18 @@ def networks(automaton: Automaton, token: Token, following: list[Token]) -> Mend
             behind.append(token)
         token = automaton.next()
     rest = [*(behind or ()), token]
-    return Mend(rest, word.start, word.end, "NETWORK .. END_NETWORK is another tool's form of rungs",
-                "rungs stand between LADDER and END_LADDER, each behind a line RUNG, as mnemonics or drawn; "
-                "`fbvm import` reads PLCopen XML", cut=True, silent=rest[0].start)
+    return Repair(rest, word.start, word.end, "NETWORK .. END_NETWORK is another tool's form of rungs",
+                  "rungs stand between LADDER and END_LADDER, each behind a line RUNG, as mnemonics or drawn; "
+                  "`fbvm import` reads PLCopen XML", cut=True, silent=rest[0].start)
 
 
-def comment_signs(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def comment_signs(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`-- text`, `*)`"""
     text, before = automaton.text, automaton.before
     if token.type == "STAR" and text[token.end:token.end + 1] == ")" and anchor(automaton.states).size == len(automaton.states):
         automaton.next()
-        return Mend([], token.start, token.end + 1, "`*)` without `(*`", "a comment is closed once for each `(*`", lossless=True)
+        return Repair([], token.start, token.end + 1, "`*)` without `(*`", "a comment is closed once for each `(*`",
+                      lossless=True)
     start = text.rfind("\n", 0, before.start) + 1
     line = text[start:text.find("\n", start) if "\n" in text[start:] else len(text)]
     if anchor(automaton.states).symbol != "ended_list" or not line.lstrip().startswith("--"):
@@ -88,46 +89,46 @@ def comment_signs(automaton: Automaton, token: Token, following: list[Token]) ->
     while token.start < start + len(line) and token.type != "$END":
         token = automaton.next()
     at = start + len(line) - len(line.lstrip())
-    return Mend([token], at, at + 2, "`--` begins no comment", "a comment begins with // or stands in (* *)", cut=True,
-                silent=start + len(line), lossless=True)
+    return Repair([token], at, at + 2, "`--` begins no comment", "a comment begins with // or stands in (* *)", cut=True,
+                  silent=start + len(line), lossless=True)
 
 
-def until(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def until(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`REPEAT .. END_REPEAT` without a condition"""
     open_ = frames(automaton.states, automaton.values)
     if token.type != "END_REPEAT" or not open_ or open_[-1].word.type != "REPEAT" or not advance(automaton.states, "UNTIL"):
         return None
     at = token.start, token.start
-    return Mend([Token("UNTIL", "UNTIL", *at), Token("TRUE", "TRUE", *at), token], token.start, token.end,
-                "UNTIL and its condition are missing in front of END_REPEAT", "write UNTIL done END_REPEAT;", lossless=False)
+    return Repair([Token("UNTIL", "UNTIL", *at), Token("TRUE", "TRUE", *at), token], token.start, token.end,
+                  "UNTIL and its condition are missing in front of END_REPEAT", "write UNTIL done END_REPEAT;", lossless=False)
 
 
-def colon_behind(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def colon_behind(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`ELSE: ..`, `VAR: ..`, `PROGRAM Main: ..`, `IF a: ..`"""
     before, open_ = automaton.before, frames(automaton.states, automaton.values)
     if token.type != "COLON":
         return None
     text, here = before.text.upper(), (token.start, token.end)
     if before.type == "ELSE":
-        return Mend([], *here, "`:` behind ELSE", "ELSE is no label: it has no `:`", lossless=True)
+        return Repair([], *here, "`:` behind ELSE", "ELSE is no label: it has no `:`", lossless=True)
     if before.type in ("VAR", "VAR_GLOBAL") and len(following) > 2 and following[2].type not in ("COLON", "COMMA", "AT"):
         return None
     if before.type in ("VAR", "VAR_GLOBAL", "THEN", "DO", "OF", "REPEAT"):
-        return Mend([], *here, f"`:` behind {text}", "leave it out", lossless=True)
+        return Repair([], *here, f"`:` behind {text}", "leave it out", lossless=True)
     word = open_[-1].word if open_ else before
     if word.type in ("PROGRAM", "FUNCTION_BLOCK") and not automaton.text[word.end:before.start].strip():
-        return Mend([], *here, f"`:` behind the name of a {word.type}", "leave it out", lossless=True)
+        return Repair([], *here, f"`:` behind the name of a {word.type}", "leave it out", lossless=True)
     for kind in ("THEN", "DO"):
         if advance(automaton.states, kind) and advance(automaton.states, "COLON") is None:
-            return Mend([Token(kind, kind, *here)], *here, f"`{kind}` expected, but `:` found",
-                        "blocks are written IF .. THEN .. END_IF and FOR .. DO .. END_FOR", lossless=True)
+            return Repair([Token(kind, kind, *here)], *here, f"`{kind}` expected, but `:` found",
+                          "blocks are written IF .. THEN .. END_IF and FOR .. DO .. END_FOR", lossless=True)
     return None
 
 
-def statement_as_value(automaton: Automaton, token: Token, following: list[Token]) -> Mend | None:
+def statement_as_value(automaton: Automaton, token: Token, following: list[Token]) -> Repair | None:
     """`x := IF a THEN 1 ELSE 2;`"""
     if token.type not in ("IF", "CASE") or not advance(automaton.states, "NUMBER") or automaton.before.type != "ASSIGN":
         return None
     rest = _behind(automaton, automaton.next(), ";")
-    return Mend(rest, token.start, token.end, f"{token.type} is a statement and has no value",
-                "SEL(condition, if_false, if_true) has one", cut=True, lossless=False)
+    return Repair(rest, token.start, token.end, f"{token.type} is a statement and has no value",
+                  "SEL(condition, if_false, if_true) has one", cut=True, lossless=False)

@@ -1,6 +1,8 @@
-"""The words of syntax errors: what is expected at a place, what was found, and what helps."""
+"""The wording of syntax errors: what is expected at a place, what was found, and a hint."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 from fbvm.syntax.st.lexer import Token, lexis
 from fbvm.syntax.st.tables import tables
@@ -21,35 +23,36 @@ GROUPS = (
     ("a name", {"NAME"}, {"NAME", "POU_MODIFIER", "QUALIFIER", "AT"}),
     ("an address such as D100, CIO 1519.03 or %MW10", {"LOCATION"}, {"LOCATION"}),
 )
-"""Phrase, the terminals that give it away, and all those that it stands for."""
+"""The name of a group of terminals, the terminals that must all be expected for the name to be used, and the group."""
 
 CONTINUATIONS = {
     "PLUS", "MINUS", "STAR", "SLASH", "MOD", "POWER", "AND", "AMPERSAND", "AND_THEN", "OR", "OR_ELSE", "XOR", "EQUAL",
     "UNEQUAL", "LESS", "GREATER", "LESS_EQUAL", "GREATER_EQUAL", "DOT", "PART", "CARET", "LSQB"}
-"""What may always follow an operand, and is nobody's news."""
+"""Terminals that may follow any operand, and are not worth a mention."""
 
 STATEMENTS = {"IF", "CASE", "FOR", "WHILE", "REPEAT", "DIRECT"}
-"""With these and names statements begin."""
+"""Terminals besides names with which a statement begins."""
 
 LABEL_SIGNS = {"COLON", "COMMA", "RANGE", "SET_ASSIGN", "ATTEMPT"}
 """What may follow a name at the start of a statement, beside `:=`, `(` and `;`."""
 
 UNSAID = {"REFUSED_SECTION", "REFUSED_BLOCK", "TRY", "ACCESS", "INHERITANCE", "POU_MODIFIER", "SELF", "JMP", "QUALIFIER", "EDGE",
           "OVERLAP", "ACTION", "DIRECTION", "STEP", "TRANSITION"}
-"""What may stand there and would be refused, or is seldom meant."""
+"""Terminals that are allowed and never mentioned: they would be refused later, or are seldom meant."""
 
 FIRST = ("SEMICOLON", "THEN", "DO", "OF", "TO", "ASSIGN", "COLON", "COMMA", "RPAR", "RSQB")
-"""Order of the signs in a message; others follow by their names."""
+"""Terminals that a message names first, in this order; others follow in the order of their names."""
 
 SHOWN = 4
+"""Most terminals that a message names."""
 
 MEANT = {
     "STEP": ("BY", "the step of a loop stands behind BY"),
     "DOWNTO": ("TO", "write TO, and BY -1"),
     "IN": ("ASSIGN", "write FOR i := 0 TO 9 DO"),
 }
-"""Words of other languages -> ours, and advice."""
-SLIPS = (
+"""Word of another language -> the terminal that is meant, and advice."""
+CONFUSED = (
     ("TO", "ASSIGN", "the variable of a loop takes its first value with `:=`"),
     ("RANGE", "TO", "the last value of a loop stands behind TO"),
     ("OUTPUT", "ASSIGN", "`:` stands behind a label of CASE, `:=` assigns"),
@@ -62,15 +65,16 @@ SLIPS = (
     ("CARET", "POWER", "a power is written 2 ** 3"),
     ("DO", "FOR", "a loop that tests at its end is REPEAT .. UNTIL condition END_REPEAT"),
 )
-"""What stands where something else is expected, and advice; the first row that fits counts."""
+"""A terminal that is found, the terminal that is expected there, and advice; the first row that fits counts."""
 OPENING = {"THEN": ("IF", "IF"), "DO": ("FOR", "FOR or WHILE"), "OF": ("CASE", "CASE"), "BY": ("FOR", "FOR")}
-"""Words in the middle of a statement -> the word that shows that one begins here, and what stands in front of them."""
+"""Word in the middle of a statement -> a terminal that is expected only where a statement begins, and the words that the
+word belongs to."""
 MIDDLE = {"THEN", "DO", "OF", "TO", "BY", "AND", "OR", "XOR", "MOD"}
-"""Reserved words that nobody takes for a name."""
+"""Reserved words that are hardly ever meant as a name."""
 
 
 def sign(kind: str) -> str:
-    """How a terminal is written."""
+    """How a terminal is written in a program."""
     for terminal in tables("st").terminals:
         if terminal.name == kind:
             return terminal.pattern if terminal.literal else kind
@@ -78,12 +82,12 @@ def sign(kind: str) -> str:
 
 
 def quoted(kind: str) -> str:
-    """A terminal in a message."""
+    """How a terminal is written in a message."""
     return sign(kind) if kind == "$END" else f"`{sign(kind)}`"
 
 
 def wanted(kinds: set[str]) -> str:
-    """What is expected, in the user's words; "" if everything is."""
+    """The part of a message that says what is expected; "" if nothing of `kinds` is worth a mention."""
     rest = set(kinds) - UNSAID
     if {"NAME", "SEMICOLON"} <= rest and rest & {"END_VAR", "END_TYPE", "END_STRUCT", "END_UNION"}:
         rest -= {"SEMICOLON"}  # one too many is taken, and seldom meant
@@ -95,9 +99,9 @@ def wanted(kinds: set[str]) -> str:
             rest -= {"LPAR"}
     rest = rest - CONTINUATIONS or rest
     parts = []
-    for phrase, marks, members in GROUPS:
+    for name, marks, members in GROUPS:
         if marks <= rest:
-            parts.append(phrase)
+            parts.append(name)
             rest -= members
             break
     signs = [kind for kind in FIRST if kind in rest] + sorted(rest - set(FIRST))
@@ -110,7 +114,7 @@ def wanted(kinds: set[str]) -> str:
 
 
 def found(token: Token) -> str:
-    """The token that stands there."""
+    """The part of a message that says which token was found."""
     if token.type == "$END":
         return "the end of the text"
     text = token.text if len(token.text) <= 40 else token.text[:37] + "..."
@@ -132,19 +136,44 @@ def hint(token: Token, kinds: set[str]) -> str:
     ours, advice = MEANT.get(token.text.upper(), ("", ""))
     if ours in kinds:
         return advice
-    for found_kind, wanted_kind, advice in SLIPS:
+    for found_kind, wanted_kind, advice in CONFUSED:
         if token.type == found_kind and wanted_kind in kinds:
             return advice
-    if token.type == "ASSIGN" and "COLON" in kinds and "NUMBER" not in kinds:
-        return "a declaration has a type, and then its value: `x : INT := 5;`"
-    if {"FUNCTION", "TYPE"} <= kinds and (token.type == "NAME" or "FOR" in kinds or token.type in STATEMENTS):
-        return "statements stand in a POU: PROGRAM Main .. END_PROGRAM"
-    if token.type in ("STRUCT", "UNION") and {"FUNCTION", "TYPE"} <= kinds:
-        return f"write TYPE Name : {token.type} .. END_{token.type} END_TYPE"
-    if token.type in lexis().reserved - MIDDLE and "NAME" in kinds and "IF" not in kinds and token.type[:4] != "END_":
-        return f"{token.text} is a reserved word and cannot be a name"
-    if (token.type in ("RSQB", "COLON", "COMMA") and "RANGE" in kinds and "COMMA" not in kinds) or kinds == {"LSQB"}:
-        return "an array is written ARRAY [0..9] OF INT"
-    if token.type == "PART" and "NUMBER" in kinds:
-        return "a number has digits in front of its point, as 0.5"
-    return ""
+    return next((advice(token) for applies, advice in _ADVICE if applies(token, kinds)), "")
+
+
+def _begins_type_or_value(token: Token, kinds: set[str]) -> bool:
+    return token.type == "ASSIGN" and "COLON" in kinds and "NUMBER" not in kinds
+
+
+def _begins_statement_outside(token: Token, kinds: set[str]) -> bool:
+    return {"FUNCTION", "TYPE"} <= kinds and (token.type == "NAME" or "FOR" in kinds or token.type in STATEMENTS)
+
+
+def _begins_structure_outside(token: Token, kinds: set[str]) -> bool:
+    return token.type in ("STRUCT", "UNION") and {"FUNCTION", "TYPE"} <= kinds
+
+
+def _is_reserved_as_name(token: Token, kinds: set[str]) -> bool:
+    is_word = token.type in lexis().reserved - MIDDLE and token.type[:4] != "END_"
+    return is_word and "NAME" in kinds and "IF" not in kinds
+
+
+def _is_in_array_type(token: Token, kinds: set[str]) -> bool:
+    is_bound = token.type in ("RSQB", "COLON", "COMMA") and "RANGE" in kinds and "COMMA" not in kinds
+    return is_bound or kinds == {"LSQB"}
+
+
+def _is_number_without_digits(token: Token, kinds: set[str]) -> bool:
+    return token.type == "PART" and "NUMBER" in kinds
+
+
+_ADVICE: tuple[tuple[Callable[[Token, set[str]], bool], Callable[[Token], str]], ...] = (
+    (_begins_type_or_value, lambda token: "a declaration has a type, and then its value: `x : INT := 5;`"),
+    (_begins_statement_outside, lambda token: "statements stand in a POU: PROGRAM Main .. END_PROGRAM"),
+    (_begins_structure_outside, lambda token: f"write TYPE Name : {token.type} .. END_{token.type} END_TYPE"),
+    (_is_reserved_as_name, lambda token: f"{token.text} is a reserved word and cannot be a name"),
+    (_is_in_array_type, lambda token: "an array is written ARRAY [0..9] OF INT"),
+    (_is_number_without_digits, lambda token: "a number has digits in front of its point, as 0.5"),
+)
+"""When an advice applies, given the token and what is expected in its place, and its text; the first that applies counts."""

@@ -1,13 +1,14 @@
-"""The charts of one POU: that of its body, and those that actions have."""
+"""The charts of one POU: the chart of its body, and the charts of its actions."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from fbvm.base.types import fold
+from fbvm.syntax.sfc.context import action_flags
 from fbvm.syntax.sfc.elements import Part, SfcElements
 from fbvm.syntax.sfc.flags import declared
-from fbvm.syntax.sfc.lowering import Evolution, action_flags
+from fbvm.syntax.sfc.lowering import ChartLowering
 from fbvm.syntax.sfc.rules import sound
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.tree import Action, Block, VarSection
@@ -16,8 +17,10 @@ from fbvm.syntax.tree.sfc import Sfc, Step, Transition
 
 
 class Charts:
-    """Makes statements of charts.  `sections` fill with what they declare; `actions` are those of the POU, with statements
-    in place of their charts."""
+    """Puts the nodes of charts in place of their elements.
+
+    `sections` grows by the variables that the charts need; `actions` are the actions of the POU, each with its chart as
+    its body."""
 
     def __init__(self, builder: SfcElements, actions: list[Action], sections: Sequence[VarSection]) -> None:
         self.builder = builder
@@ -25,10 +28,10 @@ class Charts:
         self.actions = actions
         self.sections: list[VarSection] = []
         self._users: dict[str, Action | None] = {}
-        """Folded names of actions, and in whose chart they are named: None is the body's."""
+        """By folded name of an action, the action whose chart has an association with it; None for the chart of the body."""
 
     def body(self, word: Token, body: Block, elements: Sequence[Action | Part]) -> Block:
-        """The body of the POU, which is a chart if it has steps."""
+        """The body of the POU that begins with `word`: the chart if the POU has steps, else `body` as it is."""
         parts = [part for part in elements if isinstance(part, Step | Transition)]
         charted, self.builder.charted = self.builder.charted, {}
         if not parts and not charted:
@@ -53,7 +56,7 @@ class Charts:
                                 f"what is to be executed in every scan belongs {where}")
 
     def _chart(self, parts: Sequence[Part], start: int, end: int, action: Action | None) -> Sfc:
-        """A chart; one whose text has errors is not looked at as a whole."""
+        """The node of a chart.  The rules for whole charts are checked only if its text has no errors."""
         steps = [part for part in parts if isinstance(part, Step)]
         transitions = [part for part in parts if isinstance(part, Transition)]
         told = self.builder.diagnostics
@@ -63,6 +66,6 @@ class Charts:
             name = association.action
             if self._users.setdefault(fold(name.text), action) is not action:
                 self.builder.report("S0112", name.start, name.end, f"{name.text} is an action of another chart of this POU", "")
-        made = Evolution(self.builder, steps, transitions, self.actions, action, self.flags).sfc(start, end, good)
+        made = ChartLowering(self.builder, steps, transitions, self.actions, action, self.flags).sfc(start, end, good)
         self.sections += made.sections
         return made

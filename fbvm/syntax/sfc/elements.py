@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from fbvm.base.diagnostics import Source
+from fbvm.syntax.st.declarations import Declarations
 from fbvm.syntax.st.lexer import Token
-from fbvm.syntax.st.statements import Items, Statements
+from fbvm.syntax.st.statements import Items
 from fbvm.syntax.tree import Action, Block, Call, CallStatement, Expr, Name, NameRef
 from fbvm.syntax.tree.sfc import QUALIFIERS, Association, Step, Transition
 
 Part = Step | Transition
 
 
-class SfcElements(Statements):
+class SfcElements(Declarations):
     """The functions of the rules of steps and transitions."""
 
     def __init__(self, source: Source) -> None:
         super().__init__(source)
         self.charted: dict[Action, list[Part]] = {}
-        """Actions of the POU that is being read whose body is a chart of its own, which needs to know all actions."""
+        """Actions of the POU that is being read whose bodies are charts, with the elements of these.  Charts are lowered when
+        the POU is complete, since they need to know all its actions."""
 
     def step(self, word: Token, token: Token, colon: Token, associations: list[Association], end: Token) -> Step:
-        self.refuse_selves()
+        self.refuse_self_references()
         return Step(word.start, end.end, self.declared(token), word.text.upper() == "INITIAL_STEP", tuple(associations))
 
     def association(self, token: Token, opener: Token | None, given: list[Expr] | None, closer: Token | None,
@@ -60,7 +62,7 @@ class SfcElements(Statements):
 
     def _transition(self, word: Token, token: Token | None, priority: int | None, sources: list[Name],
                     targets: list[Name], condition: Expr, body: Block | None, end: Token) -> Transition:
-        self.refuse_selves()
+        self.refuse_self_references()
         return Transition(word.start, end.end, self.declared(token) if token else None, priority, tuple(sources),
                           tuple(targets), condition, body)
 

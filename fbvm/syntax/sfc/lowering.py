@@ -1,11 +1,12 @@
 """Steps and transitions to statements: what one call of a chart does (IEC 61131-3, 6.7.5 and 6.7.6).
 
-In this order: times of active steps; conditions of the transitions that are enabled, on the steps as the call found them;
-all that fire, at once; the control of every action; BOOL variables that are actions; the ACTIONs that are to run.  A step
-is active for one call at least.  The first call activates the initial steps and tests no transition.
+A call does in this order: it updates the times of active steps; tests the transitions that were enabled when the call began;
+fires all whose conditions are TRUE, at once; calls the control of every action; assigns the BOOL variables that are
+actions; runs the ACTIONs that are active.  A step is active for one call at least.  The first call activates the initial
+steps and tests no transition.
 
-Statements without extent in the text are those that nobody wrote: who looks statement by statement is not shown them.  What
-is shown is the chart, where it begins; each transition that is tested; the step behind it, if it fires; what actions do.
+Stepping and tracing stop at statements that have an extent in the text: the chart, where it begins; each transition that is
+tested; the step that follows a transition that fires; the statements of actions.
 """
 
 from __future__ import annotations
@@ -14,157 +15,143 @@ from collections.abc import Iterable, Sequence
 
 from fbvm.base.types import fold
 from fbvm.syntax import tree
-from fbvm.syntax.sfc.flags import steered
+from fbvm.syntax.sfc.context import ACTION_FLAGS, Associations, ChartContext, flags_variable
+from fbvm.syntax.sfc.flags import with_flags
 from fbvm.syntax.st.expressions import Expressions
-from fbvm.syntax.st.lexer import Token
-from fbvm.syntax.tree import Expr, Name, NameRef, Statement, VarDecl, VarSection
+from fbvm.syntax.tree import Expr, Name, NameRef, Statement, VarSection
 from fbvm.syntax.tree.ladder import Element
 from fbvm.syntax.tree.node import walk
 from fbvm.syntax.tree.sfc import Association, Sfc, Step, Transition
 
-CONTROL = "SFC_ACTION_CONTROL"
-"""The block that decides when an action is executed, in `fblib/iec` and, where a dialect has another answer, there."""
 STEP_FLAGS = (("X", "BOOL"), ("T", "TIME"))
-ACTION_FLAGS = (("Q", "BOOL"), ("A", "BOOL"))
+"""The flags of a step, with their types."""
 PULSES = ("P", "P0", "P1")
-Used = list[tuple[Step, Association]]
+"""Qualifiers of actions that are executed when a step is entered or left."""
 
 
-class Evolution:
-    """Writes the statements of one chart.  They are placed `at` the element that they come from."""
+class ChartLowering(ChartContext):
+    """Writes the statements of one chart."""
 
     def __init__(self, builder: Expressions, steps: Sequence[Step], transitions: Sequence[Transition],
                  actions: Iterable[tree.Action], inside: tree.Action | None, flags: frozenset[str] = frozenset()) -> None:
-        """`inside` is the action that the chart is the body of; `flags` are those of CODESYS that the POU declares."""
-        self.builder = builder
-        self.steps = steps
+        """As ChartContext, with the transitions of the chart."""
+        super().__init__(builder, steps, actions, inside, flags)
         self.transitions = transitions
-        self.actions = {fold(action.name.text): action for action in actions}
         self.named = {fold(step.name.text): step for step in steps}
-        self.inside = inside.name.text if inside is not None else "chart"
-        self.flags = flags if inside is None else frozenset()
         self.is_called_often = inside is not None
-        self.at = self.start = self.end = 0
-        self.shown: dict[str, str] = {}
-        """Names of actions as they are written first."""
-        self.kept: dict[str, VarDecl] = {}
-        self.temporaries: dict[str, VarDecl] = {}
 
     def sfc(self, start: int, end: int, sound: bool) -> Sfc:
-        """The chart with its statements; one that is not `sound` has none."""
-        used = self._used()
-        self.start, self.end = start, end
+        """The node of the chart that stands from `start` to `end`; a chart that is not `sound` has no statements."""
+        used = self._associations()
         self.at = start
         body: tree.Block = () if not sound else (
-            *self._fresh(), self._begun_or_evolved(), *map(self._commit, self.steps),
-            *self._controls(used), *self.variables(used),
+            *self._clear_transients(), self._begin_or_proceed(), *map(self._activate, self.steps),
+            *self._call_controls(used), *self.assign_variables(used),
             *(statement for name, action in self.actions.items() if name in used for statement in self._run(action)))
         if sound and self.flags:
             self.at = start
-            body = steered(self, body, used)
-        sections = (self._section("VAR", [_flags(step.name, STEP_FLAGS) for step in self.steps], "step"),
-                    self._section("VAR", list(self.kept.values())), self._section("VAR_TEMP", list(self.temporaries.values())))
+            body = with_flags(self, body, used)
+        flags = [flags_variable(step.name, STEP_FLAGS) for step in self.steps]
+        declared = (("VAR", flags, "step"), ("VAR", self.kept.values(), ""), ("VAR_TEMP", self.temporaries.values(), ""))
+        sections = tuple(VarSection(start, end, kind, (), tuple(variables), True, role) for kind, variables, role in declared)
         return Sfc(start, end, tuple(self.steps), tuple(self.transitions), body, sections)
 
-    def _used(self) -> dict[str, Used]:
-        """The associations of each action, actions in the order of their first one."""
-        used: dict[str, Used] = {}
+    def _associations(self) -> dict[str, Associations]:
+        """By folded name of each action, its associations; actions in the order of their first association."""
+        used: dict[str, Associations] = {}
         for step in self.steps:
             for association in step.associations:
                 used.setdefault(fold(association.action.text), []).append((step, association))
         return used
 
-    # --- steps and transitions --------------------------------------------------------------------------------------
+    # --- steps and transitions ---
 
-    def _fresh(self) -> Iterable[Statement]:
-        """In an action, which may be called several times in one call of its POU: nothing is entered or left yet."""
+    def _clear_transients(self) -> Iterable[Statement]:
+        """Set back which steps were entered and left, if the chart is the body of an action: it may be called several times in
+        one call of its POU, during which temporaries keep their values."""
         if self.is_called_often:
             for step in self.steps:
-                yield from (self.put(self._entered(step), False), self.put(self.left(step), False))
+                yield from (self.put(self.entered(step), False), self.put(self.exited(step), False))
 
-    @property
-    def begun(self) -> NameRef:
-        """Whether the initial steps were activated."""
-        return self._keep(f"${self.inside} begun", "BOOL")
-
-    def _begun_or_evolved(self) -> Statement:
+    def _begin_or_proceed(self) -> Statement:
         begun = self.begun
-        evolved = (*map(self._time, self.steps), *self._tested())
-        first = (self.put(begun, True), *(self.put(self._entered(s), True) for s in self.steps if s.initial))
-        return self.when(begun, evolved, first)
+        proceed = (*map(self._update_time, self.steps), *self._test_all())
+        first = (self.put(begun, True), *(self.put(self.entered(s), True) for s in self.steps if s.initial))
+        return self.when(begun, proceed, first)
 
-    def _time(self, step: Step) -> Statement:
+    def _update_time(self, step: Step) -> Statement:
         self.at = step.start
-        passed = self._binary("-", self._now(), self._since(step))
+        passed = self.binary("-", self.now(), self.since(step))
         return self.when(self.flag(step.name, "X"), (self.assign(self.flag(step.name, "T"), passed),))
 
-    def _tested(self) -> list[Statement]:
-        """The transitions, those first that go first where several are enabled by one step."""
+    def _test_all(self) -> list[Statement]:
+        """Test the transitions by priority, so that of several that leave one step the first whose condition is TRUE fires."""
         order = sorted(self.transitions, key=lambda t: (t.priority is None, t.priority or 0))
         taken: set[str] = set()
         made = []
         for transition in order:
-            made.append(self._transition(transition, taken))
+            made.append(self._test(transition, taken))
             taken.update(fold(name.text) for name in transition.sources)
         return made
 
-    def _transition(self, transition: Transition, taken: set[str]) -> Statement:
-        """Test a transition if it is enabled: if all steps before it are active, and none is left by another one."""
+    def _test(self, transition: Transition, taken: set[str]) -> Statement:
+        """Test a transition if it is enabled: if all its source steps are active and no transition tested before leaves one of
+        them.  `taken` are folded names of steps that transitions tested before leave."""
         self.at = transition.start
         steps = [self.named[fold(name.text)] for name in transition.sources]
         enabled = [self.flag(step.name, "X") for step in steps]
-        enabled += [self.negated(self.left(step)) for step in steps if fold(step.name.text) in taken]
+        enabled += [self.negated(self.exited(step)) for step in steps if fold(step.name.text) in taken]
         seen = Element(self.at, transition.end, self.transitions.index(transition), transition.condition)
-        first, *others = (self._entered(self.named[fold(name.text)]) for name in transition.targets)
+        first, *others = (self.entered(self.named[fold(name.text)]) for name in transition.targets)
         begin = tree.Assign(transition.targets[0].start, transition.targets[0].end, (first,), ":=", self.truth(True))
-        fires = (begin, *(self.put(step, True) for step in (*others, *map(self.left, steps))))
-        tested = tree.If(transition.start, transition.end, ((seen, fires),), tuple(self._waits(transition)) or None)
+        fires = (begin, *(self.put(step, True) for step in (*others, *map(self.exited, steps))))
+        tested = tree.If(transition.start, transition.end, ((seen, fires),), tuple(self._wake_for_condition(transition)) or None)
         if transition.body is not None and transition.name is not None:
-            self._temporary(transition.name.text)
-        return self.when(self._all(enabled), (*(transition.body or ()), tested))
+            self.temporary(transition.name.text)
+        return self.when(self.join("AND", enabled), (*(transition.body or ()), tested))
 
-    def _waits(self, transition: Transition) -> Iterable[Statement]:
-        """For `step.T >= duration`: when that may become true by itself."""
+    def _wake_for_condition(self, transition: Transition) -> Iterable[Statement]:
+        """For `step.T >= duration` in a condition: ask for a scan when that becomes TRUE by the passing of time."""
         for node in walk(transition.condition):
             if isinstance(node, tree.Binary) and node.op in (">", ">=") and isinstance(node.right, tree.Literal | NameRef) \
                     and isinstance(node.left, tree.Member) and isinstance(node.left.of, NameRef) \
                     and fold(node.left.name.text) == "T" and fold(node.left.of.text) in self.named:
-                yield self._due(self.named[fold(node.left.of.text)], node.right)
+                yield self.wake_at(self.named[fold(node.left.of.text)], node.right)
 
-    def _commit(self, step: Step) -> Statement:
-        """Enter or leave a step; one that is left and entered at once begins anew."""
+    def _activate(self, step: Step) -> Statement:
+        """Activate or deactivate a step by the transitions that have fired; one that is left and entered at once begins anew."""
         self.at = step.start
         active = self.flag(step.name, "X")
-        enter = (self.put(active, True), self.assign(self.flag(step.name, "T"), self._duration()),
-                 self.assign(self._since(step), self._now()))
-        branches = (self._entered(step), enter), (self.left(step), (self.put(active, False),))
+        enter = (self.put(active, True), self.assign(self.flag(step.name, "T"), self.no_time()),
+                 self.assign(self.since(step), self.now()))
+        branches = (self.entered(step), enter), (self.exited(step), (self.put(active, False),))
         return tree.If(self.at, self.at, branches, None)
 
-    # --- actions ----------------------------------------------------------------------------------------------------
+    # --- actions ---
 
-    def _controls(self, used: dict[str, Used]) -> Iterable[Statement]:
+    def _call_controls(self, used: dict[str, Associations]) -> Iterable[Statement]:
         for name, pairs in used.items():
             self.at = pairs[0][1].start
-            yield from self._dues(pairs)
-            inputs = self._inputs(pairs, name in self.actions)
+            yield from self._wake_for_actions(pairs)
+            inputs = self._control_inputs(pairs, name in self.actions)
             arguments = tuple(tree.Argument(self.at, self.at, ":=", Name(self.at, self.at, pin), value)
                               for pin, value in inputs.items())
-            control = self._control(pairs[0][1].action)
+            control = self.control(pairs[0][1].action)
             yield tree.CallStatement(self.at, self.at, tree.Call(self.at, self.at, control, arguments))
 
-    def _inputs(self, pairs: Used, coded: bool) -> dict[str, Expr]:
-        """What enters the control of an action.  L and D are N while their time says so; for a variable each pulse is one
-        call long."""
+    def _control_inputs(self, pairs: Associations, coded: bool) -> dict[str, Expr]:
+        """The inputs of the control of an action, by pin.  L and D go to the pin N, as long as the time of the step allows;
+        for a BOOL variable (not `coded`), P0 and P1 go to the pin P: each pulse lasts one call."""
         wanted: dict[str, list[Expr]] = {}
         times: dict[str, list[tuple[Expr, Expr]]] = {}
         for step, association in pairs:
             self.at = association.start
             qualifier, time = association.qualifier, association.time
             pin = {"L": "N", "D": "N"}.get(qualifier, qualifier if coded or qualifier not in PULSES else "P")
-            wanted.setdefault(pin, []).append(self._term(step, association))
+            wanted.setdefault(pin, []).append(self._contribution(step, association))
             if time is not None and qualifier in ("SD", "SL"):
                 times.setdefault(f"{pin}_T", []).append((self.flag(step.name, "X"), time))
-        inputs = {pin: self.joined("OR", terms) for pin, terms in wanted.items()}
+        inputs = {pin: self.join("OR", terms) for pin, terms in wanted.items()}
         for pin, choices in times.items():
             *rest, (_, value) = choices
             for active, time in reversed(rest):
@@ -172,139 +159,27 @@ class Evolution:
             inputs[pin] = value
         return inputs
 
-    def _term(self, step: Step, association: Association) -> Expr:
-        """What one association contributes."""
+    def _contribution(self, step: Step, association: Association) -> Expr:
+        """The expression that one association contributes to its pin."""
         qualifier, time = association.qualifier, association.time
         if qualifier in PULSES:
-            return self.left(step) if qualifier == "P0" else self._entered(step)
+            return self.exited(step) if qualifier == "P0" else self.entered(step)
         active = self.flag(step.name, "X")
         if qualifier not in ("L", "D", "DS") or time is None:
             return active
-        return self._all([active, self._binary("<" if qualifier == "L" else ">=", self.flag(step.name, "T"), time)])
+        return self.join("AND", [active, self.binary("<" if qualifier == "L" else ">=", self.flag(step.name, "T"), time)])
 
-    def _dues(self, pairs: Used) -> Iterable[Statement]:
-        """When L, D and DS change by themselves."""
+    def _wake_for_actions(self, pairs: Associations) -> Iterable[Statement]:
+        """Ask for a scan when an L, D or DS changes by the passing of time."""
         for step, association in pairs:
             if association.time is not None and association.qualifier in ("L", "D", "DS"):
                 self.at = association.start
-                waits = self._binary("<", self.flag(step.name, "T"), association.time)
-                yield self.when(self._all([self.flag(step.name, "X"), waits]), (self._due(step, association.time),))
-
-    def begin_again(self, used: Used) -> Iterable[Statement]:
-        """Let go of an action, whatever was stored of it."""
-        name = used[0][1].action
-        held = tree.Argument(self.at, self.at, ":=", Name(self.at, self.at, "R"), self.truth(True))
-        yield tree.CallStatement(self.at, self.at, tree.Call(self.at, self.at, self._control(name), (held,)))
-        yield self.put(self._member(self._control(name), "R"), False)
-        if fold(name.text) in self.actions:
-            yield from (self.put(self.flag(name, flag), False) for flag, _ in ACTION_FLAGS)
-
-    def variables(self, used: dict[str, Used]) -> Iterable[Statement]:
-        for name, pairs in used.items():
-            if name not in self.actions:
-                action = pairs[0][1].action
-                self.at = action.start
-                yield self.assign(NameRef(action.start, action.end, action.text), self._member(self._control(action), "Q"))
+                waits = self.binary("<", self.flag(step.name, "T"), association.time)
+                yield self.when(self.join("AND", [self.flag(step.name, "X"), waits]), (self.wake_at(step, association.time),))
 
     def _run(self, action: tree.Action) -> Iterable[Statement]:
         self.at = action.start
         for flag, _ in ACTION_FLAGS:
-            yield self.assign(self.flag(action.name, flag), self._member(self._control(action.name), flag))
+            yield self.assign(self.flag(action.name, flag), self.member(self.control(action.name), flag))
         call = tree.CallStatement(self.at, self.at, tree.Call(self.at, self.at, self.name(action.name.text), ()))
         yield self.when(self.flag(action.name, "A"), (call,))
-
-    # --- variables --------------------------------------------------------------------------------------------------
-
-    def _section(self, kind: str, variables: list[VarDecl], role: str = "") -> VarSection:
-        return VarSection(self.start, self.end, kind, (), tuple(variables), True, role)
-
-    def _keep(self, name: str, kind: str) -> NameRef:
-        if name not in self.kept:
-            self.kept[name] = _declared(Name(self.at, self.at, name), kind)
-        return self.name(name)
-
-    def _temporary(self, name: str) -> NameRef:
-        if name not in self.temporaries:
-            self.temporaries[name] = _declared(Name(self.at, self.at, name), "BOOL")
-        return self.name(name)
-
-    def _since(self, step: Step) -> NameRef:
-        return self._keep(f"${step.name.text} since", "TIME")
-
-    def _entered(self, step: Step) -> NameRef:
-        return self._temporary(f"${step.name.text} entered")
-
-    def left(self, step: Step) -> NameRef:
-        return self._temporary(f"${step.name.text} left")
-
-    def _control(self, action: Name) -> NameRef:
-        return self._keep(f"${self.shown.setdefault(fold(action.text), action.text)} control", CONTROL)
-
-    # --- statements and expressions ---------------------------------------------------------------------------------
-
-    def name(self, text: str) -> NameRef:
-        return NameRef(self.at, self.at, text)
-
-    def _member(self, of: Expr, name: str) -> Expr:
-        return tree.Member(self.at, self.at, of, Name(self.at, self.at, name))
-
-    def flag(self, name: Name, flag: str) -> Expr:
-        return self._member(self.name(name.text), flag)
-
-    def when(self, condition: Expr, then: Iterable[Statement], otherwise: Iterable[Statement] = ()) -> Statement:
-        return tree.If(self.at, self.at, ((condition, tuple(then)),), tuple(otherwise) or None)
-
-    def assign(self, target: Expr, value: Expr) -> Statement:
-        return tree.Assign(self.at, self.at, (target,), ":=", value)
-
-    def put(self, target: Expr, value: bool) -> Statement:
-        return self.assign(target, self.truth(value))
-
-    def truth(self, value: bool) -> Expr:
-        return tree.Literal(self.at, self.at, "bool", value, None, "TRUE" if value else "FALSE")
-
-    def negated(self, value: Expr) -> Expr:
-        return tree.Unary(self.at, self.at, "NOT", value)
-
-    def _binary(self, operator: str, left: Expr, right: Expr) -> Expr:
-        return tree.Binary(self.at, self.at, operator, left, right, self.at)
-
-    def _all(self, parts: list[Expr]) -> Expr:
-        return self.joined("AND", parts)
-
-    def joined(self, operator: str, parts: list[Expr]) -> Expr:
-        """A tree that is no deeper than needed: a step may have hundreds of associations."""
-        if len(parts) == 1:
-            return parts[0]
-        half = len(parts) // 2
-        return self._binary(operator, self.joined(operator, parts[:half]), self.joined(operator, parts[half:]))
-
-    def _duration(self) -> Expr:
-        return self.builder.typed_literal(Token("TYPED_LITERAL", "T#0s", self.at, self.at))
-
-    def function(self, name: str, *values: Expr) -> Expr:
-        arguments = tuple(tree.Argument(value.start, value.end, "", None, value) for value in values)
-        return tree.Call(self.at, self.at, self.name(name), arguments)
-
-    def _now(self) -> Expr:
-        return self.function("TIME")
-
-    def _due(self, step: Step, after: Expr) -> Statement:
-        moment = self._binary("+", self._since(step), after)
-        return tree.CallStatement(self.at, self.at, self.function("__DUE", moment))
-
-
-def action_flags(start: int, end: int, actions: Iterable[tree.Action]) -> VarSection:
-    """The flags of all actions of a POU with charts."""
-    flags = tuple(_flags(action.name, ACTION_FLAGS) for action in actions)
-    return VarSection(start, end, "VAR", (), flags, True, "action")
-
-
-def _flags(name: Name, members: Iterable[tuple[str, str]]) -> VarDecl:
-    """The variable that has the name of a step or action."""
-    fields = tuple(_declared(Name(name.start, name.end, field), kind) for field, kind in members)
-    return VarDecl(name.start, name.end, (name,), None, tree.StructSpec(name.start, name.end, fields), None)
-
-
-def _declared(name: Name, kind: str) -> VarDecl:
-    return VarDecl(name.start, name.end, (name,), None, tree.NamedType(name.start, name.end, kind), None)

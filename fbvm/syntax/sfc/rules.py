@@ -1,6 +1,6 @@
-"""Whether steps and transitions are a chart: every name is there once, and each network has one initial step.
+"""The rules that steps and transitions must keep to be a chart: every name exists once, each network has one initial step.
 
-What is allowed and hardly meant, such as steps that nothing reaches, is told by `check/lint/sfc.py`.
+`check/lint/sfc.py` warns of what is allowed and hardly meant, such as steps that nothing reaches.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ Report = Callable[..., None]
 
 
 def sound(steps: Sequence[Step], transitions: Sequence[Transition], report: Report) -> bool:
-    """Whether the chart can be executed; what is wrong is told."""
+    """Whether the chart can be executed; reports every rule that it breaks."""
     wrong: list[bool] = []
 
     def tell(code: str, name: Name, message: str, hint: str = "") -> None:
@@ -35,7 +35,7 @@ def sound(steps: Sequence[Step], transitions: Sequence[Transition], report: Repo
 
 
 def _names(transitions: Iterable[Transition], known: dict[str, Step], tell: Callable[..., None]) -> None:
-    """Every step that a transition names is there, and is named once on each side."""
+    """Check that every step that a transition names exists, and is named once on each side."""
     for transition in transitions:
         for side, names in (("FROM", transition.sources), ("TO", transition.targets)):
             seen: set[str] = set()
@@ -50,7 +50,7 @@ def _names(transitions: Iterable[Transition], known: dict[str, Step], tell: Call
 
 
 def networks(steps: Sequence[Step], transitions: Iterable[Transition]) -> list[tuple[list[Step], list[Transition]]]:
-    """The steps and transitions that are connected, in the order of writing."""
+    """Groups of steps and transitions that are connected, each in the order of writing."""
     known = {fold(step.name.text): position for position, step in enumerate(steps)}
     number = list(range(len(steps)))
     joined = [(one, {known[fold(name.text)] for name in (*one.sources, *one.targets)}) for one in transitions]
@@ -66,7 +66,7 @@ def networks(steps: Sequence[Step], transitions: Iterable[Transition]) -> list[t
 
 
 def _initial(steps: Sequence[Step], transitions: Iterable[Transition], tell: Callable[..., None]) -> None:
-    """Each network has one initial step."""
+    """Check that each network has one initial step."""
     for connected, _ in networks(steps, transitions):
         begins = [step for step in connected if step.initial]
         for step in begins[1:]:

@@ -1,4 +1,4 @@
-"""What all builders share: reporting, lists, names.  The functions of a builder are named as the grammar's rules."""
+"""What all builders share: reporting, lists, names.  The methods of a builder are named as the grammar's rules."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.syntax.recovery.refused import refused_what
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.refused import refused_what
 from fbvm.syntax.tree import Expr, Name, Refused, Statement
 from fbvm.syntax.tree.ladder import Ladder
 
 CHAIN_LIMIT = 1000
-"""Deepest tree of one expression, in nodes; those who walk trees rely on it."""
+"""Deepest tree of one expression, in nodes; recursion over trees relies on it."""
 
 
 ERROR_LIMIT = 100
@@ -28,7 +28,7 @@ _NUMBERED = re.compile(r"%?\s*([TC]\d+)", re.I)
 
 
 class Stop(Exception):
-    """The rest of the text is not looked at."""
+    """The rest of the text is not parsed."""
 
 
 class TooDeep(Exception):
@@ -43,30 +43,30 @@ class Builder:
         self.diagnostics: list[Diagnostic] = []
         self.errors = 0
         self.odd: list[int] = []
-        """Where characters were passed over that no word begins with, and where strings without end end."""
+        """Ends of unknown characters that were passed over, and of strings without end."""
         self.unclosed: list[int] = []
-        """Where strings without end end, those with a wrong escape included."""
+        """Ends of strings without end, also of strings with a wrong escape."""
         self.cut_short = False
-        """Whether a comment or pragma without end has swallowed the rest of the text."""
+        """Whether a comment or pragma without end reaches to the end of the text."""
         self.full = False
-        """Whether so many errors were found that the rest is not worth looking at."""
-        self.selves: list[Token] = []
+        """Whether ERROR_LIMIT is reached."""
+        self.self_references: list[Token] = []
         """THIS and SUPER seen since the last statement."""
         self.ladders: list[Ladder] = []
         """LADDERs of the POU that is being read."""
         self.numbered: dict[str, str] = {}
-        """Symbols of timers and counters that are known here, in capitals, and what they are declared AT."""
+        """Symbol of a timer or counter, in capitals -> the number that it is declared AT, as T5."""
         self.numbered_everywhere: dict[str, str] = {}
-        """Those among global variables."""
+        """The same for symbols among global variables."""
         self.targets: dict[Statement, str] = {}
-        """Its JMPs, each with the label that it names."""
+        """JMPs of the POU that is being read -> the label that each names."""
         self.labels: dict[Statement, str] = {}
-        """Its labels for JMP."""
+        """Labels of the POU that is being read -> their names."""
         self.depths: dict[Expr, int] = {}
-        """Depth of the expressions under construction, where it is not 1."""
+        """Depth of expressions under construction, if it is not 1."""
 
     def note_numbered(self, names: Sequence[Name], place: str) -> None:
-        """Note whether names mean a timer or a counter in ladder: those that are declared AT one."""
+        """Note the names of a declaration AT a timer or counter as its symbols; forget those AT another `place`."""
         found = _NUMBERED.fullmatch(place)
         for name in names:
             if found:
@@ -78,7 +78,7 @@ class Builder:
         self.tell(Diagnostic(code, self.source, start, end, message, hint, lossless=lossless and code in LOSSLESS))
 
     def tell(self, diagnostic: Diagnostic) -> None:
-        """Keep a message; of errors the first ERROR_LIMIT only."""
+        """Keep a diagnostic; of errors only the first ERROR_LIMIT."""
         if diagnostic.severity == "error":
             if self.full:
                 return
@@ -92,7 +92,7 @@ class Builder:
         self.diagnostics.append(diagnostic)
 
     def forget(self, start: int, end: int) -> None:
-        """Take back what was told of a part of the text."""
+        """Remove the diagnostics of a part of the text."""
         self.diagnostics = [each for each in self.diagnostics if not start <= each.start < end]
 
     def empty(self) -> list[Any]:

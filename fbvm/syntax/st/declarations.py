@@ -1,28 +1,21 @@
-"""Builds the nodes of declarations: POUs, variables, types, configurations (grammar/declarations.lark)."""
+"""Builds the nodes of declarations of variables and of configurations (grammar/declarations.lark, 6.5, 6.8)."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fbvm.syntax.recovery.refused import refused_what
-from fbvm.syntax.sfc.elements import Part, SfcElements
 from fbvm.syntax.st.expressions import Item
-from fbvm.syntax.st.jumps import Jumps, Tangled
 from fbvm.syntax.st.lexer import Token
-from fbvm.syntax.st.statements import Items
+from fbvm.syntax.st.types import Types
 from fbvm.syntax.tree import (
     Access,
     AccessVars,
-    Action,
-    Actions,
     Argument,
     ArrayInit,
-    Block,
     BlockTask,
     Configuration,
     ConfigVar,
     ConfigVars,
-    Declaration,
     Expr,
     GlobalVars,
     Initial,
@@ -31,125 +24,21 @@ from fbvm.syntax.tree import (
     Name,
     NamedType,
     Node,
-    Pou,
     ProgramInstance,
     Refused,
-    RefusedStatement,
     Resource,
-    SourceText,
     Task,
     TypeSpec,
     VarDecl,
     VarSection,
 )
-from fbvm.syntax.tree.sfc import Step, Transition
 
-Head = tuple[Name, list[Refused]]
 Settings = AccessVars | ConfigVars
-Section = VarSection | Refused | Settings
-Element = Action | Step | Transition | Refused
 ConfigItem = VarSection | Task | ProgramInstance | Refused | Settings
 
 
-class Declarations(SfcElements):
-    """The functions of the rules of declarations."""
-
-    def source_text(self, declarations: list[Declaration]) -> SourceText:
-        return SourceText(0, len(self.source.text), tuple(declarations))
-
-    # --- POUs ---
-
-    def add_inheritance(self, refused: list[Refused], word: Token, names: list[NamedType]) -> list[Refused]:
-        what, code = refused_what(word.text)
-        refused.append(Refused(word.start, names[-1].end, what, code))
-        return refused
-
-    def pou_head(self, modifiers: list[Token], token: Token, inheritance: list[Refused]) -> Head:
-        """FINAL, PUBLIC and their like say who may extend or name a POU, and change nothing that it does."""
-        return self.declared(token), [*(self.refused(m) for m in modifiers if m.text.upper() == "ABSTRACT"), *inheritance]
-
-    def pou(self, word: Token, head: Head, sections: list[Section], items: Items, actions: list[Element],
-            end: Token) -> Pou:
-        return self.function(word, head, None, None, sections, items, actions, end)
-
-    def function(self, word: Token, head: Head, colon: Token | None, result: TypeSpec | None,
-                 sections: list[Section], items: Items, actions: list[Element], end: Token) -> Pou:
-        name, refused = head
-        accesses = [s for s in sections if isinstance(s, AccessVars) and word.type == "PROGRAM"]
-        refused += [_out_of_place(s) for s in (*sections, *actions)
-                    if s not in accesses and not isinstance(s, VarSection | Action | Step | Transition)]
-        blocks = [i for i in items if isinstance(i, RefusedStatement) and self.is_block(i)]
-        refused += [Refused(b.start, b.end, b.what, b.code) for b in blocks]
-        body = self.block([i for i in items if i not in blocks] if blocks else items)
-        self.refuse_selves()
-        declared = [s for s in sections if isinstance(s, VarSection)]
-        own = [a for a in actions if isinstance(a, Action)]
-        if self.ladders:
-            from fbvm.syntax.ladder.blocks import begin
-
-            own += [subroutine for ladder in self.ladders for subroutine in ladder.subroutines]
-            if word.type == "PROGRAM":
-                begin(self.ladders)
-            declared += self.ladder_sections(declared)
-        self.numbered = dict(self.numbered_everywhere)
-        body = self.without_jumps(body, declared)
-        if self.charted or any(isinstance(a, Step | Transition) for a in actions):
-            from fbvm.syntax.sfc.charts import Charts
-
-            charts = Charts(self, own, declared)
-            body = charts.body(word, body, [a for a in actions if not isinstance(a, Refused)])
-            own, declared = charts.actions, declared + charts.sections
-        return Pou(word.start, end.end, word.text.upper(), name, result, tuple(declared), body, tuple(refused), tuple(own),
-                   tuple(accesses))
-
-    def without_jumps(self, body: Block, declared: list[VarSection]) -> Block:
-        """The body of a POU with conditions and loops for its jumps; as it is where these cannot say the same."""
-        jumps = Jumps(self.targets, self.labels)
-        for jump in jumps.astray():
-            self.report("S0201", jump.start, jump.end, f"there is no label {self.targets[jump]} here",
-                        "write `name:` in front of the statement to go on with")
-        try:
-            made = jumps.body(body) if self.targets or self.labels else body
-        except Tangled:
-            made = body
-        else:
-            declared += [jumps.section(body)] if jumps.flags else []
-        self.targets.clear()
-        self.labels.clear()
-        return made
-
-    def ladder_sections(self, sections: list[VarSection]) -> list[VarSection]:
-        """What the LADDERs of a POU need: memory of their steps, and instances that the POU has not declared itself."""
-        from fbvm.syntax.ladder.blocks import undeclared
-
-        first, last = self.ladders[0], self.ladders[-1]
-        instances = undeclared([i for ladder in self.ladders for i in ladder.instances], sections, self.report)
-        kept = {v.names[0].text: v for ladder in self.ladders for v in ladder.variables}
-        temporaries = {v.names[0].text: v for ladder in self.ladders for v in ladder.temporaries}
-        self.ladders.clear()
-        return [VarSection(first.start, last.end, kind, (), tuple(variables), True)
-                for kind, variables in (("VAR", [*kept.values(), *instances]), ("VAR_TEMP", temporaries.values())) if variables]
-
-    def action(self, word: Token, owner: Token | None, dot: Token | None, token: Token, colon: Token | None, items: Items,
-               end: Token) -> Action:
-        body = self.block(items)
-        self.refuse_selves()
-        return Action(word.start, end.end, self.name(owner) if owner else None, self.declared(token), body)
-
-    def action_chart(self, word: Token, token: Token, colon: Token, items: Items, parts: list[Part], end: Token) -> Action:
-        made = self.action(word, None, None, token, colon, items, end)
-        self.charted[made] = parts
-        return made
-
-    def actions_of(self, word: Token, owner: Token | None, actions: list[Element], end: Token) -> Actions:
-        for part in (each for each in actions if isinstance(each, Step | Transition)):
-            self.report("S0111", part.start, part.end, "a chart stands in its POU, not in ACTIONS", "")
-        return Actions(word.start, end.end, self.name(owner) if owner else None,
-                       tuple(a for a in actions if isinstance(a, Action)), tuple(a for a in actions if isinstance(a, Refused)))
-
-    def is_block(self, statement: RefusedStatement) -> bool:
-        """Whether a refused statement is a METHOD or the like, which belongs to the POU and not to its body."""
-        return statement.what not in ("THIS", "SUPER", "JMP", "__TRY") and not statement.what.startswith("label")
+class Declarations(Types):
+    """The functions of the rules of variables and configurations."""
 
     # --- variables ---
 
@@ -271,13 +160,6 @@ def _resource(start: int, end: int, name: Name | None, processor: Name | None,
         start, end, name, processor, tuple(i for i in items if isinstance(i, VarSection)),
         tuple(i for i in items if isinstance(i, Task)), tuple(i for i in items if isinstance(i, ProgramInstance)),
         tuple(i for i in items if isinstance(i, Refused)), _settings(items))
-
-
-def _out_of_place(item: Refused | Settings) -> Refused:
-    """What a POU cannot have."""
-    if isinstance(item, Refused):
-        return item
-    return Refused(item.start, item.end, f"{'VAR_ACCESS' if isinstance(item, AccessVars) else 'VAR_CONFIG'} of a POU", "S0901")
 
 
 def _settings(items: Sequence[Node]) -> tuple[Settings, ...]:

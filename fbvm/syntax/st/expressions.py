@@ -86,7 +86,7 @@ class Expressions(Builder):
         return Direct(token.start, token.end, token.text)
 
     def self_reference(self, token: Token) -> NameRef:
-        self.selves.append(token)
+        self.self_references.append(token)
         return NameRef(token.start, token.end, token.text)
 
     def member(self, of: Expr, dot: Token, token: Token) -> Member:

@@ -1,7 +1,7 @@
-"""JMP and labels of Structured Text, written with what the standard has: conditions, and a loop for a jump back.
+"""JMP and labels of Structured Text as conditions, and as a loop for a jump back.
 
-A jump sets a variable; what it passes over is executed only while that is FALSE, and loops in between are left.
-A label takes the jump, and so sets the variable back.
+A jump sets a variable.  Statements that the jump passes over are executed only while the variable is FALSE, and loops that
+the jump leads out of are left.  The label sets the variable back.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Jumps:
         return made
 
     def astray(self) -> list[Statement]:
-        """Jumps to labels that there are not."""
+        """Jumps to labels that do not exist."""
         known = {fold(label) for label in self.labels.values()}
         return [jump for jump, label in self.targets.items() if fold(label) not in known]
 
@@ -59,7 +59,8 @@ class Jumps:
         return tree.VarSection(start, end, "VAR_TEMP", (), tuple(variables), True)
 
     def _block(self, block: Block, loop: str | None) -> tuple[Block, tuple[str, ...]]:
-        """A list of statements and the jumps that leave it; `loop` is None where the list is no body of a loop."""
+        """The statements of a list without jumps, and the labels of jumps that leave the list; `loop` is None if the list is not
+        the body of a loop."""
         return self._sequence([self._row(each) for each in block], loop)
 
     def _row(self, statement: Statement) -> Row:
@@ -80,7 +81,8 @@ class Jumps:
         return Row(_rebuilt(statement, inner), tuple(leaving))
 
     def _sequence(self, rows: list[Row], loop: str | None) -> tuple[Block, tuple[str, ...]]:
-        """Statements behind a jump are executed if it has not been taken.  `loop` names the label of a jump back, if any."""
+        """Put the statements behind a jump under the condition that it has not been taken.  In the body of a loop, `loop` is the
+        label of the jump back that makes the loop, or ""."""
         rows = self._with_loops(rows)
         made: list[Statement] = []
         group: list[Statement] = []
@@ -106,13 +108,13 @@ class Jumps:
         return (*made, *self._guarded(group, passing)), tuple(gone)
 
     def _leaves(self, at: Statement, names: list[str], loop: str) -> Iterator[Statement]:
-        """Leave the loop around for labels behind it; go on with it for its own."""
+        """Leave the loop if a jump to a label behind it was taken; continue it for its own label."""
         for name in names:
             leave = (tree.Continue if name == loop else tree.Exit)(at.start, at.end)
             yield tree.If(at.start, at.end, ((self._flag(at, name), (leave,)),), None)
 
     def _with_loops(self, rows: list[Row]) -> list[Row]:
-        """A label that is jumped back to begins a loop, up to the last of these jumps."""
+        """Rows with loops for jumps back: each from its label up to the last jump to that label.  Raises Tangled."""
         for first, row in enumerate(rows):
             last = max((at for at, later in enumerate(rows) if at > first and row.label in later.leaving), default=None) \
                 if row.label else None
@@ -152,7 +154,7 @@ class Jumps:
 
 
 def _leaves_loop(statement: Statement) -> bool:
-    """Whether it has an EXIT or CONTINUE of a loop around it."""
+    """Whether a statement contains an EXIT or CONTINUE of a loop around the statement."""
     if isinstance(statement, tree.Exit | tree.Continue):
         return True
     found: list[bool] = []
@@ -167,7 +169,7 @@ def _leaves_loop(statement: Statement) -> bool:
 
 
 def _rebuilt(node: Statement, inner: Callable[[Block], Block]) -> Statement:
-    """A statement with other blocks in it."""
+    """The statement with `inner` of each block in place of the block."""
     if isinstance(node, tree.If):
         branches = tuple((condition, inner(block)) for condition, block in node.branches)
         return changed(node, branches=branches, otherwise=None if node.otherwise is None else inner(node.otherwise))

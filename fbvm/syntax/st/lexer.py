@@ -36,8 +36,8 @@ MISSPELT = {
     "END_TRANS": "END_TRANSITION", "END_VAR_INPUT": "END_VAR", "END_VAR_OUTPUT": "END_VAR", "END_VARS": "END_VAR",
     "VARINPUT": "VAR", "VAROUTPUT": "VAR", "VARINOUT": "VAR", "FUNCTIONBLOCK": "FUNCTION_BLOCK",
     "SWITCH": "CASE", "BREAK": "EXIT", "END": "END_"}
-"""Words of other languages, and ours without their `_`: of the type MISSPELT, and names where they fit as such.  So are
-END with a space behind it, and words that begin with VAR_."""
+"""Word of another language, or of ours without its `_` -> the terminal that is meant.  These words have the type MISSPELT and
+are names where names fit; so have END with a space behind it, and words that begin with VAR_."""
 
 _END_OF = re.compile(r"(?i)[ \t]+(?:IF|CASE|FOR|WHILE|REPEAT|VAR|STRUCT|TYPE|FUNCTION|FUNCTION_BLOCK|PROGRAM|STEP|TRANSITION|"
                      r"ACTION)\b")
@@ -47,7 +47,7 @@ _END_LADDER = re.compile(r"(?im)^[ \t]*END_LADDER\b")
 
 
 def meant(text: str) -> str:
-    """The terminal that a misspelt word was to be."""
+    """The terminal that is meant by a misspelt word."""
     word = text.upper()
     if word.startswith("END") and word[3:4].isspace():
         return f"END_{word[3:].strip()}"
@@ -74,18 +74,18 @@ _SIGNS = tuple((re.compile(shape), advice) for shape, advice in (
     (r"(?<!\.)%[A-Za-z]", "an address has a number behind its letters: %QX0.0, %MW10"),
     (r"#", "a type stands in front of `#`, and no space"),
     (r"\\", "the escape in a string is `$`")))
-"""What no word begins with, and advice."""
+"""Characters with which no token begins, and a hint."""
 _WRITTEN = tuple((re.compile(row[0]), *row[1:]) for row in (
     (r"#([0-9.]+(?:[mun]s|[dhms]))\b", "TYPED_LITERAL", r"T#\1", r"`\g<0>` is no duration", r"a duration is written T#\1"),
     (r"[#$]([0-9A-Fa-f]+)\b", "NUMBER", r"16#\1", r"`\g<0>` is no number", r"hexadecimal digits are written 16#\1"),
     (r"[\u2018-\u201f`\u00b4]([^'\u2018-\u201f`\u00b4\r\n]*)[\u2018-\u201f`\u00b4]", "STRING_LITERAL", r"'\1'",
      "the quotes are not straight", r"a text is written '\1'"),
     (r"#[ \t]+[A-Za-z][^\r\n]*", "", "", "`#` begins no comment", "a comment begins with // or stands in (* *)")))
-"""What other languages write: pattern, our terminal and its text, message, advice."""
+"""Forms of other languages: pattern, our terminal and its text, message, hint."""
 _DRAWN = re.compile(r"(?:[ \t]*[│├┃┣][^\n]*\n)+")
 """Lines that begin with the left rail of a rung."""
 END_OF_FILE = "\x1a\0"
-"""Characters with which older machines fill a file behind its end."""
+"""Characters with which older systems fill a file behind its end."""
 NO_VALUE = ("<<", ">>", "++", "--")
 """Operators of other languages for which there is none of ours."""
 _WORDS = r"(?s:\(?([A-Z_]+(?:\|[A-Z_]+)*)\)?(\(\?[=!].*)?)"
@@ -94,12 +94,14 @@ OPERAND_ENDS = {"NAME", "RPAR", "RSQB", "CARET", "DIRECT", "PART"}
 
 
 class Lexis(NamedTuple):
-    """What the grammar says about words and characters, ready for use."""
+    """The words and characters of the grammar, as tables and patterns."""
 
     words: dict[str, str]
     """Word in capitals -> terminal."""
     conditions: dict[str, re.Pattern[str]]
-    """Terminal -> what must follow the word."""
+    """Terminal -> pattern of the text that must follow the word."""
+    in_context: frozenset[str]
+    """Terminals of words whose meaning depends on the text behind them."""
     reserved: frozenset[str]
     operand_ends: frozenset[str]
     """Terminals with which an operand may end."""
@@ -107,7 +109,7 @@ class Lexis(NamedTuple):
     master: re.Pattern[str]
     location: re.Pattern[str]
     unknown: re.Pattern[str]
-    """A run of characters that nothing begins with."""
+    """A run of characters with which no token begins."""
     foreign_word: re.Pattern[str]
     """A word with letters of any alphabet."""
     set_assign: re.Pattern[str]
@@ -139,14 +141,28 @@ def lexis() -> Lexis:
     patterns["SIGN"] = "|".join(re.escape(sign) for sign in sorted(signs, key=len, reverse=True))
     alternatives = "|".join(f"(?P<{name}>{patterns[name]})" for name in _ORDER)
     known = re.escape("".join(sorted(set("".join(signs) + "'\"{%"))))
-    return Lexis(words, conditions, frozenset(reserved), frozenset(OPERAND_ENDS | set(words.values()) - reserved), signs,
-                 re.compile(rf"\s*(?:{alternatives})"),
-                 re.compile(r"\s*(" + patterns["LOCATION"] + ")"), re.compile(rf"[^\s\w{known}]+"), re.compile(r"[^\W0-9]\w*"),
-                 re.compile(patterns["SET_ASSIGN"]))
+    return Lexis(
+        words, conditions, frozenset({*conditions, "MISSPELT", "LADDER"}), frozenset(reserved),
+        frozenset(OPERAND_ENDS | set(words.values()) - reserved), signs,
+        re.compile(rf"\s*(?:{alternatives})"), re.compile(r"\s*(" + patterns["LOCATION"] + ")"),
+        re.compile(rf"[^\s\w{known}]+"), re.compile(r"[^\W0-9]\w*"), re.compile(patterns["SET_ASSIGN"]))
 
 
 def _pattern(terminal: Terminal) -> str:
     return f"(?i:{terminal.pattern})" if terminal.ignore_case else f"(?:{terminal.pattern})"
+
+
+class Kinds(dict[str, str]):
+    """Word as written -> terminal, for the words of one text as they are met."""
+
+    def __init__(self, words: dict[str, str]) -> None:
+        super().__init__()
+        self.words = words
+
+    def __missing__(self, word: str) -> str:
+        upper = word.upper()
+        kind = self[word] = self.words.get(upper) or ("MISSPELT" if upper[:4] == "VAR_" else "NAME")
+        return kind
 
 
 class Lexer:
@@ -159,9 +175,7 @@ class Lexer:
     def tokens(self) -> Iterator[Token]:
         """Every token, then one of type "$END"."""
         text, at, lex = self.text, 0, lexis()
-        match, signs, words, conditions = lex.master.match, lex.signs, lex.words, lex.conditions
-        known: dict[str, str] = {}
-        ends = lex.operand_ends
+        match, signs, kinds, in_context, ends = lex.master.match, lex.signs, Kinds(lex.words), lex.in_context, lex.operand_ends
         before, length, new = "", len(text), tuple.__new__
         while True:
             found = match(text, at)
@@ -179,17 +193,9 @@ class Lexer:
             if kind == "SIGN":
                 kind = signs[word]
             elif kind == "NAME":
-                kind = known.get(word, "")
-                if not kind:
-                    kind = known[word] = words.get(word.upper()) or _unknown_word(word)
-                if kind in conditions and not conditions[kind].match(text, at):
-                    kind = "NAME"
-                if kind == "MISSPELT" and len(word) == 3:
-                    end_of = _END_OF.match(text, at)
-                    kind, at = (kind, end_of.end()) if end_of else ("NAME", at)
-                    word = text[start:at]
-                elif kind == "LADDER":
-                    at = self._ladder(start, at)
+                kind = kinds[word]
+                if kind in in_context:
+                    kind, at = self._word_in_context(lex, before, kind, start, at)
                     word = text[start:at]
                 elif before == "AT" or (before in ends and text.startswith("=", at)):
                     kind, at = self._special(lex, before, kind, start, at)
@@ -209,15 +215,29 @@ class Lexer:
             before = kind
         yield Token("$END", "", length, length)
 
+    def _word_in_context(self, lex: Lexis, before: str, kind: str, start: int, end: int) -> tuple[str, int]:
+        """The terminal of a word that depends on the text behind the word, and where its token ends."""
+        condition = lex.conditions.get(kind)
+        if condition is not None and not condition.match(self.text, end):
+            kind = "NAME"
+        if kind == "MISSPELT" and end - start == len("END"):
+            end_of = _END_OF.match(self.text, end)
+            return (kind, end_of.end()) if end_of else ("NAME", end)
+        if kind == "LADDER":
+            return kind, self._ladder(start, end)
+        if before == "AT" or (before in lex.operand_ends and self.text.startswith("=", end)):
+            return self._special(lex, before, kind, start, end)
+        return kind, end
+
     def _special(self, lex: Lexis, before: str, kind: str, start: int, end: int) -> tuple[str, int]:
-        """LOCATION behind AT, `S=` behind an operand; else what it was."""
+        """The terminal of a token and its end: LOCATION behind AT, `S=` behind an operand; otherwise `kind` and `end`."""
         pattern, name = (lex.location, "LOCATION") if before == "AT" else (lex.set_assign, "SET_ASSIGN")
         found = pattern.match(self.text, start)
         return (name, found.end()) if found else (kind, end)
 
     def _odd(self, lex: Lexis, at: int) -> tuple[Token | None, int]:
-        """Pass over what no terminal begins with: spaces at the end, pragmas, unknown characters.  Returns what to read
-        in its place, if anything, and where to go on."""
+        """Pass over text with which no terminal begins: spaces at the end, pragmas, unknown characters.  Returns the token to
+        read in its place, if any, and where to go on."""
         text = self.text
         while at < len(text) and text[at].isspace():
             at += 1
@@ -251,7 +271,7 @@ class Lexer:
 
     def _meant(self, at: int, shape: re.Pattern[str], kind: str, ours: str, message: str,
                advice: str) -> tuple[Token | None, int]:
-        """What other languages write with these characters: a number, a text, a comment (of which nothing is left)."""
+        """Report a form of another language; returns the token that is meant, None for a comment, and where to go on."""
         match = shape.match(self.text, at)
         assert match is not None
         self.report("S0102", at, match.end(), match.expand(message), match.expand(advice))
@@ -296,7 +316,7 @@ class Lexer:
         return found.end()
 
     def _comment(self, start: int) -> int:
-        """Where the bracket comment of `start` ends; each kind nests in itself."""
+        """Where the bracket comment that begins at `start` ends; each kind nests in itself."""
         opener = self.text[start:start + 2]
         closer = opener[::-1].replace("(", ")")
         mark = re.compile(re.escape(opener) + "|" + re.escape(closer))
@@ -309,11 +329,6 @@ class Lexer:
             depth += 1 if found[0] == opener else -1
             at = found.end()
         return at
-
-
-def _unknown_word(word: str) -> str:
-    """The terminal of a word that is none of ours."""
-    return "MISSPELT" if word[:4].upper() == "VAR_" else "NAME"
 
 
 def _short(text: str) -> str:

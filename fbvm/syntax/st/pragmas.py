@@ -1,4 +1,4 @@
-"""Which pragmas may be passed over without a word, since they only speak to editors and other tools."""
+"""Pragmas: which ones are ignored without a warning, since they only concern editors and other tools, and which ones matter."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PACK_MODES = {"0": 1, "1": 1, "2": 2, "4": 4, "8": 8}
 """Values of the attribute pack_mode, and the multiples of bytes at which members of a structure lie at most."""
 
 DIALECTAL = {"ref", "external"}
-"""Pragmas that mean something in some dialects only: what becomes of them is said where the dialect is known."""
+"""Pragmas that mean something in some dialects only; they are judged when the dialect is known."""
 
 NO_EFFECT = "what it switches for another compiler is not switched here"
 """The hint for pragmas that are not known."""
@@ -31,7 +31,7 @@ _PACK_MODE = re.compile(r"\s*attribute\s*'pack_mode'\s*:=\s*'([^']*)'\s*", re.IG
 _HEXADECIMAL = re.compile(r"""\{\s*attribute\s*'displaymode'\s*:=\s*'hex(?:adecimal)?'\s*\}\s*\Z""", re.IGNORECASE)
 _HIDDEN = re.compile(r"""\{\s*attribute\s*'hide'\s*\}\s*\Z""", re.IGNORECASE)
 _REACH = 100
-"""How far before a name its pragma is looked for."""
+"""Characters in front of a name in which its pragma is searched."""
 
 _REF = re.compile(r"VAR_INPUT\s*\{\s*ref\s*\}", re.IGNORECASE)
 _POU = re.compile(r"\s*(?:FUNCTION|FUNCTION_BLOCK|PROGRAM)\b", re.IGNORECASE)
@@ -50,7 +50,7 @@ def harmless(text: str) -> bool:
 
 
 def dialectal(text: str) -> bool:
-    """Whether it is for the dialect to say what the pragma whose contents are `text` means."""
+    """Whether the meaning of the pragma whose contents are `text` depends on the dialect."""
     return text.strip().lower() in DIALECTAL
 
 
@@ -80,8 +80,7 @@ def shown_in_hexadecimal(text: str, start: int) -> bool:
 
 
 def hides_inside(text: str, start: int) -> bool:
-    """Whether `{attribute 'hide'}` stands before the POU that begins at `start`: who looks statement by statement passes
-    over what is inside."""
+    """Whether `{attribute 'hide'}` stands before the POU that begins at `start`: stepping does not stop inside."""
     before = text[max(0, start - _REACH):start]
     return before.rstrip().endswith("}") and _HIDDEN.search(before) is not None
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from itertools import pairwise, zip_longest
 
-from fbvm.syntax.recovery.refused import refused_what
 from fbvm.syntax.st.expressions import Expressions
 from fbvm.syntax.st.lexer import Token
 from fbvm.syntax.st.literals import ELEMENTARY
+from fbvm.syntax.st.refused import refused_what
 from fbvm.syntax.tree import (
     Assign,
     Block,
@@ -29,7 +29,6 @@ from fbvm.syntax.tree import (
     Statement,
     While,
 )
-from fbvm.syntax.tree.ladder import Ladder
 
 Value = tuple[Expr, Expr | None]
 Branch = tuple[Expr, Block]
@@ -66,7 +65,7 @@ class Statements(Expressions):
         return items
 
     def block(self, items: Items) -> Block:
-        """A list as it stands outside CASE: a label of one name is one for JMP, another one is misplaced."""
+        """The statements of a list outside CASE: a label of one name is a label for JMP, another one is reported."""
         made: list[Statement] = []
         for item, behind in zip_longest(items, items[1:]):
             if not isinstance(item, Label):
@@ -76,7 +75,7 @@ class Statements(Expressions):
         return tuple(made)
 
     def _no_label(self, label: Label, behind: Label | Statement | None) -> bool:
-        """Whether `a : INT;` or `a : 5;` stands there, which is told; a label has nothing behind it, or what is executed."""
+        """Whether a label is none, since `a : INT;` or `a : 5;` is written; that is reported."""
         value, high = label.values[0]
         first = behind.targets[0] if isinstance(behind, Assign) else behind.call if isinstance(behind, CallStatement) else None
         if high is not None or first is None or not isinstance(value, NameRef):
@@ -104,19 +103,19 @@ class Statements(Expressions):
         return Empty(label.start, label.end)
 
     def checked(self, statement: Statement) -> Statement:
-        """The statement itself, or its refusal if it spoke of THIS or SUPER."""
-        mine = [token for token in self.selves if token.start >= statement.start] if self.selves else None
+        """The statement itself, or its refusal if it contains THIS or SUPER."""
+        mine = [token for token in self.self_references if token.start >= statement.start] if self.self_references else None
         if not mine:
             return statement
-        del self.selves[-len(mine):]
+        del self.self_references[-len(mine):]
         return RefusedStatement(statement.start, statement.end, mine[0].text.upper(), "S0902")
 
-    def refuse_selves(self) -> None:
-        """Report THIS and SUPER that stand where no statement could carry the refusal."""
-        for token in self.selves:
+    def refuse_self_references(self) -> None:
+        """Report THIS and SUPER outside of statements, which have no statement to refuse."""
+        for token in self.self_references:
             word = token.text.upper()
             self.report("S0902", token.start, token.end, f"{word} is object-oriented text, which is refused", "")
-        self.selves.clear()
+        self.self_references.clear()
 
     # --- simple statements ---
 
@@ -155,14 +154,6 @@ class Statements(Expressions):
         return RefusedStatement(token.start, token.end, *refused_what(token.text))
 
     # --- compound statements ---
-
-    def ladder(self, token: Token) -> Ladder:
-        """LADDER .. END_LADDER, which has a front end of its own."""
-        from fbvm.syntax.ladder.lowering import read_ladder
-
-        made = read_ladder(self, token)
-        self.ladders.append(made)
-        return made
 
     def if_statement(self, word: Token, condition: Expr, then: Token, items: Items, more: list[Branch],
                      other: Token | None, otherwise: Items | None, end: Token) -> Statement:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from fbvm.syntax.st.declarations import Declarations
 from fbvm.syntax.st.expressions import Item
 from fbvm.syntax.st.lexer import Token
+from fbvm.syntax.st.statements import Statements
 from fbvm.syntax.tree import (
     Argument,
     ArraySpec,
@@ -30,8 +30,8 @@ from fbvm.syntax.tree import (
 EnumMember = tuple[Name, Expr | None]
 
 
-class Types(Declarations):
-    """The functions of the rules of types; with those it inherits, the whole grammar's."""
+class Types(Statements):
+    """The functions of the rules of types."""
 
     def type_declaration(self, word: Token, declarations: list[Declaration], end: Token) -> list[Declaration]:
         return declarations

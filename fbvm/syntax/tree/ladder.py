@@ -1,7 +1,7 @@
 """The nodes of ladder (IEC 61131-3, 8.2): rungs as they were written, and what they do written as statements.
 
-A rung is a statement whose body is made of ordinary ones; what is only true of rungs are `Edge` and `Element`.  So
-whoever checks, lowers or executes needs to know these two, and whoever draws or prints needs to know the steps.
+A rung is a statement whose body is made of ordinary ones, and of the expressions of this module.  So checking, lowering and
+execution need to know only these expressions; drawing and printing need the steps.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from fbvm.syntax.tree.node import node as _node
 
 @_node
 class Edge(Expr):
-    """TRUE in the one evaluation in which `of` rises, or falls.  `memory` is the variable that holds what `of` was when it
-    was last evaluated."""
+    """TRUE in the one evaluation in which `of` rises, or falls.  `memory` is the variable with the value of `of` at its last
+    evaluation."""
 
     of: Expr
     memory: NameRef
@@ -23,8 +23,8 @@ class Edge(Expr):
 
 @_node
 class Element(Expr):
-    """What is seen at a step of a rung: the state of a contact, or the power that reaches an output.  `step` is its
-    place in the rung's steps."""
+    """A value that can be observed at a step of a rung: the state of a contact, or the power that reaches an output.  `step` is
+    the number of the step in the rung."""
 
     step: int
     value: Expr
@@ -57,8 +57,8 @@ class Step(Node):
 
 @_node
 class Rung(Statement):
-    """`steps` are what was written, `body` is what they do.  `notes` are comments as they were
-    written, with the number of the step that each stands in front of."""
+    """`steps` are the instructions as written, `body` the statements that execute them.  `notes` are comments as written, each
+    with the number of the step behind it."""
 
     number: int
     comment: str
@@ -79,4 +79,4 @@ class Ladder(Statement):
     instances: tuple[VarDecl, ...]
     """Instances that FBCALL names."""
     subroutines: tuple[Action, ...]
-    """What stands between SBN and RET."""
+    """The subroutines, from SBN to RET."""

@@ -371,7 +371,7 @@ class Configuration(Declaration):
 
 @_node
 class Pragma(Node):
-    """`{...}` with its contents; kept for those who know it."""
+    """`{...}` with its contents."""
 
     text: str
 

@@ -1,8 +1,8 @@
 """The nodes of sequential function charts (IEC 61131-3, 6.7): steps and transitions as they were written, and what they do
 written as statements.
 
-A chart is a statement whose body is made of ordinary ones.  So whoever lowers or executes needs to know nothing of steps,
-and whoever checks, draws or prints finds them here.
+A chart is a statement whose body is made of ordinary ones.  So lowering and execution need to know nothing of steps; checking,
+drawing and printing find them here.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
+from fbvm.syntax.parser import parse
 from fbvm.syntax.st import literals
-from fbvm.syntax.st.parser import parse
 from fbvm.syntax.tree import Assign, Literal, Pou
 
 SECOND = 1_000_000_000

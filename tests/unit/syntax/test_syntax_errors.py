@@ -6,7 +6,7 @@ import pytest
 from rows import each_of
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Assign, For, If, Pou, SourceText
 
 

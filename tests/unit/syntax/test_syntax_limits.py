@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 from fbvm.base.diagnostics import Source
+from fbvm.syntax.parser import parse
 from fbvm.syntax.st.automaton import NESTING_LIMIT
 from fbvm.syntax.st.builder import CHAIN_LIMIT
-from fbvm.syntax.st.parser import parse
 from fbvm.syntax.tree import Pou
 
 pytestmark = pytest.mark.slow

@@ -9,7 +9,7 @@ from typing import Any
 from rows import each_of
 
 from fbvm.base.diagnostics import Source
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.tree import Binary, Literal, Name, NamedType, NameRef, Node
 from fbvm.syntax.tree.node import names_of
 

@@ -1,10 +1,10 @@
-"""Bodies of a document as lines of our text: ST as it is, ladder as LADDER .. END_LADDER and as statements, FBD as
-statements."""
+"""Bodies of a document as lines of a source file: ST as it is, ladder as LADDER .. END_LADDER and statements, FBD as
+statements, charts in their textual form."""
 
 from __future__ import annotations
 
-from fbvm.interchange.plcopen.read.charts import Chart, Incomplete
-from fbvm.interchange.plcopen.read.diagram import read_diagram
+from fbvm.interchange.plcopen.read.charts import Chart, NotImportable
+from fbvm.interchange.plcopen.read.diagram import Diagram, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Document, Pou, Reading
 from fbvm.interchange.plcopen.read.networks import Network, networks
 from fbvm.interchange.plcopen.read.rung_steps import rung_steps
@@ -14,11 +14,11 @@ from fbvm.interchange.plcopen.read.values import Unexecutable
 
 NOTE = "//"
 SPANS = {"IL", "ILC", "JMP", "CJP", "CJPN", "JME", "JMP0", "JME0", "FOR", "NEXT", "BREAK", "SBN", "RET", "END"}
-"""Instructions that speak of the rungs between them, which so must all be rungs."""
+"""Instructions that cover rungs: if a diagram has one, all its networks must be written as rungs."""
 
 
 class Bodies:
-    """Writes the bodies of one POU; `scope.made` has what must be declared besides."""
+    """Writes the bodies of one POU; `scope.made` grows by the variables that the POU must declare for them."""
 
     def __init__(self, reading: Reading, document: Document, pou: Pou) -> None:
         self.reading, self.pou = reading, pou
@@ -41,36 +41,39 @@ class Bodies:
             self._lose_places(body)
         try:
             return Chart(self.reading, self.scope, self.pou, self.lines).lines(body.element)
-        except Incomplete as refusal:
+        except NotImportable as refusal:
             self.reading.report("X0203", *refusal.args)
             return [f"{NOTE} the sequential function chart was not taken over: {refusal.args[1]}"]
 
     def _diagram(self, body: Body) -> list[str]:
+        """A body in LD or FBD: consecutive rungs stand in one LADDER .. END_LADDER, statements between these."""
         diagram = read_diagram(self.reading, body.element)
         if len({(item.x, item.y) for item in diagram.objects}) > 1:
             self._lose_places(body)
+        self._check_jumps(diagram)
+        mnemonics = {item.mnemonic.lstrip("!@%") for item in diagram.objects if item.mnemonic}
         lines: list[str] = []
+        in_ladder = False
+        statements = Statements(self.reading, self.scope)
+        for network in networks(diagram):
+            rung = self._rung(network, bool(mnemonics)) if body.language == "LD" and not network.broken else None
+            if rung is None and mnemonics & SPANS and not network.broken:
+                item = network.objects[0]
+                self.reading.report("X0202", item.element, "the network cannot be written as a rung, and stands among jumps")
+                item.broken = True
+            if in_ladder != (rung is not None):
+                lines.append("END_LADDER" if in_ladder else "LADDER")
+                in_ladder = not in_ladder
+            lines += rung if rung is not None else self._written(statements, network)
+        return [*lines, "END_LADDER"] if in_ladder else lines
+
+    def _check_jumps(self, diagram: Diagram) -> None:
+        """Report jumps to labels that do not exist."""
         labels = {item.text.upper() for item in diagram.objects if item.kind == "label"}
         for item in diagram.objects:
             if item.kind == "jump" and item.text.upper() not in labels:
                 self.reading.report("X0202", item.element, f"there is no label {item.text}")
                 item.broken = True
-        ours = {item.mnemonic.lstrip("!@%") for item in diagram.objects if item.mnemonic}
-        in_ladder = False
-        statements = Statements(self.reading, self.scope)
-        for network in networks(diagram):
-            rung = self._rung(network, bool(ours)) if body.language == "LD" and not network.broken else None
-            if rung is None and ours & SPANS and not network.broken:
-                item = network.objects[0]
-                self.reading.report("X0202", item.element, "the network cannot be written as a rung, and stands among jumps")
-                item.broken = True
-            if rung is not None and not in_ladder:
-                lines.append("LADDER")
-            elif rung is None and in_ladder:
-                lines.append("END_LADDER")
-            in_ladder = rung is not None
-            lines += rung if rung is not None else self._written(statements, network)
-        return [*lines, "END_LADDER"] if in_ladder else lines
 
     def _rung(self, network: Network, ours: bool) -> list[str] | None:
         steps = rung_steps(network, self.scope, ours)
@@ -82,7 +85,7 @@ class Bodies:
         return [f"RUNG {self.rungs} {first}".rstrip(), *(f"    '{line}" for line in more), *(f"    {step}" for step in steps)]
 
     def _written(self, statements: Statements, network: Network) -> list[str]:
-        """A network as statements, under a comment that says which one it was."""
+        """A network as statements, under a comment with its number; one that cannot be executed as a comment."""
         comments = [line.strip() for comment in network.comments for line in comment.splitlines() if line.strip()]
         before = {key: list(names) for key, names in self.scope.made.items()}
         if network.broken:
@@ -100,7 +103,7 @@ class Bodies:
 
 
 def _text(text: str) -> list[str]:
-    """A textual body without empty lines around it, blanks in front of lines kept."""
+    """The lines of a textual body with their indentation, without empty lines around them."""
     lines = text.expandtabs(4).splitlines()
     while lines and not lines[0].strip():
         lines.pop(0)

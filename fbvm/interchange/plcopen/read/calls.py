@@ -2,27 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.check.calls.functions import is_standard
+from fbvm.interchange.plcopen.read.context import NetworkContext
 from fbvm.interchange.plcopen.read.diagram import Object, Pin, Wire
 from fbvm.interchange.plcopen.read.rung_parts import instruction
 from fbvm.interchange.plcopen.read.scope import SHARED
-from fbvm.interchange.plcopen.read.values import ATOM, CHAINED, INFIX, TRUE, Unexecutable, Value, joined, negation
-
-if TYPE_CHECKING:
-    from fbvm.interchange.plcopen.read.statements import Statements
+from fbvm.interchange.plcopen.read.values import ATOM, CHAINED, INFIX, TRUE, Unexecutable, Value, joined, negation, variable
 
 
 class Calls:
-    """Writes calls into the statements of a network."""
+    """Writes the calls of a network's blocks into its context."""
 
-    def __init__(self, statements: Statements) -> None:
-        self.statements = statements
+    def __init__(self, context: NetworkContext) -> None:
+        self.context = context
         self.guards: dict[tuple[Object, str], Value] = {}
-        """Conditions under which results may be assigned: those of functions whose EN is connected."""
+        """By output of a block whose EN is connected, the condition under which its value may be assigned."""
         self.reads: frozenset[str] = frozenset()
-        """What the arguments of the call at work read."""
+        """Roots of the variables that the arguments of the call at work read."""
 
     def write(self, item: Object) -> None:
         """The call of a block."""
@@ -38,7 +34,7 @@ class Calls:
             self._function(item)
 
     def guard(self, pin: Pin) -> Value | None:
-        """The condition under which what reaches a pin is to be assigned; None if always."""
+        """The condition under which the value at a pin may be assigned; None if always."""
         if len(pin.wires) != 1:
             return None
         return self.guards.get((pin.wires[0].source, pin.wires[0].pin))
@@ -46,33 +42,33 @@ class Calls:
     # --- function blocks ---
 
     def _instance(self, item: Object) -> None:
-        statements = self.statements
+        context = self.context
         arguments = self._arguments(item, [pin for pin in item.inputs if pin.connected])
-        root = statements.scope.root(item.instance)
-        writes = {root, SHARED, *(statements.scope.root(text) for text in self._in_outs(item, arguments))}
+        root = context.scope.root(item.instance)
+        writes = {root, SHARED, *(context.scope.root(text) for text in self._in_outs(item, arguments))}
         enabled = any(text.startswith("EN :=") for text in arguments)
         if enabled:
             for sink, wire in self._next_sinks(item):
                 arguments.append(f"{wire.pin} => {sink.text}")
-                writes.add(statements.drop(sink, wire))
-        held = enabled and any(statements.uses[item, pin.name] for pin in item.outputs if pin.name.upper() != "ENO")
+                writes.add(context.take_over(sink, wire))
+        held = enabled and any(context.uses[item, pin.name] for pin in item.outputs if pin.name.upper() != "ENO")
         eno = self._eno(item, arguments, held)
         if eno:
-            statements.effect(f"{eno.text} := FALSE;", eno.reads)
-        statements.effect(f"{item.instance}({', '.join(arguments)});", frozenset(writes))
+            context.write(f"{eno.text} := FALSE;", eno.reads)
+        context.write(f"{item.instance}({', '.join(arguments)});", frozenset(writes))
         for pin in item.outputs:
             wire = Wire(item, pin.name)
             if pin.name.upper() == "ENO":
-                statements.give(wire, eno or TRUE)
+                context.set_output(wire, eno or TRUE)
             else:
                 if eno and enabled:
                     self.guards[item, pin.name] = eno
                 value = Value(f"{item.instance}.{pin.name}", ATOM, frozenset((root,)))
-                statements.give(wire, statements.changed(item, value, pin.negated, pin.edge))
+                context.set_output(wire, context.modified(item, value, pin.negated, pin.edge))
 
     def _next_sinks(self, item: Object) -> list[tuple[Object, Wire]]:
-        """The plain variables that get outputs of a block, if they are the next in the order."""
-        objects = self.statements.network.objects
+        """The output variables that a call can write itself: those that directly follow the block in the order of evaluation."""
+        objects = self.context.network.objects
         found = []
         for other in objects[objects.index(item) + 1:]:
             wires = other.inputs[0].wires if other.kind == "outVariable" else []
@@ -85,53 +81,53 @@ class Calls:
         return found
 
     def _eno(self, item: Object, arguments: list[str], wanted: bool = False) -> Value | None:
-        """A variable for ENO, if somebody uses it."""
-        statements = self.statements
-        if not statements.uses[item, "ENO"] and not wanted:
+        """A variable for ENO, if ENO is used or `wanted`; added to the arguments of the call."""
+        context = self.context
+        if not context.uses[item, "ENO"] and not wanted:
             return None
-        name = statements.scope.new(f"Enabled_{item.id}", "BOOL", False)
+        name = context.scope.new(f"Enabled_{item.id}", "BOOL", False)
         arguments.append(f"ENO => {name}")
-        return Value(name, ATOM, frozenset((name.upper(),)))
+        return variable(name)
 
     def _arguments(self, item: Object, pins: list[Pin]) -> list[str]:
-        """Inputs by name; an EN that is always TRUE is left out."""
+        """The arguments for input pins, by name; an EN that is always TRUE is left out."""
         arguments = []
         for pin in pins:
-            value = self.statements.take(item, pin)
+            value = self.context.value_at(item, pin)
             self.reads |= value.reads
             if pin.name.upper() != "EN" or not value.is_true:
                 arguments.append(f"{pin.name} := {value.text}")
         return arguments
 
     def _in_outs(self, item: Object, arguments: list[str]) -> list[str]:
-        """Add what is connected to in-outs, and say what it is."""
+        """Add the arguments for in-outs; returns the variables that are connected to them."""
         names = []
         for pin in item.in_outs:
             texts = [pin.expression] if pin.expression else [wire.source.text for wire in pin.wires
                                                             if wire.source.kind in ("inVariable", "inOutVariable")]
             through = [wire for wire in pin.wires if wire.source.kind == "block"]
             if through and len(pin.wires) == 1:
-                texts = [self.statements.take(item, pin).text]
+                texts = [self.context.value_at(item, pin).text]
             if len(texts) != 1:
                 raise Unexecutable(item, f"in-out {pin.name} of {item.text} must be connected to one variable", "")
             if not through and not pin.expression:
-                self.statements.take(item, pin)
+                self.context.value_at(item, pin)
             names += texts
             arguments.append(f"{pin.name} := {texts[0]}")
-            self.statements.give(Wire(item, pin.name), self.statements.expression(texts[0]))
+            self.context.set_output(Wire(item, pin.name), self.context.expression(texts[0]))
         return names
 
     # --- functions ---
 
     def _standard(self, item: Object) -> None:
         """A function of the standard: an expression."""
-        statements = self.statements
+        context = self.context
         result = next((pin for pin in item.outputs if pin.name.upper() != "ENO"), None)
         wire = Wire(item, result.name if result else "")
-        if not statements.needed(wire) and not statements.uses[item, "ENO"]:
-            statements.idle(item)
+        if not context.is_used(wire) and not context.uses[item, "ENO"]:
+            context.warn_unused(item)
             for pin in item.inputs:
-                statements.take(item, pin)
+                context.value_at(item, pin)
             return
         condition = self._enable(item)
         pins = [pin for pin in item.inputs if pin.name.upper() != "EN"]
@@ -139,12 +135,12 @@ class Calls:
             pins.pop()
         if loose := [pin.name or "an input" for pin in pins if not pin.connected]:
             raise Unexecutable(item, f"{', '.join(loose)} of {item.text} is not connected", "a function needs all its inputs")
-        value = self._called(item.text, [statements.take(item, pin) for pin in pins])
+        value = self._called(item.text, [context.value_at(item, pin) for pin in pins])
         if result is not None:
-            value = statements.changed(item, value, result.negated, result.edge)
+            value = context.modified(item, value, result.negated, result.edge)
         if condition is None:
-            statements.give(Wire(item, "ENO"), TRUE)
-            statements.give(wire, value, keep=True)
+            context.set_output(Wire(item, "ENO"), TRUE)
+            context.set_output(wire, value, keep=True)
         else:
             self._guarded(item, wire, condition, value)
 
@@ -160,40 +156,40 @@ class Calls:
         return Value(f"{name}({', '.join(value.text for value in values)})", ATOM - 1, reads)
 
     def _enable(self, item: Object) -> Value | None:
-        """What reaches EN; None if nothing does, or always TRUE."""
+        """The value at EN; None if EN is not connected or always TRUE."""
         pin = item.pin("EN")
         if pin is None or not pin.connected:
             return None
-        value = self.statements.take(item, pin)
+        value = self.context.value_at(item, pin)
         return None if value.is_true else value
 
     def _guarded(self, item: Object, wire: Wire, condition: Value, value: Value) -> None:
-        """A result that is worked out only while EN is ON, and otherwise stays what it was."""
-        statements, scope = self.statements, self.statements.scope
-        sinks = [(sink, pin) for sink in statements.network.objects for pin in sink.pins if pin.wires == [wire]]
+        """Set a result that is evaluated while `condition` is TRUE, and otherwise keeps its value."""
+        context, scope = self.context, self.context.scope
+        sinks = [(sink, pin) for sink in context.network.objects for pin in sink.pins if pin.wires == [wire]]
         if (sink := self._next_sink(item, wire)) is not None:
-            statements.assign(sink, value, condition)
-        elif statements.uses[wire.source, wire.pin]:
+            context.assign(sink, value, condition)
+        elif context.uses[wire.source, wire.pin]:
             eno = scope.new(f"Enabled_{item.id}", "BOOL", False)
-            enabled = Value(eno, ATOM, frozenset((eno.upper(),)))
+            enabled = variable(eno)
             name = self._result(item, wire, sinks)
-            statements.effect(f"{eno} := {condition.text};", enabled.reads)
-            statements.effect(f"IF {eno} THEN {name} := {value.text}; END_IF;", frozenset((name.upper(),)))
+            context.write(f"{eno} := {condition.text};", enabled.reads)
+            context.write(f"IF {eno} THEN {name} := {value.text}; END_IF;", frozenset((name.upper(),)))
             self.guards[item, wire.pin] = enabled
-            statements.give(wire, Value(name, ATOM, frozenset((name.upper(),))))
-            statements.give(Wire(item, "ENO"), enabled)
+            context.set_output(wire, variable(name))
+            context.set_output(Wire(item, "ENO"), enabled)
         else:
-            statements.give(Wire(item, "ENO"), condition, keep=True)
+            context.set_output(Wire(item, "ENO"), condition, keep=True)
 
     def _next_sink(self, item: Object, wire: Wire) -> Object | None:
-        """The variable that gets a result, if it is the only one who does, and the next in the order."""
-        if self.statements.uses[item, wire.pin] != 1 or self.statements.uses[item, "ENO"]:
+        """The output variable of a result, if it is the only consumer and directly follows in the order of evaluation."""
+        if self.context.uses[item, wire.pin] != 1 or self.context.uses[item, "ENO"]:
             return None
         return next((sink for sink, found in self._next_sinks(item) if found == wire), None)
 
     def _result(self, item: Object, wire: Wire, sinks: list[tuple[Object, Pin]]) -> str:
-        """A variable that keeps a result from pass to pass."""
-        scope = self.statements.scope
+        """The name of a new variable that keeps a result from pass to pass."""
+        scope = self.context.scope
         kind = scope.wire_type(wire) or next((found for sink, _ in sinks if sink.kind != "block"
                                               and (found := scope.type_of(sink.text))), "")
         if not kind:
@@ -201,48 +197,64 @@ class Calls:
         return scope.new(f"Result_{item.id}", kind, True)
 
     def _function(self, item: Object) -> None:
-        """A function of the project or a library, which may write more than its result."""
-        statements, scope = self.statements, self.statements.scope
+        """A function of the project or of a library, which may write more than its result."""
+        context = self.context
         condition = self._enable(item)
         arguments = self._arguments(item, [pin for pin in item.inputs if pin.connected and pin.name.upper() != "EN"])
-        writes = {SHARED, *(scope.root(text) for text in self._in_outs(item, arguments))}
-        known = scope.pous.get(item.text.upper())
-        result = next((pin for pin in item.outputs
-                       if pin.name.upper() != "ENO" and not (known and known.variable(pin.name))), None)
-        for pin in item.outputs:
-            if pin is not result and pin.name.upper() != "ENO" and statements.uses[item, pin.name]:
-                name = scope.new(f"{pin.name}_{item.id}", scope.wire_type(Wire(item, pin.name)) or "BOOL", condition is not None)
-                arguments.append(f"{pin.name} => {name}")
-                statements.give(Wire(item, pin.name), Value(name, ATOM, frozenset((name.upper(),))))
+        writes = {SHARED, *(context.scope.root(text) for text in self._in_outs(item, arguments))}
+        result = self._result_pin(item)
+        self._take_outputs(item, result, arguments, keeps=condition is not None)
         wire = Wire(item, result.name if result else "")
-        if condition is None and not statements.uses[item, "ENO"] and not any("=>" in text for text in arguments) \
-                and not item.in_outs and statements.uses[item, wire.pin] == 1 and result and not result.edge:
-            statements.settle(frozenset((SHARED,)))
+        if condition is None and result is not None and self._is_expression(item, result, arguments):
+            context.save_values(frozenset((SHARED,)))
             value = Value(f"{item.text}({', '.join(arguments)})", ATOM - 1, self.reads | {SHARED})
-            statements.give(wire, negation(value) if result.negated else value)
+            context.set_output(wire, negation(value) if result.negated else value)
             return
-        self._as_statement(item, wire if statements.uses[item, wire.pin] else None, condition, arguments, frozenset(writes))
+        self._as_statement(item, wire if context.uses[item, wire.pin] else None, condition, arguments, frozenset(writes))
+
+    def _result_pin(self, item: Object) -> Pin | None:
+        """The output of a function that is its result: the first one that is neither ENO nor a VAR_OUTPUT."""
+        known = self.context.scope.pous.get(item.text.upper())
+        return next((pin for pin in item.outputs
+                     if pin.name.upper() != "ENO" and not (known and known.variable(pin.name))), None)
+
+    def _take_outputs(self, item: Object, result: Pin | None, arguments: list[str], keeps: bool) -> None:
+        """Lead every VAR_OUTPUT of a function that is used to a variable; one that `keeps` its value if the call is not
+        executed."""
+        context = self.context
+        for pin in item.outputs:
+            if pin is not result and pin.name.upper() != "ENO" and context.uses[item, pin.name]:
+                wire = Wire(item, pin.name)
+                name = context.scope.new(f"{pin.name}_{item.id}", context.scope.wire_type(wire) or "BOOL", keeps)
+                arguments.append(f"{pin.name} => {name}")
+                context.set_output(wire, variable(name))
+
+    def _is_expression(self, item: Object, result: Pin, arguments: list[str]) -> bool:
+        """Whether the call of a function can stand where its result is used: once, and nothing else of the call is used."""
+        uses = self.context.uses
+        has_outputs = bool(uses[item, "ENO"] or item.in_outs or any("=>" in text for text in arguments))
+        return not has_outputs and uses[item, result.name] == 1 and not result.edge
 
     def _as_statement(self, item: Object, wire: Wire | None, condition: Value | None, arguments: list[str],
                       writes: frozenset[str]) -> None:
-        statements = self.statements
+        context = self.context
         eno = self._eno(item, arguments)
         target = ""
         if wire is not None:
-            sinks = [(sink, pin) for sink in statements.network.objects for pin in sink.pins if pin.wires == [wire]]
+            sinks = [(sink, pin) for sink in context.network.objects for pin in sink.pins if pin.wires == [wire]]
             target = self._result(item, wire, sinks)
             writes |= {target.upper()}
         call = f"{f'{target} := ' if target else ''}{item.text}({', '.join(arguments)});"
         if eno:
-            statements.effect(f"{eno.text} := FALSE;", eno.reads)
+            context.write(f"{eno.text} := FALSE;", eno.reads)
         if condition is not None:
-            enabled = statements.scope.new(f"Enable_{item.id}", "BOOL", False)
-            statements.effect(f"{enabled} := {condition.text};", frozenset((enabled.upper(),)))
+            enabled = context.scope.new(f"Enable_{item.id}", "BOOL", False)
+            context.write(f"{enabled} := {condition.text};", frozenset((enabled.upper(),)))
             if wire is not None:
-                self.guards[item, wire.pin] = Value(enabled, ATOM, frozenset((enabled.upper(),)))
+                self.guards[item, wire.pin] = variable(enabled)
             call = f"IF {enabled} THEN {call} END_IF;"
-        statements.effect(call, writes)
+        context.write(call, writes)
         if eno:
-            statements.give(Wire(item, "ENO"), eno)
+            context.set_output(Wire(item, "ENO"), eno)
         if wire is not None:
-            statements.give(wire, Value(target, ATOM, frozenset((target.upper(),))))
+            context.set_output(wire, variable(target))

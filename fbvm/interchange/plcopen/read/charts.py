@@ -1,7 +1,7 @@
 """Sequential function charts of a document as steps, transitions and actions of the textual form.
 
-A chart is found by its wires: upwards from a transition to the steps that must be active, downwards to those that follow.
-Divergences, convergences and jumps are wires, and are gone behind this.
+Wires lead upwards from a transition to the steps that must be active, and downwards to the steps that follow.
+Divergences, convergences and jumps only pass wires on: the textual form has none.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from fbvm.interchange.plcopen.markup import Element
 from fbvm.interchange.plcopen.read.diagram import Diagram, Object, placed, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Pou, Reading
-from fbvm.interchange.plcopen.read.markup import Element
 from fbvm.interchange.plcopen.read.networks import LARGEST, Network, networks
 from fbvm.interchange.plcopen.read.scope import Scope
 from fbvm.interchange.plcopen.read.statements import Statements
@@ -24,13 +24,13 @@ PASSING = ("selectionDivergence", "selectionConvergence", "simultaneousDivergenc
 _ASSIGNED = re.compile(r"(?s)\s*([^\W\d]\w*)?\s*:=\s*(.*?);?\s*\Z")
 
 
-class Incomplete(Exception):
+class NotImportable(Exception):
     """The chart cannot be taken over; the arguments are an element, a message and a hint."""
 
 
 @dataclass(eq=False)
 class Arrow:
-    """A transition with the steps before and behind it."""
+    """A transition with the names of the steps that it leaves and of those that it enters."""
 
     element: Element
     sources: list[str]
@@ -38,48 +38,58 @@ class Arrow:
 
 
 class Chart:
-    """One chart on its way.  `write` makes the lines of a body, for inline actions."""
+    """Writes one chart.  `write` makes the lines of the body of an inline action or a transition."""
 
     def __init__(self, reading: Reading, scope: Scope, pou: Pou, write: Callable[[Body], list[str]]) -> None:
         self.reading, self.scope, self.pou, self.write = reading, scope, pou, write
         self.actions: list[str] = []
 
     def lines(self, body: Element) -> list[str]:
-        """Steps, transitions and inline actions.  Raises Incomplete."""
+        """Steps, transitions and inline actions.  Raises NotImportable."""
+        self._index(body)
+        self._check(body)
+        steps = body.all("step")
+        self.scope.taken |= {step.get("name").upper() for step in steps}
+        diagram = read_diagram(self.reading, body, chart=True)
+        if len(body.children) > LARGEST:
+            raise NotImportable(body, f"the chart has more than {LARGEST} elements", "")
+        arrows = [self._arrow(transition) for transition in body.all("transition")]
+        blocks = {reference: block for block in body.all("actionBlock") for reference in _references(block)}
+        lines = [line for step in steps for line in self._step(step, blocks.get(step.get("localId")))]
+        lines += [line for arrow in sorted(arrows, key=_order(arrows)) for line in self._transition(arrow, diagram)]
+        self._report_unused(diagram)
+        return [*lines, *self.actions]
+
+    def _index(self, body: Element) -> None:
+        """Note the elements by localId, and by localId the elements to which wires lead from each."""
         self.known = {child.get("localId"): child for child in body.children if child.get("localId")}
         self.followers: dict[str, list[Element]] = {}
         for child in body.children:
             for reference in _references(child):
                 self.followers.setdefault(reference, []).append(child)
+
+    def _check(self, body: Element) -> None:
+        """Refuse a chart with macro steps, or without an initial step."""
         for child in body.all("macroStep"):
-            raise Incomplete(child, f"the macro step {child.get('name')} is not taken over", "draw its steps in the chart")
-        steps = body.all("step")
-        if not any(step.get("initialStep") == "true" for step in steps):
-            raise Incomplete(body, "the chart has no initial step", "")
-        self.scope.taken |= {step.get("name").upper() for step in steps}
-        diagram = read_diagram(self.reading, body, chart=True)
-        if len(body.children) > LARGEST:
-            raise Incomplete(body, f"the chart has more than {LARGEST} elements", "")
-        arrows = [self._arrow(transition) for transition in body.all("transition")]
-        blocks = {reference: block for block in body.all("actionBlock") for reference in _references(block)}
-        lines = []
-        for step in steps:
-            lines += self._step(step, blocks.get(step.get("localId")))
-        for arrow in sorted(arrows, key=_order(arrows)):
-            lines += self._transition(arrow, diagram)
-        used = {item for asked in diagram.objects if asked.kind == "condition" for item in _feeding(asked)}
+            raise NotImportable(child, f"the macro step {child.get('name')} is not taken over", "draw its steps in the chart")
+        if not any(step.get("initialStep") == "true" for step in body.all("step")):
+            raise NotImportable(body, "the chart has no initial step", "")
+
+    def _report_unused(self, diagram: Diagram) -> None:
+        """Report what is drawn in the chart and feeds no condition of a transition."""
+        conditions = (item for item in diagram.objects if item.kind == "condition")
+        used = {item for condition in conditions for item in _feeding(condition)}
         for item in diagram.objects:
             if item not in used and item.kind != "rightPowerRail":
                 self.reading.report("X0203", item.element, f"{item.text or item.kind} belongs to no transition of the chart, "
                                     "and is not taken over")
-        return [*lines, *self.actions]
 
     # --- steps ---
 
     def _step(self, step: Element, block: Element | None) -> list[str]:
         word = "INITIAL_STEP" if step.get("initialStep") == "true" else "STEP"
         if not step.get("name"):
-            raise Incomplete(step, "a step has no name", "")
+            raise NotImportable(step, "a step has no name", "")
         associations = []
         for number, action in enumerate(block.all("action") if block else [], 1):
             associations.append(self._association(step, action, number))
@@ -88,14 +98,14 @@ class Chart:
     def _association(self, step: Element, action: Element, number: int) -> str:
         qualifier = action.get("qualifier") or "N"
         if qualifier not in QUALIFIERS:
-            raise Incomplete(action, f"the qualifier {qualifier} is not executed", f"there are {', '.join(QUALIFIERS)}")
+            raise NotImportable(action, f"the qualifier {qualifier} is not executed", f"there are {', '.join(QUALIFIERS)}")
         reference, inline = action.one("reference"), action.one("inline")
         name = reference.get("name").strip() if reference else ""
         if inline is not None and (language := _language(inline)) is not None:
             name = self._free(f"{step.get('name')}_{number}")
             self.actions += [f"ACTION {name}:", *self.write(Body(language.name, language)), "END_ACTION"]
         if not name:
-            raise Incomplete(action, f"an action of step {step.get('name')} names nothing", "")
+            raise NotImportable(action, f"an action of step {step.get('name')} names nothing", "")
         given = [qualifier]
         if QUALIFIERS[qualifier]:
             given.append(duration(action.get("duration")) or action.get("duration") or "T#0s")
@@ -118,7 +128,7 @@ class Chart:
         targets = self._below(transition)
         for found, where in ((sources, "above"), (targets, "below")):
             if not found:
-                raise Incomplete(transition, f"no step stands {where} transition {transition.get('localId')}", "")
+                raise NotImportable(transition, f"no step stands {where} transition {transition.get('localId')}", "")
         return Arrow(transition, sources, targets)
 
     def _above(self, element: Element) -> list[str]:
@@ -126,7 +136,7 @@ class Chart:
         return self._steps(element, lambda here: [self.known[r] for r in _references(here) if r in self.known])
 
     def _below(self, element: Element) -> list[str]:
-        """Names of the steps to which wires lead from an element; a jump is one to its target."""
+        """Names of the steps to which wires lead from an element; a jump leads to its target."""
         return self._steps(element, lambda here: self.followers.get(here.get("localId"), []))
 
     def _steps(self, element: Element, beside: Callable[[Element], list[Element]]) -> list[str]:
@@ -150,7 +160,7 @@ class Chart:
         for element in self.known.values():
             if element.get("name").upper() == name:
                 return [element.get("name")] if element.name == "step" else self._divided(element)
-        raise Incomplete(jump, f"there is no step {jump.get('targetName')} to jump to", "")
+        raise NotImportable(jump, f"there is no step {jump.get('targetName')} to jump to", "")
 
     def _divided(self, divergence: Element) -> list[str]:
         """The steps directly behind a simultaneous divergence."""
@@ -167,12 +177,12 @@ class Chart:
         return [f"TRANSITION{way} := {condition};", "END_TRANSITION"]
 
     def _condition(self, element: Element, diagram: Diagram) -> tuple[str, str, list[str]]:
-        """A name, and either an expression or the lines that assign to the name."""
+        """The name of a transition, and its condition: an expression, or lines that assign to the name."""
         condition = element.one("condition")
         negated = condition is not None and condition.get("negated") == "true"
         name = self._free(f"T{element.get('localId')}")
         if condition is None:
-            raise Incomplete(element, f"transition {element.get('localId')} has no condition", "")
+            raise NotImportable(element, f"transition {element.get('localId')} has no condition", "")
         if (reference := condition.one("reference")) is not None:
             name = reference.get("name").strip()
             body = next((body for known, body in self.pou.transitions if known.upper() == name.upper()), None)
@@ -181,7 +191,7 @@ class Chart:
             name = inline.get("name") if re.fullmatch(r"[^\W\d]\w*", inline.get("name")) else name
             language = _language(inline)
             if language is None:
-                raise Incomplete(inline, "the condition is empty", "")
+                raise NotImportable(inline, "the condition is empty", "")
             return self._bodied(name, Body(language.name, language), negated)
         return self._drawn(name, element, diagram, negated)
 
@@ -199,19 +209,19 @@ class Chart:
     def _drawn(self, name: str, element: Element, diagram: Diagram, negated: bool) -> tuple[str, str, list[str]]:
         """A condition that is drawn: the objects that feed it."""
         number = element.get("localId")
-        asked = next((item for item in diagram.objects if item.kind == "condition" and item.id == number), None)
-        if asked is None or not asked.inputs[0].connected:
-            raise Incomplete(element, f"transition {number} has no condition", "")
-        asked.text, asked.negated = name, negated
-        part = networks(Diagram(_feeding(asked), []))
+        condition = next((item for item in diagram.objects if item.kind == "condition" and item.id == number), None)
+        if condition is None or not condition.inputs[0].connected:
+            raise NotImportable(element, f"transition {number} has no condition", "")
+        condition.text, condition.negated = name, negated
+        part = networks(Diagram(_feeding(condition), []))
         network = Network([item for one in part for item in one.objects], {wire for one in part for wire in one.cut})
         if network.broken:
-            raise Incomplete(element, f"the condition of transition {number} was not understood", "")
+            raise NotImportable(element, f"the condition of transition {number} was not understood", "")
         try:
             lines = Statements(self.reading, self.scope).write(network)
         except Unexecutable as refusal:
             item, message, hint = refusal.args
-            raise Incomplete(item.element, message, hint) from None
+            raise NotImportable(item.element, message, hint) from None
         if len(lines) == 1:
             return name, lines[0].removeprefix(f"{name} := ").removesuffix(";"), []
         return name, "", lines
@@ -230,7 +240,7 @@ def _names(names: list[str]) -> str:
 
 
 def _references(element: Element) -> list[str]:
-    """Where the wires into an element of a chart come from, those of a condition left out."""
+    """The localIds from which wires lead into an element of a chart, not counting the wires of its condition."""
     return [wire.get("refLocalId") for point in element.all("connectionPointIn") for wire in point.all("connection")]
 
 
@@ -240,7 +250,8 @@ def _place(element: Element) -> tuple[float, float]:
 
 
 def _order(arrows: list[Arrow]) -> Callable[[Arrow], tuple[float, tuple[str, ...], float, int]]:
-    """From top to bottom; those of one step from left to right, which is their order if none has a priority."""
+    """The key that sorts transitions from top to bottom, and those that leave one step from left to right: without
+    priorities that is the order in which they are tested."""
     top = {tuple(arrow.sources): min(_place(other.element)[0] for other in arrows if other.sources == arrow.sources)
            for arrow in arrows}
 
@@ -250,10 +261,10 @@ def _order(arrows: list[Arrow]) -> Callable[[Arrow], tuple[float, tuple[str, ...
     return key
 
 
-def _feeding(asked: Object) -> list[Object]:
+def _feeding(condition: Object) -> list[Object]:
     """An object and all that feeds it, in the order of writing."""
-    found = {asked}
-    todo = [asked]
+    found = {condition}
+    todo = [condition]
     while todo:
         for pin in todo.pop().pins:
             for wire in pin.wires:

@@ -1,7 +1,7 @@
 """The elements of a graphical body (LD, FBD) and the wires between them, as one flat list: the schema knows no networks.
 
-A wire is stored at its consumer.  Connectors and continuations are wires too and are gone behind this; a coil passes
-on the power that reaches it, so a wire from a coil is one from what feeds the coil.
+A wire is stored at its consumer.  Connectors and continuations are replaced by wires; a coil passes on the power that
+reaches it, so a wire from a coil becomes a wire from what feeds the coil.
 """
 
 from __future__ import annotations
@@ -10,17 +10,18 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import NamedTuple
 
+from fbvm.interchange.plcopen.markup import Element
 from fbvm.interchange.plcopen.read.document import Reading
-from fbvm.interchange.plcopen.read.markup import Element
-from fbvm.interchange.plcopen.read.types import MNEMONIC, own_text
+from fbvm.interchange.plcopen.read.types import own_text
+from fbvm.interchange.plcopen.schema import MNEMONIC
 
 OBJECTS = {"leftPowerRail", "rightPowerRail", "contact", "coil", "block", "inVariable", "outVariable", "inOutVariable",
            "label", "jump", "return"}
-"""What can be executed, or carries power."""
+"""Elements that can be executed, or carry power."""
 SFC_OBJECTS = {"step", "macroStep", "jumpStep", "transition", "selectionDivergence", "selectionConvergence",
                "simultaneousDivergence", "simultaneousConvergence", "actionBlock"}
 NAMELESS = ("", "none")
-"""Pins that are named so have no name (CODESYS exporters)."""
+"""Names that stand for a pin without a name (CODESYS exporters)."""
 
 
 class Wire(NamedTuple):
@@ -69,13 +70,13 @@ class Object:
     in_outs: list[Pin] = field(default_factory=list)
     outputs: list[Pin] = field(default_factory=list)
     mnemonic: str = ""
-    """Which instruction a block is that we have drawn."""
+    """The mnemonic of the ladder instruction, if fbvm has drawn the block."""
     broken: bool = False
     """Whether something about it was not understood, and has a diagnostic."""
 
     @property
     def pins(self) -> list[Pin]:
-        """Where wires end."""
+        """The pins at which wires end."""
         return [*self.inputs, *self.in_outs]
 
     def pin(self, name: str) -> Pin | None:
@@ -85,95 +86,118 @@ class Object:
 
 @dataclass
 class Diagram:
-    """The objects of one body in the order of writing, and its comments; titles, which are boxes without wires, are such."""
+    """The objects of one body in the order of writing, and its comments; titles, which are boxes without wires, are comments."""
 
     objects: list[Object]
     comments: list[Object]
 
 
 def read_diagram(reading: Reading, body: Element, chart: bool = False) -> Diagram:
-    """The diagram in an element LD or FBD; what cannot be understood has a diagnostic.  Of a chart, what is drawn besides
-    steps: an object of kind "condition" stands for each transition whose condition is drawn."""
-    objects: list[Object] = []
-    comments: list[Object] = []
-    known: dict[str, Object] = {}
-    connectors: dict[str, Object] = {}
-    for place, element in enumerate(body.children):
-        if element.name in ("addData", "documentation"):
-            continue
-        made = _object(reading, element, place)
+    """The diagram in an element LD or FBD; what cannot be understood is reported.
+
+    With `chart`, `body` is an element SFC: steps and the like are left out, and an object of kind "condition" stands for
+    each transition whose condition is drawn."""
+    return _DiagramReader(reading, body, chart).diagram()
+
+
+class _DiagramReader:
+    """Reads one body: first its elements, then the wires between them."""
+
+    def __init__(self, reading: Reading, body: Element, chart: bool) -> None:
+        self.reading, self.body, self.chart = reading, body, chart
+        self.objects: list[Object] = []
+        self.comments: list[Object] = []
+        self.known: dict[str, Object] = {}
+        """Objects by localId."""
+        self.connectors: dict[str, Object] = {}
+        """Connectors by name in capitals."""
+
+    def diagram(self) -> Diagram:
+        for place, element in enumerate(self.body.children):
+            if element.name not in ("addData", "documentation"):
+                self._add(element, place)
+        for item in self.objects:
+            for pin in item.pins:
+                for number, name, at in pin.raw:
+                    item.broken |= not self._connect(pin, number, name, at)
+        used = {wire.source for item in self.objects for pin in item.pins for wire in pin.wires}
+        titles = [item for item in self.objects
+                  if item.kind == "vendorElement" and item not in used and not item.inputs[0].raw]
+        kept = [item for item in self.objects if item.kind not in ("connector", "continuation") and item not in titles]
+        for item in kept:
+            for pin in item.pins:
+                pin.wires = _followed(pin.wires)
+        return Diagram(kept, self.comments + titles)
+
+    def _add(self, element: Element, place: int) -> None:
+        """Add the object of an element; `place` is the number of the element in the body."""
+        made = _object(self.reading, element, place)
         if made.kind == "comment":
-            comments.append(made)
-            continue
-        if chart and element.name in SFC_OBJECTS:
-            objects += _conditions(element, place)
-            continue
-        if element.name in SFC_OBJECTS:
-            made.broken = True
-            reading.report("X0202", element, f"{element.name} stands in a body of {body.name}")
-        objects.append(made)
-        _register(reading, made, known, connectors)
-    for item in objects:
-        for pin in item.pins:
-            for number, name, at in pin.raw:
-                item.broken |= not _connect(reading, pin, number, name, at, known, connectors)
-    asked = {wire.source for item in objects for pin in item.pins for wire in pin.wires}
-    titles = [item for item in objects if item.kind == "vendorElement" and item not in asked and not item.inputs[0].raw]
-    comments += titles
-    kept = [item for item in objects if item.kind not in ("connector", "continuation") and item not in titles]
-    for item in kept:
-        for pin in item.pins:
-            pin.wires = _followed(pin.wires)
-    return Diagram(kept, comments)
+            self.comments.append(made)
+        elif self.chart and element.name in SFC_OBJECTS:
+            self.objects += _conditions(element, place)
+        else:
+            if element.name in SFC_OBJECTS:
+                made.broken = True
+                self.reading.report("X0202", element, f"{element.name} stands in a body of {self.body.name}")
+            self.objects.append(made)
+            self._register(made)
 
+    def _register(self, made: Object) -> None:
+        """Note an object by its localId, a connector also by its name."""
+        if not made.id.isdigit():
+            if made.element.name != "vendorElement":
+                made.broken = True
+                self.reading.report("X0105", made.element, f"<{made.element.name}> has no number as its localId")
+        elif made.id in self.known:
+            made.broken = self.known[made.id].broken = True
+            self.reading.report("X0105", made.element, f"localId {made.id} is there twice",
+                                "each element of a body has a number of its own")
+        self.known.setdefault(made.id, made)
+        if made.kind == "connector":
+            other = self.connectors.setdefault(made.text.upper(), made)
+            if other is not made:
+                made.broken = other.broken = True
+                self.reading.report("X0202", made.element, f"there are two connectors {made.text}")
 
-def _register(reading: Reading, made: Object, known: dict[str, Object], connectors: dict[str, Object]) -> None:
-    if not made.id.isdigit():
-        if made.element.name != "vendorElement":
-            made.broken = True
-            reading.report("X0105", made.element, f"<{made.element.name}> has no number as its localId")
-    elif made.id in known:
-        made.broken = known[made.id].broken = True
-        reading.report("X0105", made.element, f"localId {made.id} is there twice",
-                       "each element of a body has a number of its own")
-    known.setdefault(made.id, made)
-    if made.kind == "connector":
-        if made.text.upper() in connectors:
-            made.broken = connectors[made.text.upper()].broken = True
-            reading.report("X0202", made.element, f"there are two connectors {made.text}")
-        connectors.setdefault(made.text.upper(), made)
-
-
-def _connect(reading: Reading, pin: Pin, number: str, name: str, at: Element, known: dict[str, Object],
-             connectors: dict[str, Object]) -> bool:
-    """Lay one wire, and whether that could be done."""
-    source = known.get(number)
-    if source is None:
-        reading.report("X0201", at, f"a wire comes from element {number!r}, which there is not",
-                       "draw the wire once more")
-        return False
-    if source.kind == "continuation":
-        joined = connectors.get(source.text.upper())
-        if joined is None:
-            reading.report("X0201", source.element, f"there is no connector {source.text}")
+    def _connect(self, pin: Pin, number: str, name: str, at: Element) -> bool:
+        """Add the wire from output `name` of element `number` to a pin; whether there is such an output."""
+        source = self.known.get(number)
+        if source is None:
+            self.reading.report("X0201", at, f"a wire comes from element {number!r}, which there is not",
+                                "draw the wire once more")
             return False
-        source = joined
-    elif source.kind == "block":
-        outputs = [*source.outputs, *source.in_outs]
+        if source.kind == "continuation":
+            joined = self.connectors.get(source.text.upper())
+            if joined is None:
+                self.reading.report("X0201", source.element, f"there is no connector {source.text}")
+                return False
+            source = joined
+        elif source.kind == "block":
+            found = self._output(source, name, at)
+            if found is None:
+                return False
+            name = found
+        pin.wires.append(Wire(source, name if source.kind == "block" else ""))
+        return True
+
+    def _output(self, block: Object, name: str, at: Element) -> str | None:
+        """The output of a block that a wire names; its first one but ENO if the wire names none; None if there is no such
+        output, which is reported."""
+        outputs = [*block.outputs, *block.in_outs]
         if not name:
             named = [pin for pin in outputs if pin.name.upper() != "ENO"]
-            name = (named or outputs)[0].name if outputs else ""
-        elif not any(output.name.upper() == name.upper() for output in outputs):
-            has = ", ".join(output.name for output in outputs if output.name) or "none"
-            reading.report("X0201", at, f"a wire comes from output {name} of {source.text}, which there is not",
-                           f"its outputs are {has}")
-            return False
-    pin.wires.append(Wire(source, name if source.kind == "block" else ""))
-    return True
+            return (named or outputs)[0].name if outputs else ""
+        if any(output.name.upper() == name.upper() for output in outputs):
+            return name
+        has = ", ".join(output.name for output in outputs if output.name) or "none"
+        self.reading.report("X0201", at, f"a wire comes from output {name} of {block.text}, which there is not",
+                            f"its outputs are {has}")
+        return None
 
 
 def _followed(wires: list[Wire]) -> list[Wire]:
-    """Wires with connectors and coils replaced by what feeds them, each once."""
+    """The wires, each once, with the wires into a connector or a coil in place of a wire that comes from it."""
     found: dict[Wire, None] = {}
     seen: set[Object] = set()
     todo = wires[::-1]
@@ -188,7 +212,7 @@ def _followed(wires: list[Wire]) -> list[Wire]:
 
 
 def _conditions(element: Element, place: int) -> list[Object]:
-    """What asks for the condition of a transition, if that is drawn."""
+    """The object with the condition of a transition as its input; none if the condition is not drawn."""
     condition = element.one("condition")
     points = condition.all("connectionPointIn") if condition else []
     if not points:
@@ -203,7 +227,7 @@ def _conditions(element: Element, place: int) -> list[Object]:
 
 
 def placed(element: Element) -> tuple[float, float]:
-    """Where an element is drawn, x and y; what is no number of a place counts as 0."""
+    """The x and y at which an element is drawn; 0 for a coordinate that is no number."""
     position = element.one("position")
     return (_number(position.get("x")), _number(position.get("y"))) if position else (0.0, 0.0)
 
@@ -248,7 +272,7 @@ def _object(reading: Reading, element: Element, place: int) -> Object:
 
 
 def _text(element: Element) -> str:
-    """What an element is about: its variable, expression, label, name or text."""
+    """The variable, expression, label, name or text of an element."""
     attribute = {"block": "typeName", "label": "label", "jump": "label", "connector": "name", "continuation": "name"}
     if element.name in attribute:
         return element.get(attribute[element.name]).strip()
@@ -258,7 +282,7 @@ def _text(element: Element) -> str:
 
 
 def _merge_in_outs(made: Object) -> None:
-    """Beremiz before 2.01 has an in-out as an input and an output of one name."""
+    """Make in-outs of pairs of an input and an output of one name, as Beremiz before 2.01 writes in-outs."""
     outputs = {pin.name.upper(): pin for pin in made.outputs}
     for pin in [pin for pin in made.inputs if pin.name and pin.name.upper() in outputs]:
         made.inputs.remove(pin)
@@ -278,7 +302,7 @@ def _pin(element: Element, point: Element | None, name: str) -> Pin:
 
 
 def _wire_in(pin: Pin, point: Element | None) -> None:
-    """What a connectionPointIn says."""
+    """Note the wires, or the typed operand, of a connectionPointIn."""
     if point is None:
         return
     for connection in point.all("connection"):

@@ -8,18 +8,18 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.interchange.plcopen.read.markup import Element
+from fbvm.interchange.plcopen.markup import Element
 
 
 @dataclass
 class Reading:
-    """One document on its way; `diagnostics` grows, `where` names the POU at work."""
+    """The import of one document: its source, and the diagnostics so far; `where` names the POU at work."""
 
     source: Source
     diagnostics: list[Diagnostic] = field(default_factory=list)
     where: str = ""
     counted: dict[str, tuple[Element, int]] = field(default_factory=dict)
-    """What is lost in many places and is not needed: the first place, and how often."""
+    """What is left out in many places and not needed to run -> the first place, and how often."""
 
     def report(self, code: str, at: Element, message: str, hint: str = "") -> None:
         """A message about an element."""
@@ -30,12 +30,12 @@ class Reading:
         self.diagnostics.append(Diagnostic(code, self.source, at.at, at.at + 1 + len(at.name), text, hint))
 
     def count(self, what: str, at: Element) -> None:
-        """Note something that is not needed to run."""
+        """Count something that is left out and not needed to run."""
         first, times = self.counted.get(what, (at, 0))
         self.counted[what] = first, times + 1
 
     def close(self) -> None:
-        """Say what was counted, a message for each kind."""
+        """Report what was counted, one message for each kind."""
         for what, (first, times) in self.counted.items():
             again = f" ({times} times, here for the first)" if times > 1 else ""
             self.diagnostics.append(Diagnostic("X0190", self.source, first.at, first.at + 1 + len(first.name), what + again))

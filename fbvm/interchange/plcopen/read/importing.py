@@ -1,4 +1,4 @@
-"""Import of PLCopen TC6 XML: a document in, source files of ours and a list of what was not taken over out."""
+"""Import of PLCopen TC6 XML: a document in, source files and diagnostics out; nothing is left out without a diagnostic."""
 
 from __future__ import annotations
 
@@ -6,22 +6,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, errors
+from fbvm.interchange.plcopen.markup import parse_markup, read_markup
 from fbvm.interchange.plcopen.read.document import Reading
-from fbvm.interchange.plcopen.read.markup import parse_markup, read_markup
 from fbvm.interchange.plcopen.read.project import read_project
 from fbvm.interchange.plcopen.read.sources import sources
 
 
 @dataclass(frozen=True)
 class Imported:
-    """What became of a document: texts by the names of their files, and messages in order of place."""
+    """The result of an import: source texts by file name, and diagnostics in the order of the document."""
 
     files: dict[str, str]
     diagnostics: list[Diagnostic]
 
     @property
     def errors(self) -> list[Diagnostic]:
-        """Those about what the program lacks now."""
+        """Diagnostics about parts of the program that were not taken over."""
         return errors(self.diagnostics)
 
 

@@ -1,9 +1,10 @@
-"""The networks of a diagram, and the order in which things happen in them.
+"""The networks of a diagram, and the order in which their objects are evaluated.
 
-A network is what wires hold together, rails left out.  Networks go by executionOrderId where all have one, else from top
-to bottom; without positions, as written.  In a network an object comes behind all that feed it; what is free goes by
-executionOrderId, then from top to bottom and from left to right.  A loop is cut where it leaves a variable, if one lies
-in it, else where it enters the block that comes first, which so sees what was there one pass before.
+A network is a set of objects that wires connect, rails not counted.  Networks are in the order of executionOrderId if all
+have one, else from top to bottom; without positions, as written.  In a network an object follows all objects that feed it;
+objects that could be next go by executionOrderId, then from top to bottom and from left to right.  A loop is cut at the wire
+that leaves a variable, if the loop contains one, else at a wire into the block that comes first; a cut wire carries the value
+of the pass before.
 """
 
 from __future__ import annotations
@@ -16,23 +17,23 @@ from math import inf
 from fbvm.interchange.plcopen.read.diagram import Diagram, Object, Wire
 
 LARGEST, MOST_LOOPS = 5_000, 200
-"""Objects and loops of the largest network that is taken over; drawings of people have far fewer."""
+"""Most objects and most loops of a network that is taken over; drawings of people have far fewer."""
 RAILS = ("leftPowerRail", "rightPowerRail")
 SINKS = ("coil", "outVariable", "inOutVariable", "block", "jump", "return", "label")
-"""What does something."""
+"""Kinds of objects that have an effect."""
 
 
 @dataclass(eq=False)
 class Network:
-    """Objects in the order in which they are executed.  `cut` are wires (consumer, wire) that bring the value of the pass
-    before; `comments` stand above it."""
+    """Objects in the order of their evaluation.  `cut` are wires (consumer, wire) that carry the value of the pass before;
+    `comments` stand above the network."""
 
     objects: list[Object]
     cut: set[tuple[Object, Wire]] = field(default_factory=set)
     comments: list[str] = field(default_factory=list)
     number: int = 0
     refused: str = ""
-    """Why nobody tries to execute it."""
+    """Why the network is not taken over; "" if it is."""
 
     @property
     def broken(self) -> bool:
@@ -63,7 +64,7 @@ def _place(item: Object, flat: bool) -> tuple[float, float, int]:
 
 
 def _by_number(made: list[Network]) -> list[Network] | None:
-    """Networks by executionOrderId, if all that do something have one and no two networks mix theirs."""
+    """The networks by executionOrderId, if all objects with an effect have one and no two networks mix theirs; else None."""
     spans = []
     for network in made:
         numbers = [item.order for item in network.objects if item.kind in SINKS and item.kind != "label"]
@@ -90,7 +91,7 @@ def _comment(made: list[Network], comments: list[Object], flat: bool) -> None:
 
 
 class _Joined:
-    """Which objects hang together: called with an object, the one that stands for all of its network."""
+    """Which objects are connected: called with an object, returns the one that stands for its whole network (union-find)."""
 
     def __init__(self, items: list[Object]) -> None:
         self.parent = {item: item for item in items}
@@ -115,7 +116,7 @@ def _feeds(item: Object, inside: set[Object], cut: set[tuple[Object, Wire]]) -> 
 
 
 def _network(group: list[Object], flat: bool) -> Network:
-    """Sort a network; where only loops are left, cut one and go on."""
+    """A network with its objects sorted; if only loops are left, one is cut."""
     if len(group) > LARGEST:
         return _refused(group)
     inside = set(group)
@@ -166,7 +167,8 @@ def _back(left: list[Object], inside: set[Object], cut: set[tuple[Object, Wire]]
 
 
 def _loops(left: list[Object], inside: set[Object], cut: set[tuple[Object, Wire]]) -> dict[Object, int]:
-    """Objects that wires lead from one to the other and back have the same number (Tarjan 1972, without recursion)."""
+    """Numbers of the strongly connected components: two objects in a loop have the same number (Tarjan 1972, without
+    recursion)."""
     among = set(left)
     index: dict[Object, int] = {}
     low: dict[Object, int] = {}

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from fbvm.interchange.plcopen.markup import Element
 from fbvm.interchange.plcopen.read.document import (
     Body,
     Configuration,
@@ -22,29 +23,25 @@ from fbvm.interchange.plcopen.read.document import (
     Variable,
     VarList,
 )
-from fbvm.interchange.plcopen.read.markup import Element
-from fbvm.interchange.plcopen.read.types import LOCATION, MNEMONIC, duration, location, note, type_text, value_text
+from fbvm.interchange.plcopen.read.types import duration, location, note, type_text, value_text
+from fbvm.interchange.plcopen.schema import KINDS, LOCATION, MNEMONIC, QUALIFIERS, SECTIONS
 
 TC6 = "http://www.plcopen.org/xml/tc6"
 IEC_10 = "www.iec.ch/public/TC65SC65BWG7TF10"
 """Namespace of IEC 61131-10, another schema (from memory of the family, assumed)."""
-KINDS = {"function": "FUNCTION", "functionBlock": "FUNCTION_BLOCK", "program": "PROGRAM"}
-SECTIONS = {"localVars": "VAR", "tempVars": "VAR_TEMP", "inputVars": "VAR_INPUT", "outputVars": "VAR_OUTPUT",
-            "inOutVars": "VAR_IN_OUT", "externalVars": "VAR_EXTERNAL", "globalVars": "VAR_GLOBAL"}
-QUALIFIERS = {"constant": "CONSTANT", "retain": "RETAIN", "nonretain": "NON_RETAIN", "persistent": "PERSISTENT"}
 LANGUAGES = ("ST", "IL", "LD", "FBD", "SFC")
 OBJECT_ORIENTED = {"method", "property", "interface", "getaccessor", "setaccessor", "pouinheritance", "itf", "namespace"}
-"""Last words of names of `addData` that hold parts of programs (CODESYS)."""
+"""Last words of the names of `addData` with object-oriented parts of programs (CODESYS)."""
 READ = {"pou", "globalvars", "datatype", "application", "mixedattrsvarlist", "resource", "device", "location", "action"}
-"""Those whose contents are taken."""
+"""Last words of the names of `addData` whose contents are taken over."""
 SETTINGS = {"objectid", "tasksettings", "projectinformation", "projectstructure", "fbdcalltype", "fbdelementtype",
             "interfaceasplaintext", "buildproperties"}
-"""Those that say again what the elements say, or speak of the tool itself."""
+"""Last words of the names of `addData` that repeat what elements say, or concern the tool itself."""
 _IDENTIFIER = re.compile(r"[^\W\d]\w*")
 
 
 def read_project(reading: Reading, root: Element) -> Document | None:
-    """What is in a document; None if it is none of PLCopen TC6, and then a diagnostic says why."""
+    """The contents of a document; None, with a diagnostic, if it is no document of PLCopen TC6."""
     if root.namespace == IEC_10 or (root.name == "Project" and "61131" in root.namespace):
         reading.report("X0104", root, "this is XML of IEC 61131-10, the successor of PLCopen TC6, which is not read",
                        "let the tool export PLCopen XML (TC6)")
@@ -83,7 +80,7 @@ def _parts(root: Element) -> Iterator[tuple[Element, Element]]:
 
 
 def identifier(reading: Reading, element: Element, attribute: str = "name") -> str:
-    """A name that an element must have; "" with a diagnostic if it has none, or one that no program can say."""
+    """The name of an element; "" with a diagnostic if it has none, or one that is no identifier."""
     name = element.get(attribute).strip()
     if not name:
         reading.report("X0105", element, f"<{element.name}> has no {attribute}")
@@ -104,7 +101,7 @@ def _data_type(reading: Reading, element: Element) -> Iterator[DataType]:
 
 
 def _var_list(reading: Reading, element: Element, name: str = "") -> Iterator[VarList]:
-    """The list that an element is, and those of other qualifiers that it holds (CODESYS)."""
+    """The list of an element, and the lists with other qualifiers inside of it (CODESYS)."""
     name = element.get("name") or name
     inside = [inner for inner in element.walk() if inner is not element and inner.name == element.name]
     qualifiers = tuple(word for key, word in QUALIFIERS.items() if element.get(key) in ("true", "1"))
@@ -222,7 +219,7 @@ def _data(element: Element) -> list[Element]:
 
 
 def _added(reading: Reading, root: Element) -> None:
-    """List what stands in `addData`."""
+    """Report the `addData` that are not taken over."""
     pou = ""
     for element in root.walk():
         if element.name == "pou":

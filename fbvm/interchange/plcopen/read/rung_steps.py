@@ -1,7 +1,7 @@
-"""A network as mnemonics, where they say exactly what the network does.
+"""Networks as mnemonics, if these do exactly what the network does.
 
-They do if each contact and block has one place among them, and what is read and written comes in the same order as in the
-network.  Other networks become statements.
+They do if each contact and block is one step, and reads and writes keep the order of the network.  Other networks become
+statements.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from fbvm.syntax.ladder.text import instruction_text
 BRANCHES = 16
 """TR0 to TR15, each for one branch point of a rung."""
 LONGEST = 200
-"""Objects of the largest network that is written as a rung."""
+"""Most objects of a network that is written as a rung."""
 
 
 @dataclass(eq=False)
 class Parallel:
-    """Ways side by side, each a series."""
+    """Branches in parallel, each a series."""
 
     ways: list[Series]
 
@@ -32,15 +32,15 @@ Series = list["Object | Parallel"]
 
 @dataclass(eq=False)
 class Branch:
-    """A place behind an element or a parallel: the outputs there, and where it goes on."""
+    """A branch point behind an element or a parallel: the outputs there, and the branches that go on from it."""
 
     outputs: list[Object] = field(default_factory=list)
     ways: list[tuple[Object | Parallel, Branch]] = field(default_factory=list)
 
 
 def rung_steps(network: Network, scope: Scope, ours: bool = False) -> list[str] | None:
-    """The lines of a rung; None if mnemonics do not say it.  `ours` is a diagram that we have drawn, in which wires from the
-    rail were P_On."""
+    """The lines of a rung; None if mnemonics cannot do what the network does.  `ours` says that fbvm has drawn the diagram: a
+    wire from the rail then stands for P_On."""
     try:
         return _Rung(network, scope, ours).lines()
     except Inexact:
@@ -56,7 +56,7 @@ class _Rung:
         self.order: list[Object] = []
         self.steps: list[str] = []
         self.points = 0
-        """Branch points so far: each has a TR of its own."""
+        """Number of branch points so far: each has a TR bit of its own."""
 
     def lines(self) -> list[str]:
         if len(self.network.objects) > LONGEST or self.network.cut or not self.parts.outputs:
@@ -71,7 +71,7 @@ class _Rung:
         return self.steps
 
     def _alone(self, output: Object, powers: list[tuple[Wire, ...]]) -> None:
-        """An instruction that takes no condition, or several, and so has a rung for itself."""
+        """Write a rung for an instruction that takes no condition or several: it must be the only output."""
         if len(self.parts.outputs) > 1:
             raise Inexact
         for wires in powers:
@@ -102,7 +102,7 @@ class _Rung:
     # --- shape ---
 
     def _series(self, wires: tuple[Wire, ...]) -> Series:
-        """What lies between the rail and a place, as elements and parallels one behind the other."""
+        """The elements and parallels between the rail and a place that these wires lead to."""
         if not wires:
             raise Inexact
         if wires not in self.known:
@@ -117,7 +117,7 @@ class _Rung:
         return self.known[wires]
 
     def _merged(self, ways: list[Series]) -> Series:
-        """Several ways as one: what they begin with together, and a parallel of the rest."""
+        """Several series as one: the elements with which they begin alike, and a parallel of the rest."""
         if len(ways) == 1:
             return ways[0]
         if not all(ways):
@@ -143,7 +143,7 @@ class _Rung:
     # --- steps ---
 
     def _branch(self, branch: Branch, follows: bool) -> None:
-        """What hangs on a place, in the order of the network; a TR keeps the power for what comes later."""
+        """Write the outputs and branches of a branch point in the order of the network; a TR bit keeps the power."""
         parts: list[Object | tuple[Object | Parallel, Branch]] = [*branch.outputs, *branch.ways]
         parts.sort(key=lambda part: self.place[part if isinstance(part, Object) else self._first(part[0])])
         ways = [at for at, part in enumerate(parts) if not isinstance(part, Object)]
@@ -172,7 +172,7 @@ class _Rung:
         return part
 
     def _part(self, part: Object | Parallel, follows: bool) -> None:
-        """An element or a parallel, behind what is there already, or at the rail."""
+        """Write an element or a parallel: at the rail, or with `follows` in series with what is written."""
         if isinstance(part, Object):
             self._element("AND" if follows else "LD", part)
             return

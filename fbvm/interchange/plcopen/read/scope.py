@@ -1,6 +1,6 @@
-"""What the names in a diagram stand for: types of variables and results, who shares memory, and names that are free.
+"""The names in a diagram: types of variables and results, which memory a name stands for, and which names are free.
 
-Only as much as the import needs to keep a value in a variable; whoever checks the program comes later.
+Only as much as the import needs to keep a value in a variable; the program is checked later.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from fbvm.check.calls.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, co
 from fbvm.interchange.plcopen.read.diagram import Object, Wire
 from fbvm.interchange.plcopen.read.document import Document, Pou, Variable
 from fbvm.syntax import tree
-from fbvm.syntax.ladder.operands import Operands, Wrong
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.ladder.operands import OperandError, Operands
+from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 
 SHARED = "%"
-"""Stands for all that somebody else may write: located, global and referenced variables."""
+"""The root of all that other POUs may write: located, global and referenced variables."""
 COMPARISONS = ("GT", "GE", "EQ", "LE", "LT", "NE")
 _ROOT = re.compile(r"[^\W\d]\w*")
 _WORDS = re.compile(r"'[^']*'|\"[^\"]*\"|[A-Za-z]+#\S*|%[\w.]+|(?<![\w.%])[^\W\d]\w*")
 _OPERATORS = {"TRUE", "FALSE", "AND", "OR", "NOT", "XOR", "MOD"}
 _DEEP = 12
-"""How far a type is looked for against the wires."""
+"""Most blocks through which the type of a wire is followed upwards."""
 
 
 class Scope:
@@ -43,7 +43,8 @@ class Scope:
         """Variables that the import adds: (section, type) -> names."""
 
     def new(self, stem: str, kind: str, keeps: bool) -> str:
-        """Declare a variable; `keeps` if its value lasts to the next pass."""
+        """Declare a variable of the type `kind`; returns its name, `stem` or `stem_2` and so on.  With `keeps`, its value lasts
+        to the next pass."""
         name, number = stem, 1
         while name.upper() in self.taken:
             number += 1
@@ -55,11 +56,11 @@ class Scope:
 
     @property
     def is_function(self) -> bool:
-        """Whether nothing lasts from one call to the next."""
+        """Whether the POU is a function, in which nothing lasts from one call to the next."""
         return self.pou.kind == "FUNCTION"
 
     def roots(self, expression: str) -> frozenset[str]:
-        """What a text of Structured Text reads: names of variables that only this POU can write, and SHARED for all others."""
+        """The roots of the variables that an expression of Structured Text reads."""
         found = set()
         for match in _WORDS.finditer(expression):
             word = match[0]
@@ -70,22 +71,22 @@ class Scope:
         return frozenset(found)
 
     def bit(self, text: str) -> str:
-        """A bit as Structured Text says it: an address that rungs know, such as W0.00, has a `%` there."""
+        """The bit that an operand of a rung names, in Structured Text: an address such as W0.00 gets a `%`."""
         if self.declares(text):
             return text
         try:
             meant = Operands().expression(text, "b", 0, 0)
-        except Wrong:
+        except OperandError:
             return text
         return meant.text if isinstance(meant, tree.Direct) else text
 
     def declares(self, expression: str) -> bool:
-        """Whether somebody declares the name with which a text begins."""
+        """Whether the name with which a text begins is declared."""
         match = _ROOT.match(expression)
         return match is not None and match[0].upper() in self.taken
 
     def root(self, name: str) -> str:
-        """What memory a name stands for."""
+        """The root of a variable: its folded name if only this POU can write it, else SHARED."""
         match = _ROOT.match(name)
         if not match:
             return SHARED
@@ -99,7 +100,7 @@ class Scope:
     # --- types ---
 
     def type_of(self, expression: str) -> str:
-        """The type of an expression that is the name of a variable, or a literal; "" if that is not known."""
+        """The type of an expression that is the name of a variable or a literal; "" for another expression."""
         expression = expression.strip()
         if expression.upper() in ("TRUE", "FALSE"):
             return "BOOL"
@@ -126,7 +127,7 @@ class Scope:
         return _library_pins(block.upper()).get(pin.upper(), "")
 
     def wire_type(self, wire: Wire, depth: int = 0) -> str:
-        """The type of what a wire carries; "" if that cannot be told."""
+        """The type of the value on a wire; "" if it is not known."""
         item = wire.source
         if depth > _DEEP:
             return ""
@@ -143,33 +144,47 @@ class Scope:
         return self._function_type(item, wire.pin, depth)
 
     def _function_type(self, item: Object, pin: str, depth: int) -> str:
+        """The type of an output of a function."""
         name = item.text.upper()
         other = self.pous.get(name)
         if other is not None:
             variable = other.variable(pin)
             return variable.type if variable else other.result
-        if name in COMPARISONS:
-            return "BOOL"
-        row = SIGNATURES.get(name)
-        if row is not None and row.result not in ("T", ""):
-            return row.result
-        if (change := conversion(name)) is not None:
-            return change.target
-        if name in TIME_OPERATORS:
-            function, (left, right) = TIME_OPERATORS[name]
-            return ("LTIME" if left.startswith("L") else "TIME") if function == "SUB" and left == right else left
-        if (typed := typed_name(name)) is not None:
-            return name.removeprefix(f"{typed[0]}_") if typed[0] not in COMPARISONS else "BOOL"
-        if row is None and name not in OPERATORS:
+        return _standard_type(name) or self._operand_type(item, depth)
+
+    def _operand_type(self, item: Object, depth: int) -> str:
+        """The type of the result of a standard function whose result has the type of its operands."""
+        name = item.text.upper()
+        if name not in SIGNATURES and name not in OPERATORS:
             return ""
-        skipped = {"EN", "G", "K", "N", "L", "P"}
-        for data in (p for p in item.inputs if p.name.upper() not in skipped):
+        for data in (pin for pin in item.inputs if pin.name.upper() not in _NO_OPERANDS):
             found = self.type_of(data.expression) if data.expression else ""
-            for inner in data.wires:
-                found = found or self.wire_type(inner, depth + 1)
+            for wire in data.wires:
+                found = found or self.wire_type(wire, depth + 1)
             if found:
                 return found
         return ""
+
+
+_NO_OPERANDS = {"EN", "G", "K", "N", "L", "P"}
+"""Inputs of standard functions whose type says nothing about that of the result."""
+
+
+def _standard_type(name: str) -> str:
+    """The type of the result of a standard function by its name; "" if that depends on the operands."""
+    row = SIGNATURES.get(name)
+    if name in COMPARISONS:
+        return "BOOL"
+    if row is not None and row.result not in ("T", ""):
+        return row.result
+    if (change := conversion(name)) is not None:
+        return change.target
+    if name in TIME_OPERATORS:
+        function, (left, right) = TIME_OPERATORS[name]
+        return ("LTIME" if left.startswith("L") else "TIME") if function == "SUB" and left == right else left
+    if (typed := typed_name(name)) is not None:
+        return name.removeprefix(f"{typed[0]}_") if typed[0] not in COMPARISONS else "BOOL"
+    return ""
 
 
 def _globals(document: Document) -> Iterable[tuple[Variable, ...]]:

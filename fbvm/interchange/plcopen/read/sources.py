@@ -1,4 +1,4 @@
-"""A document as source files of ours: a POU a file, a file for types, one for each list of globals, one for configurations."""
+"""A document as source files: one for each POU, for types, for each list of globals, and for each configuration."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fbvm.interchange.plcopen.read.types import remark
 from fbvm.syntax.formatter.formatter import formatted
 
 GLOBALS = "globals"
-"""File of the lists of globals that have no name."""
+"""Name of the file for lists of globals without a name."""
 TYPES = "types"
 
 

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 import re
 
+from fbvm.interchange.plcopen.markup import Element
 from fbvm.interchange.plcopen.read.document import Reading
-from fbvm.interchange.plcopen.read.markup import Element
+from fbvm.interchange.plcopen.schema import ELEMENTARY, LOCATION
 
-_NAMES = ("BOOL BYTE WORD DWORD LWORD SINT INT DINT LINT USINT UINT UDINT ULINT REAL LREAL TIME DATE DT TOD "
-          "ANY ANY_DERIVED ANY_ELEMENTARY ANY_MAGNITUDE ANY_NUM ANY_REAL ANY_INT ANY_BIT ANY_STRING ANY_DATE")
-ELEMENTARY = frozenset(_NAMES.split())
-"""Types that are empty elements of their name (TC6 2.01 elementaryTypes)."""
 _LATER = frozenset(("LTIME", "LDATE", "LDT", "LTOD", "CHAR", "WCHAR"))
-"""Types of edition 3, that documents have in the same way, and that are not written."""
-LOCATION = "urn:fbvm:location"
-"""Our `addData`: an address that is no IEC location."""
-MNEMONIC = "urn:fbvm:mnemonic"
-"""The same: which instruction a block is."""
+"""Types of edition 3, which some documents have in the same way; they are read and not written."""
 _NAME = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*")
 _DURATION = re.compile(r"P(?:(\d{1,12})D)?(?:T(?:(\d{1,12})H)?(?:(\d{1,12})M)?(?:(\d{1,12}(?:\.\d+)?)S)?)?")
 
@@ -100,18 +93,22 @@ def value_text(holder: Element | None) -> str:
 
 
 def location(element: Element) -> str:
-    """Where a variable lies: its address, or one that is no IEC location, which we keep as data of our own."""
+    """The address of a variable, from `address` or, if it is no IEC location, from fbvm's own data; "" if it has none."""
     return own_text(element, LOCATION) or element.get("address").strip()
 
 
 def own_text(element: Element, name: str) -> str:
-    """What data of our own says about an element."""
+    """The text of fbvm's own data of a name at an element; "" if there is none."""
     added = element.one("addData")
     return next((data.text.strip() for data in added.all("data") if data.get("name") == name), "") if added else ""
 
 
 def duration(text: str) -> str:
-    """An interval as a literal: `T#20ms`, `PT0.02S` (CODESYS) and `20ms` (OpenPLC) are found; "" for a name."""
+    """A duration as a literal, from `T#20ms`, `PT0.02S` (CODESYS) or `20ms` (OpenPLC); "" for another text, such as a name.
+
+    >>> duration("PT0.02S")
+    'T#20ms'
+    """
     text = text.strip()
     iso = _DURATION.fullmatch(text)
     if iso and any(iso.groups()):

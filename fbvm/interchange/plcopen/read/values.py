@@ -1,4 +1,4 @@
-"""Values on wires as texts of Structured Text, that remember how tightly they bind and what they read."""
+"""Values on wires: expressions of Structured Text with their precedence and the variables that they read."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class Unexecutable(Exception):
 
 @dataclass(frozen=True)
 class Value:
-    """A text, its level, and the roots of what it reads (`Scope.roots`)."""
+    """An expression as text, the level of its operator, and the roots of the variables that it reads (`Scope.roots`)."""
 
     text: str
     level: int = ATOM
     reads: frozenset[str] = frozenset()
 
     def at(self, level: int) -> str:
-        """The text where an operand of that level is wanted."""
+        """The text as an operand of an operator of that level: in parentheses if it binds more loosely."""
         return self.text if self.level >= level else f"({self.text})"
 
     @property
@@ -45,8 +45,13 @@ class Value:
 TRUE, FALSE = Value("TRUE"), Value("FALSE")
 
 
+def variable(name: str) -> Value:
+    """The value of a variable that the import has declared."""
+    return Value(name, ATOM, frozenset((name.upper(),)))
+
+
 def written(text: str, reads: frozenset[str]) -> Value:
-    """A value that somebody else wrote as an expression."""
+    """The value of an expression that stands in the document."""
     text = " ".join(text.split())
     return Value(text, ATOM if _ATOM.fullmatch(text) else LOOSE, reads)
 
@@ -59,7 +64,7 @@ def joined(name: str, values: list[Value]) -> Value:
 
 
 def either(values: list[Value]) -> Value:
-    """A wired OR; no value at all is FALSE."""
+    """A wired OR of any number of values; FALSE of none."""
     left = [value for value in values if not value.is_false]
     if any(value.is_true for value in left):
         return TRUE
@@ -67,14 +72,14 @@ def either(values: list[Value]) -> Value:
 
 
 def both(first: Value, second: Value) -> Value:
-    """Two contacts in series."""
+    """The AND of two values: contacts in series."""
     if first.is_false or second.is_false:
         return FALSE
     return second if first.is_true else first if second.is_true else joined("AND", [first, second])
 
 
 def negation(value: Value) -> Value:
-    """The other state."""
+    """The inverse of a BOOL value."""
     if value.is_true or value.is_false:
         return FALSE if value.is_true else TRUE
     if value.level == UNARY and value.text.startswith("NOT "):

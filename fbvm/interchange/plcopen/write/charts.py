@@ -1,27 +1,27 @@
-"""Sequential function charts of the tree as charts of PLCopen XML: each step once, and a jump for every other way to it."""
+"""Sequential function charts as charts of PLCopen XML: each step is drawn once, every other way to it ends in a jump."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from fbvm.interchange.plcopen.read.markup import Element, element
+from fbvm.interchange.plcopen.markup import Element, element
 from fbvm.interchange.plcopen.write.layout import End, wired
 from fbvm.interchange.plcopen.write.types import Types
 from fbvm.syntax import tree
 from fbvm.syntax.tree.sfc import Sfc, Step, Transition
 
 LANE, HIGH, TOP = 320, 160, 40
-"""Places in the drawing: how far apart columns and rows of steps are, and where the first row is."""
+"""Units of the drawing: the distances of columns and of rows of steps, and the y of the first row."""
 STEP_WIDTH, STEP_HEIGHT, ACTION_WIDTH, ACTION_HEIGHT = 80, 30, 140, 20
 
 Body = Callable[[tree.Block, int, int], Element]
-"""Makes the element of a body of the tree, given where it stands in the text."""
+"""Makes the element of a body, given the start and end of its text."""
 
 
 @dataclass
 class ChartWriter:
-    """Draws one chart.  `named` grows with transitions that have bodies."""
+    """Draws one chart.  `named` grows by the elements of transitions that have bodies."""
 
     types: Types
     chart: Sfc
@@ -50,7 +50,7 @@ class ChartWriter:
         return self.number
 
     def _from(self, first: Step) -> None:
-        """Draw a step, and all that follows it and has not been drawn."""
+        """Draw a step and all steps behind it that have not been drawn."""
         todo: list[tuple[str, int | None, int, int]] = [(first.name.text.upper(), None, self.lanes, 0)]
         self.claimed.add(todo[0][0])
         self.lanes += 1

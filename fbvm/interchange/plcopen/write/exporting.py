@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
-from fbvm.interchange.plcopen.read.markup import Element, element, written
+from fbvm.interchange.plcopen.markup import Element, element, written
 from fbvm.interchange.plcopen.write.pous import pou
-from fbvm.interchange.plcopen.write.types import Types, Unsayable
+from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
-from fbvm.syntax.st.parser import parse
+from fbvm.syntax.parser import parse
 from fbvm.syntax.st.pragmas import harmless
 from fbvm.syntax.text import read
 
 NAMESPACE = "http://www.plcopen.org/xml/tc6_0201"
 XHTML = "http://www.w3.org/1999/xhtml"
 BEGINNING = "1970-01-01T00:00:00"
-"""When a document was made, if nobody says it."""
+"""The creation time in a document, if none is given."""
 _NAME = re.compile(r"[^\W\d]\w*")
 
 
@@ -32,13 +32,13 @@ class Exported:
 
     @property
     def errors(self) -> list[Diagnostic]:
-        """Those about what the document lacks."""
+        """Diagnostics about parts of the sources that the document lacks."""
         return errors(self.diagnostics)
 
 
 @dataclass
 class _Parts:
-    """What goes where in the document."""
+    """The elements of the document, by the place that they go to."""
 
     types: list[Element] = field(default_factory=list)
     pous: list[Element] = field(default_factory=list)
@@ -73,8 +73,8 @@ def _source(parts: _Parts, source: Source) -> None:
     for declared in text.declarations:
         try:
             _declaration(parts, types, declared, named if _NAME.fullmatch(named) else "")
-        except Unsayable as unsayable:
-            node, message, hint = unsayable.args
+        except NotExportable as unexportable:
+            node, message, hint = unexportable.args
             what = f"{declared.name.text}: " if isinstance(declared, tree.Pou | tree.TypeDecl | tree.Configuration) else ""
             parts.diagnostics.append(Diagnostic("X0301", source, node.start, node.end, f"{what}{message}", hint))
     for pragma in text.pragmas:
@@ -99,13 +99,13 @@ def _declaration(parts: _Parts, types: Types, declared: tree.Declaration, name: 
     elif isinstance(declared, tree.Configuration):
         parts.configurations.append(_configuration(types, declared))
     elif isinstance(declared, tree.Refused):
-        raise Unsayable(declared, f"{declared.what} is not exported", "")
+        raise NotExportable(declared, f"{declared.what} is not exported", "")
     else:
-        raise Unsayable(declared, "what stands outside of its POU is not exported", "put ACTIONs into their POU")
+        raise NotExportable(declared, "what stands outside of its POU is not exported", "put ACTIONs into their POU")
 
 
 def _matters(pragma: str) -> bool:
-    """Whether the program means something else without a pragma in front of a declaration."""
+    """Whether a pragma in front of a declaration changes the meaning of the program."""
     return not harmless(pragma) or bool(re.search(r"(?i)'(pack_mode|qualified_only|strict)'", pragma))
 
 
@@ -114,7 +114,7 @@ def _matters(pragma: str) -> bool:
 
 def _configuration(types: Types, declared: tree.Configuration) -> Element:
     for unsaid in (*declared.refused, *declared.settings):
-        raise Unsayable(unsaid, "VAR_ACCESS and VAR_CONFIG are not exported", "")
+        raise NotExportable(unsaid, "VAR_ACCESS and VAR_CONFIG are not exported", "")
     resources = [_resource(types, resource) for resource in declared.resources]
     lists = [types.section(section) for section in declared.sections]
     return element("configuration", *resources, *lists, name=declared.name.text)
@@ -122,11 +122,11 @@ def _configuration(types: Types, declared: tree.Configuration) -> Element:
 
 def _resource(types: Types, resource: tree.Resource) -> Element:
     for unsaid in (*resource.refused, *resource.settings):
-        raise Unsayable(unsaid, "this part of a RESOURCE is not exported", "")
+        raise NotExportable(unsaid, "this part of a RESOURCE is not exported", "")
     instances: dict[str, list[Element]] = {}
     for program in resource.programs:
         if program.connections or program.blocks or program.qualifiers:
-            raise Unsayable(program, "connections and qualifiers of programs are not exported", "assign in the program")
+            raise NotExportable(program, "connections and qualifiers of programs are not exported", "assign in the program")
         task = program.task.text.upper() if program.task else ""
         instances.setdefault(task, []).append(element("pouInstance", name=program.name.text, typeName=program.type_name.text))
     tasks = [_task(types, task, instances.get(task.name.text.upper(), [])) for task in resource.tasks]
@@ -141,7 +141,7 @@ def _task(types: Types, task: tree.Task, programs: Iterable[Element]) -> Element
 
 
 def _project(parts: _Parts, name: str, created: str) -> Element:
-    """The frame, in the order of the schema."""
+    """The element `project`, its parts in the order of the schema."""
     if parts.globals and not parts.configurations:
         parts.configurations.append(element("configuration", element("resource", name="Res0"), name="Config0"))
     if parts.globals:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fbvm.interchange.plcopen.read.markup import Element, element
-from fbvm.interchange.plcopen.read.types import MNEMONIC
+from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.plcopen.schema import MNEMONIC
 
 LEFT, COLUMN, ROW, GAP = 20, 110, 60, 40
-"""Places in the drawing, in its units: where the rail stands, and how far apart columns, rows and networks are."""
+"""Units of the drawing: the x of the rail, and the distances of columns, rows and networks."""
 SYMBOL_WIDTH, SYMBOL_HEIGHT = 21, 15
 """Size of a contact and of a coil, as Beremiz draws them."""
 RAIL_WIDTH, VARIABLE_WIDTH, VARIABLE_HEIGHT, BLOCK_WIDTH, PIN = 3, 80, 25, 90, 25
@@ -18,7 +18,7 @@ AXIS = 20
 
 @dataclass(frozen=True)
 class End:
-    """An output that wires may come from: its element, pin, and place."""
+    """An output from which wires may come: the number of its element, its pin, and its position."""
 
     id: int
     pin: str
@@ -30,14 +30,14 @@ Ends = tuple[End, ...]
 
 
 class Drawing:
-    """One body of ladder on its way."""
+    """The drawing of one body: `elements` grows from top to bottom."""
 
     def __init__(self) -> None:
         self.elements: list[Element] = []
         self.top = GAP
         self.number = 0
         self.first = 0
-        """Where the elements of the network at work begin."""
+        """Number of elements before those of the network at work."""
 
     def next_id(self) -> int:
         self.number += 1
@@ -59,7 +59,7 @@ class Drawing:
         self.top += 20 * len(lines) + 20
 
     def rail(self) -> tuple[Element, End]:
-        """The left rail of a network; its outputs are counted when the network is finished."""
+        """Begin a network with its left rail; the outputs of the rail are added by `close`."""
         self.first = len(self.elements)
         made = element("leftPowerRail", _position(LEFT, self.top), localId=self.next_id(), height=ROW, width=RAIL_WIDTH)
         self.elements.append(made)
@@ -92,8 +92,8 @@ class Drawing:
 
     def block(self, kind: str, instance: str, inputs: list[tuple[str, Ends | str]], outputs: list[tuple[str, str]], column: int,
               row: int, mnemonic: str = "") -> dict[str, End]:
-        """A block: each input is a name with the wires or the text that it takes, each output a name with the variable that
-        gets it, or "".  The ends of its outputs by name.  `mnemonic` is what it is for us, as data of our own."""
+        """A block; returns the ends of its outputs by name.  Each input is a name with the wires or the text that it takes, each
+        output a name with the variable that gets it, or "".  `mnemonic` is kept as fbvm's own data."""
         x, y = self.x(column), self.y(row) - PIN
         pins: list[Element] = []
         values = [(name, (self.in_variable(what, x - 20, y + PIN * (at + 1)),) if isinstance(what, str) else what)
@@ -134,12 +134,12 @@ class Drawing:
         self.top += height + GAP
 
     def skip(self, rows: int) -> None:
-        """Go on below a network that has no rails."""
+        """Finish a network that has no rails."""
         self.top += rows * ROW + GAP
 
 
 def own_data(name: str, text: str) -> Element:
-    """Data that only we understand."""
+    """An `addData` that only fbvm understands."""
     return element("addData", element("data", element("text", text), name=name, handleUnknown="discard"))
 
 

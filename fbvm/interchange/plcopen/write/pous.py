@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import re
 
-from fbvm.interchange.plcopen.read.markup import Element, element
+from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.plcopen.schema import KINDS
 from fbvm.interchange.plcopen.write.charts import ChartWriter
 from fbvm.interchange.plcopen.write.layout import Drawing
 from fbvm.interchange.plcopen.write.rungs import RungWriter
 from fbvm.interchange.plcopen.write.statements import StatementWriter
-from fbvm.interchange.plcopen.write.types import Types, Unsayable
+from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
 from fbvm.syntax.tree.ladder import Ladder
 from fbvm.syntax.tree.sfc import Sfc
 
-KINDS = {"FUNCTION": "function", "FUNCTION_BLOCK": "functionBlock", "PROGRAM": "program"}
+TYPES_OF_POUS = {kind: name for name, kind in KINDS.items()}
 _END = re.compile(r"(?i)END_(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|ACTION)\s*$")
 _COLON = re.compile(r"\s*:(?!=)")
 _JUMP = re.compile(r"(?i)\bJMP\b")
@@ -22,33 +23,43 @@ _LABEL = re.compile(r"(?m)^[ \t]*[^\W\d]\w*[ \t]*:(?!=)")
 
 
 def pou(types: Types, declared: tree.Pou) -> Element:
-    """The element of a POU.  Raises Unsayable if it has something for which the format has no form."""
+    """The element of a POU.  Raises NotExportable if the POU has something for which the format has no form."""
     for refused in declared.refused:
-        raise Unsayable(refused, f"{refused.what} is not exported", "")
+        raise NotExportable(refused, f"{refused.what} is not exported", "")
     if declared.accesses:
-        raise Unsayable(declared.accesses[0], "VAR_ACCESS of a POU is not exported", "")
+        raise NotExportable(declared.accesses[0], "VAR_ACCESS of a POU is not exported", "")
     sections = [section for section in declared.sections if not section.hidden]
+    variables = [variable for section in sections for variable in section.variables]
     types.note(sections)
-    types.instances = {name.text.upper(): variable.spec.text for section in sections for variable in section.variables
-                       for name in variable.names if isinstance(variable.spec, tree.NamedType)}
+    types.instances = {name.text.upper(): variable.spec.text for variable in variables for name in variable.names
+                       if isinstance(variable.spec, tree.NamedType)}
     lists = [types.section(section) for section in sections if section.variables]
-    taken = {name.text.upper() for section in sections for variable in section.variables for name in variable.names}
+    taken = {name.text.upper() for variable in variables for name in variable.names}
     transitions: list[Element] = []
     if declared.body and isinstance(declared.body[0], Sfc):
         inner, transitions, instances = _chart(types, declared.body[0], taken)
     else:
         inner, instances = _body(types, declared.body, *_span(types, declared), taken)
-    actions = [_action(types, action, taken, instances) for action in declared.actions if not action.name.text.startswith("$")]
+    actions = [_action(types, action, taken, instances) for action in declared.actions if not _is_hidden(action)]
     if instances:
         lists.append(element("localVars", *instances.values()))
     result = element("returnType", types.spec(declared.result)) if declared.result is not None else None
-    return element("pou", element("interface", result, *lists), element("actions", *actions) if actions else None,
-                   element("transitions", *transitions) if transitions else None, element("body", inner),
-                   name=declared.name.text, pouType=KINDS[declared.kind])
+    return element("pou", element("interface", result, *lists), _unless_empty("actions", actions),
+                   _unless_empty("transitions", transitions), element("body", inner),
+                   name=declared.name.text, pouType=TYPES_OF_POUS[declared.kind])
+
+
+def _is_hidden(action: tree.Action) -> bool:
+    """Whether an action is a subroutine of a LADDER, which has no name that can be written."""
+    return action.name.text.startswith("$")
+
+
+def _unless_empty(name: str, elements: list[Element]) -> Element | None:
+    return element(name, *elements) if elements else None
 
 
 def _chart(types: Types, chart: Sfc, taken: set[str]) -> tuple[Element, list[Element], dict[str, Element]]:
-    """The element of a chart, its transitions that have bodies, and variables that these need."""
+    """The element of a chart; the elements of its transitions that have bodies; the variables that these bodies need, by name."""
     instances: dict[str, Element] = {}
 
     def body(statements: tree.Block, start: int, end: int) -> Element:
@@ -62,7 +73,7 @@ def _chart(types: Types, chart: Sfc, taken: set[str]) -> tuple[Element, list[Ele
 
 
 def _span(types: Types, declared: tree.Pou) -> tuple[int, int]:
-    """Where the body of a POU stands in the text."""
+    """Where the body of a POU begins and ends in the text."""
     heads: list[tree.Node] = [declared.name, *(s for s in declared.sections if not s.hidden)]
     if declared.result is not None:
         heads.append(declared.result)
@@ -72,8 +83,7 @@ def _span(types: Types, declared: tree.Pou) -> tuple[int, int]:
         start += 1
     found = _END.search(text, start, declared.end)
     end = found.start() if found else declared.end
-    written = [action.start for action in declared.actions
-               if start <= action.start < end and not action.name.text.startswith("$")]
+    written = [action.start for action in declared.actions if start <= action.start < end and not _is_hidden(action)]
     return start, min([end, *written])
 
 
@@ -89,16 +99,16 @@ def _action(types: Types, action: tree.Action, taken: set[str], instances: dict[
 
 
 def _body(types: Types, body: tree.Block, start: int, end: int, taken: set[str]) -> tuple[Element, dict[str, Element]]:
-    """The element of a body, and the variables that it needs besides, by name."""
+    """The element of a body, and the variables that the POU must declare for it, by name.  Raises NotExportable."""
     for statement in body:
         if isinstance(statement, tree.RefusedStatement):
-            raise Unsayable(statement, f"{statement.what} is not exported", "")
+            raise NotExportable(statement, f"{statement.what} is not exported", "")
     text = types.source.text[start:end]
     if not any(isinstance(statement, Ladder) for statement in body):
         types.kept.append((start, end))
         return element("ST", element("xhtml:p", _dedented(text))), {}
     if len(body) > 1 and (_JUMP.search(text) or _LABEL.search(_without_ladder(text))):
-        raise Unsayable(body[0], "jumps between rungs are not exported", "put the statements into a POU of Structured Text")
+        raise NotExportable(body[0], "jumps between rungs are not exported", "put the statements into a POU of Structured Text")
     drawing = Drawing()
     rungs = RungWriter(drawing, types, taken)
     statements = StatementWriter(drawing, types)
@@ -115,7 +125,7 @@ def _without_ladder(text: str) -> str:
 
 
 def _dedented(text: str) -> str:
-    """Lines moved to the left as a whole, without empty ones around them."""
+    """A text without its common indentation and without empty lines around it."""
     lines = text.expandtabs(4).split("\n")
     first, *more = lines
     margin = min((len(line) - len(line.lstrip()) for line in more if line.strip()), default=0)

@@ -1,7 +1,7 @@
-"""Rungs as ladder diagrams: the steps of mnemonics, followed with the stack of those who execute them.
+"""Rungs as ladder diagrams: follows the steps of mnemonics with the stack of conditions with which they are executed.
 
-Power is a place, which is a set of outputs that are joined, and what was put behind it and has not been drawn yet.
-Comparisons become blocks of the standard; other instructions become boxes of their names, which only we understand.
+`Power` is a condition: the outputs from which it comes, and elements behind these that have not been drawn yet.
+Comparisons become blocks of the standard; other instructions become boxes of their names, which only fbvm understands.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from fbvm.base.areas import parse_address
-from fbvm.interchange.plcopen.read.markup import Element, element
-from fbvm.interchange.plcopen.read.types import LOCATION
+from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.plcopen.schema import LOCATION
 from fbvm.interchange.plcopen.write.layout import Drawing, End, Ends, own_data
-from fbvm.interchange.plcopen.write.types import Types, Unsayable
+from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.drawing.diagram import WIRE
-from fbvm.syntax.ladder.instruction_set import JOINS, Instruction, instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import JOINS, Instruction, instruction_set
 from fbvm.syntax.ladder.mnemonics import Symbol, read_rungs
-from fbvm.syntax.ladder.operands import SYMBOLS, Operands, Wrong
+from fbvm.syntax.ladder.operands import SYMBOLS, OperandError, Operands
 from fbvm.syntax.ladder.symbols import number
 from fbvm.syntax.tree.ladder import Ladder, Rung, Step
 
@@ -50,7 +50,7 @@ class Test:
 
 @dataclass(eq=False)
 class Ways:
-    """Series side by side."""
+    """Series in parallel."""
 
     series: list[list[Contact | Test | Ways]]
 
@@ -60,7 +60,8 @@ Series = list[Contact | Test | Ways]
 
 @dataclass
 class Power:
-    """A place, None for the rail, and what follows it; `column` and `row` say where the next element goes."""
+    """A condition: `ends` are the outputs from which it comes (None: the rail), `series` the elements behind them that are not
+    drawn yet; the next element goes to `column` and `row`."""
 
     ends: Ends | None = None
     series: Series = field(default_factory=list)
@@ -69,7 +70,7 @@ class Power:
 
 
 class RungWriter:
-    """Draws the rungs of one POU; `declared` are variables that it adds, by name."""
+    """Draws the rungs of one POU; `declared` grows by the variables that the drawing needs, by name."""
 
     def __init__(self, drawing: Drawing, types: Types, taken: set[str]) -> None:
         self.drawing, self.types, self.taken = drawing, types, taken
@@ -78,7 +79,7 @@ class RungWriter:
         """Symbols that mean timers and counters, and their numbers."""
 
     def ladder(self, ladder: Ladder) -> None:
-        """Draw LADDER .. END_LADDER.  Raises Unsayable."""
+        """Draw LADDER .. END_LADDER.  Raises NotExportable."""
         for symbol in self._symbols(ladder):
             if timer := number(symbol):
                 self.numbered[symbol.name.upper()] = timer
@@ -146,8 +147,8 @@ class RungWriter:
         else:
             self._instruction(step, row)
 
-    def _unsayable(self, what: str) -> Unsayable:
-        return Unsayable(self.step, f"ladder of PLCopen XML has no {what}", "write that rung in Structured Text")
+    def _not_exportable(self, what: str) -> NotExportable:
+        return NotExportable(self.step, f"ladder of PLCopen XML has no {what}", "write that rung in Structured Text")
 
     @property
     def power(self) -> Power:
@@ -180,27 +181,27 @@ class RungWriter:
         marks = dict(EDGES.get(edge, {}))
         if negated:
             if edge:
-                raise self._unsayable("contact that is negated and has an edge")
+                raise self._not_exportable("contact that is negated and has an edge")
             marks["negated"] = "true"
         return [Contact(self._symbol(name), marks)]
 
     def _symbol(self, name: str) -> str:
-        """A variable; an address without a name is one that only we can name."""
+        """The variable of a contact or coil; an address is noted as one that other tools cannot name."""
         name = self.numbered.get(name.upper(), name)
         try:
             meant = Operands().expression(name, "b", self.step.start, self.step.end)
-        except Wrong as wrong:
-            raise Unsayable(self.step, wrong.args[0], "") from None
+        except OperandError as wrong:
+            raise NotExportable(self.step, wrong.args[0], "") from None
         if not isinstance(meant, tree.NameRef | tree.Member | tree.Index) or name.upper() in SYMBOLS:
             self.foreign(self.step, f"{name} is an address, for which other tools have no name; declare a variable AT it")
         return name
 
     def _beside(self, other: Power) -> None:
-        """OR: another way to the same place."""
+        """OR: join another condition to this one."""
         power = self.power
         if power.ends is None and other.ends is None:
             if not power.series or not other.series:
-                raise self._unsayable("wire that bridges contacts")
+                raise self._not_exportable("wire that bridges contacts")
             known = power.series[0] if len(power.series) == 1 and isinstance(power.series[0], Ways) else None
             ways = known.series if known else [power.series]
             self.now = Power(None, [Ways([*ways, other.series])])
@@ -217,7 +218,7 @@ class RungWriter:
             self.now = first
             self._beside(second)
         elif second.ends is not None:
-            raise self._unsayable("AND of two places from which something else hangs")
+            raise self._not_exportable("AND of two places from which something else hangs")
         else:
             first.series += second.series
             self.now = first
@@ -225,7 +226,7 @@ class RungWriter:
     # --- drawing ---
 
     def _drawn(self, power: Power) -> Ends:
-        """Draw what is still to be drawn of a power, and keep its place."""
+        """Draw the elements of a condition that are not drawn yet; returns the outputs from which it comes."""
         if power.ends is None and power.column == 0:
             power.row = max(power.row, self.rows)
         ends = (self._rail_end(power.row),) if power.ends is None else power.ends
@@ -239,7 +240,7 @@ class RungWriter:
         return End(self.start.id, "", self.start.x, self.drawing.y(row))
 
     def _series(self, series: Series, ends: Ends, column: int, row: int) -> tuple[Ends, int, int]:
-        """Draw contacts one behind the other: what comes out, the next column, and the rows that they take."""
+        """Draw elements in series; returns the outputs at their end, the next column, and the number of rows."""
         rows = 1
         for part in series:
             if isinstance(part, Contact):
@@ -262,7 +263,7 @@ class RungWriter:
         return ends, column, rows
 
     def _tested(self, part: Test, ends: Ends, column: int, row: int) -> Ends:
-        """A comparison as a block of the standard, and what comes before it ANDed."""
+        """Draw a comparison as a block of the standard, and an AND with the condition before it."""
         kind = COMPARISONS.get(re.sub(r"[A-Z]+$", "", part.mnemonic), part.mnemonic)
         values = [(f"IN{at}", self._operand(text)) for at, text in enumerate(part.operands, 1)]
         made = self.drawing.block(kind, "", [*values], [("OUT", "")], column + 1, row + 1, part.mnemonic)
@@ -272,7 +273,8 @@ class RungWriter:
         return (self.drawing.block("AND", "", both, [("OUT", "")], column + 2, row)["OUT"],)
 
     def _output(self) -> tuple[Ends, int, int]:
-        """The power for an output, and where that goes: a row of its own.  What was saved is drawn first, in its order."""
+        """Draw the saved conditions in their order, then the present one; returns its outputs, and the column and row for what it
+        goes to."""
         for saved in self.saved:
             if saved.series:
                 self._drawn(saved)
@@ -303,27 +305,27 @@ class RungWriter:
         """NOP."""
 
     def _keep(self) -> None:
-        """KEEP: a coil that sets and, stronger, one that resets."""
+        """KEEP: a coil that sets, and behind it one that resets, which therefore wins."""
         name = self._symbol(self.step.operands[0])
         reset, set_ = self.power, self.saved.pop()
         if name.upper() in {c.variable.upper() for c in _contacts(reset.series)} or reset.ends is not None:
-            raise self._unsayable("KEEP whose reset asks for its own bit")
+            raise self._not_exportable("KEEP whose reset asks for its own bit")
         self.now = set_
         self._draw_coil(name, COILS["SET"])
         self.now = Power(None, reset.series, 0, self.rows)
         self._draw_coil(name, COILS["RSET"])
 
     def _function(self, kind: str, pin: str, output: str, instance: str = "") -> None:
-        """A block that stands in the way of the power."""
+        """Draw a block that the power goes through."""
         ends, column, row = self._output()
         made = self.drawing.block(kind, instance, [(pin, ends)], [(output, "")], column, row, kind if kind == "NOT" else "")
         self.now = Power((made[output],), [], column + 1, row)
 
     def _refuse(self) -> None:
-        raise self._unsayable(self.step.mnemonic)
+        raise self._not_exportable(self.step.mnemonic)
 
     def _up(self) -> None:
-        """UP: an R_TRIG in the way.  F_TRIG is no DOWN: it has an edge in its first call too."""
+        """UP: an R_TRIG that the power goes through.  DOWN is refused: F_TRIG also has an edge in its first call."""
         name, last = "Edge", 1
         while f"{name}{last}".upper() in self.taken | {known.upper() for known in self.declared}:
             last += 1
@@ -332,7 +334,7 @@ class RungWriter:
         self._function("R_TRIG", "CLK", "Q", f"{name}{last}")
 
     def _instruction(self, step: Step, row: Instruction) -> None:
-        """An instruction of Omron's as a box of its name: conditions, then operands as they are written."""
+        """Draw an instruction of Omron's as a box of its name: conditions, then operands as they are written."""
         self.foreign(step, f"{step.mnemonic} is an instruction that other tools do not have")
         inputs: list[tuple[str, Ends | str]] = []
         column = place = 0
@@ -371,7 +373,7 @@ class RungWriter:
         self.now = Power((made[leaving],), [], column + 3, below)
 
     def _operand(self, text: str) -> str:
-        """What enters a pin, as Structured Text."""
+        """An operand at a pin, in Structured Text."""
         text = self.numbered.get(text.upper(), text)
         if text.upper() in ("P_ON", "P_OFF"):
             return "TRUE" if text.upper() == "P_ON" else "FALSE"

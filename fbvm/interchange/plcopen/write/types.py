@@ -6,9 +6,8 @@ import re
 from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
-from fbvm.interchange.plcopen.read.markup import Element, element
-from fbvm.interchange.plcopen.read.project import QUALIFIERS, SECTIONS
-from fbvm.interchange.plcopen.read.types import ELEMENTARY, LOCATION
+from fbvm.interchange.plcopen.markup import Element, element
+from fbvm.interchange.plcopen.schema import ELEMENTARY, LOCATION, QUALIFIERS, SECTIONS
 from fbvm.interchange.plcopen.write.layout import own_data
 from fbvm.syntax import tree
 
@@ -23,12 +22,12 @@ _NUMBERED = re.compile(r"([TtCc])(\d+)")
 _REMARK = re.compile(r"[ \t]*;?[ \t]*//[ \t]*([^\n]*)")
 
 
-class Unsayable(Exception):
-    """The format has no way to say it; the arguments are the node, a message and a hint."""
+class NotExportable(Exception):
+    """The format has no form for something; the arguments are the node, a message and a hint."""
 
 
 class Types:
-    """Writes the types of one source; `foreign` are (node, message) of what only we understand."""
+    """Writes types, values and sections of one source; `foreign` grows by (node, message) for what only fbvm understands."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -36,12 +35,12 @@ class Types:
         self.kept: list[tuple[int, int]] = []
         """Parts of the text that are exported as they are."""
         self.numbered: dict[str, str] = {}
-        """Timers and counters by the names of variables that lie at them, in capitals."""
+        """Variable in capitals -> the timer or counter that it is declared AT."""
         self.instances: dict[str, str] = {}
-        """Types of the variables of the POU at work that have a type by name, by names in capitals."""
+        """Variable of the POU at work, in capitals -> the name of its type."""
 
     def text(self, node: tree.Node) -> str:
-        """What was written, with the brackets around parts of it, which the tree does not have."""
+        """The text of a node, with the brackets around parts of it, which the tree does not have."""
         text, start, end = self.source.text, node.start, node.end
         while any(open_ends := _brackets(text[start:end])):
             if open_ends[1]:
@@ -51,7 +50,7 @@ class Types:
         return _squeezed(text[start:end])
 
     def note(self, sections: Iterable[tree.VarSection]) -> None:
-        """Look for variables that lie at timers and counters."""
+        """Note the variables of these sections that are declared AT timers and counters."""
         for variable in (variable for section in sections for variable in section.variables):
             if variable.location is not None and (found := _NUMBERED.fullmatch(variable.location.text.strip())):
                 self.numbered |= {name.text.upper(): f"{found[1].upper()}{int(found[2])}" for name in variable.names}
@@ -59,7 +58,7 @@ class Types:
     # --- types ---
 
     def spec(self, spec: tree.TypeSpec) -> Element:
-        """The element of a type.  Raises Unsayable."""
+        """The element of a type.  Raises NotExportable."""
         if isinstance(spec, tree.NamedType):
             name = LONG.get(spec.text.upper(), spec.text.upper())
             return element(name) if name in ELEMENTARY else element("derived", name=spec.text)
@@ -80,13 +79,13 @@ class Types:
             return element("struct", *(made for member in spec.members for made in self.variables(member)))
         if isinstance(spec, tree.RefSpec) and spec.kind == "POINTER TO":
             return element("pointer", element("baseType", self.spec(spec.target)))
-        raise Unsayable(spec, f"the format has no type for {self.text(spec).split('(')[0][:40]}", "")
+        raise NotExportable(spec, f"the format has no type for {self.text(spec).split('(')[0][:40]}", "")
 
     def _array(self, spec: tree.ArraySpec) -> Element:
         dimensions = []
         for dimension in spec.dimensions:
             if dimension is None:
-                raise Unsayable(spec, "the format has no arrays of any length", "")
+                raise NotExportable(spec, "the format has no arrays of any length", "")
             low, high = dimension
             dimensions.append(element("dimension", lower=self.text(low), upper=self.text(high)))
         return element("array", *dimensions, element("baseType", self.spec(spec.element)))
@@ -100,7 +99,7 @@ class Types:
             for times, inner in value.items:
                 repeated = {"repetitionValue": self.text(times)} if times is not None else {}
                 if inner is None:
-                    raise Unsayable(value, "the format cannot repeat a default value", "")
+                    raise NotExportable(value, "the format cannot repeat a default value", "")
                 items.append(element("value", self.value(inner), **repeated))
             return element("arrayValue", *items)
         if isinstance(value, tree.StructInit):
@@ -113,7 +112,7 @@ class Types:
     def variables(self, declared: tree.VarDecl) -> Iterator[Element]:
         """One element for each name of a declaration."""
         if declared.edge:
-            raise Unsayable(declared, "the format has no R_EDGE and F_EDGE", "use R_TRIG or F_TRIG")
+            raise NotExportable(declared, "the format has no R_EDGE and F_EDGE", "use R_TRIG or F_TRIG")
         for name in declared.names:
             made = element("variable", element("type", self.spec(declared.spec)), name=name.text)
             if declared.location is not None:
@@ -133,22 +132,22 @@ class Types:
         made.content.append(own_data(LOCATION, text))
 
     def section(self, section: tree.VarSection, name: str = "") -> Element:
-        """The list that a section is."""
+        """The element of a section.  Raises NotExportable."""
         kind = LISTS.get(section.kind)
         if kind is None:
-            raise Unsayable(section, f"the format has no {section.kind}", "")
+            raise NotExportable(section, f"the format has no {section.kind}", "")
         marks = {}
         for qualifier in section.qualifiers:
             word = qualifier.text.upper()
             if word not in WORDS:
-                raise Unsayable(qualifier, f"the format has no {word}", "")
+                raise NotExportable(qualifier, f"the format has no {word}", "")
             marks[WORDS[word]] = "true"
         named = {"name": name} if name else {}
         return element(kind, *(made for declared in section.variables for made in self.variables(declared)), **named, **marks)
 
 
 def _brackets(text: str) -> tuple[int, int]:
-    """How many brackets are open at the end of a text, and how many are closed that nothing opened."""
+    """How many brackets a text opens and does not close, and how many it closes and does not open."""
     opened = closed = 0
     for match in _SIGNS.finditer(text):
         if match[0] == "(":
@@ -161,10 +160,10 @@ def _brackets(text: str) -> tuple[int, int]:
 
 
 def _squeezed(text: str) -> str:
-    """One blank for many and for line ends, but not within strings; without comments."""
+    """A text without comments, with one blank for each run of blanks and line ends outside of strings."""
     return _BLANKS.sub(lambda match: match[1] if match[1] and match[1][0] in "'\"" else " ", text).strip()
 
 
 def documentation(text: str) -> Element:
-    """Text for people."""
+    """An element `documentation`."""
     return element("documentation", element("xhtml:p", text))

@@ -1,4 +1,4 @@
-"""A drawing surface of characters on which lines meet: each cell knows which ways lines leave it, thin or thick."""
+"""A surface of characters on which lines meet: each cell knows the directions in which lines leave it, thin or thick."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cache
 LEFT, RIGHT, UP, DOWN = range(4)
 WAY_WORDS = {"LEFT": (LEFT,), "RIGHT": (RIGHT,), "UP": (UP,), "DOWN": (DOWN,), "HORIZONTAL": (LEFT, RIGHT),
              "VERTICAL": (UP, DOWN)}
-"""Words in the names of box drawing characters, and the ways in which lines leave these."""
+"""Words in the names of box drawing characters -> the directions in which lines leave the character."""
 THIN, THICK, DOUBLE = 1, 2, 3
 _WEIGHTS = {"LIGHT": THIN, "SINGLE": THIN, "HEAVY": THICK, "DOUBLE": DOUBLE}
 
@@ -32,7 +32,7 @@ def _characters() -> dict[tuple[int, int, int, int], str]:
 
 
 def _parts(words: list[str]) -> list[tuple[tuple[int, ...], int]]:
-    """Ways and weights that a name gives: a weight stands in front of its ways, or behind them."""
+    """The directions and weights that a name says: a weight stands in front of its directions, or behind them."""
     if words[0] not in _WEIGHTS:
         return [(ways, weight) for ways, weight in _parts(words[::-1])]
     parts: list[tuple[tuple[int, ...], int]] = []
@@ -54,7 +54,7 @@ class Surface:
         self.strokes: set[tuple[int, int]] = set()
         """Characters that are the strokes of a contact or the brackets of a coil."""
         self.faint: set[tuple[int, int]] = set()
-        """Characters that say less than others, as addresses below symbols."""
+        """Cells of less important text, such as addresses below symbols."""
 
     def _leave(self, x: int, y: int, way: int, weight: int) -> None:
         cell = self.lines.setdefault((x, y), [0, 0, 0, 0])
@@ -75,7 +75,7 @@ class Surface:
             self._leave(x, at + 1, UP, weight)
 
     def write(self, x: int, y: int, text: str) -> None:
-        """Text over whatever is there."""
+        """Write text over the cells there."""
         for at, character in enumerate(text):
             self.texts[x + at, y] = character
 

@@ -1,4 +1,4 @@
-"""Boxes of a rung as they are drawn: what stands on which of their rows, and how wide that is."""
+"""The layout of boxes: the texts of each row, and the width."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ Values = Callable[[int, str], str]
 
 
 class Row(NamedTuple):
-    """A row of a box: what stands inside at the left and at the right, and beside it what enters and what leaves."""
+    """A row of a box: the texts inside at the left and at the right, and the operands outside at the left and at the right."""
 
     left: str
     right: str = ""
@@ -20,7 +20,7 @@ class Row(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """A box: `left`, `wide` and `right` are the columns of what enters, from side to side, and of what leaves."""
+    """A box: `left`, `wide` and `right` are the columns of the operands at the left, of the box, and of those at the right."""
 
     title: str
     heads: tuple[Row, ...]
@@ -33,14 +33,14 @@ class Shape(NamedTuple):
     """Columns from the left side to the text of a row."""
 
     def placed(self, conditions: Sequence[int]) -> dict[int, Row]:
-        """Its rows by their distance from the upper side; conditions come in on some."""
+        """Its rows by their distance from the upper side; conditions enter in some of them."""
         made = dict(zip(conditions, self.heads, strict=False))
         free = max(made, default=0) + 1
         return made | dict(enumerate(self.rows, free))
 
 
 def shape(box: Box, values: Values) -> Shape:
-    """How a box is drawn, with the values that its operands had."""
+    """The layout of a box, with the values that its operands had."""
     if box.instance:
         return _block(box, values)
     texts = [_valued(box.step, operand, values) for operand in box.operands]
@@ -66,7 +66,7 @@ def _widest(texts: Iterator[str]) -> int:
 
 
 def _rows(box: Box, values: Values) -> Iterator[Row]:
-    """The pins in their order: one that gives stands beside the one before if that takes."""
+    """The pins in rows: an output stands beside the input in front of it."""
     before: Pin | None = None
     for pin in box.pins:
         if before is not None and pin.output:
@@ -89,6 +89,6 @@ def _row(box: Box, taking: Pin | None, giving: Pin | None, values: Values) -> Ro
 
 
 def _valued(step: int, operand: str, values: Values) -> str:
-    """An operand with the value it had."""
+    """An operand with its value, if the value is known."""
     value = values(step, operand)
     return f"{operand} = {value}" if value else operand

@@ -1,23 +1,23 @@
-"""Steps of a rung to what is drawn: contacts in series and in parallel, branch points, coils and boxes."""
+"""Steps of a rung to a diagram: contacts in series and in parallel, branch points, coils and boxes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from fbvm.syntax.ladder.instruction_set import instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import instruction_set
 
 StepText = tuple[str, str, tuple[str, ...]]
 """Prefix, mnemonic and operands of an instruction."""
 
 
 class Undrawable(Exception):
-    """The steps can be executed and have no drawing, as an OR behind an output."""
+    """The steps can be executed and cannot be drawn, as with an OR behind an output."""
 
 
 @dataclass(eq=False)
 class Contact:
-    """A contact: `mark` is what stands between its two strokes."""
+    """A contact: `mark` is the text between its two strokes."""
 
     step: int
     mark: str
@@ -26,7 +26,7 @@ class Contact:
 
 @dataclass(frozen=True)
 class Pin:
-    """A pin of a function block: an input with what enters it, or an output with where its value goes."""
+    """A pin of a function block: an input with its operand, or an output with the variable that takes its value."""
 
     name: str
     operand: str
@@ -70,7 +70,7 @@ class Parallel:
 
 @dataclass(eq=False)
 class Point:
-    """A place behind a series from which power goes on to outputs and to other points; the first one is the bus bar."""
+    """A point behind a series, from which power goes on to outputs and to other points; the first point is the bus bar."""
 
     path: Series
     outs: list[Out] = field(default_factory=list)
@@ -80,7 +80,7 @@ Part = Contact | Box | Parallel
 Out = Coil | Box | Point
 
 WIRE = "*"
-"""The operand of a pin of FBCALL that the condition enters in place of EN, or that power leaves in place of ENO."""
+"""The operand that marks the pin of an FBCALL that takes power in place of EN, or gives power in place of ENO."""
 CALL = "CALL"
 """The call of a block in Structured Text, as a step: type, instance, pins; a pin takes a condition where nothing enters it."""
 COILS = {"OUT": " ", "OUTNOT": "/", "SET": "S", "RSET": "R", "DIFU": "↑", "DIFD": "↓"}
@@ -97,7 +97,7 @@ class _Condition:
 
 
 def diagram(steps: Sequence[StepText]) -> Point:
-    """The bus bar of a rung with all that hangs on it.  Raises Undrawable."""
+    """The bus bar of a rung with all elements that follow it.  Raises Undrawable."""
     reader = _Reader()
     try:
         for number, (prefix, mnemonic, operands) in enumerate(steps):
@@ -109,7 +109,7 @@ def diagram(steps: Sequence[StepText]) -> Point:
 
 
 class _Reader:
-    """Follows the steps with a stack, as those do who execute them."""
+    """Follows the steps with the stack of conditions with which they are executed."""
 
     def __init__(self) -> None:
         self.bar = Point(Series())
@@ -117,7 +117,7 @@ class _Reader:
         self.stack: list[_Condition] = []
         self.kept: dict[str, Point] = {}
         self.lost = False
-        """Whether the condition is that of the last input of a box, which nothing can be drawn behind."""
+        """Whether the condition is that of the last input of a box, behind which nothing can be drawn."""
 
     def step(self, number: int, prefix: str, mnemonic: str, operands: tuple[str, ...]) -> None:
         if operands and operands[0].upper() in self.kept and mnemonic == "LD":
@@ -164,7 +164,7 @@ class _Reader:
         self.now.path.parts.append(Box(number, text, through=True))
 
     def _point(self) -> Point:
-        """The point at which the condition is now; made if there is none."""
+        """The point at which the execution condition is; made if there is none yet."""
         if self.now.is_empty():
             return self.now.start
         point = Point(self.now.path)
@@ -193,8 +193,8 @@ class _Reader:
             self._box(Box(number, prefix + mnemonic, operands), row.inputs if row else 1)
 
     def _box(self, box: Box, count: int) -> None:
-        """A box at the end of a rung.  If it has several inputs, they are the last blocks; all but the first begin at the
-        bus bar."""
+        """Add a box as an output.  If it has several inputs, these are the last blocks; all but the first of these begin at
+        the bus bar."""
         if count < 2:
             start = self.bar if box.instance and not count else self._point()
             start.outs.append(box)
@@ -210,20 +210,20 @@ class _Reader:
         self.now = self.now if self.lost else _Condition(self.bar, Series())
 
     def finish(self) -> None:
-        """A path behind which nothing stands, as a block whose ENO nobody uses, goes on to the end."""
+        """Make a point at the end of a path that no output follows, such as a block whose ENO is not used."""
         if not self.now.is_empty():
             self._point()
 
 
 def _branches(path: Series) -> list[Series]:
-    """A path as branches of a parallel connection: one that is nothing else is taken apart."""
+    """The branches of a path; one branch if the path is no parallel connection."""
     if len(path.parts) == 1 and isinstance(path.parts[0], Parallel):
         return path.parts[0].branches
     return [path]
 
 
 def joined(mnemonic: str) -> tuple[str, str] | None:
-    """How a mnemonic of a contact joins, and what is behind LD, AND, OR in it; None for all others."""
+    """How a contact joins (LD, AND or OR), and the rest of its mnemonic; None for an instruction that is no contact."""
     for how in ("LD", "AND", "OR"):
         rest = mnemonic.removeprefix(how)
         if rest != mnemonic and (rest in ("", "NOT", "TST", "TSTN") or rest[0] in "=<>"):
@@ -239,7 +239,7 @@ def _contact(number: int, prefix: str, rest: str, operands: tuple[str, ...]) -> 
 
 
 def coil_mark(prefix: str, mnemonic: str) -> str:
-    """What stands between the brackets of a coil."""
+    """The text between the brackets of a coil."""
     mark = COILS[mnemonic]
     return (prefix + mark.strip()) or mark
 

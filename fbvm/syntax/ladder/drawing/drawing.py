@@ -1,4 +1,4 @@
-"""Ladder as a drawing of characters: rungs with contacts, coils and boxes, and with thick lines where power was."""
+"""Rungs as drawings of characters: contacts, coils and boxes, with thick lines where there was power."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fbvm.syntax.ladder.drawing.widths import LEAD, LINK, SLACK, Sight, Widths
 
 ARROW = "►"
 LEAST = 24
-"""Columns that a rung needs for anything to be drawn."""
+"""Least columns of a rung."""
 STEP = 4
 """Columns by which a rung becomes wider if an element does not fit."""
 AT_REST = Sight()
@@ -50,7 +50,7 @@ def drawn(bar: Point, width: int = 80, sight: Sight = AT_REST) -> Surface:
 
 
 class _Rest(NamedTuple):
-    """What a line left for another one further down."""
+    """The rest of a line that goes on further down."""
 
     number: int
     point: Point
@@ -64,7 +64,7 @@ class _Drawing:
         self.surface = Surface()
         self.width, self.widths, self.sight = width, widths, widths.sight
         self.need = 0
-        """Columns that would have been enough for what did not fit."""
+        """Width in columns that would have been enough for what did not fit."""
         self._start = 0
         """The column in which the line at work begins."""
         self._left: list[_Rest] = []
@@ -83,7 +83,7 @@ class _Drawing:
         return self.surface
 
     def _state(self, step: int, which: int = -1) -> bool | None:
-        """What was seen at a step; None at rest or if it was not reached."""
+        """The state or power at a step; None at rest or if the step was not executed."""
         if self.sight.states is None:
             return None
         seen = self.sight.states.get(step)
@@ -114,7 +114,7 @@ class _Drawing:
         return y
 
     def _point(self, point: Point, x: int, y: int, power: bool | None, is_open: bool = False, below: int = 0) -> int:
-        """A path, and what hangs on its end; what does not fit is left for another line."""
+        """A path and the point at its end; what does not fit is left for another line."""
         depth, parts = y, point.path.parts
         for at, part in enumerate(parts):
             behind = LINK if at + 1 < len(parts) else self.widths.needed(point) + SLACK
@@ -127,7 +127,7 @@ class _Drawing:
         return max(depth, self._outs(point, x, y, power, is_open, max(depth, below)))
 
     def _leave(self, rest: Point, x: int, y: int, power: bool | None) -> int:
-        """End a line with an arrow and a number; the rest of it begins with them, in a line below all that is begun."""
+        """End a line with an arrow and a number; its rest begins with the same arrow, below all lines that were begun."""
         self._links += 1
         self._left.append(_Rest(self._links, rest, power))
         self._arrow(self._links, x, y, bool(power))
@@ -139,7 +139,7 @@ class _Drawing:
         self._take(x + 4 + len(str(number)))
 
     def _go_on(self, number: int, x: int, y: int, power: bool) -> int:
-        """Begin a line with an arrow in column x; the column behind it."""
+        """Begin a line with an arrow in column x; returns the column behind the arrow."""
         mark = f"{ARROW}{number}"
         self.surface.write(x, y + 1, mark)
         self.surface.across(x + len(mark) - 1, x + len(mark) + 2, y + 1, power)
@@ -181,7 +181,7 @@ class _Drawing:
         return rows, row if rows else y
 
     def _box(self, made: Shape, x: int, y: int, conditions: Sequence[int]) -> int:
-        """A box whose first condition is on the line; how many rows it takes."""
+        """A box whose first condition is on the line; returns its number of rows."""
         rows = made.placed(conditions)
         deep = max([*rows, *conditions, 1]) + 1
         for edge in (y, y + deep):
@@ -202,7 +202,7 @@ class _Drawing:
         return deep + 1
 
     def _labels(self, label: str, below: str, x: int, wide: int, y: int) -> int:
-        """A name above a mark and an address or a value below; how many rows that are more than two."""
+        """A name above a mark, and an address or a value below; returns how many rows are needed beyond two."""
         self.surface.write(x + (wide - len(label)) // 2, y, label)
         if below:
             start = x + (wide - len(below)) // 2
@@ -230,7 +230,7 @@ class _Drawing:
         return y + height - top, power, y + 1, x
 
     def _fitting(self, part: Part, room: int) -> int:
-        """The columns for a part where there are so many: branches can be made to go on below."""
+        """The columns that a part takes if there is `room`: branches take less than they need, since they can go on below."""
         natural = self.widths.part(part)
         return max(room, LEAST // 2) if isinstance(part, Parallel) and room < natural else natural
 

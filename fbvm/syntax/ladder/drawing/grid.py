@@ -1,7 +1,6 @@
-"""A drawing of a rung as cells: the elements that are found in it, and what is wire.
+"""A drawing of a rung as cells: finds contacts, coils, boxes and texts; all other cells are wire.
 
-Drawings of box characters and those that people type (`|--| |--( )--|`) are read alike; whether a line is thick or thin
-has no meaning.
+Box characters and typed characters (`|--| |--( )--|`) mean the same; whether a line is thick or thin has no meaning.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from dataclasses import dataclass, field
 from functools import cache
 
 from fbvm.syntax.ladder.drawing.box_lines import DOWN, LEFT, RIGHT, UP, WAY_WORDS
-from fbvm.syntax.ladder.instruction_set import instruction_set, spelling
+from fbvm.syntax.ladder.instructions.instruction_set import instruction_set, spelling
 
 Cell = tuple[int, int]
 WAYS = {LEFT: (-1, 0), RIGHT: (1, 0), UP: (0, -1), DOWN: (0, 1)}
@@ -26,25 +25,27 @@ _COIL_KNOWN = re.compile(r" ?[!@%]{0,2}(?:[/↑↓PN]|S|R|SET|RSET|)(?: ?)")
 _OPERAND = r"[A-Za-z_%][\w.]*(?:\[\d+\][\w.]*)*|\d+\.\d+"
 _NAMED = {False: re.compile(rf"[\[\]|┤┫](?: ?(/)| ?([PN↑↓])(?= )|) ?({_OPERAND}) ?[\]\[|├┣]"),
           True: re.compile(rf"\((?: ?(/)| ?([PNSR↑↓]|SET|RSET)(?= )|) ?({_OPERAND}) ?\)")}
-"""Contacts and coils with their operand inside, as others type them: `[ a ]`, `[/a]`, `( b )`, `(S b)`."""
+"""Contacts and coils with their operand inside: `[ a ]`, `[/a]`, `( b )`, `(S b)`."""
 _BRACKETS = re.compile(r"\[[^\[\]|]*\w[^\[\]|]*\]")
 _LINK = re.compile(r"[►▶>](\d+)")
 _TITLE = re.compile(r"([A-Za-z_]\w*) ?: ?([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*)")
 _NAME = re.compile(r" *([A-Za-z_]\w*) *")
 _HEAD = re.compile(r" *(?:([A-Za-z_]\w*) +([A-Za-z_]\w*) +(\w+)|([A-Za-z_]\w*)) *")
-"""The first row of a block: its type, by itself or between two pins."""
+"""The first row of a block: its type, alone or between two pins."""
+_UPPER_SIDE = re.compile(r"[─━═-]*( ?[A-Za-z_][\w .:\[\]]*)?[─━═-]*[┐┓╗╮┒┑+]")
+"""The upper side of a box behind its left corner, perhaps with a title."""
 _STUB = frozenset("─━-╶╴╺╸")
 _BOX_TEXT = re.compile(r" ?[A-Za-z0-9@%!&#+]")
 _TEXT = re.compile(r"= [^\s─-╿|]+(?:, [^\s─-╿|]+)*|[^\s─-╿|]+")
 """A text of a row: one word, or the values that stand below a comparison."""
 
 
-class Bad(Exception):
+class DrawingError(Exception):
     """The drawing cannot be read; the arguments are column, row, width, message and hint."""
 
 
 @dataclass(eq=False)
-class Drawn:
+class DrawnElement:
     """A contact or a coil: the columns of its strokes or brackets."""
 
     x: int
@@ -54,7 +55,7 @@ class Drawn:
     is_coil: bool
     operands: tuple[str, ...] = ()
     operand_at: list[tuple[int, int]] = field(default_factory=list)
-    """Of each operand the columns, in the row above, or inside."""
+    """For each operand its first column and the one behind its last, in the row above or, if `inside`, in its own row."""
     inside: bool = False
 
 
@@ -69,7 +70,7 @@ class DrawnBox:
     title: tuple[str, str] | None
     """Instance and type of a block."""
     heads: tuple[int, int]
-    """The rows in which these stand."""
+    """The rows in which instance and type stand."""
     rows: dict[int, str] = field(default_factory=dict)
     stubs: dict[tuple[int, int], str] = field(default_factory=dict)
     """Operands beside a side, by side (LEFT, RIGHT) and row."""
@@ -77,7 +78,7 @@ class DrawnBox:
 
 @cache
 def ways(character: str) -> frozenset[int]:
-    """The ways in which lines leave a box character; those of `|`, `-` and `+` depend on what stands around."""
+    """The directions in which lines leave a box character; those of `|`, `-` and `+` depend on their neighbours."""
     words = unicodedata.name(character, "").split()
     if words[:2] != ["BOX", "DRAWINGS"] or "DIAGONAL" in words:
         return frozenset()
@@ -91,17 +92,17 @@ class Grid:
         self.lines = lines
         self.taken: set[Cell] = set()
         self.boxes: list[DrawnBox] = []
-        self.elements: list[Drawn] = []
+        self.elements: list[DrawnElement] = []
         self.links: list[tuple[int, int, int, int]] = []
         """Arrows: column, row, width, number."""
         self.places: dict[str, str] = {}
-        """What stands below symbols."""
-        self.problems: list[Bad] = []
-        """What is wrong with texts: often they are where they are because a wire is wrong, so wires come first."""
+        """By operands of an element, the text in the row below the element: the addresses of its symbols."""
+        self.problems: list[DrawingError] = []
+        """Errors of texts.  They are raised after those of wires: a misplaced text often comes of a wrong wire."""
         for y, line in enumerate(lines):
             if "\t" in line.rstrip():
-                raise Bad(line.index("\t"), y, 1, "there is a tab in the drawing",
-                          "columns are only known of spaces: write spaces")
+                raise DrawingError(line.index("\t"), y, 1, "there is a tab in the drawing",
+                                   "columns are only known of spaces: write spaces")
         self.left = min((x for line in lines if (x := _first(line)) is not None and line[x] in RAIL), default=0)
         self.right = self._right_rail()
         self._find_boxes()
@@ -114,12 +115,12 @@ class Grid:
         return self.lines[y][x] if 0 <= y < len(self.lines) and 0 <= x < len(self.lines[y]) else " "
 
     def _line(self, x: int, y: int) -> str:
-        """The character of a cell; a sign of a number is none of a line."""
+        """The character of a cell; a blank for the sign of a number, which is no line."""
         character = self.at(x, y)
         return " " if character in "+-" and self.at(x + 1, y).isdigit() else character
 
     def ways(self, x: int, y: int) -> frozenset[int]:
-        """The ways in which wires leave a cell; those of elements have none."""
+        """The directions in which wires leave a cell; none for the cells of elements and texts."""
         character = self._line(x, y)
         if (x, y) in self.taken:
             return frozenset()
@@ -136,7 +137,7 @@ class Grid:
         longest = max((line for line in self.lines if line[-1:] in (*RAIL, *"-─━)") and line), key=len, default="")
         return len(longest) - 1 if len(longest) - 1 > self.left and longest[-1] in RAIL else 0
 
-    # --- boxes ------------------------------------------------------------------------------------------------------
+    # --- boxes ---
 
     def _find_boxes(self) -> None:
         for y, line in enumerate(self.lines):
@@ -146,8 +147,8 @@ class Grid:
                     self.taken |= {(column, row) for column in range(x, box.until + 1) for row in range(y, box.bottom + 1)}
 
     def _box(self, x: int, y: int) -> DrawnBox | None:
-        """The box with this upper left corner, if it is one."""
-        upper = re.compile(r"[─━═-]*( ?[A-Za-z_][\w .:\[\]]*)?[─━═-]*[┐┓╗╮┒┑+]").match(self.lines[y], x + 1)
+        """The box with this upper left corner, if it is one.  Raises DrawingError."""
+        upper = _UPPER_SIDE.match(self.lines[y], x + 1)
         if not upper or (until := upper.end() - 1) - x < 2:
             return None
         bottom = y + 1
@@ -155,22 +156,32 @@ class Grid:
             bottom += 1
         rows = {row: self.lines[row][x + 1:until] for row in range(y + 1, bottom)}
         if not self._is_bottom(x, until, bottom) or not any(text.strip() for text in rows.values()):
-            if rows or self._is_side(x, y + 1) and _BOX_TEXT.match(self.lines[y + 1], x + 1):
-                raise Bad(x, bottom, until - x + 1, f"the box that begins in column {x + 1} is open in this row",
-                          f"its sides stand in the columns {x + 1} and {until + 1} down to its lower corners")
+            self._check_open(x, y, until, bottom)
             return None
         if any(any(ways(c) or c == "|" for c in text) for text in rows.values()):
             return None
-        named = upper[1] and _TITLE.search(upper[1])
-        if upper[1] and not named:
-            raise Bad(x + 2, y, len(upper[1].strip()), f"`{upper[1].strip()}` is no title of a block",
-                      "write instance : type")
-        if named:
-            return DrawnBox(x, y, until, bottom, (named[1], named[2]), (y, y), rows)
-        return self._headed(DrawnBox(x, y, until, bottom, None, (y, y), rows))
+        title = self._title(x, y, upper[1])
+        box = DrawnBox(x, y, until, bottom, title, (y, y), rows)
+        return box if title else self._headed(box)
+
+    def _check_open(self, x: int, y: int, until: int, bottom: int) -> None:
+        """Refuse what begins as a box and has no lower side."""
+        if bottom > y + 1 or self._is_side(x, y + 1) and _BOX_TEXT.match(self.lines[y + 1], x + 1):
+            raise DrawingError(x, bottom, until - x + 1, f"the box that begins in column {x + 1} is open in this row",
+                               f"its sides stand in the columns {x + 1} and {until + 1} down to its lower corners")
+
+    def _title(self, x: int, y: int, text: str | None) -> tuple[str, str] | None:
+        """Instance and type from the text in the upper side of a box; None if there is no text."""
+        if not text:
+            return None
+        found, bare = _TITLE.search(text), text.strip()
+        if not found:
+            raise DrawingError(x + 2, y, len(bare), f"`{bare}` is no title of a block", "write instance : type")
+        return found[1], found[2]
 
     def _headed(self, box: DrawnBox) -> DrawnBox:
-        """A box with its type in its first row and its instance above it is one of a block, as other tools draw it."""
+        """The box with instance and type from its first row or from the row above, where other tools draw them; the same box if
+        it is that of an instruction."""
         row, first = next((row, text) for row, text in box.rows.items() if text.strip())
         if named := _TITLE.fullmatch(first.strip()):
             box.title, box.heads = (named[1], named[2]), (row, row)
@@ -178,9 +189,9 @@ class Grid:
         elif len(box.rows) > 1 and (typed := _HEAD.fullmatch(first)) and spelling(first.split()[0]) not in instruction_set().rows:
             above = _NAME.fullmatch(self.lines[box.y - 1][box.x:box.until + 1]) if box.y else None
             if not above:
-                raise Bad(box.x, box.y, box.until + 1 - box.x,
-                          f"`{first.split()[0]}` is no instruction, and as a block this box has no instance",
-                          "write the name of the instance above the box, or instance : type in its upper side")
+                raise DrawingError(box.x, box.y, box.until + 1 - box.x,
+                                   f"`{first.split()[0]}` is no instruction, and as a block this box has no instance",
+                                   "write the name of the instance above the box, or instance : type in its upper side")
             box.title, box.heads = (above[1], typed[2] or typed[4]), (box.y - 1, row)
             self._take(box.x + above.start(1), box.x + above.end(1), box.y - 1)
             box.rows[row] = f"{typed[1]} {typed[3]}"
@@ -198,7 +209,7 @@ class Grid:
         return all(c in "─━═-" for c in self.lines[y][x + 1:until])
 
     def _find_stubs(self) -> None:
-        """What enters and leaves pins of blocks: a text, and a line to the box."""
+        """Find the operands at pins of blocks: a text that a line connects with the side of the box."""
         for box in self.boxes:
             for y in box.rows if box.title else ():
                 for side, start, step in ((LEFT, box.x - 1, -1), (RIGHT, box.until + 1, 1)):
@@ -216,7 +227,7 @@ class Grid:
                     self.taken |= {(column, y) for column in range(min(at - step, start), max(at - step, start) + 1)}
 
     def _is_operand(self, x: int, y: int) -> bool:
-        """Whether an operand begins or ends in a cell; one with a sign has a digit behind it."""
+        """Whether an operand begins or ends in a cell; behind a sign stands a digit."""
         character = self.at(x, y)
         if (x, y) in self.taken:
             return False
@@ -226,13 +237,13 @@ class Grid:
         return character not in " |[()►▶>" and not ways(character) and not arrow
 
     def _continues(self, x: int, y: int, step: int) -> bool:
-        """Whether the text of a pin goes on: up to a line or to two spaces, where a value stands behind ` = `."""
+        """Whether the text at a pin goes on in a cell: it ends at a line or a space, but for the spaces of ` = value`."""
         character, line = self.at(x, y), self.lines[y]
         if character == " ":
             return line[max(x - 2, 0):x + 3].find(" = ") in (0, 2) if 0 <= x < len(line) else False
         return not ways(character) and character != "|"
 
-    # --- contacts and coils -----------------------------------------------------------------------------------------
+    # --- contacts and coils ---
 
     def _find_elements(self) -> None:
         for y, line in enumerate(self.lines):
@@ -246,7 +257,7 @@ class Grid:
                 self.elements.append(found_next)
         self.elements.sort(key=lambda element: (element.y, element.x))
 
-    def _next_element(self, line: str, at: int, y: int) -> Drawn | None:
+    def _next_element(self, line: str, at: int, y: int) -> DrawnElement | None:
         for x in range(at, len(line)):
             if named := self._named(line, x, y):
                 return named
@@ -258,13 +269,13 @@ class Grid:
                     continue
                 if not known.fullmatch(found[1]):
                     what, hint = _UNKNOWN[is_coil]
-                    raise Bad(x, y, found.end() - x, f"`{found[0]}` is no {what}", hint)
+                    raise DrawingError(x, y, found.end() - x, f"`{found[0]}` is no {what}", hint)
                 self._take(x, found.end(), y)
-                return Drawn(x, found.end() - 1, y, found[1].strip() or " ", is_coil)
+                return DrawnElement(x, found.end() - 1, y, found[1].strip() or " ", is_coil)
         return None
 
-    def _named(self, line: str, x: int, y: int) -> Drawn | None:
-        """The contact or coil with its operand inside that begins here, if one does."""
+    def _named(self, line: str, x: int, y: int) -> DrawnElement | None:
+        """The contact or coil with its operand inside that begins in a column, if there is one.  Raises DrawingError."""
         for is_coil, shape in _NAMED.items():
             found = shape.match(line, x)
             if not found or self._is_taken(x, found.end(), y) or not self._is_on_wire(x, found.end() - 1, y, is_coil):
@@ -275,11 +286,12 @@ class Grid:
             if not is_coil and any(self._is_crossed(column, y) for column in (x, found.end() - 1)):
                 continue
             self._take(x, found.end(), y)
-            return Drawn(x, found.end() - 1, y, found[1] or found[2] or " ", is_coil, (found[3],), [found.span(3)], True)
+            return DrawnElement(x, found.end() - 1, y, found[1] or found[2] or " ", is_coil, (found[3],), [found.span(3)], True)
         other = _BRACKETS.match(line, x)
         if other and not self._is_taken(x, other.end(), y) and self._is_on_wire(x, other.end() - 1, y, False):
-            raise Bad(x, y, other.end() - x, f"`{other[0]}` is no contact",
-                      "a comparison is ┤>├ with its two operands above; an instruction or a block is a box of several rows")
+            raise DrawingError(x, y, other.end() - x, f"`{other[0]}` is no contact",
+                               "a comparison is ┤>├ with its two operands above; "
+                               "an instruction or a block is a box of several rows")
         return None
 
     def _is_on_wire(self, x: int, until: int, y: int, is_coil: bool) -> bool:
@@ -301,10 +313,10 @@ class Grid:
     def _take(self, x: int, until: int, y: int) -> None:
         self.taken |= {(column, y) for column in range(x, until)}
 
-    # --- texts ------------------------------------------------------------------------------------------------------
+    # --- texts ---
 
     def _find_labels(self) -> None:
-        """Operands above contacts and coils; then what stands below them."""
+        """Find the operands above contacts and coils, then the texts below them."""
         for element in (each for each in self.elements if not each.inside):
             row = None if element.is_coil else instruction_set().rows.get("LD" + element.mark.lstrip("!@%").strip())
             wanted = len(row.operands) if row else 1
@@ -317,22 +329,22 @@ class Grid:
                 if not above:
                     text = self.lines[y][start:end]
                     self._take(start, end, y)
-                    self.problems.append(Bad(start, y, end - start, f"`{text}` belongs to no contact, coil or box",
-                                             "operands stand above contacts and coils, in the row next to theirs"))
+                    self.problems.append(DrawingError(start, y, end - start, f"`{text}` belongs to no contact, coil or box",
+                                                      "operands stand above contacts and coils, in the row next to theirs"))
                     continue
                 near = min(above, key=lambda e: abs(e.x + e.until - start - end))
                 self.places[" ".join(near.operands)] = self.lines[y][start:end]
                 self._take(start, end, y)
 
-    def _label(self, element: Drawn, wanted: int) -> list[tuple[int, int]]:
-        """Where the operands of a contact or coil stand: so many texts, those nearest to it."""
+    def _label(self, element: DrawnElement, wanted: int) -> list[tuple[int, int]]:
+        """The columns of the operands of a contact or coil: the `wanted` texts of the row above that are nearest to it."""
         texts = [text for text in self._texts(element.y - 1) if not self.lines[element.y - 1].startswith("= ", text[0])]
         choices = [texts[at:at + wanted] for at in range(len(texts) - wanted + 1)
                    if all(b[0] - a[1] == 1 for a, b in zip(texts[at:at + wanted], texts[at + 1:at + wanted], strict=False))]
         near = [c for c in choices if c[0][0] <= element.until + 2 and c[-1][1] >= element.x - 1]
         if not near:
             what = "coil" if element.is_coil else "contact"
-            self.problems.append(Bad(
+            self.problems.append(DrawingError(
                 element.x, element.y, element.until + 1 - element.x, f"above this {what} stands no operand",
                 f"write {f'{wanted} operands with one space between them' if wanted > 1 else 'it'} in the row above, "
                 f"over column {(element.x + element.until) // 2 + 1}"))
@@ -351,7 +363,7 @@ class Grid:
 
 
 RAIL = "│┃├┣┝┠┤┫┥┨|║╟╢┌└┐┘+"
-"""Characters of which rails are made."""
+"""Characters of rails."""
 _UNKNOWN = {False: ("contact", "contacts are ┤ ├, ┤/├, ┤↑├, ┤↓├, and comparisons such as ┤=├ with two operands above"),
             True: ("coil", "coils are ( ), (/), (S), (R), (↑), (↓); other instructions are boxes")}
 
@@ -363,7 +375,7 @@ def _first(line: str) -> int | None:
 
 
 def _plain(character: str, way: int) -> frozenset[int]:
-    """The ways of a neighbour as far as its character alone says it."""
+    """The directions in which lines leave a neighbour in direction `way`, judged by its character alone."""
     if character == "-":
         return frozenset((LEFT, RIGHT))
     if character == "|":

@@ -1,4 +1,4 @@
-"""Nets to a diagram: what hangs together in a drawing, as series, branches and points from which outputs leave."""
+"""Nets to a diagram: the elements of a drawing as series, branches, and points from which outputs leave."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ from dataclasses import dataclass, field
 
 from fbvm.syntax.ladder.drawing.box_lines import LEFT, RIGHT
 from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Part, Pin, Point, Series
-from fbvm.syntax.ladder.drawing.grid import Bad, Drawn, DrawnBox, Grid
+from fbvm.syntax.ladder.drawing.grid import DrawingError, DrawnBox, DrawnElement, Grid
 from fbvm.syntax.ladder.drawing.wires import BUS, SINK, Net, Order, Wires, border
 
 INLINE = ("NOT", "UP", "DOWN")
-"""Instructions that are boxes on a line."""
-Source = Drawn | DrawnBox
+"""Instructions that are drawn as boxes on a line."""
+Source = DrawnElement | DrawnBox
 
 
 @dataclass(eq=False)
 class _Edge:
-    """What lies between two nets."""
+    """The elements between two nets."""
 
     start: Hashable
     end: Hashable
@@ -35,7 +35,7 @@ class _Leaf:
 
 
 class Network:
-    """The diagram of a drawing.  `sources` says as what each of its elements was drawn."""
+    """Makes the diagram of a drawing.  `sources` maps each element of the diagram to what was drawn for it."""
 
     def __init__(self, grid: Grid) -> None:
         self.grid = grid
@@ -46,14 +46,14 @@ class Network:
         self.edges: list[_Edge] = []
         self.leaves: dict[Hashable, list[_Leaf]] = {}
         self._rows: dict[int, list[tuple[Order, Series]]] = {}
-        """Branches with their places, by the parallel connection that they are of."""
+        """By parallel connection, its branches with their positions."""
         for element in grid.elements:
             self._element(element)
         for box in grid.boxes:
             self._box(box)
 
     def diagram(self) -> Point:
-        """The bus bar with all that hangs on it.  Raises Bad."""
+        """The bus bar with all elements that follow it.  Raises DrawingError."""
         while self._merge_branches() or self._merge_series():
             pass
         self._check()
@@ -63,7 +63,7 @@ class Network:
 
     # --- elements ---------------------------------------------------------------------------------------------------
 
-    def _element(self, drawn: Drawn) -> None:
+    def _element(self, drawn: DrawnElement) -> None:
         start = self.wires.net(border(drawn.x, drawn.y, LEFT))
         if drawn.is_coil:
             coil = Coil(-1, drawn.mark, drawn.operands)
@@ -76,8 +76,8 @@ class Network:
 
     def _edge(self, start: Net, end: Net, part: Part, drawn: Source) -> None:
         if start.name == end.name:
-            raise Bad(drawn.x, drawn.y, drawn.until + 1 - drawn.x, "a wire leads around this, so it has no effect",
-                      "take the wire away, or let it begin in front of another contact")
+            raise DrawingError(drawn.x, drawn.y, drawn.until + 1 - drawn.x, "a wire leads around this, so it has no effect",
+                               "take the wire away, or let it begin in front of another contact")
         self.edges.append(_Edge(start.name, end.name, start.order, [part]))
 
     def _box(self, drawn: DrawnBox) -> None:
@@ -85,12 +85,14 @@ class Network:
         entries = [y for y in rows if (LEFT, y) not in drawn.stubs and self.wires.is_used(border(drawn.x, y, LEFT))]
         exits = [y for y in rows if (RIGHT, y) not in drawn.stubs and self.wires.is_used(border(drawn.until, y, RIGHT))]
         if not entries:
-            raise Bad(drawn.x, drawn.y, 1, "no wire leads to this box", "draw ─ to its left side, in the row of its first line")
+            raise DrawingError(drawn.x, drawn.y, 1, "no wire leads to this box",
+                               "draw ─ to its left side, in the row of its first line")
         if drawn.title:
             for side, used in ((LEFT, entries), (RIGHT, exits)):
                 if len(used) > 1:
-                    raise Bad(drawn.x if side == LEFT else drawn.until, used[1], 1, f"a second wire {_WAYS[side]} this block",
-                              "one wire leads through a block; at its other pins stand operands, such as a variable")
+                    raise DrawingError(drawn.x if side == LEFT else drawn.until, used[1], 1,
+                                       f"a second wire {_WAYS[side]} this block",
+                                       "one wire leads through a block; at its other pins stand operands, such as a variable")
         box = _block(drawn, entries[0], exits[0] if exits else -1) if drawn.title else _instruction(drawn)
         self.sources[id(box)] = drawn
         start, *others = (self.wires.net(border(drawn.x, y, LEFT)) for y in entries)
@@ -104,7 +106,7 @@ class Network:
     # --- reduction --------------------------------------------------------------------------------------------------
 
     def _merge_branches(self) -> bool:
-        """Join what lies between the same two nets."""
+        """Join the edges between the same two nets to parallel connections."""
         found: dict[tuple[Hashable, Hashable], list[_Edge]] = {}
         for edge in self.edges:
             if edge.end != SINK:
@@ -119,14 +121,14 @@ class Network:
         return bool(groups)
 
     def _branches(self, edge: _Edge) -> list[tuple[Order, Series]]:
-        """An edge as branches with their places: one that is nothing else is taken apart."""
+        """The branches of an edge with their positions; one branch if the edge is no parallel connection."""
         first = edge.parts[0]
         if len(edge.parts) == 1 and isinstance(first, Parallel):
             return self._rows[id(first)]
         return [(edge.order, Series(edge.parts))]
 
     def _merge_series(self) -> bool:
-        """Join two edges at a net on which nothing else hangs."""
+        """Join two edges to a series at a net that has no other edge."""
         kept = {BUS, SINK, *self.leaves, *(net.name for leaves in self.leaves.values() for leaf in leaves for net in leaf.others)}
         for before in self.edges:
             behind = [edge for edge in self.edges if edge.start == before.end]
@@ -165,14 +167,14 @@ class Network:
         return {net.name: net for leaves in self.leaves.values() for leaf in leaves for net in leaf.others}
 
     def _bad(self, part: Part | Coil, message: str, hint: str) -> None:
-        """Say what is wrong at an element; of branches at the first one."""
+        """The error at an element; for branches, at the first one."""
         while isinstance(part, Parallel):
             part = part.branches[0].parts[0]
         drawn = self.sources[id(part)]
-        raise Bad(drawn.x, drawn.y, drawn.until + 1 - drawn.x, message, hint)
+        raise DrawingError(drawn.x, drawn.y, drawn.until + 1 - drawn.x, message, hint)
 
     def _hang(self, point: Point, net: Hashable) -> None:
-        """Hang on a point what its net has, from above."""
+        """Add to a point what follows its net, from above."""
         others = self._others()
         outs: list[tuple[Order, Coil | Box | Point]] = []
         for leaf in self.leaves.get(net, ()):
@@ -209,7 +211,7 @@ _WAYS = {LEFT: "enters", RIGHT: "leaves"}
 
 
 def _block(drawn: DrawnBox, entry: int, leaving: int) -> Box:
-    """A box of a function block: pins at its sides; the condition enters in one row and leaves in one."""
+    """A box of a function block: pins at its sides; power enters in one row and leaves in one."""
     assert drawn.title
     pins: list[Pin] = []
     wired = {LEFT: "EN", RIGHT: "ENO"}
@@ -220,8 +222,8 @@ def _block(drawn: DrawnBox, entry: int, leaving: int) -> Box:
         for side, name in ((LEFT, left), (RIGHT, right)):
             if operand := drawn.stubs.get((side, y)):
                 if not name:
-                    raise Bad(drawn.x if side == LEFT else drawn.until, y, 1, f"`{operand}` stands at no pin",
-                              "write the name of the pin inside of the box, at this side")
+                    raise DrawingError(drawn.x if side == LEFT else drawn.until, y, 1, f"`{operand}` stands at no pin",
+                                       "write the name of the pin inside of the box, at this side")
                 pins.append(Pin(name, operand, side == RIGHT))
     return Box(-1, drawn.title[1], (), (), True, drawn.title[0], tuple(pins), (wired[LEFT],), wired[RIGHT])
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from fbvm.syntax.ladder.drawing.box_lines import LEFT
 from fbvm.syntax.ladder.drawing.diagram import Box, Point
-from fbvm.syntax.ladder.drawing.grid import Bad, DrawnBox, Grid
+from fbvm.syntax.ladder.drawing.grid import DrawingError, DrawnBox, Grid
 from fbvm.syntax.ladder.drawing.network import Network
 from fbvm.syntax.ladder.drawing.steps import Coded, steps
 
@@ -20,8 +20,7 @@ _REMARK = re.compile(r"(?<=[│┃┤┫┥┨|\s])\s*(//.*)$")
 
 @dataclass(frozen=True)
 class Picture:
-    """What a drawing says besides its instructions: how wide it is, whether lines of it go on below, and what stands below
-    symbols."""
+    """What a drawing has besides its instructions: its width, whether lines go on below, and the texts below symbols."""
 
     bar: Point
     width: int
@@ -51,22 +50,22 @@ def remark_of(line: str) -> str:
 
 
 def read_drawing(lines: Sequence[str], offsets: Sequence[int]) -> tuple[list[Placed], Picture]:
-    """The instructions of a drawing; `offsets` are the places of its lines in the text.  Raises Bad."""
+    """The instructions of a drawing; `offsets` are the places of its lines in the text.  Raises DrawingError."""
     bare = next((row for row, line in enumerate(lines) if _BARE.match(line)), None)
     if bare is not None:
-        raise Bad(len(lines[bare]) - len(lines[bare].lstrip()), bare, 1, "the left rail is missing",
-                  "each row of a drawing begins with │ or |")
+        raise DrawingError(len(lines[bare]) - len(lines[bare].lstrip()), bare, 1, "the left rail is missing",
+                           "each row of a drawing begins with │ or |")
     grid = Grid([_REMARK.sub("", line).rstrip() for line in lines])
     network = Network(grid)
     bar = network.diagram()
     if not bar.outs:
-        raise Bad(grid.left, 0, 1, "nothing hangs on the bus bar", "draw a wire from it, with contacts and a coil")
+        raise DrawingError(grid.left, 0, 1, "nothing hangs on the bus bar", "draw a wire from it, with contacts and a coil")
     width = max(map(len, grid.lines)) - grid.left
     return _placed(steps(bar), network, offsets), Picture(bar, width, bool(grid.links), grid.places)
 
 
 def _placed(coded: Sequence[Coded], network: Network, offsets: Sequence[int]) -> list[Placed]:
-    """The instructions with their places; one that nobody has drawn stands behind the one before."""
+    """The instructions with their places; an instruction that is not drawn, such as AND LD, has the place of the one before."""
     made: list[Placed] = []
     end = offsets[0]
     for one in coded:
@@ -87,7 +86,7 @@ def _placed(coded: Sequence[Coded], network: Network, offsets: Sequence[int]) ->
 
 
 def _operands(one: Coded, drawn: DrawnBox, grid: Grid, offsets: Sequence[int]) -> list[tuple[int, int]]:
-    """Where the operands of a box stand; of a pin so that what is behind its sign is in its place."""
+    """The places of the operands of a box.  That of a pin is moved so that the operand behind its sign is in its place."""
     assert isinstance(one.drawn, Box)
     if drawn.title is None:
         words = [(offsets[y] + drawn.x + 1 + found.start(), offsets[y] + drawn.x + 1 + found.end())
@@ -106,7 +105,7 @@ def _operands(one: Coded, drawn: DrawnBox, grid: Grid, offsets: Sequence[int]) -
 
 
 def _stubs(drawn: DrawnBox) -> list[tuple[tuple[int, int], str]]:
-    """What stands at pins, in the order of the rows, left before right."""
+    """The operands at pins, in the order of the rows, left before right."""
     return sorted(drawn.stubs.items(), key=lambda stub: (stub[0][1], stub[0][0] != LEFT))
 
 

@@ -1,4 +1,4 @@
-"""What is drawn to the steps of a rung: the one way in which this project writes a diagram as instructions."""
+"""Diagrams to the steps of a rung; each diagram has one form as instructions."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _EDGES = {mark: prefix for prefix, mark in EDGES.items()} | {"P": "@", "N": "%"}
 
 
 class Coded(NamedTuple):
-    """An instruction, and what it was drawn as; None for one that is only about how the others hang together."""
+    """An instruction, and the element that it was drawn as; None for one that only joins others, such as AND LD."""
 
     prefix: str
     mnemonic: str
@@ -33,7 +33,7 @@ class _Coder:
         self.points = 0
 
     def outs(self, point: Point, at_bar: bool = False) -> None:
-        """What hangs on a point whose condition is there; it is kept in a TR if it is needed again."""
+        """The outputs and paths of a point whose condition has been made; a TR bit keeps the condition if it is needed again."""
         kept = ""
         if not at_bar and any(isinstance(out, Point) or isinstance(out, Box) and out.inputs for out in point.outs[:-1]):
             kept = f"TR{self.points}"
@@ -58,7 +58,7 @@ class _Coder:
         self.steps.append(Coded("", mnemonic, operands))
 
     def series(self, path: Series, is_joined: bool) -> None:
-        """Conditions one behind the other, behind others if `is_joined`."""
+        """Conditions in series; with `is_joined`, in series with the condition that has been made."""
         for part in path.parts:
             self.part(part, "AND" if is_joined else "LD")
             is_joined = True

@@ -1,4 +1,4 @@
-"""How wide the parts of a rung are where they are drawn, and what is known about them that takes room."""
+"""The width of the parts of a drawn rung, and the addresses and values that need width."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Part, Point, 
 LINK = 5
 """Columns of the arrow with a number at the end of a line that goes on below."""
 SLACK = 4
-"""Columns more than needed between conditions and what ends the rung."""
+"""Spare columns between the conditions and the outputs of a rung."""
 LEAD = 2
 """Columns of line on either side of a box."""
 States = Mapping[int, Sequence[bool]]
@@ -28,13 +28,13 @@ def _unseen(step: int, operand: str) -> str:
 
 
 class Sight(NamedTuple):
-    """What is known about a rung besides its steps.  No `states` draw it at rest."""
+    """Addresses, values and states to draw with a rung.  Without `states` it is drawn at rest."""
 
     states: States | None = None
     places: Callable[[str], str] = _nothing
     """The address behind a symbol, "" if it has none."""
     values: Callable[[int, str], str] = _unseen
-    """The value that an operand of a step had, "" if nobody has seen one."""
+    """The value that an operand of a step had; "" if it is not known."""
 
 
 class Widths:
@@ -51,7 +51,7 @@ class Widths:
         return max(self.series(point.path) + max(behind, default=2 + SLACK), *lower, 0)
 
     def needed(self, point: Point) -> int:
-        """Behind a path: for what ends the rung, or for an arrow."""
+        """The columns needed behind a path: for the outputs of the rung, or for an arrow."""
         return max((LINK if isinstance(out, Point) else self.output(out) for out in point.outs), default=2)
 
     def part(self, part: Part) -> int:
@@ -73,7 +73,7 @@ class Widths:
         return sum(map(self.part, path.parts))
 
     def output(self, out: Coil | Box) -> int:
-        """Of what ends a rung, up to the right rail."""
+        """The columns of an output, up to the right rail."""
         if isinstance(out, Coil):
             return max(len(out.mark) + 6, self._label(out) + 6)
         made = self.shape(out)
@@ -88,7 +88,7 @@ class Widths:
         return shape(box, self.sight.values)
 
     def below(self, contact: Contact) -> str:
-        """What stands below a contact: its address, or the values that it compares."""
+        """The text below a contact: its address, or the values that it compares."""
         if len(contact.operands) == 1:
             return self.sight.places(contact.operands[0])
         seen = [value for operand in contact.operands if (value := self.sight.values(contact.step, operand))]

@@ -1,4 +1,4 @@
-"""Wires of a drawing to nets: which elements are joined, and where a wire ends in the air."""
+"""Wires of a drawing to nets: which elements are joined, and which wires end at nothing."""
 
 from __future__ import annotations
 
@@ -6,32 +6,32 @@ from collections.abc import Hashable
 from typing import NamedTuple
 
 from fbvm.syntax.ladder.drawing.box_lines import LEFT, RIGHT, UP
-from fbvm.syntax.ladder.drawing.grid import RAIL, WAYS, Bad, Cell, Grid
+from fbvm.syntax.ladder.drawing.grid import RAIL, WAYS, Cell, DrawingError, Grid
 
 BUS, SINK = "bus", "sink"
 """The nets of the left and of the right rail."""
 Border = tuple[str, int, int]
 """Between two cells: "h" or "v", and the cell to the left of it or above."""
 Order = tuple[int, ...]
-"""Where something hangs on a net, counted from above: rows, each that of an arrow but the last."""
+"""The position of an element on a net, from above: the rows of the arrows that lead to its line, then its own row."""
 
 
 class Net(NamedTuple):
-    """What a port is joined to, and its place in the order of what hangs there."""
+    """The net that a port is joined to, and the position of the port on it."""
 
     name: Hashable
     order: Order
 
 
 class Wires:
-    """All wires of a drawing, joined."""
+    """The nets of a drawing."""
 
     def __init__(self, grid: Grid) -> None:
         self.grid = grid
         self._above: dict[Hashable, Hashable] = {}
         self._users: dict[Border, list[Cell]] = {}
         self._pieces: dict[Hashable, Hashable] = {}
-        """What is joined without arrows."""
+        """Nets that are joined without arrows."""
         self._prefixes: dict[Hashable, Order] = {}
         self._join_wires()
         self._join_rails()
@@ -40,7 +40,7 @@ class Wires:
         self._join_arrows()
 
     def net(self, border: Border) -> Net:
-        """The net that a port has at a border of its cell."""
+        """The net at a border of a cell."""
         piece = self._pieces.get(border, border)
         return Net(self._root(border), (*self._prefixes.get(piece, ()), border[2]))
 
@@ -94,14 +94,15 @@ class Wires:
                     continue
                 side = border(x, y, way)
                 if net == SINK and side in self._users and self._root(side) == BUS:
-                    raise Bad(grid.left, y, grid.right - grid.left + 1, "this wire leads from rail to rail with nothing on it",
-                              "draw contacts and a coil, or take the wire away")
+                    raise DrawingError(grid.left, y, grid.right - grid.left + 1,
+                                       "this wire leads from rail to rail with nothing on it",
+                                       "draw contacts and a coil, or take the wire away")
                 if side in self._users or way in grid.ways(x, y) and grid.at(x, y) not in "|+":
                     self._use(side, (x, y))
                     self._join(side, net)
 
     def _look_for_ends(self) -> None:
-        """A border at which a wire comes from one side only is the end of a wire."""
+        """Refuse wires that end at nothing: a border that a wire reaches from one side only."""
         arrows = {border(x, y, LEFT) for x, y, _, _ in self.grid.links} | \
                  {border(x + wide - 1, y, RIGHT) for x, y, wide, _ in self.grid.links}
         ends = sorted((y, x, end) for end, users in self._users.items() if len(users) < 2 and end not in arrows
@@ -109,10 +110,10 @@ class Wires:
         for y, x, end in ends:
             if not self.grid.right and end == border(len(self.grid.lines[y].rstrip()) - 1, y, RIGHT):
                 continue  # a drawing without a right rail
-            raise Bad(x, y, 1, *self._said(x, y, end))
+            raise DrawingError(x, y, 1, *self._said(x, y, end))
 
     def _said(self, x: int, y: int, end: Border) -> tuple[str, str]:
-        """What is wrong where a wire ends, and what to do."""
+        """The message and the hint for a wire that ends at nothing."""
         grid = self.grid
         way = next(way for way in WAYS if border(x, y, way) == end)
         beside = grid.at(x + WAYS[way][0], y + WAYS[way][1])
@@ -131,18 +132,19 @@ class Wires:
                 f"in {where} write a character that has a line to this side, such as ┤ ├ ┬ ┴ ┼ ─")
 
     def _join_arrows(self) -> None:
-        """Arrows with the same number are one place: the first in the order of rows leaves, the other goes on."""
+        """Join the arrows with the same number: the line of the first, in the order of rows, goes on at the other."""
         ends: dict[int, tuple[int, int, int]] = {}
         begun: dict[int, tuple[int, int, int]] = {}
         for x, y, wide, number in sorted(self.grid.links, key=lambda link: link[1]):
             known = ends if border(x, y, LEFT) in self._users else begun
             if number in known:
-                raise Bad(x, y, wide, f"there is another arrow with the number {number}", "give each pair of arrows its number")
+                raise DrawingError(x, y, wide, f"there is another arrow with the number {number}",
+                                   "give each pair of arrows its number")
             known[number] = x, y, wide
         for number in sorted({*ends} ^ {*begun}):
             x, y, wide = ends.get(number) or begun[number]
-            raise Bad(x, y, wide, f"there is one arrow with the number {number}",
-                      f"►{number} stands at the end of a line, and at the beginning of the one that goes on")
+            raise DrawingError(x, y, wide, f"there is one arrow with the number {number}",
+                               f"►{number} stands at the end of a line, and at the beginning of the one that goes on")
         for number, (x, y, _) in sorted(ends.items(), key=lambda item: item[1][1]):
             at, row, wide = begun[number]
             leaving, going = border(x, y, LEFT), border(at + wide - 1, row, RIGHT)
@@ -152,7 +154,7 @@ class Wires:
 
 
 def border(x: int, y: int, way: int) -> Border:
-    """The border of a cell in one way."""
+    """The border of a cell in one direction."""
     if way in (LEFT, RIGHT):
         return "h", x - (way == LEFT), y
     return "v", x, y - (way == UP)

@@ -1,6 +1,6 @@
-"""Texts that are understood as a whole and refused: from METHOD to END_METHOD and their like.
+"""Texts that are read as one token and refused: METHOD .. END_METHOD and the like.
 
-`whole` runs over the tokens behind such a word, so that comments and strings inside need no thought."""
+`whole` takes the tokens behind such a word, so that an END in a comment or a string does not count."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from fbvm.syntax.st.lexer import Token
 OBJECT_ORIENTED = {"CLASS", "INTERFACE", "NAMESPACE", "METHOD", "PROPERTY", "USING", "EXTENDS", "IMPLEMENTS", "THIS",
                    "SUPER", "ABSTRACT", "FINAL", "PUBLIC", "PRIVATE", "PROTECTED", "INTERNAL"}
 ENDS = {"USING": ";", "__TRY": "__ENDTRY"}
-"""What ends a refused text, where it is not END_ and the word."""
+"""Word -> the end of its refused text, if that is not END_ and the word."""
 
 HOUSES = {"CLASS", "INTERFACE", "NAMESPACE"}
-"""Texts that may contain whole POUs or methods; all others end at the latest with their POU."""
+"""Words of texts that may contain whole POUs or methods; other texts end at the latest with their POU."""
 
 LIMITS = {"FUNCTION", "FUNCTION_BLOCK", "PROGRAM", "CONFIGURATION", "END_FUNCTION", "END_FUNCTION_BLOCK", "END_PROGRAM",
           "END_CONFIGURATION", "END_RESOURCE", "TYPE", "$END"}
 
 
 def refused_what(text: str) -> tuple[str, str]:
-    """How to call a refused piece in messages, and its code, from its first word."""
+    """The name of a refused text in messages, and the code of its diagnostic, from its first word."""
     word = text.split(None, 1)[0].split("(")[0].upper()
     if word in OBJECT_ORIENTED:
         return word, "S0902"
@@ -29,7 +29,8 @@ def refused_what(text: str) -> tuple[str, str]:
 
 
 def whole(opener: Token, source: str, following: Callable[[], Token]) -> tuple[Token, Token | None]:
-    """The token from a refused word to its end; if the end is missing, also the token before which it was missed."""
+    """The token from a refused word to its end, and None; without an END, the token up to where the text must end, and the
+    token that follows there."""
     word = opener.text.upper()
     end_word = ENDS.get(word, f"END_{word}")
     depth, last = 1, opener

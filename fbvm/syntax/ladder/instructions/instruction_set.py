@@ -10,7 +10,7 @@ from typing import NamedTuple
 from fbvm.base.data import data_folder
 
 JOINS = ("LD", "AND", "OR")
-"""What stands in front of a comparison or a bit test to say how it joins the rung."""
+"""Prefixes of a comparison or a bit test that say how it joins the execution condition."""
 
 
 KINDS = {
@@ -19,7 +19,7 @@ KINDS = {
     "z": "a word or constant in BCD", "Z": "two words or a constant in BCD", "a": "words", "k": "words or a constant",
     "A": "words", "n": "a number", "t": "the number of a timer", "c": "the number of a counter",
     "m": "a timer or counter, as in T0005 or C0005", "v": "an address or symbol", "x": "an index register"}
-"""What an instruction may want in a place, in words."""
+"""Letter for a kind of operand -> its name in messages."""
 
 
 class Instruction(NamedTuple):
@@ -31,17 +31,17 @@ class Instruction(NamedTuple):
     variations: str
     inputs: int
     operands: str
-    """A letter for each: what the instruction wants there."""
+    """For each operand the letter of its kind."""
     names: tuple[str, ...]
-    """What the manual calls them."""
+    """The names of the operands in the manual."""
     least: int
-    """How many have to be there."""
+    """How many operands must be given."""
     join: str
     """LD, AND or OR in front of a comparison."""
     kind: str
     does: str
     words: str
-    """What it does or why it is refused, where the library does not say it."""
+    """What it does or why it is refused, if the library does not say it."""
 
     def role(self, position: int) -> str:
         """What an operand is, for messages."""
@@ -50,7 +50,7 @@ class Instruction(NamedTuple):
 
     @property
     def described(self) -> str:
-        """What it wants in each place."""
+        """The operands with their kinds, for a hint."""
         wanted = [f"{name} is {KINDS[kind]}" for name, kind in zip(self.names, self.operands, strict=True) if name != "B"]
         return ", ".join(wanted)
 
@@ -105,16 +105,16 @@ ELSEWHERE = {
     "XIC": "LD", "XIO": "LDNOT", "OTE": "OUT",
     "MOVE": "MOV", "ADD": "+", "SUB": "-", "MUL": "*", "DIV": "/",
     **{block: f"FBCALL {block}" for block in ("TON", "TOF", "TP", "CTU", "CTD", "CTUD", "R_TRIG", "F_TRIG", "SR", "RS")}}
-"""What other tools call an instruction: instruction lists of the standard, Mitsubishi, Rockwell; and blocks."""
+"""Mnemonic of another tool -> what to write: instruction lists of the standard, Mitsubishi, Rockwell; and blocks."""
 
 
 NO_INSTRUCTIONS = {"NETWORK": "a rung begins with a line RUNG", "END_NETWORK": "a rung ends where the next one begins",
                    "END_RUNG": "a rung ends where the next one begins"}
-"""Words around rungs of other tools, and what stands here."""
+"""Word around the rungs of other tools -> hint."""
 
 
 def meant(name: str) -> list[str]:
-    """The instructions that other tools call so, or that are written most like this."""
+    """What to write for an unknown mnemonic: the instruction that other tools call so, or those with similar names."""
     if name in ELSEWHERE:
         return [ELSEWHERE[name]]
     return get_close_matches(name, instruction_set().rows, 2, 0.6)

@@ -1,19 +1,19 @@
-"""Recognises lines of ladder mnemonics that were pasted among statements, so that one message says so."""
+"""Recognises ladder mnemonics among statements, so that one message is reported for all their lines."""
 
 from __future__ import annotations
 
-from fbvm.syntax.ladder.instruction_set import instruction_set, spelling
+from fbvm.syntax.ladder.instructions.instruction_set import instruction_set, spelling
 
 INSTRUCTION_LIST = frozenset((
     "LD", "LDN", "ST", "STN", "S", "R", "AND", "ANDN", "OR", "ORN", "XOR", "XORN", "NOT", "ADD", "SUB", "MUL", "DIV", "MOD", "GT",
     "GE", "EQ", "NE", "LE", "LT", "JMP", "JMPC", "JMPCN", "CAL", "CALC", "CALCN", "RET", "RETC", "RETCN"))
 """Operators of the instruction list, as names (IEC 61131-3 ed. 3, table 68)."""
 LOOK, SURE = 600, 2
-"""Characters that are looked at, and lines that leave no doubt."""
+"""Characters that are searched, and lines of instructions that must follow one another."""
 
 
 def ladder_lines(text: str, at: int) -> bool:
-    """Whether the line of a place and those below it are ladder: instructions only, and one that no other language has."""
+    """Whether the line at an offset and those below it are ladder: only instructions, one of which no other language has."""
     start = text.rfind("\n", 0, at) + 1
     lines, own = 0, False
     for line in text[start:start + LOOK].split("\n"):

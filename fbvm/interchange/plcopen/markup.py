@@ -25,7 +25,7 @@ MAX_ELEMENTS = 1_000_000
 _DECLARED = re.compile(rb"""<\?xml[^>]*?encoding\s*=\s*["']([A-Za-z][\w.-]*)["']""")
 _ENCODINGS = re.compile(r"utf-8|utf-16|ascii|iso8859-\d+|cp125\d|cp437|cp850|koi8-[ru]|gbk|gb2312|gb18030|big5|"
                         r"shift_jis|euc_\w+")
-"""Encodings that are taken, by their names in Python."""
+"""Encodings that are accepted, by their names in Python."""
 
 
 @dataclass(eq=False)
@@ -85,7 +85,8 @@ class Refusal(Exception):
 
 
 def read_markup(path: Path, name: str) -> tuple[Source, Element] | Diagnostic:
-    """The text and the root element of a file; or why there is none.  Never raises for what a file contains."""
+    """The text and the root element of a file, or the diagnostic that says why there is none.  Never raises for what a file
+    contains."""
     try:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
@@ -145,7 +146,7 @@ def _known(declared: str) -> str:
 
 
 class _Builder:
-    """Makes elements of what the parser tells."""
+    """Makes elements from the events of expat."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -168,7 +169,7 @@ class _Builder:
         return self.top.children[0]
 
     def place(self) -> int:
-        """Where the parser stands, as an offset."""
+        """The offset that the parser has reached."""
         starts = self.source.line_starts
         line = min(max(self.parser.CurrentLineNumber, 1), len(starts))
         return min(starts[line - 1] + self.parser.CurrentColumnNumber, len(self.source.text))

@@ -1,4 +1,4 @@
-"""What the tables would do: looks ahead on a copy of the stack of states, without building anything."""
+"""Look-ahead: what the tables would do with a terminal, on a copy of the stack of states and without building nodes."""
 
 from __future__ import annotations
 

@@ -6,10 +6,10 @@ import re
 from collections.abc import Callable, Iterator
 
 from fbvm.base.diagnostics import Diagnostic, Source
-from fbvm.syntax.st.automaton import Automaton, Mender
+from fbvm.syntax.pous import SourceBuilder
+from fbvm.syntax.st.automaton import Automaton, ErrorRecovery
 from fbvm.syntax.st.builder import Stop
 from fbvm.syntax.st.lexer import Lexer, Token
-from fbvm.syntax.st.types import Types
 from fbvm.syntax.tree import SourceText
 
 
@@ -22,7 +22,7 @@ def parse(source: Source, reached: Callable[[int], None] | None = None) -> tuple
         return SourceText(0, len(source.text), ()), [Diagnostic(
             "S0101", source, xml.start(1), xml.end(1), "this is XML, no source",
             "`fbvm import FILE.xml -o DIR` makes sources of a project in PLCopen XML")]  # fmt: skip
-    builder = Types(source)
+    builder = SourceBuilder(source)
     lexer = Lexer(source.text, builder.report)
     tokens = lexer.tokens()
     automaton = Automaton(builder, _counted(tokens, reached) if reached else tokens, source.text)
@@ -51,8 +51,8 @@ OFTEN = 5000
 """Tokens between two words to the caller: a tenth of a second."""
 
 
-def _recovery(automaton: Automaton, builder: Types) -> Mender:
-    """Who mends; loaded when there is something to mend."""
+def _recovery(automaton: Automaton, builder: SourceBuilder) -> ErrorRecovery:
+    """Who repairs; loaded when there is something to repair."""
     from fbvm.syntax.recovery.recovery import Recovery
 
     return Recovery(automaton, builder)
