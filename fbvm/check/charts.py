@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, TIME, base, fold
-from fbvm.check.writes import writable
+from fbvm.check.expressions.writes import writable
 from fbvm.syntax import tree
 from fbvm.syntax.tree import sfc
 

@@ -17,13 +17,13 @@ from fbvm.check.declarations.globals import Globals
 from fbvm.check.declarations.interfaces import Interfaces
 from fbvm.check.declarations.specs import Specs, settle
 from fbvm.check.declarations.var_config import Settings
-from fbvm.check.dependencies import Asked, is_lasting, key_of
 from fbvm.check.expressions import references
 from fbvm.check.expressions.infer import Expressions
 from fbvm.check.expressions.values import Values
-from fbvm.check.facts import Pou, StandardCall, Start, TaskFact, Value, Variable
-from fbvm.check.project import Project
 from fbvm.check.statements import Statements, writes_eno
+from fbvm.check.symbols.dependencies import Asked, is_lasting, key_of
+from fbvm.check.symbols.facts import Pou, StandardCall, Start, TaskFact, Value, Variable
+from fbvm.check.symbols.project import Project
 from fbvm.syntax import tree
 
 _AS_IT_IS = nullcontext()

@@ -12,8 +12,8 @@ from fbvm.check import charts
 from fbvm.check.expressions import references
 from fbvm.check.expressions.assignability import as_number, assignable, conversion_hint
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import Pou, Value
-from fbvm.check.writes import note_count, place, writable
+from fbvm.check.expressions.writes import note_count, place, writable
+from fbvm.check.symbols.facts import Pou, Value
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder, sfc
 

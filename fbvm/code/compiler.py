@@ -15,11 +15,11 @@ from fbvm.base.dialects import dialect as named_dialect
 from fbvm.base.repeats import gathered
 from fbvm.base.types import Type, fold
 from fbvm.check.checker import Checker
-from fbvm.check.facts import Pou, Report, TaskFact
-from fbvm.check.library import Libraries, LibraryError
 from fbvm.check.lint.linter import lint as look_for_slips
 from fbvm.check.lint.suppression import Silence, Wanted
-from fbvm.check.project import Project
+from fbvm.check.symbols.facts import Pou, Report, TaskFact
+from fbvm.check.symbols.library import Libraries, LibraryError
+from fbvm.check.symbols.project import Project
 from fbvm.code.damage import Damage
 from fbvm.code.image import Image, ProgramRun, TaskRow
 from fbvm.code.lowering.evaluation import evaluate

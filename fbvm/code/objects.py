@@ -8,8 +8,8 @@ from __future__ import annotations
 from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.base.types import ArrayType, StructType, Type
 from fbvm.check.checker import Checker
-from fbvm.check.containment import Inside
 from fbvm.check.declarations.interfaces import OBJECTS_AT
+from fbvm.check.symbols.containment import Inside
 from fbvm.code.operations import FIRST_OBJECT
 
 

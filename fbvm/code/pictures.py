@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fbvm.base.types import StructType, fold
-from fbvm.check.facts import Pou
+from fbvm.check.symbols.facts import Pou
 from fbvm.code.image import SfcPicture
 from fbvm.syntax.tree import Assign, Node, sfc
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.dialects import Dialect, takers
 from fbvm.base.types import BOOL, fold
-from fbvm.check.calls.vendor_names import comma_hint
-from fbvm.check.facts import Guard
+from fbvm.check.symbols.facts import Guard
+from fbvm.check.symbols.vendor_names import comma_hint
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

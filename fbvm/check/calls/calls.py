@@ -22,11 +22,11 @@ from fbvm.base.types import (
 from fbvm.check.calls.arguments import MIXED, MIXED_HINT, mixed
 from fbvm.check.calls.generics import Generics, is_generic
 from fbvm.check.calls.standard import StandardCalls, is_known
-from fbvm.check.calls.vendor_names import comma_hint
 from fbvm.check.expressions import qualified, references
 from fbvm.check.expressions.assignability import assignable, holds, lent, same
-from fbvm.check.facts import Pou, PouCall, Variable, holds_block, is_block
-from fbvm.check.writes import note_count, writable
+from fbvm.check.expressions.writes import note_count, writable
+from fbvm.check.symbols.facts import Pou, PouCall, Variable, holds_block, is_block
+from fbvm.check.symbols.vendor_names import comma_hint
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
 

@@ -15,13 +15,13 @@ from fbvm.check.calls.functions import RESULT_STRING
 from fbvm.check.expressions.any_parameters import MEMBERS
 from fbvm.check.expressions.assignability import is_untyped, same
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Pou, holds_block
+from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Pou, holds_block
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import copied, walk
 
 if TYPE_CHECKING:
     from fbvm.check.calls.calls import Calls
-    from fbvm.check.project import Project
+    from fbvm.check.symbols.project import Project
 
 
 def variables(declared: tree.Pou) -> dict[str, str]:

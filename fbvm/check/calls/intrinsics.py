@@ -10,7 +10,7 @@ from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.types import BOOL, DINT, DWORD, UDINT, AnyType, ArrayType, OpenArrayType, Type, string
 from fbvm.check.calls.arguments import Arguments
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import UNTYPED_INT, StandardCall
+from fbvm.check.symbols.facts import UNTYPED_INT, StandardCall
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

@@ -24,14 +24,15 @@ from fbvm.base.types import (
     machine,
     string,
 )
-from fbvm.check.calls import functions, intrinsics, vendor_names
+from fbvm.check.calls import functions, intrinsics
 from fbvm.check.calls.arguments import Arguments, callee
 from fbvm.check.calls.functions import Conversion, Signature
 from fbvm.check.expressions import references, unknown_names
 from fbvm.check.expressions.assignability import BOUNDS_HINT, as_number, convertible, is_untyped, same
 from fbvm.check.expressions.literals import as_character
 from fbvm.check.expressions.values import MAKERS, is_any
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
+from fbvm.check.symbols import vendor_names
+from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, TIME, UINT, StructType, Type, base, fold
-from fbvm.check.facts import Pou, Run, TaskFact, Variable
+from fbvm.check.symbols.facts import Pou, Run, TaskFact, Variable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
-from fbvm.check.dependencies import Asked
-from fbvm.check.facts import Variable, is_open, list_name
+from fbvm.check.symbols.dependencies import Asked
+from fbvm.check.symbols.facts import Variable, is_open, list_name
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

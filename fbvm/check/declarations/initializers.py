@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import ArrayType, Type, machine
 from fbvm.check.expressions.constants import decode
-from fbvm.check.facts import Pou
+from fbvm.check.symbols.facts import Pou
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

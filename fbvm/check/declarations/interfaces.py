@@ -27,9 +27,9 @@ from fbvm.base.types import (
 )
 from fbvm.check.declarations import initializers
 from fbvm.check.declarations.locations import location_of
-from fbvm.check.declarations.reserved_names import refuse_reserved
-from fbvm.check.facts import Edge, Pou, Variable, is_block, is_open
 from fbvm.check.statements import writes_eno
+from fbvm.check.symbols.facts import Edge, Pou, Variable, is_block, is_open
+from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import passes_places
 

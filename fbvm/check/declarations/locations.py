@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, ArrayType, StringType, StructType, Type, base
-from fbvm.check.facts import holds_block, is_open
+from fbvm.check.symbols.facts import holds_block, is_open
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

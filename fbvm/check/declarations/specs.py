@@ -29,14 +29,14 @@ from fbvm.base.types import (
     reference,
     string,
 )
-from fbvm.check.calls import vendor_names
-from fbvm.check.declarations.reserved_names import refuse_reserved
 from fbvm.check.declarations.structures import RELATIVE, Members
-from fbvm.check.dependencies import Asked
 from fbvm.check.expressions.constants import default
 from fbvm.check.expressions.values import Values
-from fbvm.check.facts import Pou, is_block, is_open
-from fbvm.check.project import Project, TypeEntry
+from fbvm.check.symbols import vendor_names
+from fbvm.check.symbols.dependencies import Asked
+from fbvm.check.symbols.facts import Pou, is_block, is_open
+from fbvm.check.symbols.project import Project, TypeEntry
+from fbvm.check.symbols.reserved_names import refuse_reserved
 from fbvm.syntax import tree
 
 MAX_STRING = 65534

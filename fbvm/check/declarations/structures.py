@@ -8,8 +8,8 @@ from __future__ import annotations
 import re
 
 from fbvm.base.types import BOOL, Field, StructType, Type, base, fold
-from fbvm.check.declarations.size_limits import MAX_SIZE
-from fbvm.check.facts import holds_block, is_block
+from fbvm.check.symbols.facts import holds_block, is_block
+from fbvm.check.symbols.size_limits import MAX_SIZE
 from fbvm.syntax import tree
 
 RELATIVE = "a place in a structure is written %B2 (byte 2), %W1 (word 1) or %X2.0 (bit 0 of byte 2)"

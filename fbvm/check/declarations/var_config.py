@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, Field, StructType, Type, fold
-from fbvm.check.containment import Inside
 from fbvm.check.declarations.locations import location_of
-from fbvm.check.facts import AccessPath, Completed, Spot, Variable
+from fbvm.check.symbols.containment import Inside
+from fbvm.check.symbols.facts import AccessPath, Completed, Spot, Variable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from fbvm.check.expressions import references
 from fbvm.check.expressions.assignability import is_untyped
 from fbvm.check.expressions.constants import encode
 from fbvm.check.expressions.values import flattened, initialisable
-from fbvm.check.facts import Aggregate, AggregatePart, Variable
+from fbvm.check.symbols.facts import Aggregate, AggregatePart, Variable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

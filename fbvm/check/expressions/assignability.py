@@ -24,7 +24,7 @@ from fbvm.base.types import (
 )
 from fbvm.check.expressions.constants import limits
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
+from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Value
 from fbvm.syntax import tree
 
 _BORROWED = OpenArrayType | AnyType

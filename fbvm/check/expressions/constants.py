@@ -9,7 +9,7 @@ from fbvm.base.memory import STRUCTS
 from fbvm.base.strings import packed
 from fbvm.base.types import BOOL, DAY_NS, ArrayType, Elementary, EnumType, StringType, SubrangeType, Type, machine
 from fbvm.base.types import base as base_of
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Value
+from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Value
 
 
 class NotConstant(Exception):

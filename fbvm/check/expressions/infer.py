@@ -50,7 +50,7 @@ from fbvm.check.expressions.constants import convert, cut, limits
 from fbvm.check.expressions.operators import Operators
 from fbvm.check.expressions.subscripts import Subscripts
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
+from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder
 

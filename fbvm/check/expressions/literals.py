@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import BOOL, ELEMENTARY, Elementary, EnumType, SubrangeType, Type, base, fold, string
 from fbvm.check.expressions.constants import convert, limits
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
+from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL
 from fbvm.syntax import tree
 from fbvm.syntax.st.literals import WRONG
 

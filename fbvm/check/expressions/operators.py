@@ -34,7 +34,7 @@ from fbvm.check.expressions import constants
 from fbvm.check.expressions.assignability import UNSIGNED, as_number, conversion_hint, convertible, is_untyped
 from fbvm.check.expressions.literals import as_character
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import UNTYPED_INT, UNTYPED_REAL
+from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import Elementary, EnumType, Type, base, fold
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import Variable
+from fbvm.check.symbols.facts import Variable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ from fbvm.base.types import (
     reference,
 )
 from fbvm.check.expressions.values import MAKERS, is_null
-from fbvm.check.facts import Facts, Holder, StandardCall, Start, Variable
-from fbvm.check.writes import writable
+from fbvm.check.expressions.writes import writable
+from fbvm.check.symbols.facts import Facts, Holder, StandardCall, Start, Variable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.dialects import takers
 from fbvm.base.types import Field, StructType, fold
-from fbvm.check.calls import vendor_names
+from fbvm.check.symbols import vendor_names
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

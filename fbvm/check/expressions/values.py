@@ -8,10 +8,10 @@ from fbvm.base.codes import CODES
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import takers
 from fbvm.base.types import ArrayType, Field, RefType, StructType, Type, families, fold
-from fbvm.check.calls.vendor_names import comma_hint
 from fbvm.check.expressions.constants import encode
-from fbvm.check.facts import UNTYPED_INT, Facts, Pou, Value, Variable
-from fbvm.check.project import Project
+from fbvm.check.symbols.facts import UNTYPED_INT, Facts, Pou, Value, Variable
+from fbvm.check.symbols.project import Project
+from fbvm.check.symbols.vendor_names import comma_hint
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import walk
 

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from fbvm.base.areas import AREAS, FLAG_AREAS, Address
 from fbvm.base.types import BOOL, ArrayType, Type, base
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import Facts, Pou, PouCall, Report, Variable, is_block
 from fbvm.check.lint.body import Body
+from fbvm.check.symbols.facts import Facts, Pou, PouCall, Report, Variable, is_block
 from fbvm.syntax import tree
 from fbvm.syntax.tree import sfc
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from fbvm.check.facts import Pou, Variable
 from fbvm.check.lint import declared
 from fbvm.check.lint import sfc as lint_sfc
 from fbvm.check.lint import values as lint_values
 from fbvm.check.lint.body import Body
 from fbvm.check.lint.flow import flow
 from fbvm.check.lint.writes import Writes
+from fbvm.check.symbols.facts import Pou, Variable
 from fbvm.syntax.tree import sfc
 
 if TYPE_CHECKING:

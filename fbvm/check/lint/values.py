@@ -9,9 +9,9 @@ from typing import Any
 from fbvm.base.types import BOOL, LREAL, Type, base
 from fbvm.check.expressions.constants import wrap
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import Pou, PouCall, StandardCall, Variable
+from fbvm.check.expressions.writes import place
 from fbvm.check.lint.body import Body
-from fbvm.check.writes import place
+from fbvm.check.symbols.facts import Pou, PouCall, StandardCall, Variable
 from fbvm.syntax import tree
 
 _NO_PLACES = tree.Binary | tree.Unary | tree.Literal

@@ -13,9 +13,9 @@ from typing import Any
 
 from fbvm.base.areas import Address
 from fbvm.base.types import BOOL, base
-from fbvm.check.facts import PouCall, Variable
+from fbvm.check.expressions.writes import place
 from fbvm.check.lint.body import Body
-from fbvm.check.writes import place
+from fbvm.check.symbols.facts import PouCall, Variable
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder, sfc
 

@@ -9,7 +9,7 @@ from fbvm.code.operations import Node
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
-    from fbvm.check.facts import AggregatePart
+    from fbvm.check.symbols.facts import AggregatePart
     from fbvm.code.lowering.bodies import BodyLowering
     from fbvm.code.lowering.places import Place
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, NULL, Type, base, machine
 from fbvm.check.checker import Checker
-from fbvm.check.facts import Pou, PouCall, StandardCall
+from fbvm.check.symbols.facts import Pou, PouCall, StandardCall
 from fbvm.code.image import Body, RungPicture
 from fbvm.code.lowering import byte_order
 from fbvm.code.lowering.functions import FUNCTIONS

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import ArrayType, Elementary, EnumType, StringType, StructType, SubrangeType, Type, base
-from fbvm.check.facts import StandardCall
+from fbvm.check.symbols.facts import StandardCall
 from fbvm.code.lowering.values import is_aggregate
 from fbvm.syntax import tree
 

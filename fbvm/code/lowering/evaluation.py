@@ -10,7 +10,7 @@ from fbvm.base import arithmetic, strings
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import base, machine
 from fbvm.check.expressions.constants import convert
-from fbvm.check.facts import StandardCall, Value
+from fbvm.check.symbols.facts import StandardCall, Value
 from fbvm.code.lowering.functions import FUNCTIONS
 from fbvm.code.lowering.values import constant
 from fbvm.code.operations import FLOATS, INTEGERS, TEXT_UNITS, Node

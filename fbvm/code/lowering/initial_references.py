@@ -13,7 +13,7 @@ from fbvm.base.memory import STRUCTS
 from fbvm.base.types import ArrayType, RefType, StructType, Type
 from fbvm.check.checker import Checker
 from fbvm.check.expressions.references import MARK
-from fbvm.check.facts import Pou, Start
+from fbvm.check.symbols.facts import Pou, Start
 from fbvm.code.lowering.bodies import BodyLowering
 from fbvm.code.lowering.evaluation import value_of
 from fbvm.code.lowering.layout import Placed

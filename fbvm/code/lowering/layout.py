@@ -9,8 +9,8 @@ from fbvm.base.areas import FLAG_AREAS, SLOTS_OFFSET, Address
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import ArrayType, Field, StructType, Type, fold
 from fbvm.check.checker import Checker
-from fbvm.check.containment import Inside
-from fbvm.check.facts import Completed, Pou, Spot, Variable, holds_block
+from fbvm.check.symbols.containment import Inside
+from fbvm.check.symbols.facts import Completed, Pou, Spot, Variable, holds_block
 from fbvm.code.image import Layout, Objects, Retained
 from fbvm.code.objects import Numbering
 from fbvm.code.operations import BUFFER_OBJECT, LEASE_BYTES, OBJECT_SHIFT, OFFSET_SHIFT

@@ -28,7 +28,7 @@ from fbvm.base.types import (
     machine,
 )
 from fbvm.check.expressions.any_parameters import NUMBERS, VIEWS
-from fbvm.check.facts import StandardCall, Value, Variable
+from fbvm.check.symbols.facts import StandardCall, Value, Variable
 from fbvm.code.lowering import aggregates, plc_addresses
 from fbvm.code.lowering.layout import variable_bit
 from fbvm.code.operations import SIZES, WHOLE_BYTES, Address, Node

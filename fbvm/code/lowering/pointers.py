@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.types import ANY_SIZE, UDINT, AnyType, OpenArrayType, RefType, Type, machine
 from fbvm.check.declarations.interfaces import OBJECTS_AT
 from fbvm.check.expressions.values import is_null
-from fbvm.check.facts import Holder, Variable
+from fbvm.check.symbols.facts import Holder, Variable
 from fbvm.code.lowering.any_parameters import size_of
 from fbvm.code.lowering.places import Place
 from fbvm.code.operations import (

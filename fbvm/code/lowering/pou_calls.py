@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, RefType, followed, machine
 from fbvm.check.expressions.constants import default
-from fbvm.check.facts import PouCall, Variable
+from fbvm.check.symbols.facts import PouCall, Variable
 from fbvm.code.lowering.any_parameters import described
 from fbvm.code.lowering.places import Place
 from fbvm.code.lowering.values import is_aggregate, nothing

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from fbvm.base.areas import Area
-from fbvm.check.facts import Pou, Start, Variable
+from fbvm.check.symbols.facts import Pou, Start, Variable
 from fbvm.code.image import Objects, RungPicture, SfcPicture, Site
 from fbvm.code.lowering.layout import Placed
 from fbvm.code.operations import FIRST_OBJECT

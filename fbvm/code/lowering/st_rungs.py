@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from fbvm.base.types import BOOL
-from fbvm.check.facts import Facts, PouCall
+from fbvm.check.symbols.facts import Facts, PouCall
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Pin, Point, Series, StepText, Undrawable, diagram
 from fbvm.syntax.ladder.drawing.steps import steps

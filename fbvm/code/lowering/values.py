@@ -18,7 +18,7 @@ from fbvm.base.types import (
 )
 from fbvm.check.expressions.constants import convert as convert_constant
 from fbvm.check.expressions.values import is_any
-from fbvm.check.facts import Guard, PouCall, StandardCall, Value
+from fbvm.check.symbols.facts import Guard, PouCall, StandardCall, Value
 from fbvm.code.lowering import plc_addresses
 from fbvm.code.lowering.functions import FUNCTIONS, saturated
 from fbvm.code.operations import FLOATS, TEXT_UNITS, Node

@@ -12,8 +12,8 @@ from fbvm.base.areas import AREAS
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import ArrayType, RefType, StructType, Type, fold
 from fbvm.check.checker import Checker
-from fbvm.check.dependencies import Asked, Key, key_of
-from fbvm.check.facts import Pou, Variable
+from fbvm.check.symbols.dependencies import Asked, Key, key_of
+from fbvm.check.symbols.facts import Pou, Variable
 from fbvm.code.image import Body, Site
 from fbvm.code.lowering.bodies import BodyLowering
 from fbvm.code.lowering.program import Origin, Program

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, TextIO, TypeAlias
 
 from fbvm.base.areas import SLOTS_OFFSET, AddressError, parse_address
 from fbvm.base.types import BOOL, LINT, LREAL, TIME, ULINT, Field, StructType, Type, array, fold, string
-from fbvm.check.declarations.size_limits import MAX_SIZE
+from fbvm.check.symbols.size_limits import MAX_SIZE
 from fbvm.code.image import Image, Layout
 from fbvm.machine.plc import Plc
 from fbvm.record.trace.csv_writer import MS, SCAN, TIME_MS

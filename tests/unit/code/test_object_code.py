@@ -11,8 +11,8 @@ import pytest
 
 from fbvm.base.data import data_folder
 from fbvm.base.dialects import DIALECTS
-from fbvm.check.facts import Facts, Pou, Variable
-from fbvm.check.project import Project
+from fbvm.check.symbols.facts import Facts, Pou, Variable
+from fbvm.check.symbols.project import Project
 from fbvm.code.compiler import Compilation, compile_text
 from fbvm.code.store import object_code
 from fbvm.code.store.encoding import encode

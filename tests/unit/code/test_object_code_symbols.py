@@ -9,7 +9,7 @@ import pytest
 from rows import first_quick
 
 from fbvm.base.dialects import STANDARD
-from fbvm.check import library
+from fbvm.check.symbols import library
 from fbvm.code.compiler import compile_text
 from fbvm.code.store import object_code
 from fbvm.code.store.encoding import encode

@@ -32,7 +32,7 @@ from fbvm.base.areas import AREAS, Mailbox, refusal
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.base.types import fold
-from fbvm.check.facts import Report
+from fbvm.check.symbols.facts import Report
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
-from fbvm.check.facts import Pou
+from fbvm.check.symbols.facts import Pou
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker
-    from fbvm.check.project import Project
+    from fbvm.check.symbols.project import Project
 
 Key = tuple[str, str]
 """Library and folded name of a POU."""

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from fbvm.base.types import ArrayType, StructType, Type
-from fbvm.check.facts import Pou
+from fbvm.check.symbols.facts import Pou
 
 if TYPE_CHECKING:
     from fbvm.check.checker import Checker

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from fbvm.base.areas import AREAS, Address
 from fbvm.base.dialects import takers
 from fbvm.base.types import Field, StructType, fold
-from fbvm.check.facts import Facts, Variable
+from fbvm.check.symbols.facts import Facts, Variable
 from fbvm.syntax import tree
 
 if TYPE_CHECKING:

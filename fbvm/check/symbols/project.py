@@ -15,11 +15,11 @@ from typing import TypeVar
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import STANDARD, Dialect
 from fbvm.base.types import EnumType, RefType, Type, fold
-from fbvm.check.declarations.reserved_names import refuse_reserved
-from fbvm.check.declarations.size_limits import Room
-from fbvm.check.dependencies import Asked
-from fbvm.check.facts import Facts, Pou, Report, Variable, list_name
-from fbvm.check.library import Libraries
+from fbvm.check.symbols.dependencies import Asked
+from fbvm.check.symbols.facts import Facts, Pou, Report, Variable, list_name
+from fbvm.check.symbols.library import Libraries
+from fbvm.check.symbols.reserved_names import refuse_reserved
+from fbvm.check.symbols.size_limits import Room
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import attributes, external, pack_mode
 
