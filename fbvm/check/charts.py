@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.types import BOOL, TIME, base, fold
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.writes import writable
+from fbvm.check.symbols.facts import Pou
 from fbvm.syntax import tree
 from fbvm.syntax.tree import sfc
 
-if TYPE_CHECKING:
-    from fbvm.check.statements import Statements
 
-
-def check(statements: Statements, chart: sfc.Sfc) -> bool:
-    """Check conditions and associations; whether the statements of the chart can be checked after that."""
-    rules = _Rules(statements)
+def check(scope: Scope, pou: Pou, chart: sfc.Sfc) -> bool:
+    """Check conditions and associations of a chart in a POU; True if the statements that it means can be checked then."""
+    rules = _Rules(scope, pou)
     good = [rules.transition(transition) for transition in chart.transitions]
     good += [rules.is_free(variable) for section in chart.sections for variable in section.variables]
     for step in chart.steps:
@@ -24,11 +21,11 @@ def check(statements: Statements, chart: sfc.Sfc) -> bool:
 
 
 class _Rules:
-    def __init__(self, statements: Statements) -> None:
-        self.expressions = statements.expressions
-        self.facts = statements.facts
-        self.error = statements.error
-        self.pou = statements.pou.owner
+    def __init__(self, scope: Scope, pou: Pou) -> None:
+        self.scope = scope
+        self.facts = scope.facts
+        self.error = scope.error
+        self.pou = pou
 
     def is_free(self, declared: tree.VarDecl) -> bool:
         """Whether a name of a step or action is not taken by a variable, which was told."""
@@ -53,12 +50,12 @@ class _Rules:
         return good
 
     def _is_bool(self, expr: tree.Expr, what: str) -> bool:
-        self.expressions.condition(expr, what)
+        self.scope.condition(expr, what)
         kind = self.facts.types.get(expr)
         return kind is not None and base(kind) == BOOL
 
     def _time(self, expr: tree.Expr) -> bool:
-        if not self.expressions.fit(expr, TIME, "S0112", "the time of an action"):
+        if not self.scope.fit(expr, TIME, "S0112", "the time of an action"):
             return False
         value = self.facts.constants.get(expr)
         if isinstance(value, int) and value < 0:
@@ -68,24 +65,24 @@ class _Rules:
 
     def _action(self, name: tree.Name) -> bool:
         """An ACTION of the POU, or a BOOL variable that can be written."""
-        variable = self.expressions.variable(name.text)
+        variable = self.scope.variable(name.text)
         if fold(name.text) in self.pou.actions:
             if variable is not None and variable.role == "action":
                 return True
             self.error("S0112", name, f"the ACTION {name.text} stands behind its {self.pou.kind}, where no step sees it",
                        f"write it in front of END_{self.pou.kind}")
             return False
-        if variable is None and self.expressions.pou is not None and fold(name.text) in self.expressions.pou.damaged:
+        if variable is None and self.scope.pou is not None and fold(name.text) in self.scope.pou.failed_names:
             return False
         if variable is None or variable.role:
-            nearest = self.expressions.project.nearest(name.text, (action.tree.name.text for action in self.pou.actions.values()))
+            nearest = self.scope.project.nearest(name.text, (action.tree.name.text for action in self.pou.actions.values()))
             self.error("S0112", name, f"{name.text} is neither an ACTION of {self.pou.name} nor a variable",
                        nearest or f"write ACTION {name.text}: .. END_ACTION")
             return False
         target = tree.NameRef(name.start, name.end, name.text)
-        if self.expressions.infer(target) is None:
+        if self.scope.infer(target) is None:
             return False
         if base(variable.type) != BOOL:
             self.error("S0112", name, f"{name.text} is {variable.type}: a variable that is an action is BOOL")
             return False
-        return writable(self.expressions, target, "be an action")
+        return writable(self.scope, target, "be an action")

@@ -4,33 +4,35 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from fbvm.base.dialects import takers
-from fbvm.base.types import BOOL, EnumType, RefType, StringType, Type, base, fold
+from fbvm.base.types import BOOL, EnumType, RefType, StringType, Type, base
 from fbvm.check import charts
+from fbvm.check.calls import calls
 from fbvm.check.expressions import references
 from fbvm.check.expressions.assignability import as_number, assignable, conversion_hint
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.expressions.writes import note_count, place, writable
+from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou, Value
 from fbvm.syntax import tree
 from fbvm.syntax.tree import ladder, sfc
 
-if TYPE_CHECKING:
-    from fbvm.check.checker import Checker
+
+def check_body(context: Context, pou: Pou) -> None:
+    """Check the statements of a POU."""
+    _Statements(context, pou).block(pou.tree.body)
 
 
-class Statements:
-    """Checks the body of one POU."""
+class _Statements:
+    """The statements of one POU."""
 
-    def __init__(self, checker: Checker, pou: Pou) -> None:
-        self.checker = checker
+    def __init__(self, context: Context, pou: Pou) -> None:
         self.pou = pou
-        self.expressions = checker.expressions(pou.source, pou)
-        self.facts = self.expressions.facts
-        self.calls = checker.calls(self.expressions)
-        self.error = self.expressions.error
+        self.scope = Scope(context, pou.source, pou)
+        self.facts = self.scope.facts
+        self.error = self.scope.error
         self._loops = 0
 
     def block(self, statements: tree.Block) -> None:
@@ -41,19 +43,19 @@ class Statements:
 
     def target(self, expr: tree.Expr, purpose: str = "be written") -> Type | None:
         """The type of a place that is written, or None after a diagnostic."""
-        kind = self.expressions.infer(expr)
+        kind = self.scope.infer(expr)
         if kind is None:
             return None
-        if not self.expressions.is_variable(expr):
+        if not self.scope.is_variable(expr):
             self.error("S0501", expr, f"this is a value of {kind} and cannot {purpose}",
                        "only variables stand left of :=")
             return None
-        note_count(self.expressions, expr)
-        return kind if writable(self.expressions, expr, purpose) else None
+        note_count(self.scope, expr)
+        return kind if writable(self.scope, expr, purpose) else None
 
     def _assign(self, node: tree.Assign) -> None:
         if node.op == "REF=" and len(node.targets) == 1:
-            references.bind(self.expressions, node)
+            references.bind(self.scope, node)
             return
         if node.op == "REF=":
             self.error("S0901", node, f"{node.op} is understood but not executed by this version")
@@ -67,11 +69,11 @@ class Statements:
             self._attempt(node, kinds)
             return
         if last is None:
-            self.expressions.infer(node.value)
+            self.scope.infer(node.value)
             return
         if isinstance(node.value, tree.Call):
             self.facts.assigned.add(node.value)
-        self.expressions.fit(node.value, last)
+        self.scope.fit(node.value, last)
         for kind, value, value_kind in zip(kinds, node.targets[1:], kinds[1:], strict=False):
             if kind is not None and value_kind is not None and not assignable(value_kind, kind):
                 self.error("S0301", value, f"the value is {value_kind}, but {kind} is needed here",
@@ -79,7 +81,7 @@ class Statements:
 
     def _attempt(self, node: tree.Assign, kinds: list[Type | None]) -> None:
         """`r ?= s`: r takes the reference if it is one to its type, else NULL; without classes that is known now."""
-        kind = self.expressions.infer(node.value, kinds[-1])
+        kind = self.scope.infer(node.value, kinds[-1])
         for target, wanted in zip(node.targets, kinds, strict=True):
             if wanted is None or kind is None:
                 continue
@@ -93,20 +95,20 @@ class Statements:
         for target, kind in zip(node.targets, kinds, strict=True):
             if kind is not None and base(kind) != BOOL:
                 self.error("S0301", target, f"{node.op} sets a BOOL; this is {kind}")
-        self.expressions.condition(node.value, node.op)
+        self.scope.condition(node.value, node.op)
 
     def _call(self, node: tree.CallStatement) -> None:
         if isinstance(node.call, tree.Call):
-            self.calls.statement(node.call)
+            calls.statement(self.scope, node.call)
             return
         if isinstance(node.call, tree.StructInit):
             self.error("S0101", node.call, "the name of an instance is missing in front of `(`",
                        "write the name of the instance that is called")
             return
-        if self.calls.action(node.call) is not None:
+        if calls.action(self.scope, node.call) is not None:
             self._bare_action(node)
             return
-        kind = self.expressions.infer(node.call)
+        kind = self.scope.infer(node.call)
         if kind is not None:
             compares = isinstance(node.call, tree.Binary) and node.call.op == "="
             self.error("S0401", node.call, "this is no statement: it does nothing", "`=` compares, `:=` assigns" if compares else
@@ -115,11 +117,11 @@ class Statements:
     def _bare_action(self, node: tree.CallStatement) -> None:
         """An ACTION without (), which is a call of it in some dialects."""
         called = tree.Call(node.call.start, node.call.end, node.call, ())
-        if self.expressions.project.dialect.bare_actions:
+        if self.scope.dialect.bare_actions:
             self.facts.bare[node] = called
-            self.calls.statement(called)
+            calls.statement(self.scope, called)
             return
-        text = self.expressions.text(node.call)
+        text = self.scope.text(node.call)
         self.error("S0401", node.call, f"the ACTION {text} is named and not called",
                    f"write {text}(), or take {takers('bare_actions')}")
 
@@ -127,12 +129,12 @@ class Statements:
 
     def _if(self, node: tree.If) -> None:
         for condition, body in node.branches:
-            self.expressions.condition(condition, "IF")
+            self.scope.condition(condition, "IF")
             self.block(body)
         self.block(node.otherwise or ())
 
     def _case(self, node: tree.Case) -> None:
-        kind = self.expressions.settle(node.selector)
+        kind = self.scope.settle(node.selector)
         if kind is not None and not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_CHARS") and not isinstance(kind, EnumType):
             self.error("S0503", node.selector,
                        f"CASE chooses by an integer, a bit string, an enumeration or a text; {kind} is none",
@@ -156,9 +158,9 @@ class Statements:
         low, high = label
         if high is not None:
             self.error("S0503", low, "texts have no ranges", "write the labels one by one")
-        elif self.expressions.fit(low, kind, "S0503", "the label"):
+        elif self.scope.fit(low, kind, "S0503", "the label"):
             value = self.facts.constants.get(low)
-            shown = self.expressions.text(low)
+            shown = self.scope.text(low)
             if not isinstance(value, bytes | str):
                 self._unknown_label(low)
             elif value in taken:
@@ -187,7 +189,7 @@ class Statements:
         return low, high
 
     def _label_value(self, expr: tree.Expr, kind: Type) -> int | None:
-        if not self.expressions.fit(expr, kind, "S0503", "the label"):
+        if not self.scope.fit(expr, kind, "S0503", "the label"):
             return None
         value = self.facts.constants.get(expr)
         if value is None or not isinstance(value, int):
@@ -199,33 +201,33 @@ class Statements:
 
     def _for(self, node: tree.For) -> None:
         kind = self.target(node.variable, "count a loop")
-        if kind is not None and not is_any(as_number(kind, self.expressions.project.dialect), "ANY_INT"):
+        if kind is not None and not is_any(as_number(kind, self.scope.dialect), "ANY_INT"):
             self.error("S0504", node.variable, f"FOR counts with an integer, not with {kind}")
             kind = None
         for part, role in ((node.first, "the first value"), (node.last, "the last value"), (node.step, "the step")):
             if part is None:
                 continue
             if kind is None:
-                self.expressions.infer(part)
+                self.scope.infer(part)
             elif role == "the step":
                 self._step(part, kind)
             else:
-                self.expressions.fit(part, base(kind), "S0504", role)
-        self.expressions.counting.append(place(self.facts, node.variable) or () if kind is not None else ())
+                self.scope.fit(part, base(kind), "S0504", role)
+        self.scope.counters.append(place(self.facts, node.variable) or () if kind is not None else ())
         self._body(node.body)
-        self.expressions.counting.pop()
+        self.scope.counters.pop()
 
     def _step(self, expr: tree.Expr, kind: Type) -> None:
         """A step may be negative where the variable may not: it is then a literal, and worked out in LINT."""
-        if self.expressions.infer(expr) is None:
+        if self.scope.infer(expr) is None:
             return
         value = self.facts.constants.get(expr)
         if value == 0:
             self.error("S0504", expr, "a step of 0 never ends the loop")
         elif isinstance(value, int) and value < 0 and not isinstance(value, bool):
-            self.expressions.settle(expr)
+            self.scope.settle(expr)
         else:
-            self.expressions.fit(expr, base(kind), "S0504", "the step")
+            self.scope.fit(expr, base(kind), "S0504", "the step")
 
     def _body(self, statements: tree.Block) -> None:
         self._loops += 1
@@ -233,12 +235,12 @@ class Statements:
         self._loops -= 1
 
     def _while(self, node: tree.While) -> None:
-        self.expressions.condition(node.condition, "WHILE")
+        self.scope.condition(node.condition, "WHILE")
         self._body(node.body)
 
     def _repeat(self, node: tree.Repeat) -> None:
         self._body(node.body)
-        self.expressions.condition(node.until, "UNTIL")
+        self.scope.condition(node.until, "UNTIL")
 
     def _leave(self, node: tree.Exit | tree.Continue) -> None:
         if not self._loops:
@@ -251,28 +253,28 @@ class Statements:
         if self.pou.result is None:
             self.error("S0409", node.value, f"{self.pou.name} has no result to return")
             return
-        self.expressions.fit(node.value, self.pou.result.type)
+        self.scope.fit(node.value, self.pou.result.type)
 
     def _rungs(self, node: ladder.Ladder | ladder.Rung) -> None:
         self.block(node.body)
 
     def _sfc(self, node: sfc.Sfc) -> None:
-        if charts.check(self, node):
+        if charts.check(self.scope, self.pou.owner, node):
             self.block(node.body)
 
     def _empty(self, node: tree.Empty) -> None:
         """Nothing is wrong with `;`."""
 
     def _refused(self, node: tree.RefusedStatement) -> None:
-        self.checker.report.refuse(self.pou.source, node)
+        self.scope.project.report.refuse(self.pou.source, node)
 
 
 _CHECK: dict[type, Callable[..., None]] = {
-    tree.Assign: Statements._assign, tree.CallStatement: Statements._call, tree.If: Statements._if,
-    tree.Case: Statements._case, tree.For: Statements._for, tree.While: Statements._while,
-    tree.Repeat: Statements._repeat, tree.Exit: Statements._leave, tree.Continue: Statements._leave,
-    ladder.Ladder: Statements._rungs, ladder.Rung: Statements._rungs, sfc.Sfc: Statements._sfc,
-    tree.Return: Statements._return, tree.Empty: Statements._empty, tree.RefusedStatement: Statements._refused,
+    tree.Assign: _Statements._assign, tree.CallStatement: _Statements._call, tree.If: _Statements._if,
+    tree.Case: _Statements._case, tree.For: _Statements._for, tree.While: _Statements._while,
+    tree.Repeat: _Statements._repeat, tree.Exit: _Statements._leave, tree.Continue: _Statements._leave,
+    ladder.Ladder: _Statements._rungs, ladder.Rung: _Statements._rungs, sfc.Sfc: _Statements._sfc,
+    tree.Return: _Statements._return, tree.Empty: _Statements._empty, tree.RefusedStatement: _Statements._refused,
 }
 
 
@@ -283,36 +285,3 @@ def _take(taken: list[tuple[int, int]], low: int, high: int) -> bool:
     met = taken[start:end]
     taken[start:end] = [(min(low, met[0][0]), max(high, met[-1][1])) if met else (low, high)]
     return bool(met)
-
-
-def writes_eno(pou: Pou) -> bool:
-    """True if ENO is assigned anywhere in a body; most do not even name it."""
-    node = pou.tree
-    return "ENO" in fold(pou.source.text[node.start:node.end]) and _assigns_to(node.body, "ENO")
-
-
-def _assigns_to(statements: tree.Block, name: str) -> bool:
-    for statement in statements:
-        if isinstance(statement, tree.Assign) and any(
-                isinstance(t, tree.NameRef) and fold(t.text) == name for t in statement.targets):
-            return True
-        if any(_assigns_to(body, name) for body in bodies(statement)):
-            return True
-    return False
-
-
-_PLAIN = tree.Assign | tree.CallStatement
-_AROUND = tree.For | tree.While | tree.Repeat | ladder.Ladder | ladder.Rung | sfc.Sfc
-
-
-def bodies(statement: tree.Statement) -> list[tree.Block]:
-    """The statement lists inside a statement."""
-    if isinstance(statement, _PLAIN):
-        return []
-    if isinstance(statement, tree.If):
-        return [body for _, body in statement.branches] + [statement.otherwise or ()]
-    if isinstance(statement, tree.Case):
-        return [branch.body for branch in statement.branches] + [statement.otherwise or ()]
-    if isinstance(statement, _AROUND):
-        return [statement.body]
-    return []

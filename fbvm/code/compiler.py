@@ -124,11 +124,9 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
             damage.note(source, text, errors(diagnostics))
             project.collect(text, source)
         unread = len(report.diagnostics)
-        checker = Checker(project, evaluate)
-        checker.progress = partial(progress, "checked")
-        checker.keeps = not libraries and not project.settings
-        shelf = shelf_of(spoken) if checker.keeps else Shelf()
-        checker.known = shelf.asked
+        shared = not libraries and not project.config_sections
+        shelf = shelf_of(spoken) if shared else Shelf()
+        checker = Checker(project, evaluate, shelf.dependencies if shared else None, partial(progress, "checked"))
         checker.check(program, resource)
         if runnable and not errors(report.diagnostics):
             _demand_program(checker, program, sources, report)

@@ -9,7 +9,7 @@ from fbvm.base.areas import SLOTS_OFFSET
 from fbvm.base.types import ArrayType, StructType, Type
 from fbvm.check.checker import Checker
 from fbvm.check.declarations.interfaces import OBJECTS_AT
-from fbvm.check.symbols.containment import Inside
+from fbvm.check.symbols.containment import Containment
 from fbvm.code.operations import FIRST_OBJECT
 
 
@@ -19,7 +19,7 @@ class Numbering:
     def __init__(self, checker: Checker) -> None:
         self.checker = checker
         self.extents: list[tuple[int, int]] = []
-        self._has_objects = Inside(checker, lambda pou: bool(pou.referred))
+        self._has_objects = Containment(checker, lambda pou: bool(pou.referred))
 
     def single(self) -> None:
         """Number the variables that have one place."""

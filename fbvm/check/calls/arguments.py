@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import count, islice
-from typing import TYPE_CHECKING
 
 from fbvm.base.dialects import Dialect, takers
-from fbvm.base.types import BOOL, fold
+from fbvm.base.types import BOOL, Type, base, fold
+from fbvm.check.expressions.assignability import assignable, converted_by_dialect, holds
+from fbvm.check.expressions.scope import Scope
+from fbvm.check.expressions.writes import note_count, writable
 from fbvm.check.symbols.facts import Guard
 from fbvm.check.symbols.vendor_names import comma_hint
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
 MIXED = "a call names all of its parameters or none"
 MIXED_HINT = f"name them: parameter := value, or take {takers('mixed_arguments')}"
@@ -31,10 +30,10 @@ def mixed(call: tree.Call, dialect: Dialect) -> tree.Argument | None:
 class Arguments:
     """The arguments of one call; `names` are its parameters, of which the last may repeat; `others` name the first ones too."""
 
-    def __init__(self, expressions: Expressions, call: tree.Call, names: Sequence[str], repeats: bool = False,
+    def __init__(self, scope: Scope, call: tree.Call, names: Sequence[str], repeats: bool = False,
                  others: Sequence[str] = ()) -> None:
-        self.expressions = expressions
-        self.error = expressions.error
+        self.scope = scope
+        self.error = scope.error
         self.call = call
         self.names = names
         self.repeats = repeats
@@ -42,7 +41,7 @@ class Arguments:
 
     def in_order(self) -> list[tree.Expr] | None:
         """Values in the order of the parameters, or None after a diagnostic."""
-        other = mixed(self.call, self.expressions.project.dialect)
+        other = mixed(self.call, self.scope.dialect)
         if other is not None:
             self.error("S0406", other, MIXED, MIXED_HINT)
             return None
@@ -67,7 +66,7 @@ class Arguments:
         """True if every parameter has a value; one that is named without a value has none."""
         least = len(self.names)
         if len(given) > least and not self.repeats:
-            self.error("S0402", self.call, self._takes(len(given)), comma_hint(self.expressions.text(self.call)))
+            self.error("S0402", self.call, self._takes(len(given)), comma_hint(self.scope.text(self.call)))
             return False
         count = max(least, 1 + max(given, default=0)) if least else 0
         missing = [self._name(i) for i in islice((i for i in range(count) if i not in values), NAMED)]
@@ -121,11 +120,11 @@ class Arguments:
             return False
         if argument.value is None:
             return True
-        guard = self.expressions.facts.guards.setdefault(self.call, Guard())
+        guard = self.scope.facts.guards.setdefault(self.call, Guard())
         if name == "EN":
-            if self.expressions.fit(argument.value, BOOL, "S0405", "EN"):
+            if self.scope.fit(argument.value, BOOL, "S0405", "EN"):
                 guard.enable = argument.value
-        elif self.expressions.checker.calls(self.expressions).output(argument, BOOL, "ENO"):
+        elif output(self.scope, argument, BOOL, "ENO"):
             guard.enabled.append((argument.value, argument.negated))
         return True
 
@@ -133,3 +132,24 @@ class Arguments:
 def callee(call: tree.Call) -> str:
     """The name of what is called, for messages."""
     return call.callee.text if isinstance(call.callee, tree.NameRef) else "this"
+
+
+def output(scope: Scope, argument: tree.Argument, kind: Type, name: str) -> bool:
+    """True if the target of `name => target` takes an output of `kind`; else a diagnostic."""
+    value = argument.value
+    assert value is not None
+    target = scope.infer(value)
+    if target is None:
+        return False
+    if not scope.is_variable(value):
+        scope.error("S0407", value, f"the output {name} needs a variable to go to")
+        return False
+    if argument.negated and base(kind) != BOOL:
+        scope.error("S0405", value, f"NOT needs a BOOL output; {name} is {kind}")
+        return False
+    if not assignable(kind, target) and not holds(target, kind) and not converted_by_dialect(kind, target, scope.dialect):
+        scope.error("S0405", value, f"the output {name} is {kind} and does not fit {target}",
+                    f"let a variable of {base(kind)} take it, and convert that afterwards")
+        return False
+    note_count(scope, value)
+    return writable(scope, value, f"take the output {name}")

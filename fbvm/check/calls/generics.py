@@ -8,20 +8,18 @@ whatever its type.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from fbvm.base.types import ANYTHING, AnyType, StringType, SubrangeType, Type, base, common, families, fold, string
 from fbvm.check.calls.functions import RESULT_STRING
 from fbvm.check.expressions.any_parameters import MEMBERS
 from fbvm.check.expressions.assignability import is_untyped, same
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
+from fbvm.check.symbols.elementary_types import elementary_type
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Pou, holds_block
+from fbvm.check.symbols.project import Project
 from fbvm.syntax import tree
 from fbvm.syntax.tree.node import copied, walk
-
-if TYPE_CHECKING:
-    from fbvm.check.calls.calls import Calls
-    from fbvm.check.symbols.project import Project
 
 
 def variables(declared: tree.Pou) -> dict[str, str]:
@@ -81,75 +79,69 @@ def is_generic(pou: Pou, project: Project) -> bool:
     return bool(names.keys() - looks_into(pou, project)) if names else False
 
 
-class Generics:
-    """Finds or makes the function that a call of a generic one means, for the calls of one POU."""
-
-    def __init__(self, calls: Calls) -> None:
-        self.calls = calls
-        self.expressions = calls.expressions
-        self.error = calls.error
-        self.made = calls.project.made
-
-    def function(self, call: tree.Call, pou: Pou, want: Type | None) -> Pou | None:
-        """The function for the types of this call, or None after a diagnostic."""
-        types = self._types(call, pou, want)
-        if types is None:
+def function(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> Pou | None:
+    """The function for the types of this call, or None after a diagnostic."""
+    types = _types(scope, call, pou, want)
+    if types is None:
+        return None
+    key = pou, tuple(sorted((name, kind.name) for name, kind in types.items()))
+    if key not in scope.project.made:
+        made = Pou(pou.name, pou.kind, pou.source, copied(pou.tree), types=types, as_written=False)
+        scope.project.made[key] = made
+        if not scope.context.interface(made, pou.source, call):
             return None
-        key = pou, tuple(sorted((name, kind.name) for name, kind in types.items()))
-        if key not in self.made:
-            made = Pou(pou.name, pou.kind, pou.source, copied(pou.tree), types=types, as_written=False)
-            self.made[key] = made
-            if not self.calls.checker.interface(made, pou.source, call):
-                return None
-            self.calls.checker.check_body(made)
-        return self.made[key]
+        scope.context.check_body(made)
+    return scope.project.made[key]
 
-    def _types(self, call: tree.Call, pou: Pou, want: Type | None) -> dict[str, Type] | None:
-        """The type that each generic type stands for in a call."""
-        bound: dict[str, Type | None] = {}
-        for name, kind, expr, exact in self._arguments(call, pou):
-            if kind is None:
-                return None
-            met = bound.get(name)
-            joined = _joined(met, kind, exact)
-            if joined is None and met is not None:
-                self.error("S0405", expr, f"{name} is {met} and {kind} in one call of {pou.name}",
-                           "all its places have the same type")
-                return None
-            bound[name] = joined
-        if isinstance(pou.tree.result, tree.NamedType) and fold(pou.tree.result.text) in ANYTHING:
-            bound.setdefault(fold(pou.tree.result.text), want)
-        types: dict[str, Type] = {}
-        for name, kind in bound.items():
-            settled = self._settled(call, pou, name, kind, want)
-            if settled is None:
-                return None
-            types[name] = settled
-        return types
 
-    def _arguments(self, call: tree.Call, pou: Pou) -> Iterator[tuple[str, Type | None, tree.Expr, bool]]:
-        """Generic type, type, argument, and whether it has to be of exactly that type, for each generic parameter."""
-        names = variables(pou.tree)
-        looked = looks_into(pou, self.calls.project)
-        for name, value, section in _given(call, pou):
-            if name in names and name not in looked:
-                yield names[name], self.expressions.infer(value), value, section != "VAR_INPUT"
-
-    def _settled(self, call: tree.Call, pou: Pou, name: str, kind: Type | None, want: Type | None) -> Type | None:
-        """The type that a generic type stands for, if it belongs to it."""
-        if kind is None or is_untyped(kind):
-            wanted = base(want) if want is not None and name in families(want) else None
-            literal = "DINT" if kind is UNTYPED_INT else "LREAL" if kind is UNTYPED_REAL else None
-            if wanted is None and literal is None:
-                self.error("S0405", call, f"nothing tells which type {name} stands for in this call of {pou.name}",
-                           f"pass an argument to a parameter of type {name}")
-                return None
-            kind = wanted or self.calls.checker.specs.elementary(literal or "")
-            assert kind is not None
-        if name not in families(kind) or holds_block(kind) or isinstance(kind, AnyType):
-            self.error("S0405", call, f"{pou.name} takes {name}, this is {kind}")
+def _types(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> dict[str, Type] | None:
+    """The type that each generic type stands for in a call."""
+    bound: dict[str, Type | None] = {}
+    for name, kind, expr, exact in _arguments(scope, call, pou):
+        if kind is None:
             return None
-        return kind
+        met = bound.get(name)
+        joined = _joined(met, kind, exact)
+        if joined is None and met is not None:
+            scope.error("S0405", expr, f"{name} is {met} and {kind} in one call of {pou.name}",
+                        "all its places have the same type")
+            return None
+        bound[name] = joined
+    if isinstance(pou.tree.result, tree.NamedType) and fold(pou.tree.result.text) in ANYTHING:
+        bound.setdefault(fold(pou.tree.result.text), want)
+    types: dict[str, Type] = {}
+    for name, kind in bound.items():
+        settled = _settled(scope, call, pou, name, kind, want)
+        if settled is None:
+            return None
+        types[name] = settled
+    return types
+
+
+def _arguments(scope: Scope, call: tree.Call, pou: Pou) -> Iterator[tuple[str, Type | None, tree.Expr, bool]]:
+    """Generic type, type, argument, and whether it has to be of exactly that type, for each generic parameter."""
+    names = variables(pou.tree)
+    looked = looks_into(pou, scope.project)
+    for name, value, section in _given(call, pou):
+        if name in names and name not in looked:
+            yield names[name], scope.infer(value), value, section != "VAR_INPUT"
+
+
+def _settled(scope: Scope, call: tree.Call, pou: Pou, name: str, kind: Type | None, want: Type | None) -> Type | None:
+    """The type that a generic type stands for, if it belongs to it."""
+    if kind is None or is_untyped(kind):
+        wanted = base(want) if want is not None and name in families(want) else None
+        literal = "DINT" if kind is UNTYPED_INT else "LREAL" if kind is UNTYPED_REAL else None
+        if wanted is None and literal is None:
+            scope.error("S0405", call, f"nothing tells which type {name} stands for in this call of {pou.name}",
+                        f"pass an argument to a parameter of type {name}")
+            return None
+        kind = wanted or elementary_type(literal or "")
+        assert kind is not None
+    if name not in families(kind) or holds_block(kind) or isinstance(kind, AnyType):
+        scope.error("S0405", call, f"{pou.name} takes {name}, this is {kind}")
+        return None
+    return kind
 
 
 def _joined(met: Type | None, kind: Type, exact: bool) -> Type | None:

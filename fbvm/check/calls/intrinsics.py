@@ -4,17 +4,13 @@ Source: IEC 61131-3 ed. 3 table 15, and the operators of CODESYS, of which some 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.types import BOOL, DINT, DWORD, UDINT, AnyType, ArrayType, OpenArrayType, Type, string
 from fbvm.check.calls.arguments import Arguments
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT, StandardCall
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
 _PARAMETERS = {"SIZEOF": ["IN"], "XSIZEOF": ["IN"], "LOWER_BOUND": ["ARR", "DIM"], "UPPER_BOUND": ["ARR", "DIM"],
                "__ISVALIDREF": ["REF"], "__POUNAME": [], "BITADR": ["IN"], "__PLC_ADDRESS": ["IN"]}
@@ -37,107 +33,107 @@ _SEGMENTS = {"M": 0x40000000, "I": 0x80000000, "Q": 0xC0000000}
 """What BITADR adds to the number of the bit, by area (CODESYS online help, BITADR)."""
 
 
-def answer(expressions: Expressions, call: tree.Call, name: str) -> Type | None:
+def answer(scope: Scope, call: tree.Call, name: str) -> Type | None:
     """The type of such a call, or None after a diagnostic."""
     if name in REFUSED:
         code, what, hint = REFUSED[name]
-        expressions.error(code, call.callee, f"{name} {what}: it is understood but not executed", hint)
+        scope.error(code, call.callee, f"{name} {what}: it is understood but not executed", hint)
         return None
-    values = Arguments(expressions, call, _PARAMETERS[name]).in_order()
+    values = Arguments(scope, call, _PARAMETERS[name]).in_order()
     if values is None:
         return None
     if name == "__POUNAME":
-        shown = expressions.pou.name.encode("latin-1", "replace") if expressions.pou is not None else b""
-        expressions.facts.constants[call] = shown
+        shown = scope.pou.name.encode("latin-1", "replace") if scope.pou is not None else b""
+        scope.facts.constants[call] = shown
         return string(max(1, len(shown)))
     if name == "__ISVALIDREF":
-        return _is_bound(expressions, call, values[0])
+        return _is_bound(scope, call, values[0])
     if name == "BITADR":
-        return _bit_address(expressions, call, values[0])
+        return _bit_address(scope, call, values[0])
     if name == "__PLC_ADDRESS":
-        return _plc_address(expressions, call, values[0])
+        return _plc_address(scope, call, values[0])
     if name in ("SIZEOF", "XSIZEOF"):
-        return _size(expressions, call, values[0])
-    return _bound(expressions, call, name, values[0], values[1])
+        return _size(scope, call, values[0])
+    return _bound(scope, call, name, values[0], values[1])
 
 
-def _is_bound(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:
+def _is_bound(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
     """__ISVALIDREF(r): whether a REFERENCE TO is bound."""
-    kind = expressions.infer(value)
+    kind = scope.infer(value)
     if kind is None:
         return None
-    if value not in expressions.facts.followed:
-        expressions.error("S0405", value, "this is no variable that is declared REFERENCE TO", "compare a REF_TO with NULL")
+    if value not in scope.facts.followed:
+        scope.error("S0405", value, "this is no variable that is declared REFERENCE TO", "compare a REF_TO with NULL")
         return None
-    expressions.facts.calls[call] = StandardCall("__ISVALIDREF", [(value, kind)])
+    scope.facts.calls[call] = StandardCall("__ISVALIDREF", [(value, kind)])
     return BOOL
 
 
-def _plc_address(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:
+def _plc_address(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
     """__PLC_ADDRESS(x): where a variable lies for the index registers of ladder, 0 if they cannot point there."""
-    kind = expressions.infer(value)
+    kind = scope.infer(value)
     if kind is None:
         return None
-    if not expressions.is_variable(value):
-        expressions.error("S0407", value, "this is no variable, and has no address")
+    if not scope.is_variable(value):
+        scope.error("S0407", value, "this is no variable, and has no address")
         return None
-    expressions.facts.calls[call] = StandardCall("__PLC_ADDRESS", [(value, kind)])
+    scope.facts.calls[call] = StandardCall("__PLC_ADDRESS", [(value, kind)])
     return UDINT
 
 
-def _bit_address(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:
+def _bit_address(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
     """BITADR(x): the number of the bit in its area, with the area in the highest digit."""
-    if expressions.infer(value) is None:
+    if scope.infer(value) is None:
         return None
-    facts = expressions.facts
+    facts = scope.facts
     address = facts.directs.get(value) or (facts.variables[value].location if value in facts.variables else None)
     if address is None or address.area not in _SEGMENTS or address.area in FLAG_AREAS:
-        expressions.error("S0405", value, "BITADR asks where in %I, %Q or %M a variable lies, and this lies in none of them",
-                          "declare it AT %MX0.0")
+        scope.error("S0405", value, "BITADR asks where in %I, %Q or %M a variable lies, and this lies in none of them",
+                    "declare it AT %MX0.0")
         return None
     facts.constants[call] = _SEGMENTS[address.area] + address.byte_offset() * 8 + (
         address.bit_in_byte() if address.bit is not None else 0)
     return DWORD
 
 
-def _bound(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr, dimension: tree.Expr) -> Type | None:
+def _bound(scope: Scope, call: tree.Call, name: str, value: tree.Expr, dimension: tree.Expr) -> Type | None:
     """LOWER_BOUND(array, dimension) and UPPER_BOUND, as DINT; a constant but for ARRAY [*]."""
-    kind = expressions.infer(value)
-    counted = expressions.settle(dimension)
+    kind = scope.infer(value)
+    counted = scope.settle(dimension)
     if kind is None or counted is None:
         return None
-    number = expressions.facts.constants.get(dimension)
+    number = scope.facts.constants.get(dimension)
     if isinstance(number, bool) or not is_any(counted, "ANY_INT"):
-        expressions.error("S0405", dimension, f"{name} needs its dimension as an integer, this is {counted}")
+        scope.error("S0405", dimension, f"{name} needs its dimension as an integer, this is {counted}")
         return None
     if not isinstance(kind, ArrayType | OpenArrayType):
-        expressions.error("S0405", value, f"{name} needs an array, this is {kind}")
+        scope.error("S0405", value, f"{name} needs an array, this is {kind}")
         return None
     count = kind.dimensions if isinstance(kind, OpenArrayType) else len(kind.bounds)
     if isinstance(number, int) and not 1 <= number <= count:
-        expressions.error("S0405", dimension, f"{kind} has dimensions 1 to {count}, not {number}")
+        scope.error("S0405", dimension, f"{kind} has dimensions 1 to {count}, not {number}")
         return None
     if isinstance(number, int) and isinstance(kind, ArrayType):
-        expressions.facts.constants[call] = kind.bounds[number - 1][name == "UPPER_BOUND"]
+        scope.facts.constants[call] = kind.bounds[number - 1][name == "UPPER_BOUND"]
     else:
-        expressions.facts.calls[call] = StandardCall(name, [(value, kind), (dimension, DINT)], (kind,))
+        scope.facts.calls[call] = StandardCall(name, [(value, kind), (dimension, DINT)], (kind,))
     return DINT
 
 
-def _size(expressions: Expressions, call: tree.Call, value: tree.Expr) -> Type | None:
+def _size(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
     """SIZEOF(x) of a variable or a type: bytes, as a literal would be written but for ANY."""
     kind: Type | None = None
-    if isinstance(value, tree.NameRef) and expressions.variable(value.text) is None:
-        kind = expressions.checker.specs.named_type(value.text, expressions.source)
-        pou = expressions.project.pou(value.text, expressions.source) if kind is None else None
-        if pou is not None and pou.kind == "FUNCTION_BLOCK" and expressions.checker.interface(pou, expressions.source, value):
+    if isinstance(value, tree.NameRef) and scope.variable(value.text) is None:
+        kind = scope.named_type(value.text)
+        pou = scope.project.pou(value.text, scope.source) if kind is None else None
+        if pou is not None and pou.kind == "FUNCTION_BLOCK" and scope.context.interface(pou, scope.source, value):
             kind = pou.type
     if kind is None:
-        kind = expressions.settle(value)
+        kind = scope.settle(value)
     if kind is None:
         return None
     if isinstance(kind, AnyType):
-        expressions.facts.calls[call] = StandardCall("SIZEOF", [(value, kind)])
+        scope.facts.calls[call] = StandardCall("SIZEOF", [(value, kind)])
         return UDINT
-    expressions.facts.constants[call] = kind.size
+    scope.facts.constants[call] = kind.size
     return UNTYPED_INT

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.arithmetic import Undefined
 from fbvm.base.types import (
     ELEMENTARY,
@@ -30,13 +28,11 @@ from fbvm.check.calls.functions import Conversion, Signature
 from fbvm.check.expressions import references, unknown_names
 from fbvm.check.expressions.assignability import BOUNDS_HINT, as_number, convertible, is_untyped, same
 from fbvm.check.expressions.literals import as_character
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import MAKERS, is_any
 from fbvm.check.symbols import vendor_names
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, PouCall, StandardCall, is_block
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
 _SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations", "ANY_STRING": "STRING and WSTRING"}
 _NUMBERS = ("ANY_NUM", "ANY_BIT")
@@ -47,299 +43,312 @@ def is_known(name: str) -> bool:
     return functions.is_standard(name) or name in MAKERS or name in intrinsics.NAMES and name not in intrinsics.REFUSED
 
 
-class StandardCalls:
-    """Calls of standard functions in one POU."""
+def call(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
+    """The result's type, "" for a call without result, None after a diagnostic."""
+    result = _typed(scope, call, name, want, as_value)
+    called = scope.facts.calls.get(call)
+    if result and isinstance(called, StandardCall) and call not in scope.facts.guards and \
+            call not in scope.facts.turned:
+        _fold(scope, call, called)
+    return result
 
-    def __init__(self, expressions: Expressions) -> None:
-        self.expressions = expressions
-        self.facts = expressions.facts
-        self.error = expressions.error
 
-    def call(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
-        """The result's type, "" for a call without result, None after a diagnostic."""
-        result = self._typed(call, name, want, as_value)
-        called = self.facts.calls.get(call)
-        if result and isinstance(called, StandardCall) and call not in self.facts.guards and \
-                call not in self.facts.turned:
-            self._fold(call, called)
-        return result
+def _fold(scope: Scope, call: tree.Call, called: StandardCall) -> None:
+    """The value of a call of constants; what would trap is left to the program."""
+    values = [value for argument, _ in called.arguments if (value := scope.facts.constants.get(argument)) is not None]
+    if len(values) < len(called.arguments):
+        return
+    try:
+        value = scope.context.evaluate(called, values, scope.dialect)
+    except Undefined as undefined:
+        scope.facts.undefined[call] = scope.source, undefined.code
+        return
+    if value is not None:
+        scope.facts.constants[call] = value
 
-    def _fold(self, call: tree.Call, called: StandardCall) -> None:
-        """The value of a call of constants; what would trap is left to the program."""
-        values = [value for argument, _ in called.arguments if (value := self.facts.constants.get(argument)) is not None]
-        if len(values) < len(called.arguments):
-            return
-        try:
-            value = self.expressions.checker.evaluate(called, values, self.expressions.project.dialect)
-        except Undefined as undefined:
-            self.facts.undefined[call] = self.expressions.source, undefined.code
-            return
-        if value is not None:
-            self.facts.constants[call] = value
 
-    def _typed(self, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
-        if name in intrinsics.NAMES:
-            return intrinsics.answer(self.expressions, call, name)
-        if name in MAKERS:
-            values = Arguments(self.expressions, call, ["IN"]).in_order()
-            return references.make(self.expressions, call, name, values[0]) if values is not None else None
-        if name in functions.TIME_OPERATORS:
-            return self._time_operator(call, *functions.TIME_OPERATORS[name], want)
-        if name in functions.OPERATORS:
-            return self._operator(call, name, None, want)
-        if name in functions.SIGNATURES:
-            return self._signature(call, functions.SIGNATURES[name], None, want)
-        conversion = functions.conversion(name) or self._enum_conversion(name)
-        if conversion is not None:
-            return self._conversion(call, conversion)
-        typed = functions.typed_name(name)
-        if typed is not None:
-            if typed[0] in functions.OPERATORS:
-                return self._operator(call, *typed, want)
-            return self._signature(call, functions.SIGNATURES[typed[0]], typed[1], want)
-        for argument in call.arguments:
-            if argument.value is not None:
-                self.expressions.infer(argument.value)
-        if unknown_names.told(self.expressions, call.callee):
-            return None
-        project = self.expressions.project
-        known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]
-        self.error("S0401", call.callee, f"there is no function or instance {callee(call)}",
-                   vendor_names.FUNCTIONS.get(name) or vendor_names.library_of(callee(call)) or
-                   project.nearest(callee(call), known))
+def _typed(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
+    if name in intrinsics.NAMES:
+        return intrinsics.answer(scope, call, name)
+    if name in MAKERS:
+        values = Arguments(scope, call, ["IN"]).in_order()
+        return references.make(scope, call, name, values[0]) if values is not None else None
+    if name in functions.TIME_OPERATORS:
+        return _time_operator(scope, call, *functions.TIME_OPERATORS[name], want)
+    if name in functions.OPERATORS:
+        return _operator(scope, call, name, None, want)
+    if name in functions.SIGNATURES:
+        return _signature(scope, call, functions.SIGNATURES[name], None, want)
+    conversion = functions.conversion(name) or _enum_conversion(scope, name)
+    if conversion is not None:
+        return _conversion(scope, call, conversion)
+    typed = functions.typed_name(name)
+    if typed is not None:
+        if typed[0] in functions.OPERATORS:
+            return _operator(scope, call, *typed, want)
+        return _signature(scope, call, functions.SIGNATURES[typed[0]], typed[1], want)
+    for argument in call.arguments:
+        if argument.value is not None:
+            scope.infer(argument.value)
+    if unknown_names.is_reported(scope, call.callee):
         return None
+    project = scope.project
+    known = [*functions.names(), *(p.name for p in project.pous.values()), *project.libraries.block_names()]
+    scope.error("S0401", call.callee, f"there is no function or instance {callee(call)}",
+                vendor_names.FUNCTIONS.get(name) or vendor_names.library_of(callee(call)) or
+                project.nearest(callee(call), known))
+    return None
 
-    # --- kinds ------------------------------------------------------------------------------------------------------
 
-    def _operator(self, call: tree.Call, name: str, kind: Elementary | StringType | None,
-                  want: Type | None) -> Type | None:
-        """ADD(a, b, c) means a + b + c; NOT(a) means NOT a."""
-        names = ["IN"] if name == "NOT" else ["IN1", "IN2"]
-        values = Arguments(self.expressions, call, names, name in functions.EXTENSIBLE_OPERATORS).in_order()
-        return self._meaning(call, name, values, kind, want) if values is not None else None
+# --- kinds ------------------------------------------------------------------------------------------------------
 
-    def _time_operator(self, call: tree.Call, name: str, wanted: tuple[str, str], want: Type | None) -> Type | None:
-        """ADD_TOD_TIME(a, b) means a + b, and takes these types only."""
-        values = Arguments(self.expressions, call, ["IN1", "IN2"]).in_order()
-        if values is None:
+
+def _operator(scope: Scope, call: tree.Call, name: str, kind: Elementary | StringType | None,
+              want: Type | None) -> Type | None:
+    """ADD(a, b, c) means a + b + c; NOT(a) means NOT a."""
+    names = ["IN"] if name == "NOT" else ["IN1", "IN2"]
+    values = Arguments(scope, call, names, name in functions.EXTENSIBLE_OPERATORS).in_order()
+    return _meaning(scope, call, name, values, kind, want) if values is not None else None
+
+
+def _time_operator(scope: Scope, call: tree.Call, name: str, wanted: tuple[str, str], want: Type | None) -> Type | None:
+    """ADD_TOD_TIME(a, b) means a + b, and takes these types only."""
+    values = Arguments(scope, call, ["IN1", "IN2"]).in_order()
+    if values is None:
+        return None
+    for value, type_name in zip(values, wanted, strict=True):
+        kind = functions.named_type(type_name)
+        if kind is None and not _is_number(scope, value) or \
+                kind is not None and not scope.fit(value, kind, "S0405"):
             return None
-        for value, type_name in zip(values, wanted, strict=True):
-            kind = functions.named_type(type_name)
-            if kind is None and not self._is_number(value) or \
-                    kind is not None and not self.expressions.fit(value, kind, "S0405"):
-                return None
-        return self._meaning(call, name, values, None, want)
+    return _meaning(scope, call, name, values, None, want)
 
-    def _is_number(self, value: tree.Expr) -> bool:
-        """True for a number, whose type stays open if it is a literal; else a diagnostic."""
-        kind = self.expressions.infer(value)
-        if kind is not None and not is_untyped(kind) and not is_any(kind, "ANY_NUM"):
-            self.error("S0405", value, f"a number is needed here, this is {kind}")
-            return False
-        return kind is not None
 
-    def _meaning(self, call: tree.Call, name: str, values: list[tree.Expr], kind: Elementary | StringType | None,
-                 want: Type | None) -> Type | None:
-        """The type of a call that means an operator between its arguments."""
-        op = functions.OPERATORS[name]
-        if name == "NOT":
-            meaning: tree.Expr = tree.Unary(call.start, call.end, "NOT", values[0])
-        else:
-            meaning = values[0]
-            for value in values[1:]:
-                meaning = tree.Binary(call.start, call.end, op, meaning, value, value.start)
-        result = self.expressions.infer(meaning, kind or want)
-        if is_untyped(result) and kind is not None:
-            result = self.expressions.adopt(meaning, kind)
-        elif is_untyped(result) and call in self.facts.guards:
-            result = self.expressions.settle(meaning, want)
-        if result is None:
-            return None
-        if kind is not None and not converts(result, kind):
-            self.error("S0405", call, f"the arguments are {result}, {callee(call)} takes {kind}")
-            return None
-        self.facts.rewritten[call] = meaning
-        if meaning in self.facts.constants and call not in self.facts.guards:
-            self.facts.constants[call] = self.facts.constants[meaning]
-        return result
+def _is_number(scope: Scope, value: tree.Expr) -> bool:
+    """True for a number, whose type stays open if it is a literal; else a diagnostic."""
+    kind = scope.infer(value)
+    if kind is not None and not is_untyped(kind) and not is_any(kind, "ANY_NUM"):
+        scope.error("S0405", value, f"a number is needed here, this is {kind}")
+        return False
+    return kind is not None
 
-    def _signature(self, call: tree.Call, row: Signature, fixed: Elementary | StringType | None,
-                   want: Type | None) -> Type | str | None:
-        values = Arguments(self.expressions, call, [name for name, _ in row.parameters], row.repeats,
-                           functions.OTHER_NAMES.get(row.key, ())).in_order()
-        if values is None:
-            return None
-        wanted = [kind for _, kind in row.parameters]
-        wanted += [wanted[-1]] * (len(values) - len(wanted)) if wanted else []
-        variable: Type | None = fixed
-        if "T" in wanted and fixed is None:
-            places = [v for v, w in zip(values, wanted, strict=True) if w == "T"]
-            variable = self._bind(call, places, row, want if row.result == "T" else None)
-            if variable is None:
-                return None
-        arguments = []
-        for value, kind_name in zip(values, wanted, strict=True):
-            kind = variable if kind_name == "T" else self._parameter(value, kind_name)
-            if kind is None or not self.expressions.fit(value, kind, "S0405"):
-                return None
-            arguments.append((value, kind))
-        if row.key in functions.TURNED and variable is not None and not self._turned(call, variable):
-            return None
-        whole = [value for value, kind in arguments if kind == variable and not machine(kind)]
-        if whole and not self._as_a_whole(call, whole):
-            return None
-        self.facts.calls[call] = StandardCall(row.key, arguments, (variable,) if variable else ())
-        if row.key == "TRUNC" and want is not None and is_any(want, "ANY_INT"):
-            self.facts.calls[call] = StandardCall(row.key, arguments, (arguments[0][1], base(want)))
-            return base(want)
-        if row.result == "T":
-            assert variable is not None
-            return variable
-        return ELEMENTARY[row.result] if row.result else ""
 
-    def _as_a_whole(self, call: tree.Call, values: list[tree.Expr]) -> bool:
-        """True if a function can pass on arrays or structures; else a diagnostic.
+def _meaning(scope: Scope, call: tree.Call, name: str, values: list[tree.Expr], kind: Elementary | StringType | None,
+             want: Type | None) -> Type | None:
+    """The type of a call that means an operator between its arguments."""
+    op = functions.OPERATORS[name]
+    if name == "NOT":
+        meaning: tree.Expr = tree.Unary(call.start, call.end, "NOT", values[0])
+    else:
+        meaning = values[0]
+        for value in values[1:]:
+            meaning = tree.Binary(call.start, call.end, op, meaning, value, value.start)
+    result = scope.infer(meaning, kind or want)
+    if is_untyped(result) and kind is not None:
+        result = scope.adopt(meaning, kind)
+    elif is_untyped(result) and call in scope.facts.guards:
+        result = scope.settle(meaning, want)
+    if result is None:
+        return None
+    if kind is not None and not converts(result, kind):
+        scope.error("S0405", call, f"the arguments are {result}, {callee(call)} takes {kind}")
+        return None
+    scope.facts.rewritten[call] = meaning
+    if meaning in scope.facts.constants and call not in scope.facts.guards:
+        scope.facts.constants[call] = scope.facts.constants[meaning]
+    return result
 
-        The results of two calls of a function would lie in the same memory."""
-        if call in self.facts.guards:
-            self.error("S0405", call, f"{callee(call)} of an array or structure takes no EN and ENO", "write IF instead")
-            return False
-        made = [value for value in values if self._is_result(value)]
-        if made and callee(call).upper() not in ("MOVE", *functions.TURNED):
-            self.error("S0405", made[0], f"{callee(call)} chooses among variables, not among results of that size",
-                       "assign the result to a variable first")
-            return False
+
+def _signature(scope: Scope, call: tree.Call, row: Signature, fixed: Elementary | StringType | None,
+               want: Type | None) -> Type | str | None:
+    values = Arguments(scope, call, [name for name, _ in row.parameters], row.repeats,
+                       functions.OTHER_NAMES.get(row.key, ())).in_order()
+    if values is None:
+        return None
+    wanted = [kind for _, kind in row.parameters]
+    wanted += [wanted[-1]] * (len(values) - len(wanted)) if wanted else []
+    variable: Type | None = fixed
+    if "T" in wanted and fixed is None:
+        places = [v for v, w in zip(values, wanted, strict=True) if w == "T"]
+        variable = _bind(scope, call, places, row, want if row.result == "T" else None)
+        if variable is None:
+            return None
+    arguments = []
+    for value, kind_name in zip(values, wanted, strict=True):
+        kind = variable if kind_name == "T" else _parameter(scope, value, kind_name)
+        if kind is None or not scope.fit(value, kind, "S0405"):
+            return None
+        arguments.append((value, kind))
+    if row.key in functions.TURNED and variable is not None and not _turned(scope, call, variable):
+        return None
+    whole = [value for value, kind in arguments if kind == variable and not machine(kind)]
+    if whole and not _as_a_whole(scope, call, whole):
+        return None
+    scope.facts.calls[call] = StandardCall(row.key, arguments, (variable,) if variable else ())
+    if row.key == "TRUNC" and want is not None and is_any(want, "ANY_INT"):
+        scope.facts.calls[call] = StandardCall(row.key, arguments, (arguments[0][1], base(want)))
+        return base(want)
+    if row.result == "T":
+        assert variable is not None
+        return variable
+    return ELEMENTARY[row.result] if row.result else ""
+
+
+def _as_a_whole(scope: Scope, call: tree.Call, values: list[tree.Expr]) -> bool:
+    """True if a function can pass on arrays or structures; else a diagnostic.
+
+    The results of two calls of a function would lie in the same memory."""
+    if call in scope.facts.guards:
+        scope.error("S0405", call, f"{callee(call)} of an array or structure takes no EN and ENO", "write IF instead")
+        return False
+    made = [value for value in values if _is_result(scope, value)]
+    if made and callee(call).upper() not in ("MOVE", *functions.TURNED):
+        scope.error("S0405", made[0], f"{callee(call)} chooses among variables, not among results of that size",
+                    "assign the result to a variable first")
+        return False
+    return True
+
+
+def _turned(scope: Scope, call: tree.Call, kind: Type) -> bool:
+    """True if the order of the bytes of a value may be changed here; else a diagnostic."""
+    if _holds_references(kind):
+        scope.error("S0405", call, f"{callee(call)}: {kind} holds references, which have no order of bytes")
+        return False
+    if machine(kind) and machine(kind)[0] not in ("f", "s"):
         return True
+    if call not in scope.facts.assigned or call in scope.facts.guards:
+        scope.error("S0405", call, f"the bytes of {kind} change places in a variable only",
+                    f"write  variable := {callee(call)}(...);  and nothing else in that statement")
+        return False
+    scope.facts.turned.add(call)
+    return True
 
-    def _turned(self, call: tree.Call, kind: Type) -> bool:
-        """True if the order of the bytes of a value may be changed here; else a diagnostic."""
-        if _holds_references(kind):
-            self.error("S0405", call, f"{callee(call)}: {kind} holds references, which have no order of bytes")
-            return False
-        if machine(kind) and machine(kind)[0] not in ("f", "s"):
-            return True
-        if call not in self.facts.assigned or call in self.facts.guards:
-            self.error("S0405", call, f"the bytes of {kind} change places in a variable only",
-                       f"write  variable := {callee(call)}(...);  and nothing else in that statement")
-            return False
-        self.facts.turned.add(call)
-        return True
 
-    def _is_result(self, value: tree.Expr) -> bool:
-        """True for a value that lies in the memory of a user's function."""
-        called = self.facts.calls.get(value) if isinstance(value, tree.Call) else None
-        if isinstance(called, StandardCall) and called.key == "MOVE":
-            return self._is_result(called.arguments[0][0])
-        return isinstance(called, PouCall)
+def _is_result(scope: Scope, value: tree.Expr) -> bool:
+    """True for a value that lies in the memory of a user's function."""
+    called = scope.facts.calls.get(value) if isinstance(value, tree.Call) else None
+    if isinstance(called, StandardCall) and called.key == "MOVE":
+        return _is_result(scope, called.arguments[0][0])
+    return isinstance(called, PouCall)
 
-    def _parameter(self, value: tree.Expr, name: str) -> Type | None:
-        """The type in which an argument is wanted whose parameter has its own type."""
-        if name not in GENERIC:
-            return ELEMENTARY[name]
-        kind = self.expressions.settle(value)
-        if kind is not None and name not in families(as_number(kind, self.expressions.project.dialect)):
-            self.error("S0405", value, f"{name[4:]} is needed here, this is {kind}")
+
+def _parameter(scope: Scope, value: tree.Expr, name: str) -> Type | None:
+    """The type in which an argument is wanted whose parameter has its own type."""
+    if name not in GENERIC:
+        return ELEMENTARY[name]
+    kind = scope.settle(value)
+    if kind is not None and name not in families(as_number(kind, scope.dialect)):
+        scope.error("S0405", value, f"{name[4:]} is needed here, this is {kind}")
+        return None
+    return base(kind) if kind is not None else None
+
+
+def _bind(scope: Scope, call: tree.Call, values: list[tree.Expr], row: Signature, want: Type | None) -> Type | None:
+    """The one type that all arguments of a type variable meet in."""
+    kinds = [scope.infer(value, want) for value in values]
+    if None in kinds:
+        return None
+    character = next((kind for kind in kinds if kind is not None and is_any(kind, "ANY_CHAR")), None)
+    kinds = [as_character(scope, value, character) or kind for value, kind in zip(values, kinds, strict=True)]
+    bound: Type | None = None
+    for kind in kinds:
+        assert kind is not None
+        if is_untyped(kind):
+            continue
+        met = base(kind) if bound is None or same(kind, bound) else common(bound, kind)
+        if isinstance(kind, EnumType) or isinstance(bound, EnumType):
+            met = kind if bound in (None, kind) else None
+        if isinstance(met, StringType):
+            met = string(functions.RESULT_STRING, met.wide)
+        if met is None:
+            scope.error("S0405", call, f"{bound} and {kind} have no type in common")
             return None
-        return base(kind) if kind is not None else None
+        bound = met
+    if UNTYPED_REAL in kinds and (bound is None or not is_any(bound, "ANY_REAL")):
+        bound = _real(scope, bound, want)
+    elif bound is None:
+        bound = _integer(scope, call, values, row, want)
+    return _limited(scope, call, bound, row) if bound is not None else None
 
-    def _bind(self, call: tree.Call, values: list[tree.Expr], row: Signature, want: Type | None) -> Type | None:
-        """The one type that all arguments of a type variable meet in."""
-        kinds = [self.expressions.infer(value, want) for value in values]
-        if None in kinds:
-            return None
-        character = next((kind for kind in kinds if kind is not None and is_any(kind, "ANY_CHAR")), None)
-        kinds = [as_character(self.expressions, value, character) or kind for value, kind in zip(values, kinds, strict=True)]
-        bound: Type | None = None
-        for kind in kinds:
-            assert kind is not None
-            if is_untyped(kind):
-                continue
-            met = base(kind) if bound is None or same(kind, bound) else common(bound, kind)
-            if isinstance(kind, EnumType) or isinstance(bound, EnumType):
-                met = kind if bound in (None, kind) else None
-            if isinstance(met, StringType):
-                met = string(functions.RESULT_STRING, met.wide)
-            if met is None:
-                self.error("S0405", call, f"{bound} and {kind} have no type in common")
-                return None
-            bound = met
-        if UNTYPED_REAL in kinds and (bound is None or not is_any(bound, "ANY_REAL")):
-            bound = self._real(bound, want)
-        elif bound is None:
-            bound = self._integer(call, values, row, want)
-        return self._limited(call, bound, row) if bound is not None else None
 
-    def _real(self, bound: Type | None, want: Type | None) -> Type:
-        fits = want is not None and is_any(want, "ANY_REAL") and (bound is None or converts(bound, want))
-        return base(want) if fits and want is not None else LREAL
+def _real(scope: Scope, bound: Type | None, want: Type | None) -> Type:
+    fits = want is not None and is_any(want, "ANY_REAL") and (bound is None or converts(bound, want))
+    return base(want) if fits and want is not None else LREAL
 
-    def _integer(self, call: tree.Call, values: list[tree.Expr], row: Signature, want: Type | None) -> Type | None:
-        """The type of a type variable that met only untyped integers."""
-        if row.limits == ("ANY_REAL",):
-            return base(want) if want is not None and is_any(want, "ANY_REAL") else LREAL
-        if want is not None and is_any(want, "ANY_NUM", "ANY_BIT") and set(row.limits) & families(want):
-            return base(want)
-        settled = [self.expressions.settle(value) for value in values]
-        bound: Type | None = settled[0]
-        for kind in settled[1:]:
-            bound = common(bound, kind) if bound is not None and kind is not None else None
-        return bound
 
-    def _limited(self, call: tree.Call, bound: Type, row: Signature) -> Type | None:
-        good = set(row.limits) & families(bound) or isinstance(bound, EnumType) and "ENUMERATION" in row.limits
-        if row.limits == ("ANY_REAL",) and not good and converts(bound, LREAL):
-            return LREAL
-        if row.limits == ("ANY_STRING",) and is_any(bound, "ANY_CHAR"):
-            return string(functions.RESULT_STRING, bound.name == "WCHAR")
-        if not good or is_block(bound):
-            shown = " or ".join(_SHOWN.get(limit, limit) for limit in row.limits)
-            self.error("S0405", call, f"{callee(call)} is defined for {shown}, not for {bound}",
-                       "an instance cannot be copied" if is_block(bound) else BOUNDS_HINT
-                       if isinstance(bound, ArrayType | OpenArrayType) else "")
-            return None
-        return bound
+def _integer(scope: Scope, call: tree.Call, values: list[tree.Expr], row: Signature, want: Type | None) -> Type | None:
+    """The type of a type variable that met only untyped integers."""
+    if row.limits == ("ANY_REAL",):
+        return base(want) if want is not None and is_any(want, "ANY_REAL") else LREAL
+    if want is not None and is_any(want, "ANY_NUM", "ANY_BIT") and set(row.limits) & families(want):
+        return base(want)
+    settled = [scope.settle(value) for value in values]
+    bound: Type | None = settled[0]
+    for kind in settled[1:]:
+        bound = common(bound, kind) if bound is not None and kind is not None else None
+    return bound
 
-    # --- conversions ------------------------------------------------------------------------------------------------
 
-    def _enum_conversion(self, name: str) -> Conversion | None:
-        """`INT_TO_Color`, `Color_TO_INT` and the like, where Color is a declared enumeration."""
-        sides = tuple(name.split("_TO_"))
-        if len(sides) != 2 or sum(functions.long_name(side) in ELEMENTARY for side in sides) != 1:
-            return None
-        source, target = (side if isinstance(self._named(side), EnumType) else functions.long_name(side) for side in sides)
-        known = self._named(source) is not None and self._named(target) is not None
-        return Conversion(source, "TO", target) if known else None
+def _limited(scope: Scope, call: tree.Call, bound: Type, row: Signature) -> Type | None:
+    good = set(row.limits) & families(bound) or isinstance(bound, EnumType) and "ENUMERATION" in row.limits
+    if row.limits == ("ANY_REAL",) and not good and converts(bound, LREAL):
+        return LREAL
+    if row.limits == ("ANY_STRING",) and is_any(bound, "ANY_CHAR"):
+        return string(functions.RESULT_STRING, bound.name == "WCHAR")
+    if not good or is_block(bound):
+        shown = " or ".join(_SHOWN.get(limit, limit) for limit in row.limits)
+        scope.error("S0405", call, f"{callee(call)} is defined for {shown}, not for {bound}",
+                    "an instance cannot be copied" if is_block(bound) else BOUNDS_HINT
+                    if isinstance(bound, ArrayType | OpenArrayType) else "")
+        return None
+    return bound
 
-    def _conversion(self, call: tree.Call, row: Conversion) -> Type | None:
-        values = Arguments(self.expressions, call, ["IN"]).in_order()
-        if values is None:
-            return None
-        value = values[0]
-        target = self._named(row.target)
-        source = self._named(row.source) if row.source else self._own(value, row)
-        if source is None or target is None or not self.expressions.fit(value, source, "S0405"):
-            return None
-        if isinstance(source, StringType):
-            source = string(functions.RESULT_STRING, source.wide)
-        by_value = self.expressions.project.dialect.real_bits_by_value and row.form == "TO" and is_any(source, *_NUMBERS) and \
-            is_any(target, *_NUMBERS)
-        if not convertible(row.form, base(source), target) and not by_value:
-            self.error("S0405", call, f"{callee(call)} is not defined for {source}", "")
-            return None
-        self.facts.calls[call] = StandardCall(row.form, [(value, base(source))], (base(source), target))
-        return target
 
-    def _own(self, value: tree.Expr, row: Conversion) -> Type | None:
-        """The type of an argument that the name leaves open; a literal is BCD in the smallest bit string that holds it."""
-        kind = self.expressions.infer(value)
-        number = self.facts.constants.get(value)
-        if row.form != "BCD_TO" or kind is not UNTYPED_INT or not isinstance(number, int):
-            return self.expressions.settle(value)
-        fitting = next((name for name in ("BYTE", "WORD", "DWORD", "LWORD") if 0 <= number <= ELEMENTARY[name].high), "LWORD")
-        return self.expressions.adopt(value, ELEMENTARY[fitting], "S0405")
+# --- conversions ------------------------------------------------------------------------------------------------
 
-    def _named(self, name: str) -> Type | None:
-        return functions.named_type(name) or self.expressions.checker.specs.named_type(name, self.expressions.source)
+
+def _enum_conversion(scope: Scope, name: str) -> Conversion | None:
+    """`INT_TO_Color`, `Color_TO_INT` and the like, where Color is a declared enumeration."""
+    sides = tuple(name.split("_TO_"))
+    if len(sides) != 2 or sum(functions.long_name(side) in ELEMENTARY for side in sides) != 1:
+        return None
+    source, target = (side if isinstance(_named(scope, side), EnumType) else functions.long_name(side) for side in sides)
+    known = _named(scope, source) is not None and _named(scope, target) is not None
+    return Conversion(source, "TO", target) if known else None
+
+
+def _conversion(scope: Scope, call: tree.Call, row: Conversion) -> Type | None:
+    values = Arguments(scope, call, ["IN"]).in_order()
+    if values is None:
+        return None
+    value = values[0]
+    target = _named(scope, row.target)
+    source = _named(scope, row.source) if row.source else _own(scope, value, row)
+    if source is None or target is None or not scope.fit(value, source, "S0405"):
+        return None
+    if isinstance(source, StringType):
+        source = string(functions.RESULT_STRING, source.wide)
+    by_value = scope.dialect.real_bits_by_value and row.form == "TO" and is_any(source, *_NUMBERS) and \
+        is_any(target, *_NUMBERS)
+    if not convertible(row.form, base(source), target) and not by_value:
+        scope.error("S0405", call, f"{callee(call)} is not defined for {source}", "")
+        return None
+    scope.facts.calls[call] = StandardCall(row.form, [(value, base(source))], (base(source), target))
+    return target
+
+
+def _own(scope: Scope, value: tree.Expr, row: Conversion) -> Type | None:
+    """The type of an argument that the name leaves open; a literal is BCD in the smallest bit string that holds it."""
+    kind = scope.infer(value)
+    number = scope.facts.constants.get(value)
+    if row.form != "BCD_TO" or kind is not UNTYPED_INT or not isinstance(number, int):
+        return scope.settle(value)
+    fitting = next((name for name in ("BYTE", "WORD", "DWORD", "LWORD") if 0 <= number <= ELEMENTARY[name].high), "LWORD")
+    return scope.adopt(value, ELEMENTARY[fitting], "S0405")
+
+
+def _named(scope: Scope, name: str) -> Type | None:
+    return functions.named_type(name) or scope.named_type(name)
 
 
 def _holds_references(kind: Type) -> bool:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, TIME, UINT, StructType, Type, base, fold
+from fbvm.check.expressions.scope import Scope
+from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou, Run, TaskFact, Variable
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.checker import Checker
 
 LOWEST = 65536
 """Priority of what runs without a task: below every task."""
@@ -19,10 +16,10 @@ LOWEST = 65536
 class Configurations:
     """Finds the programs to run and makes their instances."""
 
-    def __init__(self, checker: Checker) -> None:
-        self.checker = checker
-        self.project = checker.project
-        self.report = checker.project.report
+    def __init__(self, context: Context) -> None:
+        self.context = context
+        self.project = context.project
+        self.report = context.project.report
         self._run: list[Variable] = []
         """Instances of programs that a task runs."""
 
@@ -47,7 +44,7 @@ class Configurations:
         return fitting[0]
 
     def resolve(self, program: str | None) -> None:
-        """Fill the checker's tasks: from the CONFIGURATION, or with the one program that there is or that is named."""
+        """Fill the tasks of the context: from the CONFIGURATION, or with the one program that there is or that is named."""
         configurations = self.project.configurations
         if program is None and configurations:
             for extra, source in configurations[1:]:
@@ -59,12 +56,12 @@ class Configurations:
         if program is not None:
             programs = [p for p in programs if fold(p.name) == fold(program)]
         elif len(programs) > 1:
-            called = {callee for body in self.checker.bodies for callee in body.calls}
+            called = {callee for body in self.context.bodies for callee in body.calls}
             programs = [p for p in programs if p not in called]
         if len(programs) == 1 and programs[0].type is not None:
             task = TaskFact("", LOWEST, 0)
             self._instance(programs[0].name, programs[0], task, programs[0].source, programs[0].tree.name)
-            self.checker.tasks.append(task)
+            self.context.tasks.append(task)
             self._unconnected(programs[0], programs[0].source, programs[0].tree.name, "")
 
     def _instance(self, name: str, pou: Pou, task: TaskFact, source: Source, node: tree.Node) -> None:
@@ -80,7 +77,7 @@ class Configurations:
                             (other.source, other.node.start, "the variable"))
             return
         instance = Variable(name, pou.type, "PROGRAM", source, node, place="abs", initial=pou.initial)
-        self.checker.global_order.append(instance)
+        self.context.global_order.append(instance)
         self.project.globals[key] = instance
         self._run.append(instance)
         task.runs.append(Run(instance, pou))
@@ -97,8 +94,8 @@ class Configurations:
     def _configuration(self, configuration: tree.Configuration, source: Source) -> None:
         for refused in configuration.refused:
             self.report.refuse(source, refused)
-        if self.checker.resource is not None:
-            self._resource(self.checker.resource, source)
+        if self.context.resource is not None:
+            self._resource(self.context.resource, source)
 
     def _resource(self, resource: tree.Resource, source: Source) -> None:
         for refused in resource.refused:
@@ -114,7 +111,7 @@ class Configurations:
             task = self._named(program.task, tasks, source) if program.task is not None else untasked
             if self._program(program, task or untasked, source):
                 self._blocks(program, (task or untasked).runs[-1].instance, tasks, source)
-        self.checker.tasks += [t for t in (*tasks.values(), untasked) if t.runs]
+        self.context.tasks += [t for t in (*tasks.values(), untasked) if t.runs]
 
     def _named(self, name: tree.Name, tasks: dict[str, TaskFact], source: Source) -> TaskFact | None:
         """The task of that name, or None after a diagnostic."""
@@ -137,7 +134,7 @@ class Configurations:
                                 f"a task runs an instance that {pou.name} declares in VAR; this is none",
                                 "name the instance alone:  valve WITH slow")
                 continue
-            body = self.checker.block_of(block.type)
+            body = self.context.block_of(block.type)
             in_outs = body.parameters("VAR_IN_OUT")
             if in_outs:
                 self.report.add("S0404", source, row.instance, f"the in-out {in_outs[0].name} of {block.name} is missing: "
@@ -169,7 +166,7 @@ class Configurations:
         runner = tree.Pou(name.start, program.end, "PROGRAM", tree.Name(name.start, name.end, f"{name.text} run"), None, (),
                           (tree.CallStatement(name.start, program.end, call),))
         pou = Pou(runner.name.text, "PROGRAM", source, runner)
-        self.checker.check_body(pou)
+        self.context.check_body(pou)
         task.runs[-1] = Run(task.runs[-1].instance, pou)
 
     def _task(self, declared: tree.Task, source: Source) -> TaskFact:
@@ -185,18 +182,18 @@ class Configurations:
         return TaskFact(declared.name.text, priority or 0, interval or 0, single)
 
     def _constant(self, expr: tree.Expr, kind: Type, source: Source) -> int | None:
-        expressions = self.checker.expressions(source, None)
-        if not expressions.fit(expr, kind, "S0801"):
+        scope = Scope(self.context, source, None)
+        if not scope.fit(expr, kind, "S0801"):
             return None
-        value = expressions.facts.constants.get(expr)
+        value = scope.facts.constants.get(expr)
         if not isinstance(value, int):
             self.report.add("S0801", source, expr, "a task's data must be constant")
             return None
         return value
 
     def _single(self, expr: tree.Expr, source: Source) -> str:
-        expressions = self.checker.expressions(source, None)
-        kind = expressions.infer(expr)
+        scope = Scope(self.context, source, None)
+        kind = scope.infer(expr)
         if kind is not None and (not isinstance(expr, tree.NameRef) or base(kind) != BOOL):
             self.report.add("S0801", source, expr, "SINGLE needs a global BOOL variable")
             return ""

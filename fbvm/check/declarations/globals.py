@@ -1,121 +1,84 @@
-"""Global variables: each is declared when its turn comes, or earlier if the declaration of another one asks for it."""
+"""Global variables: each is declared in the order of the text, or earlier if another declaration or a body names it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
-from fbvm.check.symbols.dependencies import Asked
-from fbvm.check.symbols.facts import Variable, is_open, list_name
-from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.checker import Checker
-
-Key = tuple[str, str]
-"""Library ("" for the user's own) and folded name."""
+from fbvm.check.declarations.variables import check_qualifiers, initialized, make_variable, type_of
+from fbvm.check.expressions.scope import Scope
+from fbvm.check.symbols.context import Context
+from fbvm.check.symbols.dependencies import Dependencies, Key
+from fbvm.check.symbols.facts import is_open, list_name
+from fbvm.check.symbols.project import GlobalDeclaration, Project
 
 
-@dataclass(eq=False)
-class Turn:
-    """One declaration of global variables, and whether it has had its turn."""
+def enroll(context: Context) -> None:
+    """Make the names of all VAR_GLOBAL sections known that were read since the last call."""
+    project = context.project
+    new, project.sections = project.sections, []
+    for section, source in new:
+        check_qualifiers(context.report, section, source, "program")
+    for section, source in new:
+        for declared in section.variables:
+            declaration = GlobalDeclaration(declared, section, source)
+            for key in _keys(project, declaration):
+                project.global_declarations.setdefault(key, declaration)
+            project.undeclared.append(declaration)
 
-    declared: tree.VarDecl
-    section: tree.VarSection
-    source: Source
-    taken: bool = False
+
+def declare(context: Context) -> None:
+    """Declare the variables of all VAR_GLOBAL sections that were read."""
+    project = context.project
+    enroll(context)
+    while project.undeclared:
+        declarations, project.undeclared = project.undeclared, []
+        for declaration in declarations:
+            _declare(context, declaration)
+        enroll(context)
 
 
-class Globals:
-    """Declares the VAR_GLOBAL sections of a project."""
+def declare_early(context: Context, key: Key) -> None:
+    """Declare the global variable of that name, if a declaration of it was read and not resolved yet."""
+    enroll(context)
+    declaration = context.project.global_declarations.get(key)
+    if declaration is not None:
+        _declare(context, declaration)
 
-    def __init__(self, checker: Checker) -> None:
-        self.checker = checker
-        self.project = checker.project
-        self.order: list[Variable] = []
-        """Global variables and program instances in the order of their slots."""
-        self._turns: list[Turn] = []
-        self._waiting: dict[Key, Turn] = {}
-        self._busy: set[Key] = set()
-        self._damaged: set[Key] = set()
-        self.project.late_global = self._on_demand
 
-    def enroll(self) -> None:
-        """Know the names of everything that was read since the last time; who asks for one has it declared."""
-        new = self.project.sections
-        if not new:
-            return
-        self.project.sections = []
-        turns = [Turn(declared, section, source) for section, source in new for declared in section.variables]
-        for section, source in new:
-            self.checker.interfaces.qualified(section, source, "program")
-        for turn in turns:
-            for key in self._keys(turn):
-                self._waiting.setdefault(key, turn)
-                self.project.waiting.add(key[1])
-        self._turns += turns
+def _keys(project: Project, declaration: GlobalDeclaration) -> list[Key]:
+    """The names under which the variables of a declaration are found: behind that of their list if it is qualified_only."""
+    space = f"{list_name(declaration.source)}." if declaration.section in project.qualified_only else ""
+    return [(declaration.source.library, f"{space}{fold(name.text)}") for name in declaration.declared.names]
 
-    def declare(self) -> None:
-        """Declare everything that was read."""
-        self.enroll()
-        while self._turns:
-            turns, self._turns = self._turns, []
-            for turn in turns:
-                self._declare(turn)
-            self.enroll()
 
-    def _keys(self, turn: Turn) -> list[Key]:
-        """Under which names the variables of a declaration are found; with that of their list if they must have it."""
-        space = f"{list_name(turn.source)}." if turn.section in self.project.qualified_only else ""
-        return [(turn.source.library, f"{space}{fold(name.text)}") for name in turn.declared.names]
-
-    def is_told(self, name: tree.NameRef, source: Source) -> bool:
-        """True if it has been said why there is no such variable; says it if the name asks for itself."""
-        keys = [(owner, fold(name.text)) for owner in self.project.owners(source)]
-        if any(key in self._busy for key in keys):
-            self.project.report.add("S0207", source, name, f"the initial value of {name.text} needs {name.text} itself")
-            return True
-        return any(key in self._damaged for key in keys)
-
-    def is_lost(self, space: str, name: str, source: Source) -> bool:
-        """True if it has been said why a list has no variable of that name."""
-        keys = {(owner, fold(text)) for owner in self.project.owners(source) for text in (name, f"{space}.{name}")}
-        return not keys.isdisjoint(self._damaged)
-
-    def _on_demand(self, key: Key) -> None:
-        """Declare a variable whose turn has not come, if there is one."""
-        self.enroll()
-        turn = self._waiting.get(key)
-        if turn is not None:
-            self._declare(turn)
-
-    def _declare(self, turn: Turn) -> None:
-        if turn.taken:
-            return
-        turn.taken = True
-        keys = self._keys(turn)
-        self._busy.update(keys)
-        with self.project.asking(Asked()):
-            resolved = self.checker.interfaces.typed(turn.declared, turn.source, None)
-        self._busy.difference_update(keys)
-        if resolved is None:
-            self._damaged.update(keys)
-            return
-        for name, key in zip(turn.declared.names, keys, strict=True):
-            variable = self.checker.interfaces.variable(turn.declared, name, turn.section, turn.source, resolved)
-            location = turn.declared.location
-            variable.qualified = turn.section in self.project.qualified_only
-            variable.space = Path(turn.source.name).stem if list_name(turn.source) in self.project.lists else ""
-            variable.place = "area" if location is not None and not is_open(location, variable.type) else "abs"
-            if not self.project.room.has(variable.type.size, f"{name.text} takes", turn.source, name):
-                self._damaged.add(key)
-                continue
-            other = self.project.globals.setdefault(key, variable)
-            if other is variable:
-                self.order.append(variable)
-            else:
-                self.project.report.add("S0202", turn.source, name, f"the global {name.text} is declared twice", "",
-                                        (other.source, other.node.start, "first declared here"))
+def _declare(context: Context, declaration: GlobalDeclaration) -> None:
+    if declaration.done:
+        return
+    declaration.done = True
+    project, declared, source = context.project, declaration.declared, declaration.source
+    keys = _keys(project, declaration)
+    project.busy_globals.update(keys)
+    with project.recording(Dependencies()):
+        scope = Scope(context, source, None)
+        resolved = type_of(scope, declared)
+        if resolved is not None:
+            resolved = initialized(scope, declared, resolved)
+    project.busy_globals.difference_update(keys)
+    if resolved is None:
+        project.failed_globals.update(keys)
+        return
+    for name, key in zip(declared.names, keys, strict=True):
+        made = make_variable(context, declared, name, declaration.section, source, resolved)
+        made.qualified = declaration.section in project.qualified_only
+        made.space = Path(source.name).stem if list_name(source) in project.lists else ""
+        made.place = "area" if declared.location is not None and not is_open(declared.location, made.type) else "abs"
+        if not project.size_limits.reserve(made.type.size, f"{name.text} takes", source, name):
+            project.failed_globals.add(key)
+            continue
+        other = project.globals.setdefault(key, made)
+        if other is made:
+            context.global_order.append(made)
+        else:
+            context.report.add("S0202", source, name, f"the global {name.text} is declared twice", "",
+                               (other.source, other.node.start, "first declared here"))

@@ -1,31 +1,30 @@
 """Initial values that name variables, in dialects that take them.
 
-In a block, a program or a list of globals such a name stands for what its variable begins with, which is known before the
-program runs.  Variables of a FUNCTION and VAR_TEMP begin anew at each start of their body, so there the expression becomes an
-assignment in front of it."""
+In a block, a program or a list of global variables such a name stands for the initial value of its variable, which is known
+before the program runs.  Variables of a FUNCTION and VAR_TEMP get their initial values at each start of their body: there the
+expression becomes an assignment in front of the body."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from fbvm.base.types import ArrayType, Type, machine
 from fbvm.check.expressions.constants import decode
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.facts import Pou
 from fbvm.syntax import tree
 
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
+def replace_by_values(scope: Scope, expr: tree.Expr) -> bool:
+    """True if the initial values of all variables are known that an initial value names.
 
-def worked_out(expressions: Expressions, expr: tree.Expr) -> bool:
-    """True if all places that an initial value names begin with a known value, which stands in the facts then."""
-    facts = expressions.facts
+    They are the constants of these names in the facts then, and the expression can be inferred anew."""
+    facts = scope.facts
     known = {}
     for place in _places(expr):
         if place in facts.constants:
             continue
-        found = _begins(expressions, place)
+        found = _initial_value(scope, place)
         if found is None or machine(found[0]) in ("", "ref"):
             return False
         known[place] = decode(*found)
@@ -35,23 +34,23 @@ def worked_out(expressions: Expressions, expr: tree.Expr) -> bool:
     return bool(known)
 
 
-def varies(expressions: Expressions, initial: tree.Initial) -> bool:
+def varies(scope: Scope, initial: tree.Initial) -> bool:
     """True for an initial value that names a variable, or calls a function of the program's own."""
     if not isinstance(initial, tree.Expr):
         return False
     for node in _nodes(initial):
         if isinstance(node, tree.NameRef):
-            variable = expressions.variable(node.text)
+            variable = scope.variable(node.text)
             if variable is not None and not variable.constant:
                 return True
         called = node.callee if isinstance(node, tree.Call) else None
-        if isinstance(called, tree.NameRef) and expressions.project.pou(called.text, expressions.source) is not None:
+        if isinstance(called, tree.NameRef) and scope.project.pou(called.text, scope.source) is not None:
             return True
     return False
 
 
 def with_assignments(pou: Pou, declared: list[tree.VarDecl]) -> tree.Pou:
-    """The tree of a POU whose body begins with the initial values of some declarations."""
+    """The tree of a POU whose body begins with assignments of the initial values of some declarations."""
     assigned: list[tree.Statement] = []
     for each in declared:
         assert isinstance(each.initial, tree.Expr)
@@ -62,19 +61,19 @@ def with_assignments(pou: Pou, declared: list[tree.VarDecl]) -> tree.Pou:
                     old.actions, old.accesses)
 
 
-def _begins(expressions: Expressions, place: tree.Expr) -> tuple[Type, bytes] | None:
-    """Type and bytes of what a place begins with, None if that is not known."""
-    facts = expressions.facts
+def _initial_value(scope: Scope, place: tree.Expr) -> tuple[Type, bytes] | None:
+    """Type and initial bytes of a variable or a part of one; None if they are not known."""
+    facts = scope.facts
     variable = facts.variables.get(place)
     if variable is not None:
         return None if variable.reference else (variable.type, variable.initial)
     if isinstance(place, tree.Member) and place in facts.fields:
-        outer, field = _begins(expressions, place.of), facts.fields[place]
+        outer, field = _initial_value(scope, place.of), facts.fields[place]
         if outer is None or field.reference or field.absolute or field.bit is not None:
             return None
         return field.type, outer[1][field.offset:field.offset + field.type.size]
     if isinstance(place, tree.Index):
-        outer = _begins(expressions, place.of)
+        outer = _initial_value(scope, place.of)
         subscripts = [facts.constants.get(subscript) for subscript in place.subscripts]
         if outer is None or not isinstance(outer[0], ArrayType) or len(subscripts) != len(outer[0].bounds):
             return None

@@ -3,37 +3,34 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 
 from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, ArrayType, StringType, StructType, Type, base
+from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import holds_block, is_open
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.checker import Checker
 
 _WITHOUT_SIGN = re.compile(r"[IQM][XBWDL]?\d+(?:\.\d+)*", re.IGNORECASE)
 
 
-def location_of(checker: Checker, declared: tree.VarDecl, kind: Type, source: Source) -> Address | None:
+def location_of(context: Context, declared: tree.VarDecl, kind: Type, source: Source) -> Address | None:
     """The address behind AT, checked against the type; None after a diagnostic."""
     node = declared.location
     assert node is not None
     if is_open(node, kind):
         return None
     try:
-        address = parse_address(node.text, checker.areas)
+        address = parse_address(node.text, context.areas)
     except AddressError as error:
-        checker.report.add("S0601", source, node, str(error), _meant(node.text, declared, kind))
+        context.report.add("S0601", source, node, str(error), _meant(node.text, declared, kind))
         return None
     if address.area in ("T", "C") and base(kind) == BOOL:
         address = Address("TF" if address.area == "T" else "CNF", address.number)
     if len(declared.names) > 1:
-        checker.report.add("S0604", source, node, "one location cannot serve several names")
+        context.report.add("S0604", source, node, "one location cannot serve several names")
         return None
-    return address if _fits(checker, address, kind, source, node) else None
+    return address if _fits(context, address, kind, source, node) else None
 
 
 def _meant(text: str, declared: tree.VarDecl, kind: Type) -> str:
@@ -44,33 +41,33 @@ def _meant(text: str, declared: tree.VarDecl, kind: Type) -> str:
     return f"another name for a variable is a reference: {name} : REFERENCE TO {kind} REF= {text};" if text.isidentifier() else ""
 
 
-def _fits(checker: Checker, address: Address, kind: Type, source: Source, node: tree.Node) -> bool:
+def _fits(context: Context, address: Address, kind: Type, source: Source, node: tree.Node) -> bool:
     """True if the address has room for the type; else a diagnostic."""
     is_bit = address.bit is not None or address.area in FLAG_AREAS
     if is_bit and isinstance(kind, ArrayType) and kind.element == BOOL:
-        checker.use_area(address.area)
+        context.use_area(address.area)
         end = address.byte_offset() * 8 + address.bit_in_byte() + kind.count
-        if end > checker.areas[address.area].size_bytes * 8:
-            checker.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
+        if end > context.areas[address.area].size_bytes * 8:
+            context.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
             return False
         return True
     if is_bit != (base(kind) == BOOL):
         if is_bit:
-            checker.report.add("S0602", source, node, f"{address} is one bit and {kind} is not BOOL")
+            context.report.add("S0602", source, node, f"{address} is one bit and {kind} is not BOOL")
         else:
-            checker.report.add("S0602", source, node, f"{address} is a word and {kind} needs a bit",
+            context.report.add("S0602", source, node, f"{address} is a word and {kind} needs a bit",
                                "name a bit, such as CIO 1519.03")
         return False
     if holds_block(kind):
-        checker.report.add("S0604", source, node, "instances of blocks have no location")
+        context.report.add("S0604", source, node, "instances of blocks have no location")
         return False
-    checker.use_area(address.area)
-    size = checker.areas[address.area].size_bytes
+    context.use_area(address.area)
+    size = context.areas[address.area].size_bytes
     if address.size_bits and not isinstance(kind, ArrayType | StructType | StringType) \
             and kind.size * 8 != max(8, address.size_bits):
-        checker.report.add("S0602", source, node, f"{address} has {address.size_bits} bits, {kind} {kind.size * 8}")
+        context.report.add("S0602", source, node, f"{address} has {address.size_bits} bits, {kind} {kind.size * 8}")
         return False
     if address.byte_offset() + kind.size > size:
-        checker.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
+        context.report.add("S0601", source, node, f"{kind} at {address} runs past the end of the area")
         return False
     return True

@@ -9,53 +9,59 @@ The name of the RESOURCE may stand in front.  A path leads to what lies in an in
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, Field, StructType, Type, fold
+from fbvm.check.declarations.initial_values import initial_bytes
 from fbvm.check.declarations.locations import location_of
-from fbvm.check.symbols.containment import Inside
+from fbvm.check.declarations.specs import resolve
+from fbvm.check.expressions.constant_integers import integer
+from fbvm.check.expressions.scope import Scope
+from fbvm.check.symbols.containment import Containment
+from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import AccessPath, Completed, Spot, Variable
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.checker import Checker
 
 _WIDTHS: dict[int, Type] = {1: BOOL, 8: BYTE, 32: DWORD, 64: LWORD}
 _UNREACHED = ("VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL")
 
 
-class Settings:
+class VarConfig:
     """What the VAR_CONFIG and VAR_ACCESS sections of a project say, once its programs have their instances."""
 
-    def __init__(self, checker: Checker, resource: str) -> None:
-        self.checker = checker
-        self.report = checker.report
-        self.resource = fold(resource)
-        """Folded name of the RESOURCE, "" if it has none."""
+    def __init__(self, context: Context) -> None:
+        self.context = context
+        self.report = context.report
         self.completed: list[Completed] = []
         self.accesses: list[AccessPath] = []
-        self._opens = Inside(checker, lambda pou: any(variable.open for variable in pou.order))
+        self._holds_open = Containment(context, lambda pou: any(variable.open for variable in pou.order))
 
     def resolve(self) -> None:
-        """Work out all sections; complain about what VAR_CONFIG leaves out."""
-        for section, source in self.checker.project.settings:
+        """Resolve all sections; report what VAR_CONFIG leaves out."""
+        for section, source in self.context.project.config_sections:
             for row in section.variables:
                 if isinstance(row, tree.ConfigVar):
                     self._config(row, source)
                 else:
                     self._access(row, source)
-        for root in self.checker.global_order:
+        for root in self.context.global_order:
             if root.kind == "PROGRAM" and isinstance(root.type, StructType):
-                pou = self.checker.block_of(root.type)
+                pou = self.context.block_of(root.type)
                 for row in (row for section in pou.tree.accesses for row in section.variables):
                     self._access(row, pou.source, Spot(root, (), root.type))
         self._left_out()
 
+    @property
+    def _resource_name(self) -> str:
+        """Folded name of the RESOURCE, "" if it has none."""
+        resource = self.context.resource
+        return fold(resource.name.text) if resource is not None and resource.name is not None else ""
+
     def _config(self, row: tree.ConfigVar, source: Source) -> None:
         spot = self._spot(row.path, source)
-        resolved = self.checker.specs.resolve(row.spec, source)
+        scope = Scope(self.context, source, None)
+        resolved = resolve(scope, row.spec)
         if spot is None or resolved is None or not self._fits(row.path, spot, resolved[0], source):
             return
         declared = spot.steps[-1] if spot.steps and isinstance(spot.steps[-1], Field) else None
@@ -69,15 +75,15 @@ class Settings:
                                 "declare it  AT %I*")
                 return
             shown = tree.VarDecl(row.start, row.end, (), row.location, row.spec, None)
-            address = location_of(self.checker, shown, spot.type, source)
+            address = location_of(self.context, shown, spot.type, source)
             if address is None:
                 return
-        initial = self.checker.values.initial(spot.type, row.initial, source, resolved[1]) if row.initial is not None else None
+        initial = initial_bytes(scope, spot.type, row.initial, resolved[1]) if row.initial is not None else None
         self.completed.append(Completed(spot, address, initial))
 
     def _access(self, row: tree.Access, source: Source, program: Spot | None = None) -> None:
         spot = self._spot(row.path, source, program)
-        resolved = self.checker.specs.resolve(row.spec, source)
+        resolved = resolve(Scope(self.context, source, None), row.spec)
         if spot is None or resolved is None or not self._fits(row.path, spot, resolved[0], source):
             return
         constant = spot.steps and isinstance(spot.steps[-1], Field) and spot.steps[-1].constant
@@ -104,7 +110,7 @@ class Settings:
         if isinstance(path, tree.NameRef):
             return self._root(path.text, path, source)
         if isinstance(path, tree.Member):
-            if program is None and isinstance(path.of, tree.NameRef) and fold(path.of.text) == self.resource:
+            if program is None and isinstance(path.of, tree.NameRef) and fold(path.of.text) == self._resource_name:
                 name = path.name
                 return self._direct(name.text, name, source) if name.text[0] == "%" else self._root(name.text, name, source)
             of = self._spot(path.of, source, program)
@@ -116,21 +122,21 @@ class Settings:
         return None
 
     def _root(self, name: str, node: tree.Node, source: Source) -> Spot | None:
-        variable = self.checker.project.globals.get(("", fold(name)))
+        variable = self.context.project.globals.get(("", fold(name)))
         if variable is not None and not variable.reference:
             return Spot(variable, (), variable.type)
-        known = [v.name for v in self.checker.project.globals.values()]
+        known = [v.name for v in self.context.project.globals.values()]
         self.report.add("S0801", source, node, f"there is no program, global variable or resource {name} here",
-                        self.checker.project.nearest(name, [*known, self.resource]))
+                        self.context.project.nearest(name, [*known, self._resource_name]))
         return None
 
     def _direct(self, text: str, node: tree.Node, source: Source) -> Spot | None:
         try:
-            address = parse_address(text, self.checker.areas)
+            address = parse_address(text, self.context.areas)
         except AddressError as error:
             self.report.add("S0601", source, node, str(error))
             return None
-        self.checker.use_area(address.area)
+        self.context.use_area(address.area)
         kind = BOOL if address.bit is not None else _WIDTHS.get(address.size_bits, WORD)
         return Spot(None, (), kind, address)
 
@@ -142,17 +148,18 @@ class Settings:
         if field is None or not reached:
             known = [f.name for f in kind.fields.values()] if isinstance(kind, StructType) else []
             self.report.add("S0210", source, path.name, f"{kind} has no {path.name.text} that a path can reach",
-                            self.checker.project.choices(path.name.text, known))
+                            self.context.project.choices(path.name.text, known))
             return None
         return Spot(of.root, (*of.steps, field), field.type)
 
     def _is_open(self, kind: Type, field: Field) -> bool:
         assert isinstance(kind, StructType)
-        return kind.block and self.checker.block_of(kind).variables[fold(field.name)].open
+        return kind.block and self.context.block_of(kind).variables[fold(field.name)].open
 
     def _element(self, of: Spot, path: tree.Index, source: Source) -> Spot | None:
         kind = of.type
-        numbers = [self.checker.values.integer(subscript, source) for subscript in path.subscripts]
+        scope = Scope(self.context, source, None)
+        numbers = [integer(scope, subscript) for subscript in path.subscripts]
         if not isinstance(kind, ArrayType) or len(numbers) != len(kind.bounds):
             self.report.add("S0304", source, path, f"this is {kind}, which has no such element")
             return None
@@ -171,14 +178,14 @@ class Settings:
     def _left_out(self) -> None:
         """Each instance needs a place for each of its variables that some VAR_CONFIG completes."""
         done = {(row.spot.root, _key(row.spot)) for row in self.completed if row.address is not None}
-        for root in self.checker.global_order:
+        for root in self.context.global_order:
             for path, key, variable in () if root.reference else self._open_in(root.type, root.name, ()):
                 if (root, key) not in done:
                     self.report.add("S0801", variable.source, variable.node, f"no VAR_CONFIG says where {path} lies",
                                     f"write  {path} AT %IX0.0 : {variable.type};  or the whole address here")
 
     def _open_in(self, kind: Type, path: str, key: tuple[object, ...]) -> Iterator[tuple[str, tuple[object, ...], Variable]]:
-        if not self._opens(kind):
+        if not self._holds_open(kind):
             return
         if isinstance(kind, ArrayType):
             for index in range(kind.count):
@@ -187,7 +194,7 @@ class Settings:
             for field in kind.fields.values():
                 yield from self._open_in(field.type, f"{path}.{field.name}", (*key, fold(field.name)))
         elif isinstance(kind, StructType):
-            for variable in self.checker.block_of(kind).order:
+            for variable in self.context.block_of(kind).order:
                 inner, step = f"{path}.{variable.name}", (*key, fold(variable.name))
                 if variable.open:
                     yield inner, step, variable

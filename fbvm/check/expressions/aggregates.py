@@ -6,131 +6,146 @@ Each lies in a place of its own in the frame of its POU, where its values are pu
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from fbvm.base.dialects import takers
 from fbvm.base.types import ArrayType, Field, RefType, StructType, Type, fold, followed
 from fbvm.check.expressions import references
 from fbvm.check.expressions.assignability import is_untyped
-from fbvm.check.expressions.constants import encode
+from fbvm.check.expressions.constant_integers import integer, repeated
+from fbvm.check.expressions.constants import default, encode
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import flattened, initialisable
 from fbvm.check.symbols.facts import Aggregate, AggregatePart, Variable
+from fbvm.check.symbols.project import Project
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
 Written = tree.ArrayInit | tree.StructInit
 Value = tuple[tuple[int, ...], int | None, Type, tree.Expr]
 """Where one value lies in the whole, several times if it is repeated; its bit; its type; what gives it."""
 
 
-class Aggregates:
-    """Types what is written out in one POU."""
-
-    def __init__(self, expressions: Expressions) -> None:
-        self.expressions = expressions
-        self.facts = expressions.facts
-        self.error = expressions.error
-
-    def kind(self, expr: Written, want: Type | None) -> Type | None:
-        """The type of what is written out, which is that of its place; None after a diagnostic."""
-        if not self._has_place(expr, want) or want is None:
-            return None
-        dialect, pou = self.expressions.project.dialect, self.expressions.pou
-        if not dialect.written_out or pou is None:
-            self.error("S0903", expr, f"{self._form(expr)} is an initial value: statements do not take it in the dialect "
-                       f"{dialect.name}", f"assign the parts one by one, or take {takers('written_out')}")
-            return None
-        values = list(self._values(want, expr, (0,)))
-        content = bytearray(self.expressions.checker.specs.fresh(want))
-        parts = [part for part in (self._part(value, content) for value in values) if part is not None]
-        self.expressions.project.asked.again = False  # it makes the frame larger
-        self.facts.aggregates[expr] = Aggregate(self._place(expr, want), bytes(content), tuple(parts))
-        return want
-
-    def _has_place(self, expr: Written, want: Type | None) -> bool:
-        """True where an array or a structure can stand; else a diagnostic."""
-        if isinstance(want, ArrayType if isinstance(expr, tree.ArrayInit) else StructType) and not (
-                isinstance(want, StructType) and want.block or isinstance(want, ArrayType) and want.packed):
-            return True
-        if isinstance(expr, tree.StructInit) and len(expr.fields) == 1:
-            self.error("S0101", expr.fields[0][0], "`=` expected, but `:=` found", "`=` compares, `:=` assigns")
-        else:
-            self.error("S0301", expr, f"{self._form(expr)} stands here, but {want or 'something else'} is needed")
-        return False
-
-    def _form(self, expr: Written) -> str:
-        return "an array [...]" if isinstance(expr, tree.ArrayInit) else "a structure (name := value)"
-
-    def _place(self, expr: Written, kind: Type) -> Variable:
-        """A variable for it in the frame of the POU that is executed."""
-        pou = self.expressions.pou
-        assert pou is not None
-        owner = pou.owner
-        owner.frame_size += -owner.frame_size % 8
-        made = Variable(f"{self._form(expr)} at {expr.start}", kind, "VAR_TEMP", pou.source, expr, owner, place="frame",
-                        offset=owner.frame_size)
-        owner.frame_size += kind.size
-        return made
-
-    # --- values -----------------------------------------------------------------------------------------------------
-
-    def _values(self, kind: Type, expr: tree.Expr, places: tuple[int, ...], bit: int | None = None) -> Iterator[Value]:
-        """The single values that something written out consists of."""
-        if isinstance(expr, tree.ArrayInit) and isinstance(kind, ArrayType):
-            yield from self._elements(kind, flattened(expr) if len(kind.bounds) > 1 else expr, places)
-        elif isinstance(expr, tree.StructInit) and isinstance(kind, StructType) and not kind.block:
-            for name, value in expr.fields:
-                member = self._member(kind, name)
-                if member is not None:
-                    there = tuple(at + member.offset for at in places)
-                    yield from self._values(member.type, value, there, member.bit)
-        elif isinstance(expr, tree.ArrayInit | tree.StructInit):
-            self._has_place(expr, kind)
-        else:
-            yield places, bit, kind, expr
-
-    def _elements(self, kind: ArrayType, expr: tree.ArrayInit, places: tuple[int, ...]) -> Iterator[Value]:
-        reached, source = 0, self.expressions.source
-        values = self.expressions.checker.values
-        for written, stands in expr.items:
-            repetition, value = values.repeated(written, stands, source)
-            count = values.integer(repetition, source) if repetition is not None else 1
-            if count is None or count < 0 or reached + count > kind.count:
-                if count is not None:
-                    self.error("S0705", stands or expr, f"too many values: {kind} has {kind.count} elements" if count > 0 else
-                               "a repetition cannot be negative")
-                return
-            if value is not None and count:
-                size = kind.element.size
-                steps = [number * size for number in range(reached, reached + count)]
-                yield from self._values(kind.element, value, tuple(at + step for at in places for step in steps))
-            reached += count
-
-    def _member(self, kind: StructType, name: tree.Name) -> Field | None:
-        member = kind.member(name.text)
-        if member is not None and initialisable(kind, member):
-            return member
-        self.error("S0210", name, f"{kind} has no {name.text}",
-                   self.expressions.project.choices(fold(name.text), (f.name for f in kind.fields.values())))
+def aggregate(scope: Scope, expr: Written, want: Type | None) -> Type | None:
+    """The type of what is written out, which is that of its place; None after a diagnostic."""
+    if not _has_place(scope, expr, want) or want is None:
         return None
-
-    def _part(self, value: Value, content: bytearray) -> AggregatePart | None:
-        """A value that is worked out when the program runs; a constant goes into the content, and is none."""
-        places, bit, kind, expr = value
-        if isinstance(kind, RefType) and kind.follows:
-            good = references.lend(self.expressions, expr, followed(kind), "S0301", str(kind))
-            return AggregatePart(places, bit, kind, expr) if good else None
-        if not self.expressions.fit(expr, kind) or is_untyped(self.facts.types[expr]):
-            return None
-        known = self.facts.constants.get(expr)
-        if known is None or isinstance(kind, RefType):
-            return AggregatePart(places, bit, kind, expr)
-        made = encode(kind, known)
-        for at in places:
-            if bit is None:
-                content[at:at + len(made)] = made
-            else:
-                content[at] = content[at] & ~(1 << bit) | (made[0] & 1) << bit
+    dialect, pou = scope.dialect, scope.pou
+    if not dialect.written_out or pou is None:
+        scope.error("S0903", expr, f"{_form(expr)} is an initial value: statements do not take it in the dialect "
+                    f"{dialect.name}", f"assign the parts one by one, or take {takers('written_out')}")
         return None
+    values = list(_values(scope, want, expr, (0,)))
+    content = bytearray(_initial_bytes(scope.project, want))
+    parts = [part for part in (_part(scope, value, content) for value in values) if part is not None]
+    scope.project.dependencies.repeatable = False  # it makes the frame larger
+    scope.facts.aggregates[expr] = Aggregate(_place(scope, expr, want), bytes(content), tuple(parts))
+    return want
+
+
+def _has_place(scope: Scope, expr: Written, want: Type | None) -> bool:
+    """True where an array or a structure can stand; else a diagnostic."""
+    if isinstance(want, ArrayType if isinstance(expr, tree.ArrayInit) else StructType) and not (
+            isinstance(want, StructType) and want.block or isinstance(want, ArrayType) and want.packed):
+        return True
+    if isinstance(expr, tree.StructInit) and len(expr.fields) == 1:
+        scope.error("S0101", expr.fields[0][0], "`=` expected, but `:=` found", "`=` compares, `:=` assigns")
+    else:
+        scope.error("S0301", expr, f"{_form(expr)} stands here, but {want or 'something else'} is needed")
+    return False
+
+
+def _form(expr: Written) -> str:
+    return "an array [...]" if isinstance(expr, tree.ArrayInit) else "a structure (name := value)"
+
+
+def _place(scope: Scope, expr: Written, kind: Type) -> Variable:
+    """A variable for it in the frame of the POU that is executed."""
+    pou = scope.pou
+    assert pou is not None
+    owner = pou.owner
+    owner.frame_size += -owner.frame_size % 8
+    made = Variable(f"{_form(expr)} at {expr.start}", kind, "VAR_TEMP", pou.source, expr, owner, place="frame",
+                    offset=owner.frame_size)
+    owner.frame_size += kind.size
+    return made
+
+
+# --- values -----------------------------------------------------------------------------------------------------
+
+
+def _values(scope: Scope, kind: Type, expr: tree.Expr, places: tuple[int, ...], bit: int | None = None) -> Iterator[Value]:
+    """The single values that something written out consists of."""
+    if isinstance(expr, tree.ArrayInit) and isinstance(kind, ArrayType):
+        yield from _elements(scope, kind, flattened(expr) if len(kind.bounds) > 1 else expr, places)
+    elif isinstance(expr, tree.StructInit) and isinstance(kind, StructType) and not kind.block:
+        for name, value in expr.fields:
+            member = _member(scope, kind, name)
+            if member is not None:
+                there = tuple(at + member.offset for at in places)
+                yield from _values(scope, member.type, value, there, member.bit)
+    elif isinstance(expr, tree.ArrayInit | tree.StructInit):
+        _has_place(scope, expr, kind)
+    else:
+        yield places, bit, kind, expr
+
+
+def _elements(scope: Scope, kind: ArrayType, expr: tree.ArrayInit, places: tuple[int, ...]) -> Iterator[Value]:
+    reached = 0
+    for written, stands in expr.items:
+        repetition, value = repeated(scope, written, stands)
+        count = integer(scope, repetition) if repetition is not None else 1
+        if count is None or count < 0 or reached + count > kind.count:
+            if count is not None:
+                scope.error("S0705", stands or expr, f"too many values: {kind} has {kind.count} elements" if count > 0 else
+                            "a repetition cannot be negative")
+            return
+        if value is not None and count:
+            size = kind.element.size
+            steps = [number * size for number in range(reached, reached + count)]
+            yield from _values(scope, kind.element, value, tuple(at + step for at in places for step in steps))
+        reached += count
+
+
+def _member(scope: Scope, kind: StructType, name: tree.Name) -> Field | None:
+    member = kind.member(name.text)
+    if member is not None and initialisable(kind, member):
+        return member
+    scope.error("S0210", name, f"{kind} has no {name.text}",
+                scope.project.choices(fold(name.text), (f.name for f in kind.fields.values())))
+    return None
+
+
+def _part(scope: Scope, value: Value, content: bytearray) -> AggregatePart | None:
+    """A value that is worked out when the program runs; a constant goes into the content, and is none."""
+    places, bit, kind, expr = value
+    if isinstance(kind, RefType) and kind.follows:
+        good = references.lend(scope, expr, followed(kind), "S0301", str(kind))
+        return AggregatePart(places, bit, kind, expr) if good else None
+    if not scope.fit(expr, kind) or is_untyped(scope.facts.types[expr]):
+        return None
+    known = scope.facts.constants.get(expr)
+    if known is None or isinstance(kind, RefType):
+        return AggregatePart(places, bit, kind, expr)
+    made = encode(kind, known)
+    for at in places:
+        if bit is None:
+            content[at:at + len(made)] = made
+        else:
+            content[at] = content[at] & ~(1 << bit) | (made[0] & 1) << bit
+    return None
+
+
+
+
+def _initial_bytes(project: Project, kind: Type) -> bytes:
+    """The bytes of a variable of a type that is declared without an initial value."""
+    if isinstance(kind, ArrayType):
+        return _initial_bytes(project, kind.element) * kind.count
+    known = next((entry.resolved[1] for entry in project.types.values()
+                  if entry.resolved is not None and entry.resolved[0] is kind), None)
+    if known is not None or not isinstance(kind, StructType):
+        return default(kind) if known is None else known
+    content = bytearray(kind.size)
+    for member in kind.fields.values():
+        if member.bit is None and not any(content[member.offset:member.offset + member.type.size]):
+            content[member.offset:member.offset + member.type.size] = _initial_bytes(project, member.type)
+    return bytes(content)

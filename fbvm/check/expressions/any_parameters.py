@@ -11,18 +11,14 @@ diSize and TypeClass are as in CODESYS; the rest is ours.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.types import (
     ANY_CLASS,
     ANY_SIZE,
     BOOL,
     BYTE,
-    DINT,
     DWORD,
     LWORD,
     WORD,
-    AnyType,
     ArrayType,
     Elementary,
     EnumType,
@@ -35,11 +31,7 @@ from fbvm.base.types import (
     fold,
     open_array,
 )
-from fbvm.check.expressions import references
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
 VIEWS = {name: open_array(1, kind) for name, kind in (
     ("BITS", BOOL), ("BYTES", BYTE), ("WORDS", WORD), ("DWORDS", DWORD), ("LWORDS", LWORD))}
@@ -53,21 +45,6 @@ _CLASSES = {"DATE_AND_TIME": "DATEANDTIME", "TIME_OF_DAY": "TIMEOFDAY", "LDATE_A
             "LTIME_OF_DAY": "LTIMEOFDAY"}
 _DERIVED: dict[type[Type], str] = {ArrayType: "ARRAY", OpenArrayType: "ARRAY", EnumType: "ENUM", SubrangeType: "SUBRANGE",
                                    RefType: "POINTER", StructType: "USERDEF"}
-
-
-def member(expressions: Expressions, expr: tree.Member, whole: AnyType) -> Type | None:
-    """The type of a member of an ANY, or None after a diagnostic."""
-    name = fold(expr.name.text)
-    if name == "TYPECLASS":
-        return expressions.checker.specs.type_classes()
-    if name in NUMBERS:
-        return DINT
-    if name == POINTER:
-        return references.to_parameter(expressions, expr)
-    if name not in VIEWS:
-        expressions.error("S0210", expr.name, f"{whole} has no {expr.name.text}",
-                          expressions.project.choices(expr.name.text, ("pValue", "diSize", "TypeClass", *VIEWS)))
-    return VIEWS.get(name)
 
 
 def type_class(kind: Type) -> str:

@@ -48,7 +48,7 @@ def assignable(kind: Type, target: Type) -> bool:
     return converts(kind, target)
 
 
-def lent(kind: Type, target: Type, dialect: Dialect) -> bool:
+def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
     """True if a dialect converts a value where the standard wants to see the conversion."""
     if isinstance(kind, EnumType) and dialect.numbers_of_enumerations:
         kind = kind.base

@@ -2,87 +2,83 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.types import BOOL, ELEMENTARY, Elementary, EnumType, SubrangeType, Type, base, fold, string
 from fbvm.check.expressions.constants import convert, limits
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL
 from fbvm.syntax import tree
 from fbvm.syntax.st.literals import WRONG
 
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
-
-def literal(expressions: Expressions, expr: tree.Literal, want: Type | None) -> Type | None:
+def literal(scope: Scope, expr: tree.Literal, want: Type | None) -> Type | None:
     """The type of a number, text, time or truth, or None after a diagnostic."""
     if expr.kind == WRONG:
         return None
     if isinstance(expr.value, str):
-        return _text(expressions, expr, expr.value, want)
-    constants = expressions.facts.constants
+        return _text(scope, expr, expr.value, want)
+    constants = scope.facts.constants
     value = constants[expr] = expr.value
     if expr.type_name is None and expr.kind in ("int", "real"):
         return UNTYPED_INT if expr.kind == "int" else UNTYPED_REAL
     name = expr.type_name or {"bool": "BOOL", "time": "TIME"}.get(expr.kind, "")
     kind = ELEMENTARY.get(name)
     if kind is None:
-        declared = expressions.checker.specs.named_type(name, expressions.source)
+        declared = scope.named_type(name)
         if not isinstance(declared, Elementary | SubrangeType):
-            expressions.error("S0204", expr, f"there is no elementary type {name}")
+            scope.error("S0204", expr, f"there is no elementary type {name}")
             return None
-        expressions.facts.types[expr] = UNTYPED_REAL if expr.kind == "real" else UNTYPED_INT
-        return expressions.adopt(expr, declared)
+        scope.facts.types[expr] = UNTYPED_REAL if expr.kind == "real" else UNTYPED_INT
+        return scope.adopt(expr, declared)
     if is_any(kind, "ANY_REAL"):
         assert isinstance(value, int | float)
         constants[expr] = convert(value, kind)
     span = limits(kind)
     if span and isinstance(value, int) and not span[0] <= value <= span[1]:
-        expressions.error("S0108", expr, f"{expr.text} is outside {kind}, which holds {span[0]} to {span[1]}")
+        scope.error("S0108", expr, f"{expr.text} is outside {kind}, which holds {span[0]} to {span[1]}")
         return None
     if expr.kind == "int" and kind == BOOL:
         constants[expr] = bool(value)
     return kind
 
 
-def _text(expressions: Expressions, expr: tree.Literal, text: str, want: Type | None) -> Type:
+def _text(scope: Scope, expr: tree.Literal, text: str, want: Type | None) -> Type:
     """A STRING or WSTRING, or of one character a CHAR or WCHAR where that is wanted."""
     kind = string(max(1, len(text)), expr.kind == "wstring")
     if expr.type_name in ("CHAR", "WCHAR"):
-        expressions.facts.constants[expr] = ord(text)
+        scope.facts.constants[expr] = ord(text)
         return ELEMENTARY[expr.type_name]
     ended = text.partition("\0")[0]
-    expressions.facts.constants[expr] = ended if kind.wide else ended.encode("latin-1")
-    return as_character(expressions, expr, want) or kind
+    scope.facts.constants[expr] = ended if kind.wide else ended.encode("latin-1")
+    return as_character(scope, expr, want) or kind
 
 
-def as_character(expressions: Expressions, expr: tree.Expr, want: Type | None) -> Type | None:
+def as_character(scope: Scope, expr: tree.Expr, want: Type | None) -> Type | None:
     """The type of a text literal without type as one character, which becomes its constant; None if it is none."""
     if not isinstance(expr, tree.Literal) or expr.type_name is not None or not isinstance(expr.value, str) or \
             len(expr.value) != 1 or want is None or \
             base(want).name != ("WCHAR" if expr.kind == "wstring" else "CHAR"):
         return None
-    expressions.facts.constants[expr] = ord(expr.value)
-    expressions.facts.types[expr] = base(want)
+    scope.facts.constants[expr] = ord(expr.value)
+    scope.facts.types[expr] = base(want)
     return base(want)
 
 
-def enum_literal(expressions: Expressions, expr: tree.EnumLiteral, want: Type | None) -> Type | None:
+def enum_literal(scope: Scope, expr: tree.EnumLiteral, want: Type | None) -> Type | None:
     """The type of `Colour#Red`, or None after a diagnostic."""
-    kind = expressions.checker.specs.named_type(expr.type_name.text, expressions.source)
+    kind = scope.named_type(expr.type_name.text)
     if not isinstance(kind, EnumType):
-        expressions.error("S0204", expr.type_name, f"there is no enumeration {expr.type_name.text}")
+        scope.error("S0204", expr.type_name, f"there is no enumeration {expr.type_name.text}")
         return None
-    return enum_value(expressions, expr, kind, expr.member)
+    return enum_value(scope, expr, kind, expr.member)
 
 
-def enum_value(expressions: Expressions, expr: tree.Expr, kind: EnumType, member: tree.Name) -> Type | None:
+def enum_value(scope: Scope, expr: tree.Expr, kind: EnumType, member: tree.Name) -> Type | None:
     """The type of a member of an enumeration, whose number is the constant; None after a diagnostic."""
     value = kind.members.get(fold(member.text))
     if value is None:
-        expressions.error("S0210", member, f"{kind} has no member {member.text}",
-                          expressions.project.choices(member.text, kind.shown.values()))
+        scope.error("S0210", member, f"{kind} has no member {member.text}",
+                    scope.project.choices(member.text, kind.shown.values()))
         return None
-    expressions.facts.constants[expr] = value
+    scope.facts.constants[expr] = value
     return kind

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BOOL,
@@ -33,12 +31,10 @@ from fbvm.base.types import (
 from fbvm.check.expressions import constants
 from fbvm.check.expressions.assignability import UNSIGNED, as_number, conversion_hint, convertible, is_untyped
 from fbvm.check.expressions.literals import as_character
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
 COMPARISONS = ("=", "<>", "<", ">", "<=", ">=")
 _FAMILY = {
@@ -63,317 +59,330 @@ def _time_rows() -> dict[tuple[str, Type, Type], Type]:
 TIMES = _time_rows()
 
 
-class Operators:
-    """The operators of the expressions of one POU."""
+# --- unary ------------------------------------------------------------------------------------------------------
 
-    def __init__(self, expressions: Expressions) -> None:
-        self.expressions = expressions
-        self.facts = expressions.facts
 
-    # --- unary ------------------------------------------------------------------------------------------------------
-
-    def unary(self, expr: tree.Unary, want: Type | None) -> Type | None:
-        kind = self.expressions.infer(expr.operand, want)
-        if kind is None:
-            return None
-        if expr.op == "NOT":
-            if kind is UNTYPED_INT and want is not None and is_any(want, "ANY_BIT"):
-                kind = self.expressions.adopt(expr.operand, want)
-                if kind is None:
-                    return None
-            good = is_any(kind, *self._family("AND"))
-        else:
-            good = is_untyped(kind) or is_any(kind, "ANY_NUM", "ANY_DURATION")
-        if not good:
-            self.expressions.error("S0302", expr, f"{expr.op} is not defined for {kind}",
-                                   _bit_hint(kind, want) if expr.op == "NOT" else "")
-            return None
-        kind = base(kind)
-        value = self.facts.constants.get(expr.operand)
-        if value is not None:
-            self.facts.constants[expr] = constants.unary(expr.op, kind, value)
-        return kind
-
-    # --- binary -----------------------------------------------------------------------------------------------------
-
-    def binary(self, expr: tree.Binary, want: Type | None) -> Type | None:
-        hint = want if expr.op not in COMPARISONS else None
-        left = self.expressions.infer(expr.left, hint)
-        right = self.expressions.infer(expr.right, hint)
-        if left is None or right is None:
-            return None
-        left, right = base(left), base(right)
-        if expr.left in self.facts.constants or expr.right in self.facts.constants:
-            return self._meant(expr, left, right, want)
-        known = self.expressions.project.meanings.get((expr.op, left, right))
-        if known is not None:
-            self.facts.operands[expr], result = known
-            return result
-        found = self._meant(expr, left, right, want)
-        if isinstance(left, Elementary) and isinstance(right, Elementary) and found is not None and \
-                expr not in self.facts.rewritten:
-            self.expressions.project.meanings[expr.op, left, right] = self.facts.operands[expr], found
-        return found
-
-    def _meant(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
-        """The type of an operator's result, or None after a diagnostic."""
-        if self._chained(expr, right):
-            return None
-        left = as_character(self.expressions, expr.left, right) or left
-        right = as_character(self.expressions, expr.right, left) or right
-        if expr.op == "**":
-            return self._power(expr, left, right, want)
-        if isinstance(left, RefType) or isinstance(right, RefType):
-            return self._reference(expr)
-        timed = self._time(expr, left, right)
-        if timed is not None:
-            return self._folded(expr, timed, timed)
-        kind = self._operand_type(expr, left, right, want)
-        if kind is None or not self._defined(expr, kind):
-            lent = self._lent(expr, left, right, want)
-            if lent is not None:
-                return lent
-            self._undefined(expr, left, right, want)
-            return None
-        kind = self._widened(expr.op, kind)
-        if not is_untyped(kind):
-            for side, side_kind in ((expr.left, left), (expr.right, right)):
-                if is_untyped(side_kind) and self.expressions.adopt(side, kind) is None:
-                    return None
-        return self._folded(expr, kind, BOOL if expr.op in COMPARISONS else kind)
-
-    def _reference(self, expr: tree.Binary) -> Type | None:
-        """References are compared; pointers are ordered too, and moved by numbers of bytes; in a dialect that counts
-        elements all references are moved."""
-        left, right = (self._beside_reference(expr, side) for side in (expr.left, expr.right))
-        moves = [isinstance(kind, RefType) and kind.moves for kind in (left, right)]
-        counts = self.expressions.project.dialect.pointers_count_elements
-        moved = [isinstance(kind, RefType) and kind.target is not None for kind in (left, right)] if counts else moves
-        refers = isinstance(left, RefType) and isinstance(right, RefType)
-        result: Type | None = None
-        if expr.op in COMPARISONS:
-            same = expr.op in ("=", "<>") and refers and common(left, right) is not None
-            result = BOOL if all(moves) or same else None
-        elif expr.op == "-" and all(moves):
-            result = DINT
-        elif expr.op in ("+", "-") and moved[0] and is_any(right, "ANY_INT", "ANY_BIT"):
-            result = left
-        elif expr.op == "+" and moved[1] and is_any(left, "ANY_INT", "ANY_BIT"):
-            result = right
-        if result is None:
-            self._undefined(expr, left, right, None)
-            return None
-        self.facts.operands[expr] = NULL
-        if counts and isinstance(result, RefType) and not self._made_by_adr(expr):
-            self.facts.by_elements.add(expr)
-        return result
-
-    def _made_by_adr(self, expr: tree.Expr) -> bool:
-        """Whether a sum begins with ADR(x), which is a plain number of bytes for who counts elements."""
-        while isinstance(expr, tree.Binary):
-            expr = expr.left if isinstance(self.facts.types[expr.left], RefType) else expr.right
-        return isinstance(expr, tree.Call) and isinstance(expr.callee, tree.NameRef) and fold(expr.callee.text) == "ADR"
-
-    def _lent(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
-        """What an operator yields in a dialect that takes bit strings and enumerations as numbers; None if it does not."""
-        dialect = self.expressions.project.dialect
-        number = is_untyped(left) or is_any(left, "ANY_NUM")
-        if expr.op == "*" and dialect.number_times_duration and is_any(right, "ANY_DURATION") and number:
-            turned = tree.Binary(expr.start, expr.end, "*", expr.right, expr.left, expr.op_start)
-            self.facts.rewritten[expr] = turned
-            return self.expressions.infer(turned)
-        timed = self._nanoseconds(expr, left, right)
-        if timed is not None:
-            return self.expressions.infer(timed)
-        a, b = as_number(left, dialect), as_number(right, dialect)
-        if (a, b) == (left, right):
-            return None
-        kind = self._operand_type(expr, a, b, want)
-        if kind is None or not self._defined(expr, kind):
-            return None
-        kind = self._widened(expr.op, kind)
-        for side, side_kind in ((expr.left, a), (expr.right, b)):
-            if is_untyped(side_kind) and self.expressions.adopt(side, kind) is None:
-                return None
-        keeps = left != a and right in (left, UNTYPED_INT) and machine(kind) == machine(left)
-        result = left if keeps else kind
-        return self._folded(expr, kind, BOOL if expr.op in COMPARISONS else result)
-
-    def _nanoseconds(self, expr: tree.Binary, left: Type, right: Type) -> tree.Binary | None:
-        """A sum of a duration and an integer in a dialect that takes integers as nanoseconds: what it means."""
-        integer = [kind is UNTYPED_INT or is_any(kind, "ANY_INT") for kind in (left, right)]
-        duration = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
-        turned = integer[0] and duration[1] and expr.op == "+"
-        if not self.expressions.project.dialect.integers_are_nanoseconds or expr.op not in ("+", "-") or \
-                not (turned or duration[0] and integer[1]):
-            return None
-        kind, number = (right, expr.left) if turned else (left, expr.right)
-        unit = tree.Literal(number.start, number.end, "time", 1, kind.name, f"{kind.name}#1ns")
-        span = tree.Binary(number.start, number.end, "*", unit, number, number.start)
-        left_side, right_side = (span, expr.right) if turned else (expr.left, span)
-        meant = tree.Binary(expr.start, expr.end, expr.op, left_side, right_side, expr.op_start)
-        self.facts.rewritten[expr] = meant
-        return meant
-
-    def _beside_reference(self, expr: tree.Binary, side: tree.Expr) -> Type:
-        """The type of an operand of an operator on references; a literal 0 that is compared is NULL."""
-        kind = self.facts.types[side]
-        if kind is UNTYPED_INT:
-            null = expr.op in COMPARISONS and self.facts.constants[side] == 0
-            kind = self.expressions.adopt(side, NULL if null else LINT) or kind
-        return kind
-
-    def _chained(self, expr: tree.Binary, right: Type) -> bool:
-        """Complain about `a < b < c`, which compares a BOOL with a number."""
-        first = expr.left
-        if expr.op not in COMPARISONS[2:] or not isinstance(first, tree.Binary) or first.op not in COMPARISONS or right == BOOL:
-            return False
-        text = self.expressions.text
-        if self.expressions.source.text[first.start:first.start + 1] != "(":
-            self.expressions.error("S0302", expr, f"{expr.op} is not defined for BOOL and {right}",
-                                   f"write {text(first)} AND {text(first.right)} {expr.op} {text(expr.right)}")
-            return True
-        return False
-
-    def _operand_type(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
-        """The type in which both operands meet."""
-        if is_untyped(left) and is_untyped(right):
-            kind = left if left is UNTYPED_REAL else right
-            return BOOL if expr.op in ("AND_THEN", "OR_ELSE") else kind
-        for side, literal, other in ((expr.left, left, right), (expr.right, right, left)):
-            if literal is UNTYPED_INT:
-                return self._meet_integer(expr.op, side, other)
-            if literal is UNTYPED_REAL:
-                return self._meet_real(other, want)
-        if isinstance(left, EnumType) and left == right:
-            return left
-        return common(left, right)
-
-    def _meet_integer(self, op: str, literal: tree.Expr, other: Type) -> Type:
-        """The type in which an untyped integer meets `other`: that, or where it computes and does not hold it a larger one."""
-        value, span = self.facts.constants.get(literal), constants.limits(other)
-        if op in COMPARISONS or not isinstance(value, int) or span is None or not is_any(other, "ANY_INT"):
-            return other
-        if span[0] <= value <= span[1]:
-            return other
-        larger = (ELEMENTARY[name] for name in IMPLICIT[base(other).name] if is_any(ELEMENTARY[name], "ANY_INT"))
-        return next((kind for kind in larger if kind.low <= value <= kind.high), other)
-
-    def _meet_real(self, other: Type, want: Type | None) -> Type | None:
-        """The real type in which an untyped real literal meets `other`."""
-        if is_any(other, "ANY_REAL"):
-            return other
-        if want is not None and is_any(want, "ANY_REAL") and converts(other, base(want)):
-            return base(want)
-        return LREAL if converts(other, LREAL) else None
-
-    def _defined(self, expr: tree.Binary, kind: Type) -> bool:
-        op = expr.op
-        if op in ("AND_THEN", "OR_ELSE"):
-            return kind == BOOL
-        if op in COMPARISONS:
-            if isinstance(kind, EnumType | RefType):
-                return op in ("=", "<>")
-            return isinstance(kind, Elementary | StringType)
-        if kind is UNTYPED_INT:
-            return True
-        if kind is UNTYPED_REAL:
-            return _FAMILY[op] == ("ANY_NUM",)
-        return is_any(kind, *self._family(op))
-
-    def _widened(self, op: str, kind: Type) -> Type:
-        """The type in which a dialect computes: DINT for what is smaller, where it takes sums so."""
-        small = op in ("+", "-", "*", "/", "MOD") and is_any(kind, "ANY_INT") and 0 < kind.size < DINT.size
-        return DINT if small and self.expressions.project.dialect.sums_in_dint else kind
-
-    def _family(self, op: str) -> tuple[str, ...]:
-        """The generic types that an operator works on; dialects take the bits of integers too."""
-        family = _FAMILY[op]
-        return (*family, "ANY_INT") if family == ("ANY_BIT",) and self.expressions.project.dialect.integers_and_bits else family
-
-    def _undefined(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> None:
-        hint = ""
-        timed = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
-        if expr.op == "*" and timed == [False, True]:
-            hint = f"the {right} stands in front: {self.expressions.text(expr.right)} * {self.expressions.text(expr.left)}"
-        elif expr.op in "+-" and left == DATE and timed[1]:
-            date, time = self.expressions.text(expr.left), self.expressions.text(expr.right)
-            hint = f"a DATE has no time of day: write DT_TO_DATE(CONCAT_DATE_TOD({date}, TOD#0:0:0) {expr.op} {time})"
-        elif any(timed) and expr.op not in ("*", "/") and UNTYPED_INT in (left, right):
-            hint = "a duration is written T#500ms"
-        elif expr.op in ("AND", "OR") and want == BOOL and not is_any(left, "ANY_BIT") and not is_any(right, "ANY_BIT"):
-            hint = "compare each of them, for example with <> 0"
-        elif expr.op in ("+", "AND") and isinstance(left, StringType):
-            hint = "CONCAT(...) joins texts"
-        elif expr.op in ("AND", "OR", "XOR"):
-            wrong, other = (right, left) if is_any(left, "ANY_BIT") else (left, right)
-            hint = _bit_hint(wrong, other)
-        elif isinstance(left, StructType) or isinstance(right, StructType):
-            hint = "compare or combine the members"
-        elif expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
-            number = UNSIGNED.get(left.name, "INT")
-            hint = f"{left} has no arithmetic: convert with {left}_TO_{number}(...), or take {takers('arithmetic_of_bits')}"
-        elif left == right and isinstance(left, EnumType):
-            numbers = (f"TO_{left.base}({self.expressions.text(side)})" for side in (expr.left, expr.right))
-            hint = f"write {f' {expr.op} '.join(numbers)}, or take {takers('numbers_of_enumerations')}"
-        elif common(left, right) is None:
-            hint = _meeting_hint(left, right)
-        self.expressions.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)
-
-    def _time(self, expr: tree.Binary, left: Type, right: Type) -> Type | None:
-        """The result of an operator on times and dates, or None if it is none of those."""
-        result = TIMES.get((expr.op, left, right))
-        if result is None and expr.op in "+-" and common(left, right) is not None:
-            met = common(left, right)
-            assert met is not None
-            result = TIMES.get((expr.op, met, met)) if is_any(left, "ANY_DURATION", "ANY_DATE") else None
-        if result is not None:
-            self.facts.operands[expr] = result
-            return result
-        if expr.op in "*/" and is_any(left, "ANY_DURATION") and \
-                (is_untyped(right) or is_any(right, "ANY_NUM")):
-            if is_untyped(right):
-                self.expressions.adopt(expr.right, LINT if right is UNTYPED_INT else LREAL)
-            self.facts.operands[expr] = left
-            return left
+def unary(scope: Scope, expr: tree.Unary, want: Type | None) -> Type | None:
+    kind = scope.infer(expr.operand, want)
+    if kind is None:
         return None
+    if expr.op == "NOT":
+        if kind is UNTYPED_INT and want is not None and is_any(want, "ANY_BIT"):
+            kind = scope.adopt(expr.operand, want)
+            if kind is None:
+                return None
+        good = is_any(kind, *_family(scope, "AND"))
+    else:
+        good = is_untyped(kind) or is_any(kind, "ANY_NUM", "ANY_DURATION")
+    if not good:
+        scope.error("S0302", expr, f"{expr.op} is not defined for {kind}",
+                    _bit_hint(kind, want) if expr.op == "NOT" else "")
+        return None
+    kind = base(kind)
+    value = scope.facts.constants.get(expr.operand)
+    if value is not None:
+        scope.facts.constants[expr] = constants.unary(expr.op, kind, value)
+    return kind
 
-    def _power(self, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
-        """`a ** b`: a real base keeps its type, an integer one gives LREAL."""
-        if is_untyped(left) and is_untyped(right):
-            return self._folded(expr, UNTYPED_REAL, UNTYPED_REAL)
-        if not all(is_untyped(k) or is_any(k, "ANY_NUM") for k in (left, right)):
-            self._undefined(expr, left, right, want)
-            return None
-        kind: Type = left if is_any(left, "ANY_REAL") else LREAL
-        single = is_untyped(left) and right == REAL or left is UNTYPED_REAL and is_any(right, "ANY_INT")
-        if single and want is not None and base(want) == REAL:
-            kind = REAL
-        for side, side_kind in ((expr.left, left), (expr.right, right)):
-            if is_untyped(side_kind) and self.expressions.adopt(side, kind) is None:
-                return None
-        return self._folded(expr, kind, kind)
 
-    def _folded(self, expr: tree.Binary, operand: Type, result: Type) -> Type | None:
-        """Note the operand type; work out the value if both sides are constant."""
-        self.facts.operands.setdefault(expr, operand)
-        a, b = self.facts.constants.get(expr.left), self.facts.constants.get(expr.right)
-        if a is None or b is None:
-            if b == 0 and expr.op in ("/", "MOD") and is_any(operand, "ANY_INT"):
-                self.expressions.error("S0703", expr.right, "this divides by zero")
-                return None
-            return result
-        if isinstance(operand, Elementary | EnumType | StringType):
-            try:
-                if not is_untyped(operand) and not is_any(operand, "ANY_DURATION", "ANY_DATE"):
-                    a, b = constants.convert(a, operand), constants.convert(b, operand)
-                self.facts.constants[expr] = constants.binary(expr.op, operand, a, b)
-            except constants.NotConstant as error:
-                self.expressions.error("S0703", expr, f"the constant expression has no value: {error}")
-                return None
-        if operand is UNTYPED_INT and result is BOOL or operand is UNTYPED_REAL and result is BOOL:
-            self.facts.operands[expr] = LREAL if operand is UNTYPED_REAL else LINT
+# --- binary -----------------------------------------------------------------------------------------------------
+
+
+def binary(scope: Scope, expr: tree.Binary, want: Type | None) -> Type | None:
+    hint = want if expr.op not in COMPARISONS else None
+    left = scope.infer(expr.left, hint)
+    right = scope.infer(expr.right, hint)
+    if left is None or right is None:
+        return None
+    left, right = base(left), base(right)
+    if expr.left in scope.facts.constants or expr.right in scope.facts.constants:
+        return _meant(scope, expr, left, right, want)
+    known = scope.project.meanings.get((expr.op, left, right))
+    if known is not None:
+        scope.facts.operands[expr], result = known
         return result
+    found = _meant(scope, expr, left, right, want)
+    if isinstance(left, Elementary) and isinstance(right, Elementary) and found is not None and \
+            expr not in scope.facts.rewritten:
+        scope.project.meanings[expr.op, left, right] = scope.facts.operands[expr], found
+    return found
+
+
+def _meant(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
+    """The type of an operator's result, or None after a diagnostic."""
+    if _chained(scope, expr, right):
+        return None
+    left = as_character(scope, expr.left, right) or left
+    right = as_character(scope, expr.right, left) or right
+    if expr.op == "**":
+        return _power(scope, expr, left, right, want)
+    if isinstance(left, RefType) or isinstance(right, RefType):
+        return _reference(scope, expr)
+    timed = _time(scope, expr, left, right)
+    if timed is not None:
+        return _folded(scope, expr, timed, timed)
+    kind = _operand_type(scope, expr, left, right, want)
+    if kind is None or not _defined(scope, expr, kind):
+        lent = _lent(scope, expr, left, right, want)
+        if lent is not None:
+            return lent
+        _undefined(scope, expr, left, right, want)
+        return None
+    kind = _widened(scope, expr.op, kind)
+    if not is_untyped(kind):
+        for side, side_kind in ((expr.left, left), (expr.right, right)):
+            if is_untyped(side_kind) and scope.adopt(side, kind) is None:
+                return None
+    return _folded(scope, expr, kind, BOOL if expr.op in COMPARISONS else kind)
+
+
+def _reference(scope: Scope, expr: tree.Binary) -> Type | None:
+    """References are compared; pointers are ordered too, and moved by numbers of bytes; in a dialect that counts
+    elements all references are moved."""
+    left, right = (_beside_reference(scope, expr, side) for side in (expr.left, expr.right))
+    moves = [isinstance(kind, RefType) and kind.moves for kind in (left, right)]
+    counts = scope.dialect.pointers_count_elements
+    moved = [isinstance(kind, RefType) and kind.target is not None for kind in (left, right)] if counts else moves
+    refers = isinstance(left, RefType) and isinstance(right, RefType)
+    result: Type | None = None
+    if expr.op in COMPARISONS:
+        same = expr.op in ("=", "<>") and refers and common(left, right) is not None
+        result = BOOL if all(moves) or same else None
+    elif expr.op == "-" and all(moves):
+        result = DINT
+    elif expr.op in ("+", "-") and moved[0] and is_any(right, "ANY_INT", "ANY_BIT"):
+        result = left
+    elif expr.op == "+" and moved[1] and is_any(left, "ANY_INT", "ANY_BIT"):
+        result = right
+    if result is None:
+        _undefined(scope, expr, left, right, None)
+        return None
+    scope.facts.operands[expr] = NULL
+    if counts and isinstance(result, RefType) and not _made_by_adr(scope, expr):
+        scope.facts.by_elements.add(expr)
+    return result
+
+
+def _made_by_adr(scope: Scope, expr: tree.Expr) -> bool:
+    """Whether a sum begins with ADR(x), which is a plain number of bytes for who counts elements."""
+    while isinstance(expr, tree.Binary):
+        expr = expr.left if isinstance(scope.facts.types[expr.left], RefType) else expr.right
+    return isinstance(expr, tree.Call) and isinstance(expr.callee, tree.NameRef) and fold(expr.callee.text) == "ADR"
+
+
+def _lent(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
+    """What an operator yields in a dialect that takes bit strings and enumerations as numbers; None if it does not."""
+    dialect = scope.dialect
+    number = is_untyped(left) or is_any(left, "ANY_NUM")
+    if expr.op == "*" and dialect.number_times_duration and is_any(right, "ANY_DURATION") and number:
+        turned = tree.Binary(expr.start, expr.end, "*", expr.right, expr.left, expr.op_start)
+        scope.facts.rewritten[expr] = turned
+        return scope.infer(turned)
+    timed = _nanoseconds(scope, expr, left, right)
+    if timed is not None:
+        return scope.infer(timed)
+    a, b = as_number(left, dialect), as_number(right, dialect)
+    if (a, b) == (left, right):
+        return None
+    kind = _operand_type(scope, expr, a, b, want)
+    if kind is None or not _defined(scope, expr, kind):
+        return None
+    kind = _widened(scope, expr.op, kind)
+    for side, side_kind in ((expr.left, a), (expr.right, b)):
+        if is_untyped(side_kind) and scope.adopt(side, kind) is None:
+            return None
+    keeps = left != a and right in (left, UNTYPED_INT) and machine(kind) == machine(left)
+    result = left if keeps else kind
+    return _folded(scope, expr, kind, BOOL if expr.op in COMPARISONS else result)
+
+
+def _nanoseconds(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> tree.Binary | None:
+    """A sum of a duration and an integer in a dialect that takes integers as nanoseconds: what it means."""
+    integer = [kind is UNTYPED_INT or is_any(kind, "ANY_INT") for kind in (left, right)]
+    duration = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
+    turned = integer[0] and duration[1] and expr.op == "+"
+    if not scope.dialect.integers_are_nanoseconds or expr.op not in ("+", "-") or \
+            not (turned or duration[0] and integer[1]):
+        return None
+    kind, number = (right, expr.left) if turned else (left, expr.right)
+    unit = tree.Literal(number.start, number.end, "time", 1, kind.name, f"{kind.name}#1ns")
+    span = tree.Binary(number.start, number.end, "*", unit, number, number.start)
+    left_side, right_side = (span, expr.right) if turned else (expr.left, span)
+    meant = tree.Binary(expr.start, expr.end, expr.op, left_side, right_side, expr.op_start)
+    scope.facts.rewritten[expr] = meant
+    return meant
+
+
+def _beside_reference(scope: Scope, expr: tree.Binary, side: tree.Expr) -> Type:
+    """The type of an operand of an operator on references; a literal 0 that is compared is NULL."""
+    kind = scope.facts.types[side]
+    if kind is UNTYPED_INT:
+        null = expr.op in COMPARISONS and scope.facts.constants[side] == 0
+        kind = scope.adopt(side, NULL if null else LINT) or kind
+    return kind
+
+
+def _chained(scope: Scope, expr: tree.Binary, right: Type) -> bool:
+    """Complain about `a < b < c`, which compares a BOOL with a number."""
+    first = expr.left
+    if expr.op not in COMPARISONS[2:] or not isinstance(first, tree.Binary) or first.op not in COMPARISONS or right == BOOL:
+        return False
+    text = scope.text
+    if scope.source.text[first.start:first.start + 1] != "(":
+        scope.error("S0302", expr, f"{expr.op} is not defined for BOOL and {right}",
+                    f"write {text(first)} AND {text(first.right)} {expr.op} {text(expr.right)}")
+        return True
+    return False
+
+
+def _operand_type(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
+    """The type in which both operands meet."""
+    if is_untyped(left) and is_untyped(right):
+        kind = left if left is UNTYPED_REAL else right
+        return BOOL if expr.op in ("AND_THEN", "OR_ELSE") else kind
+    for side, literal, other in ((expr.left, left, right), (expr.right, right, left)):
+        if literal is UNTYPED_INT:
+            return _meet_integer(scope, expr.op, side, other)
+        if literal is UNTYPED_REAL:
+            return _meet_real(scope, other, want)
+    if isinstance(left, EnumType) and left == right:
+        return left
+    return common(left, right)
+
+
+def _meet_integer(scope: Scope, op: str, literal: tree.Expr, other: Type) -> Type:
+    """The type in which an untyped integer meets `other`: that, or where it computes and does not hold it a larger one."""
+    value, span = scope.facts.constants.get(literal), constants.limits(other)
+    if op in COMPARISONS or not isinstance(value, int) or span is None or not is_any(other, "ANY_INT"):
+        return other
+    if span[0] <= value <= span[1]:
+        return other
+    larger = (ELEMENTARY[name] for name in IMPLICIT[base(other).name] if is_any(ELEMENTARY[name], "ANY_INT"))
+    return next((kind for kind in larger if kind.low <= value <= kind.high), other)
+
+
+def _meet_real(scope: Scope, other: Type, want: Type | None) -> Type | None:
+    """The real type in which an untyped real literal meets `other`."""
+    if is_any(other, "ANY_REAL"):
+        return other
+    if want is not None and is_any(want, "ANY_REAL") and converts(other, base(want)):
+        return base(want)
+    return LREAL if converts(other, LREAL) else None
+
+
+def _defined(scope: Scope, expr: tree.Binary, kind: Type) -> bool:
+    op = expr.op
+    if op in ("AND_THEN", "OR_ELSE"):
+        return kind == BOOL
+    if op in COMPARISONS:
+        if isinstance(kind, EnumType | RefType):
+            return op in ("=", "<>")
+        return isinstance(kind, Elementary | StringType)
+    if kind is UNTYPED_INT:
+        return True
+    if kind is UNTYPED_REAL:
+        return _FAMILY[op] == ("ANY_NUM",)
+    return is_any(kind, *_family(scope, op))
+
+
+def _widened(scope: Scope, op: str, kind: Type) -> Type:
+    """The type in which a dialect computes: DINT for what is smaller, where it takes sums so."""
+    small = op in ("+", "-", "*", "/", "MOD") and is_any(kind, "ANY_INT") and 0 < kind.size < DINT.size
+    return DINT if small and scope.dialect.sums_in_dint else kind
+
+
+def _family(scope: Scope, op: str) -> tuple[str, ...]:
+    """The generic types that an operator works on; dialects take the bits of integers too."""
+    family = _FAMILY[op]
+    return (*family, "ANY_INT") if family == ("ANY_BIT",) and scope.dialect.integers_and_bits else family
+
+
+def _undefined(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> None:
+    hint = ""
+    timed = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
+    if expr.op == "*" and timed == [False, True]:
+        hint = f"the {right} stands in front: {scope.text(expr.right)} * {scope.text(expr.left)}"
+    elif expr.op in "+-" and left == DATE and timed[1]:
+        date, time = scope.text(expr.left), scope.text(expr.right)
+        hint = f"a DATE has no time of day: write DT_TO_DATE(CONCAT_DATE_TOD({date}, TOD#0:0:0) {expr.op} {time})"
+    elif any(timed) and expr.op not in ("*", "/") and UNTYPED_INT in (left, right):
+        hint = "a duration is written T#500ms"
+    elif expr.op in ("AND", "OR") and want == BOOL and not is_any(left, "ANY_BIT") and not is_any(right, "ANY_BIT"):
+        hint = "compare each of them, for example with <> 0"
+    elif expr.op in ("+", "AND") and isinstance(left, StringType):
+        hint = "CONCAT(...) joins texts"
+    elif expr.op in ("AND", "OR", "XOR"):
+        wrong, other = (right, left) if is_any(left, "ANY_BIT") else (left, right)
+        hint = _bit_hint(wrong, other)
+    elif isinstance(left, StructType) or isinstance(right, StructType):
+        hint = "compare or combine the members"
+    elif expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
+        number = UNSIGNED.get(left.name, "INT")
+        hint = f"{left} has no arithmetic: convert with {left}_TO_{number}(...), or take {takers('arithmetic_of_bits')}"
+    elif left == right and isinstance(left, EnumType):
+        numbers = (f"TO_{left.base}({scope.text(side)})" for side in (expr.left, expr.right))
+        hint = f"write {f' {expr.op} '.join(numbers)}, or take {takers('numbers_of_enumerations')}"
+    elif common(left, right) is None:
+        hint = _meeting_hint(left, right)
+    scope.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)
+
+
+def _time(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> Type | None:
+    """The result of an operator on times and dates, or None if it is none of those."""
+    result = TIMES.get((expr.op, left, right))
+    if result is None and expr.op in "+-" and common(left, right) is not None:
+        met = common(left, right)
+        assert met is not None
+        result = TIMES.get((expr.op, met, met)) if is_any(left, "ANY_DURATION", "ANY_DATE") else None
+    if result is not None:
+        scope.facts.operands[expr] = result
+        return result
+    if expr.op in "*/" and is_any(left, "ANY_DURATION") and \
+            (is_untyped(right) or is_any(right, "ANY_NUM")):
+        if is_untyped(right):
+            scope.adopt(expr.right, LINT if right is UNTYPED_INT else LREAL)
+        scope.facts.operands[expr] = left
+        return left
+    return None
+
+
+def _power(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
+    """`a ** b`: a real base keeps its type, an integer one gives LREAL."""
+    if is_untyped(left) and is_untyped(right):
+        return _folded(scope, expr, UNTYPED_REAL, UNTYPED_REAL)
+    if not all(is_untyped(k) or is_any(k, "ANY_NUM") for k in (left, right)):
+        _undefined(scope, expr, left, right, want)
+        return None
+    kind: Type = left if is_any(left, "ANY_REAL") else LREAL
+    single = is_untyped(left) and right == REAL or left is UNTYPED_REAL and is_any(right, "ANY_INT")
+    if single and want is not None and base(want) == REAL:
+        kind = REAL
+    for side, side_kind in ((expr.left, left), (expr.right, right)):
+        if is_untyped(side_kind) and scope.adopt(side, kind) is None:
+            return None
+    return _folded(scope, expr, kind, kind)
+
+
+def _folded(scope: Scope, expr: tree.Binary, operand: Type, result: Type) -> Type | None:
+    """Note the operand type; work out the value if both sides are constant."""
+    scope.facts.operands.setdefault(expr, operand)
+    a, b = scope.facts.constants.get(expr.left), scope.facts.constants.get(expr.right)
+    if a is None or b is None:
+        if b == 0 and expr.op in ("/", "MOD") and is_any(operand, "ANY_INT"):
+            scope.error("S0703", expr.right, "this divides by zero")
+            return None
+        return result
+    if isinstance(operand, Elementary | EnumType | StringType):
+        try:
+            if not is_untyped(operand) and not is_any(operand, "ANY_DURATION", "ANY_DATE"):
+                a, b = constants.convert(a, operand), constants.convert(b, operand)
+            scope.facts.constants[expr] = constants.binary(expr.op, operand, a, b)
+        except constants.NotConstant as error:
+            scope.error("S0703", expr, f"the constant expression has no value: {error}")
+            return None
+    if operand is UNTYPED_INT and result is BOOL or operand is UNTYPED_REAL and result is BOOL:
+        scope.facts.operands[expr] = LREAL if operand is UNTYPED_REAL else LINT
+    return result
 
 
 def _bit_hint(kind: Type, other: Type | None) -> str:

@@ -10,54 +10,50 @@ What stands in front never decides between two declarations of a library: it onl
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.types import Elementary, EnumType, Type, base, fold
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import Variable
 from fbvm.syntax import tree
 
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
-
-def bare(expressions: Expressions, expr: tree.Expr) -> str | None:
+def bare(scope: Scope, expr: tree.Expr) -> str | None:
     """The name that an expression is, without a name space in front; None for anything else."""
     if isinstance(expr, tree.NameRef):
-        return expr.text if expressions.variable(expr.text) is None else None
-    if isinstance(expr, tree.Member) and isinstance(expr.of, tree.NameRef) and is_space(expressions, expr.of):
+        return expr.text if scope.variable(expr.text) is None else None
+    if isinstance(expr, tree.Member) and isinstance(expr.of, tree.NameRef) and is_space(scope, expr.of):
         return expr.name.text
     return None
 
 
-def is_space(expressions: Expressions, name: tree.NameRef) -> bool:
+def is_space(scope: Scope, name: tree.NameRef) -> bool:
     """True for the name of a library or of a list of global variables, where no variable is called so."""
-    return expressions.variable(name.text) is None and expressions.project.is_space(name.text)
+    return scope.variable(name.text) is None and scope.project.is_space(name.text)
 
 
-def member(expressions: Expressions, expr: tree.Member) -> Type | Variable | None:
+def member(scope: Scope, expr: tree.Member) -> Type | Variable | None:
     """What `X.name` means where X is no variable: a member of an enumeration (its type), a global variable, or nothing."""
-    outer = bare(expressions, expr.of)
+    outer = bare(scope, expr.of)
     if outer is None:
         return None
-    named = expressions.checker.specs.named_type(outer, expressions.source)
+    named = scope.named_type(outer)
     if isinstance(named, EnumType):
         return named
-    if isinstance(expr.of, tree.NameRef) and is_space(expressions, expr.of):
-        return expressions.project.listed(fold(expr.of.text), fold(expr.name.text), expressions.source)
+    if isinstance(expr.of, tree.NameRef) and is_space(scope, expr.of):
+        return scope.context.listed(fold(expr.of.text), fold(expr.name.text), scope.source)
     return None
 
 
-def is_bit(expressions: Expressions, expr: tree.Member, whole: Type) -> bool:
+def is_bit(scope: Scope, expr: tree.Member, whole: Type) -> bool:
     """True for `word.READY` with an integer constant READY, which CODESYS takes as the bit of that number."""
-    variable = expressions.variable(expr.name.text)
+    variable = scope.variable(expr.name.text)
     kind = base(whole)
     if variable is None or not variable.constant or not isinstance(kind, Elementary) or not is_any(kind, "ANY_BIT", "ANY_INT"):
         return False
     name = tree.NameRef(expr.name.start, expr.name.end, expr.name.text)
-    expressions.infer(name)
-    number = expressions.facts.constants.get(name)
+    scope.infer(name)
+    number = scope.facts.constants.get(name)
     if isinstance(number, bool) or not isinstance(number, int) or number < 0:
         return False
-    expressions.facts.bits[expr] = tree.Part(expr.start, expr.end, expr.of, "X", number)
+    scope.facts.bits[expr] = tree.Part(expr.start, expr.end, expr.of, "X", number)
     return True

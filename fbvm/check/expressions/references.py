@@ -7,8 +7,6 @@ A pointer is moved in the variable that it was made of, or, in an instance, in i
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.types import (
     BYTE,
     ArrayType,
@@ -18,66 +16,64 @@ from fbvm.base.types import (
     pointer,
     reference,
 )
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import MAKERS, is_null
 from fbvm.check.expressions.writes import writable
 from fbvm.check.symbols.facts import Facts, Holder, StandardCall, Start, Variable
 from fbvm.syntax import tree
 
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
-
-def refer(expressions: Expressions, expr: tree.Expr, lasting: bool) -> Type | None:
+def refer(scope: Scope, expr: tree.Expr, lasting: bool) -> Type | None:
     """The type of the variable that a reference is made to, or None after a diagnostic.
 
     It has to be `lasting` for REF(), which gives a reference that can be written through."""
-    kind = expressions.infer(expr)
+    kind = scope.infer(expr)
     if kind is None:
         return None
-    if not expressions.is_variable(expr):
-        expressions.error("S0407", expr, "a reference can be made to a variable only, not to a value")
+    if not scope.is_variable(expr):
+        scope.error("S0407", expr, "a reference can be made to a variable only, not to a value")
         return None
     if isinstance(kind, ArrayType) and kind.packed:
-        expressions.error("S0407", expr, f"{kind} fills no bytes that a reference could name", "refer to one of its elements")
+        scope.error("S0407", expr, f"{kind} fills no bytes that a reference could name", "refer to one of its elements")
         return None
-    root = expressions.facts.root(expr)
-    variable = expressions.facts.variables.get(root) if root not in expressions.facts.followed else None
+    root = scope.facts.root(expr)
+    variable = scope.facts.variables.get(root) if root not in scope.facts.followed else None
     if lasting and variable is not None and (reason := _short_lived(variable)):
-        expressions.error("S0407", expr, f"{variable.name} is {reason}, which may end before the reference is followed",
-                          "ADR gives a pointer to it that holds until then")
+        scope.error("S0407", expr, f"{variable.name} is {reason}, which may end before the reference is followed",
+                    "ADR gives a pointer to it that holds until then")
         return None
-    if lasting and not writable(expressions, expr, "be referred to"):
+    if lasting and not writable(scope, expr, "be referred to"):
         return None
     if variable is not None:
         variable.written = True
-    expressions.facts.holders[expr] = _holder(expressions, expr)
-    expressions.project.asked.again = False
+    scope.facts.holders[expr] = _holder(scope, expr)
+    scope.project.dependencies.repeatable = False
     return kind
 
 
-def _holder(expressions: Expressions, expr: tree.Expr) -> Holder:
+def _holder(scope: Scope, expr: tree.Expr) -> Holder:
     """What a reference to this place can be moved in."""
-    facts = expressions.facts
+    facts = scope.facts
     while facts.is_part(expr):
         whole = facts.types[expr.of]
         if isinstance(expr, tree.Member) and isinstance(whole, StructType) and whole.block:
-            member = expressions.checker.block_of(whole).variables[fold(expr.name.text)]
-            return _held(expressions, expr, member)
+            member = scope.context.block_of(whole).variables[fold(expr.name.text)]
+            return _held(scope, expr, member)
         expr = expr.of
     if isinstance(expr, tree.Direct):
         return Holder(expr)
     variable = facts.variables.get(expr) if expr not in facts.followed else None
-    return Holder() if variable is None else _held(expressions, expr, variable)
+    return Holder() if variable is None else _held(scope, expr, variable)
 
 
-def _held(expressions: Expressions, expr: tree.Expr, variable: Variable) -> Holder:
+def _held(scope: Scope, expr: tree.Expr, variable: Variable) -> Holder:
     """The holder for a variable, which is an object from now on."""
-    facts = expressions.facts
+    facts = scope.facts
     if variable.kind == "VAR_IN_OUT" or variable.place == "frame":
         number = facts.leases.setdefault(variable, len(facts.leases))
-        assert expressions.pou is not None
-        if number not in expressions.pou.owner.leases:
-            expressions.pou.owner.leases.append(number)
+        assert scope.pou is not None
+        if number not in scope.pou.owner.leases:
+            scope.pou.owner.leases.append(number)
         return Holder(expr, variable, number)
     if variable.reference:
         return Holder()
@@ -91,11 +87,11 @@ def _held(expressions: Expressions, expr: tree.Expr, variable: Variable) -> Hold
     return Holder(expr, variable)
 
 
-def to_parameter(expressions: Expressions, expr: tree.Member) -> Type:
+def to_parameter(scope: Scope, expr: tree.Member) -> Type:
     """`x.pValue` of an ANY: a pointer to what was passed."""
-    facts = expressions.facts
-    facts.holders[expr] = _held(expressions, expr.of, facts.variables[expr.of])
-    expressions.project.asked.again = False
+    facts = scope.facts
+    facts.holders[expr] = _held(scope, expr.of, facts.variables[expr.of])
+    scope.project.dependencies.repeatable = False
     return pointer(BYTE)
 
 
@@ -107,13 +103,13 @@ def _short_lived(variable: Variable) -> str:
     return "a variable of a function" if variable.owner is not None and variable.owner.is_function else ""
 
 
-def make(expressions: Expressions, call: tree.Call, name: str, value: tree.Expr) -> Type | None:
+def make(scope: Scope, call: tree.Call, name: str, value: tree.Expr) -> Type | None:
     """REF(x) and ADR(x)."""
-    kind = refer(expressions, value, lasting=name == "REF")
+    kind = refer(scope, value, lasting=name == "REF")
     if kind is None:
         return None
     made = reference(kind) if name == "REF" else pointer(kind)
-    expressions.facts.calls[call] = StandardCall("REF", [(value, kind)], (made,))
+    scope.facts.calls[call] = StandardCall("REF", [(value, kind)], (made,))
     return made
 
 
@@ -129,17 +125,17 @@ def named(init: tree.Expr) -> tree.Expr:
     return init
 
 
-def noted(facts: Facts, start: Start) -> bytes:
-    """The bytes that stand for a reference until everything has its place."""
+def placeholder(facts: Facts, start: Start) -> bytes:
+    """The bytes that stand for an initial reference until layout has placed its target; `facts.starts` gets the reference."""
     facts.starts.append(start)
     return (MARK | len(facts.starts) - 1).to_bytes(8, "little")
 
 
-def start(expressions: Expressions, start: Start) -> None:
+def check_initial(scope: Scope, start: Start) -> None:
     """Check what a reference is made to before anything runs: a place that is known by then."""
-    if not _fits(expressions, start):
+    if not _fits(scope, start):
         return
-    place, facts = start.place, expressions.facts
+    place, facts = start.place, scope.facts
     root = facts.root(place)
     owner = facts.variables.get(root)
     known = root in facts.directs or owner is not None and (
@@ -149,46 +145,46 @@ def start(expressions: Expressions, start: Start) -> None:
         known &= start.late or all(subscript in facts.constants for subscript in subscripts)
         place = place.of
     if not known:
-        expressions.error("S0701", start.whole, "an initial value must be known before the program runs",
-                          "assign it in the body instead")
+        scope.error("S0701", start.whole, "an initial value must be known before the program runs",
+                    "assign it in the body instead")
 
 
-def _fits(expressions: Expressions, start: Start) -> bool:
+def _fits(scope: Scope, start: Start) -> bool:
     """True if the reference is one to the right type; else a diagnostic."""
     if not start.kind.follows:
-        return expressions.fit(start.whole, start.kind, "S0705", "the initial value")
-    kind = refer(expressions, start.place, lasting=False)
+        return scope.fit(start.whole, start.kind, "S0705", "the initial value")
+    kind = refer(scope, start.place, lasting=False)
     if kind is None or kind == start.kind.target:
         return kind is not None
-    expressions.error("S0705", start.place, f"a {start.kind} is needed here, this is {kind}")
+    scope.error("S0705", start.place, f"a {start.kind} is needed here, this is {kind}")
     return False
 
 
-def bind(expressions: Expressions, node: tree.Assign) -> None:
+def bind(scope: Scope, node: tree.Assign) -> None:
     """`r REF= x` for what is declared REFERENCE TO."""
     target = node.targets[0]
-    kind = expressions.infer(target)
+    kind = scope.infer(target)
     if kind is None:
-        expressions.infer(node.value)
+        scope.infer(node.value)
         return
-    if target not in expressions.facts.followed:
-        expressions.error("S0301", target, "REF= binds a variable that is declared REFERENCE TO",
-                          "assign REF(...) to a REF_TO")
+    if target not in scope.facts.followed:
+        scope.error("S0301", target, "REF= binds a variable that is declared REFERENCE TO",
+                    "assign REF(...) to a REF_TO")
         return
-    if writable(expressions, target, "be bound", bound=True):
-        lend(expressions, node.value, kind, "S0301", expressions.text(target))
+    if writable(scope, target, "be bound", bound=True):
+        lend(scope, node.value, kind, "S0301", scope.text(target))
 
 
-def lend(expressions: Expressions, value: tree.Expr, kind: Type, code: str, name: str) -> bool:
+def lend(scope: Scope, value: tree.Expr, kind: Type, code: str, name: str) -> bool:
     """True if a REFERENCE TO `kind` that is called `name` can be bound to a value; else a diagnostic."""
     if is_null(value):
         return True
-    if named(value) is not value and value not in expressions.facts.followed:
-        expressions.error("S0407", value, f"{name} is bound to a variable, and this makes a reference already",
-                          f"name the variable alone: {expressions.text(named(value))}")
+    if named(value) is not value and value not in scope.facts.followed:
+        scope.error("S0407", value, f"{name} is bound to a variable, and this makes a reference already",
+                    f"name the variable alone: {scope.text(named(value))}")
         return False
-    found = refer(expressions, value, lasting=False)
+    found = refer(scope, value, lasting=False)
     if found is None or found == kind:
         return found is not None
-    expressions.error(code, value, f"{name} refers to {kind}, this is {found}")
+    scope.error(code, value, f"{name} refers to {kind}, this is {found}")
     return False

@@ -2,93 +2,86 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, RefType, StringType, Type, characters
 from fbvm.check.expressions.assignability import as_number, fitting_hint
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
-
 
 _ANY_NUMBER = -(1 << 63), (1 << 63) - 1
 """Bounds that are known only when the program runs."""
 
 
-class Subscripts:
-    """Types `of[subscripts]` in one POU."""
-
-    def __init__(self, expressions: Expressions) -> None:
-        self.expressions = expressions
-        self.facts = expressions.facts
-        self.error = expressions.error
-
-    def element(self, expr: tree.Index) -> Type | None:
-        """The type of the element, or None after a diagnostic."""
-        whole = self.expressions.infer(expr.of)
-        kinds = [self.expressions.settle(subscript) for subscript in expr.subscripts]
-        if whole is None or None in kinds:
+def element(scope: Scope, expr: tree.Index, want: Type | None) -> Type | None:
+    """The type of the element, or None after a diagnostic."""
+    whole = scope.infer(expr.of)
+    kinds = [scope.settle(subscript) for subscript in expr.subscripts]
+    if whole is None or None in kinds:
+        return None
+    if isinstance(whole, OpenArrayType):
+        return _open(scope, expr, whole, kinds)
+    if isinstance(whole, RefType) and whole.moves:
+        return _behind(scope, expr, whole, kinds)
+    if isinstance(whole, StringType):
+        if not scope.is_variable(expr.of):
+            scope.error("S0407", expr.of, "characters have subscripts in a variable only",
+                        "MID(s, 1, n) is character n of any text")
             return None
-        if isinstance(whole, OpenArrayType):
-            return self._open(expr, whole, kinds)
-        if isinstance(whole, RefType) and whole.moves:
-            return self._behind(expr, whole, kinds)
-        if isinstance(whole, StringType):
-            if not self.expressions.is_variable(expr.of):
-                self.error("S0407", expr.of, "characters have subscripts in a variable only",
-                           "MID(s, 1, n) is character n of any text")
+        whole = characters(whole)
+    if not isinstance(whole, ArrayType):
+        bit = len(expr.subscripts) == 1 and is_any(whole, "ANY_INT", "ANY_BIT")
+        of, number = scope.text(expr.of), scope.text(expr.subscripts[0])
+        scope.error("S0304", expr.of, f"this is {whole}, not an array", f"a bit is written {of}.{number}" if bit else "")
+        return None
+    element: Type = whole
+    rest = list(zip(expr.subscripts, kinds, strict=True))
+    while rest:
+        if not isinstance(element, ArrayType) or len(rest) < len(element.bounds):
+            _wrong_number(scope, expr, whole, len(whole.bounds))
+            return None
+        for (subscript, kind), (low, high) in zip(rest, element.bounds, strict=False):
+            if not _fits(scope, subscript, kind, low, high, element):
                 return None
-            whole = characters(whole)
-        if not isinstance(whole, ArrayType):
-            bit = len(expr.subscripts) == 1 and is_any(whole, "ANY_INT", "ANY_BIT")
-            of, number = self.expressions.text(expr.of), self.expressions.text(expr.subscripts[0])
-            self.error("S0304", expr.of, f"this is {whole}, not an array", f"a bit is written {of}.{number}" if bit else "")
+        rest = rest[len(element.bounds):]
+        element = element.element
+    return element
+
+
+def _open(scope: Scope, expr: tree.Index, whole: OpenArrayType, kinds: list[Type | None]) -> Type | None:
+    """Subscripts of ARRAY [*]: their bounds are known when the program runs."""
+    if len(kinds) != whole.dimensions:
+        _wrong_number(scope, expr, whole, whole.dimensions)
+        return None
+    for subscript, kind in zip(expr.subscripts, kinds, strict=True):
+        if not _fits(scope, subscript, kind, *_ANY_NUMBER, whole):
             return None
-        element: Type = whole
-        rest = list(zip(expr.subscripts, kinds, strict=True))
-        while rest:
-            if not isinstance(element, ArrayType) or len(rest) < len(element.bounds):
-                self._wrong_number(expr, whole, len(whole.bounds))
-                return None
-            for (subscript, kind), (low, high) in zip(rest, element.bounds, strict=False):
-                if not self._fits(subscript, kind, low, high, element):
-                    return None
-            rest = rest[len(element.bounds):]
-            element = element.element
-        return element
+    return whole.element
 
-    def _open(self, expr: tree.Index, whole: OpenArrayType, kinds: list[Type | None]) -> Type | None:
-        """Subscripts of ARRAY [*]: their bounds are known when the program runs."""
-        if len(kinds) != whole.dimensions:
-            self._wrong_number(expr, whole, whole.dimensions)
-            return None
-        for subscript, kind in zip(expr.subscripts, kinds, strict=True):
-            if not self._fits(subscript, kind, *_ANY_NUMBER, whole):
-                return None
-        return whole.element
 
-    def _behind(self, expr: tree.Index, whole: RefType, kinds: list[Type | None]) -> Type | None:
-        """`p[i]` of a pointer: what lies i times the size of its target further on."""
-        if len(kinds) != 1:
-            self._wrong_number(expr, whole, 1)
-            return None
-        return whole.target if self._fits(expr.subscripts[0], kinds[0], *_ANY_NUMBER, whole) else None
+def _behind(scope: Scope, expr: tree.Index, whole: RefType, kinds: list[Type | None]) -> Type | None:
+    """`p[i]` of a pointer: what lies i times the size of its target further on."""
+    if len(kinds) != 1:
+        _wrong_number(scope, expr, whole, 1)
+        return None
+    return whole.target if _fits(scope, expr.subscripts[0], kinds[0], *_ANY_NUMBER, whole) else None
 
-    def _wrong_number(self, expr: tree.Index, whole: Type, needed: int) -> None:
-        written = len(expr.subscripts)
-        self.error("S0305", expr, f"{whole} needs {needed} subscript{'s' if needed > 1 else ''}, "
-                                  f"{written} {'are' if written > 1 else 'is'} written")
 
-    def _fits(self, expr: tree.Expr, kind: Type | None, low: int, high: int, whole: Type) -> bool:
-        assert kind is not None
-        counted = as_number(kind, self.expressions.project.dialect)
-        if not is_any(counted, "ANY_INT") and not isinstance(kind, EnumType):
-            self.error("S0301", expr, f"a subscript is an integer, not {kind}", fitting_hint(expr, kind, DINT))
-            return False
-        value = self.facts.constants.get(expr)
-        if isinstance(value, int) and not low <= value <= high:
-            self.error("S0702", expr, f"subscript {value} is outside {low}..{high} of {whole}")
-            return False
-        return True
+def _wrong_number(scope: Scope, expr: tree.Index, whole: Type, needed: int) -> None:
+    written = len(expr.subscripts)
+    scope.error("S0305", expr, f"{whole} needs {needed} subscript{'s' if needed > 1 else ''}, "
+                              f"{written} {'are' if written > 1 else 'is'} written")
+
+
+def _fits(scope: Scope, expr: tree.Expr, kind: Type | None, low: int, high: int, whole: Type) -> bool:
+    assert kind is not None
+    counted = as_number(kind, scope.dialect)
+    if not is_any(counted, "ANY_INT") and not isinstance(kind, EnumType):
+        scope.error("S0301", expr, f"a subscript is an integer, not {kind}", fitting_hint(expr, kind, DINT))
+        return False
+    value = scope.facts.constants.get(expr)
+    if isinstance(value, int) and not low <= value <= high:
+        scope.error("S0702", expr, f"subscript {value} is outside {low}..{high} of {whole}")
+        return False
+    return True
+
+

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.areas import AREAS, Address
 from fbvm.base.dialects import takers
 from fbvm.base.types import Field, StructType, fold
+from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.facts import Facts, Variable
 from fbvm.syntax import tree
-
-if TYPE_CHECKING:
-    from fbvm.check.expressions.infer import Expressions
 
 _OWN = {"VAR": "a variable of its own body", "VAR_OUTPUT": "an output"}
 """What members are that only their own body writes."""
@@ -20,21 +16,21 @@ Path = tuple[object, ...]
 """A variable or address, and the steps from it to a part."""
 
 
-def writable(expressions: Expressions, expr: tree.Expr, purpose: str, bound: bool = False) -> bool:
+def writable(scope: Scope, expr: tree.Expr, purpose: str, bound: bool = False) -> bool:
     """True if the place may be written here; else a diagnostic that says why not.
 
     What a REFERENCE TO is bound to may be written by everybody who sees it; `bound` asks whether it can be bound anew."""
-    facts = expressions.facts
+    facts = scope.facts
     inner = expr
     while True:
         if inner in facts.followed and not (bound and inner is expr):
             return True
         member = facts.fields.get(inner)
         if member is not None and (member.constant or member.kind in ("VAR", "VAR_OUTPUT")) and \
-                not _written_from_outside(expressions, inner, member):
+                not _written_from_outside(scope, inner, member):
             what = "a constant" if member.constant else _OWN[member.kind]
-            expressions.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here",
-                              _writers(expressions, inner) if member.kind == "VAR" and not member.constant else "")
+            scope.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here",
+                        _writers(scope, inner) if member.kind == "VAR" and not member.constant else "")
             return False
         if not (facts.is_part(inner) or inner is expr and bound and isinstance(inner, tree.Member | tree.Index)):
             break
@@ -44,52 +40,52 @@ def writable(expressions: Expressions, expr: tree.Expr, purpose: str, bound: boo
     if variable is not None:
         address = variable.location
         if variable.constant:
-            expressions.error("S0501", expr, f"{variable.name} is CONSTANT and cannot {purpose}", "",
-                              (variable.source, variable.node.start, "declared here"))
+            scope.error("S0501", expr, f"{variable.name} is CONSTANT and cannot {purpose}", "",
+                        (variable.source, variable.node.start, "declared here"))
             return False
         if variable.role and expr.end > expr.start:
-            expressions.error("S0501", expr, f"{variable.name} is {_ROLES[variable.role]} and cannot {purpose}",
-                              "transitions and the qualifiers of actions decide it")
+            scope.error("S0501", expr, f"{variable.name} is {_ROLES[variable.role]} and cannot {purpose}",
+                        "transitions and the qualifiers of actions decide it")
             return False
-        _note_input(expressions, expr, variable)
-    if address is not None and _is_read_only(expressions, address):
-        expressions.error("S0501", expr, f"{address} is read-only for programs and cannot {purpose}")
+        _note_input(scope, expr, variable)
+    if address is not None and _is_read_only(scope, address):
+        scope.error("S0501", expr, f"{address} is read-only for programs and cannot {purpose}")
         return False
     return True
 
 
-def _writers(expressions: Expressions, expr: tree.Expr) -> str:
+def _writers(scope: Scope, expr: tree.Expr) -> str:
     """Which dialects write a variable of another body."""
-    whole = expressions.facts.types.get(expr.of) if isinstance(expr, tree.Member) else None
-    program = isinstance(whole, StructType) and whole.block and expressions.checker.block_of(whole).kind == "PROGRAM"
+    whole = scope.facts.types.get(expr.of) if isinstance(expr, tree.Member) else None
+    program = isinstance(whole, StructType) and whole.block and scope.context.block_of(whole).kind == "PROGRAM"
     return f"make it a VAR_INPUT, or take {takers('programs_are_written' if program else 'locals_are_written')}"
 
 
-def _written_from_outside(expressions: Expressions, expr: tree.Expr, member: Field) -> bool:
+def _written_from_outside(scope: Scope, expr: tree.Expr, member: Field) -> bool:
     """True for a member of an instance that the dialect lets others write."""
-    dialect, whole = expressions.project.dialect, expressions.facts.types.get(expr.of) if isinstance(expr, tree.Member) else None
+    dialect, whole = scope.dialect, scope.facts.types.get(expr.of) if isinstance(expr, tree.Member) else None
     if member.constant or not isinstance(whole, StructType) or not whole.block:
         return False
-    program = expressions.checker.block_of(whole).kind == "PROGRAM"
+    program = scope.context.block_of(whole).kind == "PROGRAM"
     return dialect.programs_are_written if program else dialect.locals_are_written
 
 
-def _is_read_only(expressions: Expressions, address: Address) -> bool:
+def _is_read_only(scope: Scope, address: Address) -> bool:
     """Whether the source may only read the address."""
     if address.area not in AREAS or address.number >= AREAS[address.area].read_only:
         return False
-    return address.area not in expressions.project.libraries.writes(expressions.source.library)
+    return address.area not in scope.project.libraries.writes(scope.source.library)
 
 
-def _note_input(expressions: Expressions, expr: tree.Expr, variable: Variable) -> None:
+def _note_input(scope: Scope, expr: tree.Expr, variable: Variable) -> None:
     """Warn of an input that is written inside its block."""
-    pou = expressions.pou
+    pou = scope.pou
     variable.written = True
     if pou is None:
         return
     raw = any(edge.hidden is variable for edge in pou.owner.edges)
     if raw or variable.kind == "VAR_INPUT" and variable.owner is pou.owner:
-        expressions.error("S0591", expr, f"{variable.name.removesuffix(' edge')} is an input of {pou.name}"
+        scope.error("S0591", expr, f"{variable.name.removesuffix(' edge')} is an input of {pou.name}"
                                          " and is written inside it")
 
 
@@ -108,12 +104,12 @@ def place(facts: Facts, expr: tree.Expr) -> Path | None:
     return None if outer is None else (*outer, step)
 
 
-def note_count(expressions: Expressions, expr: tree.Expr) -> None:
+def note_count(scope: Scope, expr: tree.Expr) -> None:
     """Warn of a write to the counter of a loop around it, to a part of it, or to what it is part of."""
-    if not expressions.counting:
+    if not scope.counters:
         return
-    written = place(expressions.facts, expr)
-    for counter in expressions.counting if written else ():
+    written = place(scope.facts, expr)
+    for counter in scope.counters if written else ():
         if counter and all(a == b for a, b in zip(written or (), counter, strict=False)):
-            expressions.error("S0590", expr, f"{expressions.text(expr)} counts the FOR loop and is written inside it")
+            scope.error("S0590", expr, f"{scope.text(expr)} counts the FOR loop and is written inside it")
             return

@@ -1,25 +1,23 @@
-"""Which types hold, however deep inside, an instance of a block about which something is asked; each type is looked into
-once, however many instances there are."""
+"""Which types are or hold, at any depth, an instance of a block with some property.
+
+Each type is looked into once, however many instances there are."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from fbvm.base.types import ArrayType, StructType, Type
+from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou
 
-if TYPE_CHECKING:
-    from fbvm.check.checker import Checker
 
+class Containment:
+    """A test of types: True for those that are or hold an instance of a block for which `property` is true."""
 
-class Inside:
-    """Answers one question about types: True for those that are or hold an instance of a block that is `asked` for."""
-
-    def __init__(self, checker: Checker, asked: Callable[[Pou], bool]) -> None:
-        self.checker, self._asked = checker, asked
+    def __init__(self, context: Context, property: Callable[[Pou], bool]) -> None:
+        self.context, self._property = context, property
         self._known: dict[int, tuple[Type, bool]] = {}
-        """By the identity of the type, which stays its own while the type is here."""
+        """By the identity of the type; the type is kept here, so that no other one gets its identity."""
 
     def __call__(self, kind: Type) -> bool:
         if isinstance(kind, ArrayType):
@@ -28,11 +26,11 @@ class Inside:
             return False
         known = self._known.get(id(kind))
         if known is None:
-            known = self._known[id(kind)] = kind, self._look(kind)
+            known = self._known[id(kind)] = kind, self._look_into(kind)
         return known[1]
 
-    def _look(self, kind: StructType) -> bool:
+    def _look_into(self, kind: StructType) -> bool:
         if not kind.block:
             return any(self(member.type) for member in kind.fields.values())
-        pou = self.checker.block_of(kind)
-        return self._asked(pou) or any(self(v.type) for v in pou.order if v.place == "self" and not v.reference)
+        pou = self.context.block_of(kind)
+        return self._property(pou) or any(self(v.type) for v in pou.order if v.place == "self" and not v.reference)

@@ -1,60 +1,41 @@
-"""What the check of a body asks of the project, so that it can be asked again where the check is spared.
+"""The recorded dependencies of a body: what its check looked up, so that the look-ups can be repeated without the check.
 
-Besides facts about its own nodes, the check of a body has POUs, types and global variables made known, in an order that
-decides where they lie.  A library never sees what users write, so this order is the same in every program."""
+The check of a body resolves POUs, types and global variables on the way, and the order in which it does that decides where
+they lie in memory.  A library never sees what users declare, so this order is the same in every program: the body of a
+library's POU is checked once, and another program repeats the recorded look-ups."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
-from fbvm.base.diagnostics import Source
 from fbvm.base.types import fold
 from fbvm.check.symbols.facts import Pou
 from fbvm.syntax import tree
 
-if TYPE_CHECKING:
-    from fbvm.check.checker import Checker
-    from fbvm.check.symbols.project import Project
-
 Key = tuple[str, str]
-"""Library and folded name of a POU."""
+"""Library ("" for the user's own) and folded name of a POU or a global variable."""
 
 
-class Asked:
-    """The questions of one body, each once, in their order, and whom it calls."""
+class Dependencies:
+    """What the check of one body looked up, each look-up once and in order, and which POUs the body calls."""
 
     def __init__(self) -> None:
-        self.questions: dict[tuple[str, str, str], None] = {}
+        self.lookups: dict[tuple[str, str, str], None] = {}
+        """What was looked up ("POU", "type", "global", "area", "declared" or "interface"), its folded name, its library."""
         self.calls: list[tuple[Key, tree.Node]] = []
-        self.again = True
-        """False if the check did what no question says."""
+        self.repeatable = True
+        """False if the check has changed more than the look-ups say."""
 
-    def note(self, what: str, name: str, owner: str = "") -> None:
-        """Remember that something was asked for."""
-        self.questions[what, name, owner] = None
+    def record(self, what: str, name: str, library: str = "") -> None:
+        """Record one look-up."""
+        self.lookups[what, name, library] = None
 
-    def end(self, pou: Pou, project: Project) -> None:
-        """Remember the calls of a body that was checked."""
+    def record_calls(self, pou: Pou, pous: Mapping[Key, Pou]) -> None:
+        """Record the calls of a body that was checked; `pous` are those of the project."""
         for callee, node in pou.calls.items():
             key = key_of(callee)
-            self.again = self.again and project.pous.get(key) is callee
+            self.repeatable = self.repeatable and pous.get(key) is callee
             self.calls.append((key, node))
-
-    def repeat(self, pou: Pou, checker: Checker) -> None:
-        """Ask the same for the same body of another project."""
-        project, source = checker.project, pou.source
-        for what, name, owner in self.questions:
-            if what == "interface":
-                checker.interface(project.pous[owner, name], source, pou.tree)
-            elif what == "declared":
-                checker.specs.declared(name, source)
-            elif what == "area":
-                checker.use_area(name)
-            else:
-                _LOOK[what](project, name, source)
-        for key, node in self.calls:
-            pou.calls[project.pous[key]] = node
 
 
 def key_of(pou: Pou) -> Key:
@@ -62,14 +43,9 @@ def key_of(pou: Pou) -> Key:
     return pou.source.library, fold(pou.name)
 
 
-def is_lasting(pou: Pou) -> bool:
-    """True for the POU of a library as it is written: not an ACTION, nor what was made for one call or one program."""
+def has_lasting_body(pou: Pou) -> bool:
+    """True for a POU of a library whose body is the same in every program.
+
+    False for one with ACTIONs, and for a tree that was made for one call or one program."""
     return bool(pou.source.library) and pou.kind in ("FUNCTION", "FUNCTION_BLOCK") and \
         pou.as_written and not pou.written_actions
-
-
-_LOOK: dict[str, Callable[[Project, str, Source], object]] = {
-    "POU": lambda project, name, source: project.pou(name, source),
-    "type": lambda project, name, source: project.type_entry(name, source),
-    "global": lambda project, name, source: project.global_variable(name, source),
-}

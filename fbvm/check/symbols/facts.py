@@ -104,12 +104,14 @@ class Pou:
     writes_eno: bool = False
     enables_itself: bool = False
     """True if the body writes ENO without declaring it: ENO is TRUE at each start then."""
-    damaged: set[str] = field(default_factory=set)
-    """Folded names whose declaration is wrong: using them is not complained about again."""
+    failed_names: set[str] = field(default_factory=set)
+    """Folded names whose declaration has an error: using them is not reported again."""
     inherits: bool = False
     """True if it EXTENDS another one, which was refused: any name may come from that."""
     later: dict[str, tuple[VarDecl, VarSection]] = field(default_factory=dict)
-    """By folded name what is declared behind what is being worked out."""
+    """By folded name the declarations behind the one that is being resolved."""
+    later_constants: dict[VarDecl, tuple[Type, bytes] | None] = field(default_factory=dict)
+    """Of these the CONSTANTs that were named before: type and value; None while they are being resolved."""
     busy: bool = False
     awaited: list[RefType] = field(default_factory=list)
     """References to instances that were met while the POU was being resolved."""
@@ -135,14 +137,14 @@ class Pou:
     def is_function(self) -> bool:
         return self.kind == "FUNCTION"
 
-    def lost(self, name: str) -> bool:
-        """True if it was said why nothing is known under this name."""
-        return self.inherits or fold(name) in self.damaged
+    def is_failed(self, name: str) -> bool:
+        """True if it is reported already why nothing is known under this name."""
+        return self.inherits or fold(name) in self.failed_names
 
     @property
-    def has_lost(self) -> bool:
-        """True if not all of its declarations are known, which was said."""
-        return self.inherits or bool(self.damaged)
+    def has_failed_names(self) -> bool:
+        """True if not all of its variables are known, which is reported already."""
+        return self.inherits or bool(self.failed_names)
 
     @property
     def owner(self) -> Pou:

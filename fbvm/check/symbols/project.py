@@ -7,7 +7,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TypeVar
@@ -15,29 +15,43 @@ from typing import TypeVar
 from fbvm.base.diagnostics import Source
 from fbvm.base.dialects import STANDARD, Dialect
 from fbvm.base.types import EnumType, RefType, Type, fold
-from fbvm.check.symbols.dependencies import Asked
+from fbvm.check.symbols.dependencies import Dependencies, Key
 from fbvm.check.symbols.facts import Facts, Pou, Report, Variable, list_name
 from fbvm.check.symbols.library import Libraries
 from fbvm.check.symbols.reserved_names import refuse_reserved
-from fbvm.check.symbols.size_limits import Room
+from fbvm.check.symbols.size_limits import SizeLimits
 from fbvm.syntax import tree
 from fbvm.syntax.st.pragmas import attributes, external, pack_mode
+
+Resolved = tuple[Type, bytes]
+"""A type, and the initial bytes of a variable of it that is declared without an initial value."""
 
 
 @dataclass(eq=False)
 class TypeEntry:
-    """A declared type; `resolved` is filled at its first use, and stays None if it is wrong."""
+    """A declared type; `resolved` is set at its first use, and stays None if the declaration has an error."""
 
     tree: tree.TypeDecl
     source: Source
     pack: int | None = None
     """The multiple of bytes at which members lie at most, where an attribute says that."""
-    resolved: tuple[Type, bytes] | None = None
+    resolved: Resolved | None = None
     busy: bool = False
-    known: bool = False
-    """True once it was worked out."""
+    """True while it is being resolved."""
+    done: bool = False
+    """True once it was resolved."""
     awaited: list[RefType] = field(default_factory=list)
-    """References to the type that were met while it was being resolved."""
+    """References to the type that were made while it was being resolved; they get their target afterwards."""
+
+
+@dataclass(eq=False)
+class GlobalDeclaration:
+    """One declaration of global variables, which is resolved in the order of the text or when a name is looked up."""
+
+    declared: tree.VarDecl
+    section: tree.VarSection
+    source: Source
+    done: bool = False
 
 
 COMPARISONS = 50_000
@@ -55,14 +69,20 @@ class Project:
         self.libraries = libraries
         self.report = report
         self.facts = Facts()
-        self.room = Room(report)
+        self.size_limits = SizeLimits(report)
         self.pous: dict[tuple[str, str], Pou] = {}
         self.types: dict[tuple[str, str], TypeEntry] = {}
         self.globals: dict[tuple[str, str], Variable] = {}
         self.sections: list[tuple[tree.VarSection, Source]] = []
-        """VAR_GLOBAL sections that still have to be declared."""
-        self.waiting: set[str] = set()
-        """Folded names of global variables that were read, and may still have to be declared."""
+        """VAR_GLOBAL sections whose names are not in `global_declarations` yet."""
+        self.global_declarations: dict[Key, GlobalDeclaration] = {}
+        """The first declaration of each global variable that was read."""
+        self.undeclared: list[GlobalDeclaration] = []
+        """Declarations of global variables in the order of the text, of which some may be resolved already."""
+        self.busy_globals: set[Key] = set()
+        """Global variables whose declaration is being resolved."""
+        self.failed_globals: set[Key] = set()
+        """Global variables whose declaration has an error that was reported."""
         self.lists: set[str] = set()
         """Folded names of the files that declare global variables outside of a CONFIGURATION."""
         self.qualified_only: set[tree.VarSection] = set()
@@ -70,12 +90,10 @@ class Project:
         self.configurations: list[tuple[tree.Configuration, Source]] = []
         self.enum_members: dict[str, list[tuple[EnumType, int, str]]] = {}
         """By folded name: enumeration, value, and the library that declares it ("" for the user's own)."""
-        self.settings: list[tuple[tree.AccessVars | tree.ConfigVars, Source]] = []
+        self.config_sections: list[tuple[tree.AccessVars | tree.ConfigVars, Source]] = []
         """VAR_ACCESS and VAR_CONFIG sections."""
-        self.late_global: Callable[[tuple[str, str]], None] = lambda key: None
-        """Declares a global variable whose turn has not come yet (set by the checker)."""
-        self.asked = Asked()
-        """What is asked for by the body that is being checked."""
+        self.dependencies = Dependencies()
+        """What the check of the present body looks up."""
         self._loaded: set[str] = set()
         self._refused: set[tuple[str, str]] = set()
         """Library and folded name of what was declared and refused: an INTERFACE, a structure that EXTENDS another."""
@@ -131,11 +149,11 @@ class Project:
                 if "qualified_only" in attributes(text, declaration):
                     self.qualified_only.add(declaration.section)
             elif isinstance(declaration, tree.ConfigVars):
-                self.settings.append((declaration, source))
+                self.config_sections.append((declaration, source))
             elif isinstance(declaration, tree.Configuration):
                 self.configurations.append((declaration, source))
-                self.settings += [(settings, source) for settings in declaration.settings]
-                self.settings += [(settings, source) for r in declaration.resources for settings in r.settings]
+                self.config_sections += [(section, source) for section in declaration.settings]
+                self.config_sections += [(section, source) for r in declaration.resources for section in r.settings]
                 self.sections += [(s, source) for s in declaration.sections]
 
     def _add_action(self, action: tree.Action, source: Source, owner: tree.Name | None, last: Pou | None) -> None:
@@ -157,7 +175,7 @@ class Project:
             self.pous[key] = pou = Pou(declaration.name.text, declaration.kind, source, declaration)
             pou.other_names = self.libraries.other_pins(source.library, pou.name)
             pou.inherits = any(refused.what == "EXTENDS" for refused in declaration.refused)
-            pou.damaged |= {name for refused in declaration.refused if (name := _refused_name(refused, source))}
+            pou.failed_names |= {name for refused in declaration.refused if (name := _refused_name(refused, source))}
             pou.written_actions += [(action, source) for action in declaration.actions]
             self.new_pous.append(pou)
             return pou
@@ -176,11 +194,11 @@ class Project:
     # --- look-up ----------------------------------------------------------------------------------------------------
 
     @contextmanager
-    def asking(self, asked: Asked) -> Iterator[Asked]:
-        """Whoever asks for something meanwhile is not the body that is being checked."""
-        before, self.asked = self.asked, asked
-        yield asked
-        self.asked = before
+    def recording(self, dependencies: Dependencies) -> Iterator[Dependencies]:
+        """Record look-ups in `dependencies` for a while, and not as those of the body that is being checked."""
+        before, self.dependencies = self.dependencies, dependencies
+        yield dependencies
+        self.dependencies = before
 
     def owners(self, source: Source) -> tuple[str, ...]:
         """Whose names `source` sees, nearest first; a library never sees the user's own."""
@@ -211,7 +229,7 @@ class Project:
             found[source.library] = self._look(table, folded, source)
         answer = found[source.library]
         if answer is not None or self.libraries.has_file(folded):
-            self.asked.note(what, folded)
+            self.dependencies.record(what, folded)
         return answer
 
     def _look(self, table: dict[tuple[str, str], T], folded: str, source: Source) -> T | None:
@@ -228,27 +246,13 @@ class Project:
         """True for a folded name whose declaration was refused."""
         return any((owner, name) in self._refused for owner in self.owners(source))
 
-    def global_variable(self, name: str, source: Source) -> Variable | None:
-        folded = fold(name)
-        for owner in self.owners(source):
-            key = owner, folded
-            if key not in self.globals and (self.sections or folded in self.waiting):
-                self.late_global(key)
-            if key in self.globals:
-                self.asked.note("global", folded)
-                return self.globals[key]
-        return None
-
     def is_space(self, name: str) -> bool:
         """True for what may stand in front of a name and a point without being a variable."""
         return fold(name) in self.lists or self.libraries.has_space(name)
 
-    def listed(self, space: str, name: str, source: Source) -> Variable | None:
-        """The global variable of that folded name in a list, or in any if a library is named."""
-        variable = self.global_variable(f"{space}.{name}", source) or self.global_variable(name, source)
-        if variable is not None and space in self.lists and list_name(variable.source) != space:
-            return None
-        return variable
+    def is_failed_global(self, name: str, source: Source) -> bool:
+        """True if a global variable that `source` sees under this name has an error that was reported."""
+        return any((owner, fold(name)) in self.failed_globals for owner in self.owners(source))
 
     def nearest_global(self, name: str, more: Iterable[str] = ()) -> str:
         """A hint for a name that means no global variable and, beside them, nothing else of `more`."""
@@ -270,7 +274,7 @@ class Project:
     def completes(self, name: str) -> bool:
         """True if a VAR_CONFIG gives places to variables of that name."""
         return any(isinstance(last, tree.Member) and fold(last.name.text) == fold(name) and row.location is not None
-                   for section, _ in self.settings if isinstance(section, tree.ConfigVars)
+                   for section, _ in self.config_sections if isinstance(section, tree.ConfigVars)
                    for row in section.variables for last in (row.path,))
 
     def choices(self, name: str, candidates: Iterable[str]) -> str:

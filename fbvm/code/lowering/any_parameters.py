@@ -47,7 +47,7 @@ def described(body: BodyLowering, expr: tree.Expr) -> list[tuple[int, Node]]:
         rows = (size, size, ("const", "i64", 8))
     else:
         rows = (size, ("mul", "i64", size, ("const", "i64", 8)), ("const", "i64", 1))
-    number = body.checker.specs.type_classes().members[type_class(kind)]
+    number = body.checker.type_classes().members[type_class(kind)]
     return [(offset, _narrow(row)) for offset, row in zip(NUMBERS, (*rows, ("const", "i64", number)), strict=True)]
 
 

@@ -9,7 +9,7 @@ from fbvm.base.areas import FLAG_AREAS, SLOTS_OFFSET, Address
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.base.types import ArrayType, Field, StructType, Type, fold
 from fbvm.check.checker import Checker
-from fbvm.check.symbols.containment import Inside
+from fbvm.check.symbols.containment import Containment
 from fbvm.check.symbols.facts import Completed, Pou, Spot, Variable, holds_block
 from fbvm.code.image import Layout, Objects, Retained
 from fbvm.code.objects import Numbering
@@ -55,16 +55,16 @@ def place(checker: Checker) -> Placed:
     _place_located(located, placed)
     for pou in checker.bodies:
         _fill_in(pou)
-    for row in checker.settings.completed:
+    for row in checker.var_config.completed:
         _complete(row, slots, placed)
     placed.objects = Objects(_numbered(checker, slots), leases, leases_at)
     placed.initial += _runs(slots)
-    retaining = Inside(checker, lambda pou: any(variable.retain for variable in pou.order))
+    retaining = Containment(checker, lambda pou: any(variable.retain for variable in pou.order))
     for variable in checker.global_order:
         placed.symbols.setdefault(fold(_path(variable)), _symbol(variable))
         if variable.place == "abs" and not variable.reference:
             placed.retained += _retained_in(variable.type, variable.offset, _path(variable), retaining, variable.retain)
-    for access in checker.settings.accesses:
+    for access in checker.var_config.accesses:
         offset, bit = _where(access.spot, placed)
         placed.symbols.setdefault(fold(access.name), Field(
             access.name, access.spot.type, offset, "VAR_ACCESS", bit, absolute=True, constant=not access.writable))
@@ -197,7 +197,7 @@ def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:
             start = None
 
 
-def _retained_in(kind: Type, offset: int, path: str, retaining: Inside, whole: bool) -> Iterator[Retained]:
+def _retained_in(kind: Type, offset: int, path: str, retaining: Containment, whole: bool) -> Iterator[Retained]:
     """A `whole` value, or RETAIN variables of instances inside it; headers of instances belong to the program."""
     if not whole and not retaining(kind):
         return
@@ -210,7 +210,7 @@ def _retained_in(kind: Type, offset: int, path: str, retaining: Inside, whole: b
         for member in kind.fields.values():
             yield from _retained_in(member.type, offset + member.offset, f"{path}.{member.name}", retaining, whole)
     elif isinstance(kind, StructType):
-        for variable in retaining.checker.block_of(kind).order:
+        for variable in retaining.context.block_of(kind).order:
             if variable.place != "self" or variable.reference:
                 continue
             name = f"{path}.{variable.name}"

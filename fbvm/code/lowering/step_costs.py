@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fbvm.check.statements import bodies
+from fbvm.check.symbols.statement_lists import bodies
 from fbvm.syntax import tree
 
 _LOOPS = tree.For | tree.While | tree.Repeat

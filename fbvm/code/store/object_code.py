@@ -12,7 +12,7 @@ from fbvm.base.areas import AREAS
 from fbvm.base.dialects import Dialect
 from fbvm.base.types import ArrayType, RefType, StructType, Type, fold
 from fbvm.check.checker import Checker
-from fbvm.check.symbols.dependencies import Asked, Key, key_of
+from fbvm.check.symbols.dependencies import Dependencies, Key, key_of
 from fbvm.check.symbols.facts import Pou, Variable
 from fbvm.code.image import Body, Site
 from fbvm.code.lowering.bodies import BodyLowering
@@ -85,7 +85,8 @@ _BASES = {
 class Shelf:
     """The object code of shipped blocks in one dialect, by their trees, which live as long as the process."""
 
-    asked: dict[tree.Pou, Asked] = field(default_factory=dict)
+    dependencies: dict[tree.Pou, Dependencies] = field(default_factory=dict)
+    """Recorded by the check of each body that has object code."""
     code: dict[tree.Pou, ObjectCode | None] = field(default_factory=dict)
     """None for what is lowered with its program."""
     met: set[tree.Pou] = field(default_factory=set)
@@ -95,11 +96,11 @@ class Shelf:
         """The body of a POU in a program.
 
         Object code is made when a shipped one is met again: it takes longer once, which most processes would not get back."""
-        if pou in checker.asked and pou.tree not in self.code:
+        if pou in checker.dependencies and pou.tree not in self.code:
             if pou.tree in self.met:
                 self.code[pou.tree] = code = made(checker, pou)
                 if code is not None:
-                    self.asked[pou.tree] = checker.asked[pou]
+                    self.dependencies[pou.tree] = checker.dependencies[pou]
             self.met.add(pou.tree)
         known = self.code.get(pou.tree)
         return known.link(program, checker, pou) if known is not None else BodyLowering(program, checker, pou).body()

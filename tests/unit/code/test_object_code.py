@@ -140,7 +140,7 @@ def test_what_is_kept_leads_to_no_program() -> None:
         for _ in range(2):
             compile_text(text)
     seen: set[int] = set()
-    left: list[object] = [*kept().code.values(), *kept().asked.values()]
+    left: list[object] = [*kept().code.values(), *kept().dependencies.values()]
     assert len(left) > 10
     while left:
         item = left.pop()
@@ -156,7 +156,7 @@ def test_what_is_kept_has_an_end() -> None:
         for name in ("CTUD", "MTCP_ETN_Fn03"):
             for size in range(3):
                 compile_text(with_blocks([name], f"pad{number} : ARRAY [0..{size}] OF INT;"))
-        sizes.append((len(kept().code), len(kept().asked), len(kept().met)))
+        sizes.append((len(kept().code), len(kept().dependencies), len(kept().met)))
     assert sizes[0] == sizes[1] == sizes[2] and sizes[0][0] > 5
 
 

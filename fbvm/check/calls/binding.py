@@ -1,0 +1,170 @@
+"""Arguments of a call of a POU: each finds its parameter and fits it, and what is missing is reported."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fbvm.base.types import BOOL, DEFAULT_STRING, AnyType, EnumType, RefType, StringType, Type, fold, followed
+from fbvm.check.calls.arguments import MIXED, MIXED_HINT, mixed, output
+from fbvm.check.expressions import references
+from fbvm.check.expressions.assignability import same
+from fbvm.check.expressions.scope import Scope
+from fbvm.check.expressions.writes import writable
+from fbvm.check.symbols.facts import Pou, PouCall, Variable, holds_block, is_block
+from fbvm.check.symbols.vendor_names import comma_hint
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder
+
+PARAMETER_KINDS = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
+"""Sections whose variables callers name."""
+
+
+def bind(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None:
+    """Match arguments with parameters, complain about what does not fit or is missing."""
+    scope.note_call(pou, call)
+    other = mixed(call, scope.dialect)
+    if other is not None:
+        scope.error("S0406", other, MIXED, MIXED_HINT)
+        return
+    for argument in call.arguments:
+        if (name := _compared(scope, argument, pou)):
+            scope.error("S0402", argument, f"this compares {name}, and passes the result",
+                        f"`:=` passes an argument: {name} := ...")
+            return
+    named = [a for a in call.arguments if a.kind]
+    positional = [a for a in call.arguments if not a.kind]
+    given: dict[str, tree.Node] = {}
+    if positional:
+        _positional(scope, call, positional, named, pou, bound, given)
+    for argument in named:
+        _named(scope, argument, pou, bound, given)
+    empty = {name for name, node in given.items() if isinstance(node, tree.Argument) and node.value is None}
+    missing = [v.name for v in pou.parameters("VAR_IN_OUT") if fold(v.name) not in given.keys() - empty]
+    if missing and not pou.has_failed_names:
+        scope.error("S0404", call, f"the in-out {' and '.join(missing)} of {pou.name} is missing",
+                    f"pass a variable: {missing[0]} := ...")
+
+
+def _positional(scope: Scope, call: tree.Call, arguments: Sequence[tree.Argument], named: Sequence[tree.Argument], pou: Pou,
+                bound: PouCall, given: dict[str, tree.Node]) -> None:
+    names = {fold(a.name.text) for a in named if a.name is not None}
+    names = {pou.other_names.get(name, name) for name in names} | {"EN", "ENO"}
+    parameters = [v for v in pou.order if v.kind in PARAMETER_KINDS and fold(v.name) not in names]
+    if len(arguments) > len(parameters) and not pou.has_failed_names:
+        plural = "" if len(parameters) == 1 else "s"
+        scope.error("S0402", arguments[len(parameters)],
+                    f"{pou.name} has {len(parameters) or 'no'} parameter{plural}, {len(arguments)} given",
+                    comma_hint(scope.text(call)))
+    for argument, variable in zip(arguments, parameters, strict=False):
+        assert argument.value is not None
+        given[fold(variable.name)] = argument
+        if variable.kind != "VAR_INPUT" or not is_block(variable.type):
+            _pass(scope, argument, variable, bound)
+    open_inputs = [v.name for v in parameters[len(arguments):] if v.kind == "VAR_INPUT" and not v.explicit]
+    if open_inputs and not named:
+        scope.error("S0404", call, f"{pou.name} needs {' and '.join(open_inputs)} too",
+                    "a call without names gives all inputs; name the parameters to leave some out")
+
+
+def _compared(scope: Scope, argument: tree.Argument, pou: Pou) -> str:
+    """The parameter that `IN = x` names for `IN := x`; "" if it is none of that."""
+    value = argument.value
+    if argument.kind or not isinstance(value, tree.Binary) or value.op != "=" or not isinstance(value.left, tree.NameRef):
+        return ""
+    name = fold(value.left.text)
+    known = next((v.name for v in pou.order if fold(v.name) == name and v.kind in PARAMETER_KINDS), "")
+    return known if scope.variable(name) is None else ""
+
+
+def _named(scope: Scope, argument: tree.Argument, pou: Pou, bound: PouCall, given: dict[str, tree.Node]) -> None:
+    assert argument.name is not None
+    name = fold(argument.name.text)
+    name = pou.other_names.get(name, name)
+    if name in given:
+        scope.error("S0403", argument.name, f"{argument.name.text} is given twice")
+        return
+    given[name] = argument
+    variable = next((v for v in pou.order if fold(v.name) == name and v.kind in PARAMETER_KINDS), None)
+    if variable is None:
+        _implicit(scope, argument, name, pou, bound)
+    elif (variable.kind == "VAR_OUTPUT") != (argument.kind == "=>"):
+        arrow = "=>" if variable.kind == "VAR_OUTPUT" else ":="
+        scope.error("S0402", argument, f"{variable.name} is {_described(variable)}: write {variable.name} {arrow} ...")
+    elif argument.value is not None:
+        if variable.kind == "VAR_INPUT" and is_block(variable.type):
+            return  # refused where it is declared
+        _pass(scope, argument, variable, bound)
+
+
+def _implicit(scope: Scope, argument: tree.Argument, name: str, pou: Pou, bound: PouCall) -> None:
+    """EN and ENO of a POU that does not declare them; anything else is unknown."""
+    assert argument.name is not None
+    if name == "EN" and argument.kind == ":=":
+        if argument.value is not None and scope.fit(argument.value, BOOL, "S0405", "EN"):
+            bound.enable = argument.value
+    elif name == "ENO" and argument.kind == "=>":
+        if argument.value is not None and output(scope, argument, BOOL, "ENO"):
+            bound.enabled.append((argument.value, argument.negated))
+    elif not pou.is_failed(name):
+        known = [v.name for v in pou.order if v.kind in PARAMETER_KINDS]
+        scope.error("S0402", argument.name, f"{pou.name} has no parameter {argument.name.text}",
+                    scope.project.choices(argument.name.text, known))
+        if argument.value is not None:
+            scope.infer(argument.value)
+
+
+def _pass(scope: Scope, argument: tree.Argument, variable: Variable, bound: PouCall) -> None:
+    value = argument.value
+    assert value is not None
+    if variable.kind == "VAR_INPUT":
+        if fold(variable.name) == "EN":
+            if scope.fit(value, BOOL, "S0405", "EN"):
+                bound.enable = value
+        elif isinstance(variable.type, RefType) and variable.type.follows:
+            if references.lend(scope, value, followed(variable.type), "S0405", f"the input {variable.name}"):
+                bound.inputs.append((variable, value))
+        elif scope.fit(value, variable.type, "S0405", variable.name):
+            bound.inputs.append((variable, value))
+    elif variable.kind == "VAR_IN_OUT":
+        if _in_out(scope, value, variable):
+            bound.in_outs.append((variable, value))
+    elif output(scope, argument, followed(variable.type), variable.name):
+        bound.outputs.append((variable, value, argument.negated))
+
+
+def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
+    kind = scope.infer(value)
+    if kind is None:
+        return False
+    if not scope.is_variable(value):
+        scope.error("S0407", value, f"the in-out {variable.name} needs a variable, not a value")
+        return False
+    if isinstance(variable.type, AnyType) and holds_block(kind):
+        scope.error("S0405", value, f"{variable.name} is {variable.type}, and {kind} is or holds an instance",
+                    "pass a variable of it")
+        return False
+    numbers = scope.dialect.numbers_of_enumerations
+    if not same(kind.base if numbers and isinstance(kind, EnumType) else kind, variable.type) and \
+            not _long_enough(kind, variable):
+        hint = "an in-out takes a variable of exactly its own type"
+        if isinstance(kind, StringType) and variable.any_length:
+            hint = f"an in-out STRING without a length works on {DEFAULT_STRING} characters: " \
+                "pass a variable that has as many, or give both the same length"
+        scope.error("S0405", value, f"the in-out {variable.name} needs {variable.type}, this is {kind}", hint)
+        return False
+    if isinstance(value, ladder.Words):
+        value = value.of
+    return variable.constant or writable(scope, value, f"be passed to the in-out {variable.name}")
+
+
+def _long_enough(kind: Type, variable: Variable) -> bool:
+    """True for a STRING that is longer than an in-out declared without a length, which uses its beginning.
+
+    The standard leaves open what such an in-out takes; a reference carries no length, so a shorter one is refused."""
+    wanted = variable.type
+    return variable.any_length and isinstance(kind, StringType) and isinstance(wanted, StringType) and \
+        kind.wide == wanted.wide and kind.capacity >= wanted.capacity
+
+
+def _described(variable: Variable) -> str:
+    return {"VAR_INPUT": "an input", "VAR_OUTPUT": "an output", "VAR_IN_OUT": "an in-out"}[variable.kind]

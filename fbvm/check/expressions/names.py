@@ -1,0 +1,69 @@
+"""Names and addresses as values: variables, members of enumerations, programs, %IX0.3."""
+
+from __future__ import annotations
+
+from fbvm.base.areas import FLAG_AREAS, AddressError, parse_address
+from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, Type, fold
+from fbvm.check.expressions import unknown_names
+from fbvm.check.expressions.scope import Scope
+from fbvm.check.symbols.facts import Variable
+from fbvm.syntax import tree
+
+
+def name(scope: Scope, expr: tree.NameRef, want: Type | None) -> Type | None:
+    """The type of the variable, or of the member of an enumeration, that a name means."""
+    if scope.pou is not None and scope.pou.later and fold(expr.text) in scope.pou.later:
+        constant = scope.context.rules.later_constant(scope.context, scope.pou, expr)
+        return variable(scope, expr, constant) if constant is not None else None
+    found = scope.variable(expr.text)
+    if found is not None:
+        return variable(scope, expr, found)
+    own = scope.source.library
+    members = [m for m in scope.project.enum_members.get(fold(expr.text), ()) if m[2] or not own]
+    near = [m for m in members if m[2] == own]
+    wanted = [m for m in members if m[0] == want] or near or members
+    if len({kind.name for kind, _, _ in wanted}) == 1:
+        scope.facts.constants[expr] = wanted[0][1]
+        return wanted[0][0]
+    if wanted:
+        scope.error("S0201", expr, f"{expr.text} is a member of several enumerations",
+                    "write which: " + " or ".join(f"{kind}#{expr.text}" for kind, _, _ in wanted))
+        return None
+    unknown_names.report_unknown(scope, expr)
+    return None
+
+
+def variable(scope: Scope, expr: tree.Expr, meant: Variable) -> Type | None:
+    """The type of an expression that names a variable; None if the value of that is wrong, which is reported."""
+    if meant.wrong:
+        return None
+    scope.facts.variables[expr] = meant
+    if meant.constant and meant.value is not None:
+        scope.facts.constants[expr] = meant.value
+    return meant.type
+
+
+def program(scope: Scope, expr: tree.NameRef) -> bool:
+    """True for the name of a program that stands for its one instance, which has its type and variable from then on."""
+    if expr in scope.facts.types or expr in scope.facts.wrong:
+        return False
+    pou = scope.project.pou(expr.text, scope.source) if scope.variable(expr.text) is None else None
+    instance = scope.context.program_instance(pou, expr) if pou is not None and pou.kind == "PROGRAM" else None
+    if instance is None:
+        return False
+    scope.facts.types[expr], scope.facts.variables[expr] = instance.type, instance
+    return True
+
+
+def address(scope: Scope, expr: tree.Direct, want: Type | None) -> Type | None:
+    """The type of a directly represented variable: BOOL or a bit string of its width."""
+    try:
+        meant = parse_address(expr.text, scope.context.areas)
+    except AddressError as error:
+        scope.error("S0601", expr, str(error))
+        return None
+    scope.facts.directs[expr] = meant
+    scope.context.use_area(meant.area)
+    if meant.bit is not None or meant.area in FLAG_AREAS:
+        return BOOL
+    return {8: BYTE, 32: DWORD, 64: LWORD}.get(meant.size_bits, WORD)

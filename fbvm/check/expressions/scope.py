@@ -1,0 +1,207 @@
+"""The scope of an expression: the names that it sees, and the type and constant that it gets."""
+
+from __future__ import annotations
+
+from fbvm.base.diagnostics import Source
+from fbvm.base.types import (
+    BOOL,
+    DINT,
+    INT,
+    LINT,
+    LREAL,
+    ULINT,
+    AnyType,
+    EnumType,
+    RefType,
+    StringType,
+    StructType,
+    SubrangeType,
+    Type,
+    base,
+    fold,
+)
+from fbvm.check.expressions import any_parameters
+from fbvm.check.expressions.assignability import (
+    assignable,
+    conversion_hint,
+    converted_by_dialect,
+    fitting_hint,
+    hidden_hint,
+    is_untyped,
+    literal_hint,
+)
+from fbvm.check.expressions.constants import convert, cut, limits
+from fbvm.check.expressions.values import is_any
+from fbvm.check.symbols.context import Context
+from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Facts, Pou, Value, Variable, is_block
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder
+
+_BEHIND_REFERENCE = tree.Deref | tree.Index | ladder.Memory | ladder.Words
+"""Expressions that name a place in memory without a variable."""
+_PLACES = _BEHIND_REFERENCE | tree.NameRef | tree.Direct | tree.Member | tree.Part
+"""Expressions that may name a place in memory."""
+_CONSTANT_PLACES = ("S0503", "S0705", "S0801")
+"""Codes of places whose values must be known before the program runs: a conversion does not help there."""
+
+
+class Scope:
+    """Where expressions stand: a source, and the POU whose variables they see (None in types and global declarations).
+
+    In the `late` scope of a POU are the initial values that its frame gets at each start of the body.  The rules of all
+    expressions get the scope, and call `infer` for the parts of an expression."""
+
+    def __init__(self, context: Context, source: Source, pou: Pou | None, late: bool = False) -> None:
+        self.context = context
+        self.project = context.project
+        self.dialect = context.project.dialect
+        self.facts: Facts = context.facts
+        self.source = source
+        self.pou = pou
+        self.late = late
+        self._rules = context.rules.expressions
+        self.qualifiers: set[tree.NameRef] = set()
+        """Names that stand in front of a point."""
+        self.counters: list[tuple[object, ...]] = []
+        """Places of the counters of the FOR loops around the present statement."""
+
+    def error(self, code: str, node: tree.Node, message: str, hint: str = "",
+              related: tuple[Source, int, str] | None = None) -> None:
+        self.project.report.add(code, self.source, node, message, hint, related)
+
+    def text(self, node: tree.Node) -> str:
+        """A piece of the program as it is written, for messages."""
+        return " ".join(self.source.text[node.start:node.end].split())
+
+    # --- entry points -----------------------------------------------------------------------------------------------
+
+    def infer(self, expr: tree.Expr, want: Type | None = None) -> Type | None:
+        """The type of an expression, or None after a diagnostic.  `want` helps literals that meet nothing else.
+
+        An expression is worked out once; calls ask for their arguments' types more than once."""
+        if expr in self.facts.types or expr in self.facts.wrong:
+            return self.facts.types.get(expr)
+        kind = self._rules[type(expr)](self, expr, want)
+        if isinstance(kind, RefType) and kind.follows:
+            self.facts.followed[expr] = kind
+            kind = kind.target
+        if kind is not None:
+            self.facts.types[expr] = kind
+        else:
+            self.facts.wrong.add(expr)
+        return kind
+
+    def settle(self, expr: tree.Expr, want: Type | None = None) -> Type | None:
+        """As `infer`, but a literal without a context takes its own smallest type."""
+        kind = self.infer(expr, want)
+        if kind is UNTYPED_INT:
+            value = self.facts.constants[expr]
+            assert isinstance(value, int)
+            for candidate in (INT, DINT, LINT, ULINT):
+                if candidate.low <= value <= candidate.high:
+                    return self.adopt(expr, candidate)
+            self.error("S0108", expr, f"{value} does not fit any integer type")
+            return None
+        return self.adopt(expr, LREAL) if kind is UNTYPED_REAL else kind
+
+    def fit(self, expr: tree.Expr, target: Type, code: str = "S0301", role: str = "") -> bool:
+        """Type `expr` for a place of type `target`; False after a diagnostic."""
+        kind = self.infer(expr, target)
+        if kind is None:
+            return False
+        if is_untyped(kind):
+            return self.adopt(expr, target, code) is not None
+        if assignable(kind, target):
+            value = self.facts.constants.get(expr)
+            return value is None or self._in_range(expr, value, target, code)
+        if converted_by_dialect(kind, target, self.dialect):
+            if expr in self.facts.constants:
+                self.facts.constants[expr] = cut(self.facts.constants[expr], base(target))
+            return True
+        known = code in _CONSTANT_PLACES and not is_block(kind)
+        self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
+                   hidden_hint(expr, target) or
+                   (literal_hint(self.facts.constants.get(expr), base(target)) if known else fitting_hint(expr, kind, target)))
+        return False
+
+    def _in_range(self, expr: tree.Expr, value: Value, target: Type, code: str) -> bool:
+        if isinstance(target, StringType) and isinstance(value, bytes | str) and len(value) > target.capacity and code != "S0503":
+            self._loses(expr, "S0790", f"the text has {len(value)} characters, and {target} keeps {target.capacity} of them")
+        if isinstance(target, SubrangeType) and isinstance(value, int) and not target.low <= value <= target.high:
+            self.error("S0702", expr, f"{value} is outside {target.low}..{target.high} of {target}")
+            return False
+        return True
+
+    def _loses(self, expr: tree.Expr, code: str, message: str) -> None:
+        """Remember a constant that its place does not keep as it is written."""
+        self.facts.losses.append((self.source, expr, code, message))
+
+    def condition(self, expr: tree.Expr, what: str) -> None:
+        """An expression that must be BOOL."""
+        kind = self.infer(expr, BOOL)
+        if is_untyped(kind):
+            kind = self.adopt(expr, BOOL, "S0303")
+        if kind is not None and base(kind) != BOOL:
+            step = isinstance(kind, StructType) and not kind.block and set(kind.fields) == {fold("X"), fold("T")}
+            self.error("S0303", expr, f"the condition of {what} is {'a step' if step else kind}, not BOOL",
+                       f"write {self.text(expr)}.X" if step else conversion_hint(kind, BOOL))
+
+    def adopt(self, expr: tree.Expr, target: Type, code: str = "S0301") -> Type | None:
+        """Give an expression of nothing but untyped literals the type `target`."""
+        value = self.facts.constants[expr]
+        kind = base(target)
+        untyped = self.facts.types[expr]
+        assert isinstance(value, int | float)
+        if isinstance(kind, RefType) and value == 0:  # CODESYS writes 0 for NULL
+            self.facts.types[expr] = target
+            return target
+        if isinstance(kind, EnumType) and self.dialect.numbers_of_enumerations:
+            kind = kind.base
+        if self.dialect.narrowing and untyped is UNTYPED_REAL and is_any(kind, "ANY_INT"):
+            untyped, value = UNTYPED_INT, int(value)
+        if untyped is UNTYPED_REAL and not is_any(kind, "ANY_REAL") or \
+                not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_REAL"):
+            self.error(code, expr, f"{untyped} does not fit {target}", literal_hint(value, kind))
+            return None
+        span = limits(target)
+        if span is not None and not span[0] <= value <= span[1]:
+            self.error("S0702", expr, f"{value} does not fit {target}, which holds {span[0]} to {span[1]}",
+                       literal_hint(value, kind) if kind == BOOL else "")
+            return None
+        self.facts.constants[expr] = held = convert(value, kind)
+        if untyped is UNTYPED_INT and isinstance(held, float) and held != value:
+            self._loses(expr, "S0791", f"{kind} cannot hold {value}: it becomes {held:.0f}")
+        self.facts.types[expr] = target
+        return target
+
+    def note_call(self, pou: Pou, node: tree.Node) -> None:
+        """Remember who calls whom, for the check of recursion."""
+        if self.pou is not None:
+            self.pou.calls.setdefault(pou, node)
+
+    # --- names ------------------------------------------------------------------------------------------------------
+
+    def variable(self, name: str) -> Variable | None:
+        """The variable that a name means here: the POU's own, else a global one."""
+        if self.pou is not None:
+            found = self.pou.variables.get(fold(name))
+            if found is not None:
+                return found
+        return self.context.global_variable(name, self.source)
+
+    def named_type(self, name: str) -> Type | None:
+        """The type of that name, elementary or declared; None without a diagnostic of its own."""
+        return self.context.named_type(name, self.source)
+
+    def is_in_memory(self, expr: tree.Expr) -> bool:
+        """True for a place in memory, and for a value that is read of one, such as a member of an ANY parameter."""
+        expr = self.facts.root(expr)
+        return isinstance(expr, _BEHIND_REFERENCE) or expr in self.facts.variables or expr in self.facts.directs or \
+            expr in self.facts.followed
+
+    def is_variable(self, expr: tree.Expr) -> bool:
+        """True for an expression that names a place in memory."""
+        if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
+            return any_parameters.is_array(expr)
+        return expr not in self.facts.rewritten and self.is_in_memory(expr) and \
+            (isinstance(expr, _PLACES) or expr in self.facts.followed)

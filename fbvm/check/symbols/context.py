@@ -1,0 +1,257 @@
+"""The context of one check: the project with its facts, the rules of the language, and what is resolved on demand.
+
+The parts of the check import this module and not one another.  Where a part needs a type, a global variable or the interface
+of a POU, the context looks it up, and has it resolved first by the rule that `Rules` has for its declaration."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from fbvm.base.areas import AREAS, E_NAMES, Area, Mailbox, e_bank
+from fbvm.base.diagnostics import Source
+from fbvm.base.dialects import Dialect
+from fbvm.base.types import EnumType, RefType, StructType, Type, fold
+from fbvm.check.symbols.dependencies import Dependencies, Key, has_lasting_body, key_of
+from fbvm.check.symbols.elementary_types import elementary_type
+from fbvm.check.symbols.facts import Facts, Pou, StandardCall, TaskFact, Value, Variable, list_name
+from fbvm.check.symbols.project import Project, Resolved, TypeEntry
+from fbvm.check.symbols.statement_lists import writes_eno
+from fbvm.syntax import tree
+
+Evaluate = Callable[[StandardCall, Sequence[Value], Dialect], Value | None]
+"""The value of a call of a standard function with constant arguments, None if it is not known before the program runs.
+
+Raises Undefined where the call would trap."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What is done with each kind of tree node.  The package's top module, `checker`, puts the rules together."""
+
+    expressions: Mapping[type, Callable[..., Type | None]]
+    """By class of expression: `rule(scope, expr, want)` infers its type, None after a diagnostic."""
+    type_declaration: Callable[[Context, TypeEntry], Resolved | None]
+    """Resolves a declared type; None after a diagnostic."""
+    global_variable: Callable[[Context, Key], None]
+    """Declares the global variable of that name, if a declaration of it was read and not resolved yet."""
+    interface: Callable[[Context, Pou], None]
+    """Fills in the variables and the layout of a POU."""
+    later_constant: Callable[[Context, Pou, tree.NameRef], Variable | None]
+    """Resolves a CONSTANT of a POU that is declared behind the declaration that names it; None after a diagnostic."""
+    body: Callable[[Context, Pou], None]
+    """Checks the statements of a POU."""
+
+
+class Context:
+    """The state of one check.  `checked_before` has the bodies of libraries that need no check, with their dependencies;
+    None if this check records no dependencies for others."""
+
+    def __init__(self, project: Project, rules: Rules, evaluate: Evaluate,
+                 checked_before: Mapping[tree.Pou, Dependencies] | None = None) -> None:
+        self.project = project
+        self.rules = rules
+        self.evaluate = evaluate
+        self.report = project.report
+        self.facts: Facts = project.facts
+        brought = project.libraries.mailboxes
+        self.areas: dict[str, Area] = {**AREAS, **{name: e_bank(name, 0) for name in E_NAMES},
+                                       **{name: box.at(0) for name, box in brought.items()}}
+        """Areas that a program may name; where the optional ones lie is known after layout."""
+        self.e_banks: set[str] = set()
+        """Names of the banks of E memory that the program uses."""
+        self.mailboxes: dict[str, Mailbox] = {}
+        """Mailboxes of units that the program uses, by area."""
+        self.tasks: list[TaskFact] = []
+        """What runs, filled by the CONFIGURATION."""
+        self.resource: tree.Resource | None = None
+        """The RESOURCE that the PLC is."""
+        self.global_order: list[Variable] = []
+        """Global variables and program instances in the order of their slots."""
+        self.bodies: list[Pou] = []
+        """POUs whose bodies are checked; their `number` is the position here."""
+        self.dependencies: dict[Pou, Dependencies] = {}
+        """Recorded dependencies of bodies of libraries whose check can be replaced by repeating them."""
+        self._checked_before = checked_before
+        self._blocks: dict[int, Pou] = {}
+        self._identifiers = 0
+        self._anonymous = 0
+
+    # --- areas, numbers ---------------------------------------------------------------------------------------------
+
+    def use_area(self, name: str) -> None:
+        """Record that the program names an area: a PLC has E banks and mailboxes of units only then."""
+        self.project.dependencies.record("area", name)
+        if name in self.project.libraries.mailboxes:
+            self.mailboxes[name] = self.project.libraries.mailboxes[name]
+        elif name in E_NAMES:
+            self.e_banks.add(name)
+
+    def new_type_identifier(self) -> int:
+        """The number that begins each instance of one more block or program."""
+        self._identifiers += 1
+        return self._identifiers
+
+    def new_anonymous_number(self) -> int:
+        """A number for one more type without a name."""
+        self._anonymous += 1
+        return self._anonymous
+
+    # --- types ------------------------------------------------------------------------------------------------------
+
+    def named_type(self, name: str, source: Source) -> Type | None:
+        """The type of that name as seen from `source`, elementary or declared; None without a diagnostic of its own."""
+        entry = self.project.type_entry(name, source)
+        if entry is None:
+            return elementary_type(name)
+        resolved = self.declared_type(name, source)
+        return resolved[0] if resolved else None
+
+    def declared_type(self, name: str, source: Source) -> Resolved | None:
+        """A declared type as seen from `source`, resolved at the first call, which reports its errors."""
+        entry = self.project.type_entry(name, source)
+        assert entry is not None
+        self.project.dependencies.record("declared", name)
+        if entry.busy:
+            self.report.add("S0207", entry.source, entry.tree.name,
+                            f"{entry.tree.name.text} contains itself", "a type cannot hold a value of its own type")
+            return None
+        if not entry.done:
+            entry.busy = True
+            with self.project.recording(Dependencies()):
+                entry.resolved = self.rules.type_declaration(self, entry)
+            entry.busy = False
+            entry.done = True
+            _set_targets(entry.awaited, entry.resolved[0] if entry.resolved else None)
+        return entry.resolved
+
+    def type_classes(self) -> EnumType:
+        """The enumeration TYPE_CLASS, whose members ANY parameters tell; a library declares it."""
+        kind = self.named_type("TYPE_CLASS", Source("", "", "codesys"))
+        assert isinstance(kind, EnumType)
+        return kind
+
+    def block_of(self, kind: StructType) -> Pou:
+        """The function block or program whose instances have this type."""
+        return self._blocks[id(kind)]
+
+    # --- global variables -------------------------------------------------------------------------------------------
+
+    def global_variable(self, name: str, source: Source) -> Variable | None:
+        """The global variable of that name as seen from `source`, declared now if it was not yet; None if there is none."""
+        project, folded = self.project, fold(name)
+        for owner in project.owners(source):
+            key = owner, folded
+            if key not in project.globals and (project.sections or key in project.global_declarations):
+                self.rules.global_variable(self, key)
+            if key in project.globals:
+                project.dependencies.record("global", folded)
+                return project.globals[key]
+        return None
+
+    def listed(self, space: str, name: str, source: Source) -> Variable | None:
+        """The global variable `space.name`, both folded: of the list (file) of that name, of any list for a library's name."""
+        variable = self.global_variable(f"{space}.{name}", source) or self.global_variable(name, source)
+        if variable is not None and space in self.project.lists and list_name(variable.source) != space:
+            return None
+        return variable
+
+    def is_failed_global(self, name: tree.NameRef, source: Source) -> bool:
+        """True if there is no such global variable and the reason is reported; it is now if its own declaration needs it."""
+        project = self.project
+        if any((owner, fold(name.text)) in project.busy_globals for owner in project.owners(source)):
+            self.report.add("S0207", source, name, f"the initial value of {name.text} needs {name.text} itself")
+            return True
+        return project.is_failed_global(name.text, source)
+
+    # --- POUs -------------------------------------------------------------------------------------------------------
+
+    def interface(self, pou: Pou, source: Source, node: tree.Node) -> bool:
+        """Resolve the variables and the layout of a POU that `node` names in `source`; False if it holds itself.
+
+        The body of a library's POU is checked with it."""
+        self.project.dependencies.record("interface", *reversed(key_of(pou)))
+        if pou.resolved:
+            return True
+        if pou.busy:
+            self.report.add("S0207", source, node, f"{pou.name} holds an instance of itself",
+                            "an instance can hold instances of other blocks only")
+            return False
+        pou.busy = True
+        outer, self.project.dependencies = self.project.dependencies, Dependencies()
+        self.rules.interface(self, pou)
+        pou.busy = False
+        pou.resolved = True
+        _set_targets(pou.awaited, pou.type)
+        if pou.type is not None:
+            self._blocks[id(pou.type)] = pou
+        if pou.source.library:
+            self.project.dependencies = Dependencies()
+            self.check_body(pou)
+        self.project.dependencies = outer
+        return True
+
+    def program_instance(self, pou: Pou, node: tree.Node) -> Variable | None:
+        """The one instance of a program that is called or looked into by its name; None if a CONFIGURATION has several."""
+        self.project.dependencies.repeatable = False
+        named = [run.name.text for run in (self.resource.programs if self.resource is not None else ())
+                 if fold(run.type_name.text) == fold(pou.name)]
+        if len(named) > 1 or not self.interface(pou, pou.source, node) or pou.type is None:
+            return None
+        name = named[0] if named else pou.name
+        known = self.project.globals.get(("", fold(name)))
+        if known is not None:
+            return known if known.type is pou.type else None
+        instance = Variable(name, pou.type, "PROGRAM", pou.source, pou.tree.name, place="abs", initial=pou.initial)
+        self.global_order.append(instance)
+        self.project.globals["", fold(name)] = instance
+        return instance
+
+    def check_body(self, pou: Pou) -> None:
+        """Check the body of a POU and of its ACTIONs, once; for a library's POU, repeat recorded dependencies instead."""
+        if pou.number >= 0 or not self.interface(pou, pou.source, pou.tree.name) or pou.number >= 0:
+            return
+        pou.number = len(self.bodies)
+        self.bodies.append(pou)
+        pou.writes_eno = writes_eno(pou)
+        if self._checked_before is None or not has_lasting_body(pou):
+            self.rules.body(self, pou)
+        elif (recorded := self._checked_before.get(pou.tree)) is not None:
+            self._repeat(recorded, pou)
+        else:
+            self._record(pou)
+        for action in pou.actions.values():
+            self.check_body(action)
+
+    def _record(self, pou: Pou) -> None:
+        """Check the body of a library's POU, and keep its dependencies if repeating them can replace the check."""
+        reported, dependencies = len(self.report.diagnostics), self.project.dependencies
+        self.rules.body(self, pou)
+        dependencies.record_calls(pou, self.project.pous)
+        if dependencies.repeatable and reported == len(self.report.diagnostics):
+            self.dependencies[pou] = dependencies
+
+    def _repeat(self, recorded: Dependencies, pou: Pou) -> None:
+        """Look up what the check of the same body looked up in another project."""
+        for what, name, library in recorded.lookups:
+            _LOOK_UP[what](self, name, library, pou)
+        for key, node in recorded.calls:
+            pou.calls[self.project.pous[key]] = node
+
+
+_LOOK_UP: dict[str, Callable[[Context, str, str, Pou], object]] = {
+    "POU": lambda context, name, library, pou: context.project.pou(name, pou.source),
+    "type": lambda context, name, library, pou: context.project.type_entry(name, pou.source),
+    "global": lambda context, name, library, pou: context.global_variable(name, pou.source),
+    "area": lambda context, name, library, pou: context.use_area(name),
+    "declared": lambda context, name, library, pou: context.declared_type(name, pou.source),
+    "interface": lambda context, name, library, pou: context.interface(context.project.pous[library, name], pou.source, pou.tree),
+}
+"""How each kind of look-up of `Dependencies` is repeated for the body of a POU."""
+
+
+def _set_targets(references: list[RefType], target: Type | None) -> None:
+    """Give references that were made before their target was resolved that target."""
+    for kind in references:
+        object.__setattr__(kind, "target", target)
+    references.clear()

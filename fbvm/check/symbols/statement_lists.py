@@ -1,0 +1,40 @@
+"""The statement lists inside statements, and what is searched for in all of them."""
+
+from __future__ import annotations
+
+from fbvm.base.types import fold
+from fbvm.check.symbols.facts import Pou
+from fbvm.syntax import tree
+from fbvm.syntax.tree import ladder, sfc
+
+_PLAIN = tree.Assign | tree.CallStatement
+_WITH_BODY = tree.For | tree.While | tree.Repeat | ladder.Ladder | ladder.Rung | sfc.Sfc
+
+
+def bodies(statement: tree.Statement) -> list[tree.Block]:
+    """The statement lists inside a statement."""
+    if isinstance(statement, _PLAIN):
+        return []
+    if isinstance(statement, tree.If):
+        return [body for _, body in statement.branches] + [statement.otherwise or ()]
+    if isinstance(statement, tree.Case):
+        return [branch.body for branch in statement.branches] + [statement.otherwise or ()]
+    if isinstance(statement, _WITH_BODY):
+        return [statement.body]
+    return []
+
+
+def writes_eno(pou: Pou) -> bool:
+    """True if the body of a POU assigns ENO anywhere.  Most bodies do not even name it, which a look at the text tells."""
+    node = pou.tree
+    return "ENO" in fold(pou.source.text[node.start:node.end]) and _assigns_to(node.body, "ENO")
+
+
+def _assigns_to(statements: tree.Block, name: str) -> bool:
+    for statement in statements:
+        if isinstance(statement, tree.Assign) and any(
+                isinstance(t, tree.NameRef) and fold(t.text) == name for t in statement.targets):
+            return True
+        if any(_assigns_to(body, name) for body in bodies(statement)):
+            return True
+    return False
