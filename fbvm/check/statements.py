@@ -13,7 +13,7 @@ from fbvm.check.expressions import references
 from fbvm.check.expressions.assignability import as_number, assignable, conversion_hint
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
-from fbvm.check.expressions.writes import note_count, place, writable
+from fbvm.check.expressions.writes import place, warn_of_written_counter, writable
 from fbvm.check.symbols.context import Context
 from fbvm.check.symbols.facts import Pou, Value
 from fbvm.syntax import tree
@@ -50,7 +50,7 @@ class _Statements:
             self.error("S0501", expr, f"this is a value of {kind} and cannot {purpose}",
                        "only variables stand left of :=")
             return None
-        note_count(self.scope, expr)
+        warn_of_written_counter(self.scope, expr)
         return kind if writable(self.scope, expr, purpose) else None
 
     def _assign(self, node: tree.Assign) -> None:

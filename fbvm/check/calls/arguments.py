@@ -9,7 +9,7 @@ from fbvm.base.dialects import Dialect, takers
 from fbvm.base.types import BOOL, Type, base, fold
 from fbvm.check.expressions.assignability import assignable, converted_by_dialect, holds
 from fbvm.check.expressions.scope import Scope
-from fbvm.check.expressions.writes import note_count, writable
+from fbvm.check.expressions.writes import warn_of_written_counter, writable
 from fbvm.check.symbols.facts import Guard
 from fbvm.check.symbols.vendor_names import comma_hint
 from fbvm.syntax import tree
@@ -151,5 +151,5 @@ def output(scope: Scope, argument: tree.Argument, kind: Type, name: str) -> bool
         scope.error("S0405", value, f"the output {name} is {kind} and does not fit {target}",
                     f"let a variable of {base(kind)} take it, and convert that afterwards")
         return False
-    note_count(scope, value)
+    warn_of_written_counter(scope, value)
     return writable(scope, value, f"take the output {name}")

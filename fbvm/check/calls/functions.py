@@ -89,7 +89,7 @@ def _time_operators(rows: str) -> dict[str, tuple[str, tuple[str, str]]]:
 TIME_OPERATORS = _time_operators(_TIME_ROWS)
 """The typed functions of times: name to the overloaded function and the types of both inputs (table 35)."""
 
-TURNED = frozenset(("TO_BIG_ENDIAN", "TO_LITTLE_ENDIAN", "FROM_BIG_ENDIAN", "FROM_LITTLE_ENDIAN"))
+BYTE_ORDER = frozenset(("TO_BIG_ENDIAN", "TO_LITTLE_ENDIAN", "FROM_BIG_ENDIAN", "FROM_LITTLE_ENDIAN"))
 """Functions that change the order of bytes."""
 
 

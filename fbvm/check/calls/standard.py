@@ -36,6 +36,8 @@ from fbvm.syntax import tree
 
 _SHOWN = {"ANY": "any value", "ENUMERATION": "enumerations", "ANY_STRING": "STRING and WSTRING"}
 _NUMBERS = ("ANY_NUM", "ANY_BIT")
+Passed = list[tuple[tree.Expr, Type]]
+"""Arguments, each with the type of its parameter."""
 
 
 def is_known(name: str) -> bool:
@@ -48,7 +50,7 @@ def call(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value: 
     result = _typed(scope, call, name, want, as_value)
     called = scope.facts.calls.get(call)
     if result and isinstance(called, StandardCall) and call not in scope.facts.guards and \
-            call not in scope.facts.turned:
+            call not in scope.facts.reversed_bytes:
         _fold(scope, call, called)
     return result
 
@@ -161,37 +163,54 @@ def _meaning(scope: Scope, call: tree.Call, name: str, values: list[tree.Expr], 
 
 def _signature(scope: Scope, call: tree.Call, row: Signature, fixed: Elementary | StringType | None,
                want: Type | None) -> Type | str | None:
+    """The result of a function with a signature, "" for none; `fixed` is the type in its name, as in MAX_INT."""
     values = Arguments(scope, call, [name for name, _ in row.parameters], row.repeats,
                        functions.OTHER_NAMES.get(row.key, ())).in_order()
     if values is None:
         return None
-    wanted = [kind for _, kind in row.parameters]
-    wanted += [wanted[-1]] * (len(values) - len(wanted)) if wanted else []
+    wanted = _parameter_types(row, len(values))
     variable: Type | None = fixed
     if "T" in wanted and fixed is None:
         places = [v for v, w in zip(values, wanted, strict=True) if w == "T"]
         variable = _bind(scope, call, places, row, want if row.result == "T" else None)
         if variable is None:
             return None
-    arguments = []
-    for value, kind_name in zip(values, wanted, strict=True):
-        kind = variable if kind_name == "T" else _parameter(scope, value, kind_name)
-        if kind is None or not scope.fit(value, kind, "S0405"):
-            return None
-        arguments.append((value, kind))
-    if row.key in functions.TURNED and variable is not None and not _turned(scope, call, variable):
+    arguments = _fitted(scope, values, wanted, variable)
+    if arguments is None or variable is not None and not _may_pass(scope, call, row, arguments, variable):
         return None
-    whole = [value for value, kind in arguments if kind == variable and not machine(kind)]
-    if whole and not _as_a_whole(scope, call, whole):
-        return None
-    scope.facts.calls[call] = StandardCall(row.key, arguments, (variable,) if variable else ())
     if row.key == "TRUNC" and want is not None and is_any(want, "ANY_INT"):
         scope.facts.calls[call] = StandardCall(row.key, arguments, (arguments[0][1], base(want)))
         return base(want)
+    scope.facts.calls[call] = StandardCall(row.key, arguments, (variable,) if variable else ())
     if row.result == "T":
         assert variable is not None
         return variable
     return ELEMENTARY[row.result] if row.result else ""
+
+
+def _parameter_types(row: Signature, count: int) -> list[str]:
+    """The names of the types of so many parameters, of which the last one may repeat."""
+    wanted = [kind for _, kind in row.parameters]
+    return wanted + [wanted[-1]] * (count - len(wanted)) if wanted else []
+
+
+def _fitted(scope: Scope, values: list[tree.Expr], wanted: list[str], variable: Type | None) -> Passed | None:
+    """Each value with the type of its parameter, where `variable` stands for T; None after a diagnostic."""
+    arguments = []
+    for value, name in zip(values, wanted, strict=True):
+        kind = variable if name == "T" else _parameter(scope, value, name)
+        if kind is None or not scope.fit(value, kind, "S0405"):
+            return None
+        arguments.append((value, kind))
+    return arguments
+
+
+def _may_pass(scope: Scope, call: tree.Call, row: Signature, arguments: Passed, variable: Type) -> bool:
+    """True if a function with a type variable can pass on values of this type; else a diagnostic."""
+    if row.key in functions.BYTE_ORDER and not _may_reverse(scope, call, variable):
+        return False
+    whole = [value for value, kind in arguments if kind == variable and not machine(kind)]
+    return not whole or _as_a_whole(scope, call, whole)
 
 
 def _as_a_whole(scope: Scope, call: tree.Call, values: list[tree.Expr]) -> bool:
@@ -202,15 +221,15 @@ def _as_a_whole(scope: Scope, call: tree.Call, values: list[tree.Expr]) -> bool:
         scope.error("S0405", call, f"{callee(call)} of an array or structure takes no EN and ENO", "write IF instead")
         return False
     made = [value for value in values if _is_result(scope, value)]
-    if made and callee(call).upper() not in ("MOVE", *functions.TURNED):
+    if made and callee(call).upper() not in ("MOVE", *functions.BYTE_ORDER):
         scope.error("S0405", made[0], f"{callee(call)} chooses among variables, not among results of that size",
                     "assign the result to a variable first")
         return False
     return True
 
 
-def _turned(scope: Scope, call: tree.Call, kind: Type) -> bool:
-    """True if the order of the bytes of a value may be changed here; else a diagnostic."""
+def _may_reverse(scope: Scope, call: tree.Call, kind: Type) -> bool:
+    """True if the bytes of a value of this type may be reversed here; else a diagnostic."""
     if _holds_references(kind):
         scope.error("S0405", call, f"{callee(call)}: {kind} holds references, which have no order of bytes")
         return False
@@ -220,7 +239,7 @@ def _turned(scope: Scope, call: tree.Call, kind: Type) -> bool:
         scope.error("S0405", call, f"the bytes of {kind} change places in a variable only",
                     f"write  variable := {callee(call)}(...);  and nothing else in that statement")
         return False
-    scope.facts.turned.add(call)
+    scope.facts.reversed_bytes.add(call)
     return True
 
 
@@ -245,30 +264,33 @@ def _parameter(scope: Scope, value: tree.Expr, name: str) -> Type | None:
 
 def _bind(scope: Scope, call: tree.Call, values: list[tree.Expr], row: Signature, want: Type | None) -> Type | None:
     """The one type that all arguments of a type variable meet in."""
-    kinds = [scope.infer(value, want) for value in values]
-    if None in kinds:
+    inferred = [scope.infer(value, want) for value in values]
+    kinds = [kind for kind in inferred if kind is not None]
+    if len(kinds) < len(inferred):
         return None
-    character = next((kind for kind in kinds if kind is not None and is_any(kind, "ANY_CHAR")), None)
+    character = next((kind for kind in kinds if is_any(kind, "ANY_CHAR")), None)
     kinds = [as_character(scope, value, character) or kind for value, kind in zip(values, kinds, strict=True)]
     bound: Type | None = None
     for kind in kinds:
-        assert kind is not None
-        if is_untyped(kind):
-            continue
-        met = base(kind) if bound is None or same(kind, bound) else common(bound, kind)
-        if isinstance(kind, EnumType) or isinstance(bound, EnumType):
-            met = kind if bound in (None, kind) else None
-        if isinstance(met, StringType):
-            met = string(functions.RESULT_STRING, met.wide)
-        if met is None:
-            scope.error("S0405", call, f"{bound} and {kind} have no type in common")
-            return None
-        bound = met
+        if not is_untyped(kind):
+            met = _met(bound, kind)
+            if met is None:
+                scope.error("S0405", call, f"{bound} and {kind} have no type in common")
+                return None
+            bound = met
     if UNTYPED_REAL in kinds and (bound is None or not is_any(bound, "ANY_REAL")):
         bound = _real(scope, bound, want)
     elif bound is None:
         bound = _integer(scope, call, values, row, want)
     return _limited(scope, call, bound, row) if bound is not None else None
+
+
+def _met(bound: Type | None, kind: Type) -> Type | None:
+    """The type in which one more argument meets those before it; None if there is none."""
+    if isinstance(kind, EnumType) or isinstance(bound, EnumType):
+        return kind if bound in (None, kind) else None
+    met = base(kind) if bound is None or same(kind, bound) else common(bound, kind)
+    return string(functions.RESULT_STRING, met.wide) if isinstance(met, StringType) else met
 
 
 def _real(scope: Scope, bound: Type | None, want: Type | None) -> Type:

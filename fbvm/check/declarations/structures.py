@@ -31,21 +31,19 @@ class Members:
         self._align = 1
 
     def add(self, name: str, kind: Type, initial: bytes, location: tree.Location | None, packed: bool = False) -> str:
-        """Put one more member in its place; what is wrong with it, "" if nothing.  `packed` ones are single bits."""
+        """Put one more member in its place.  Returns what is wrong with it, "" if nothing.  `packed` ones are single bits."""
         align = kind.align if self.pack is None or holds_block(kind) else min(kind.align, self.pack)
         self._align = max(self._align, align)
-        offset, bit = 0 if self.shared else len(self._content) + -len(self._content) % align, None
-        if packed:
-            offset, bit = self._next_bit()
+        bit: int | None
         if location is not None:
-            match = _LOCATION.fullmatch(location.text)
-            if match is None:
-                return f"{location.text} is no place in a structure"
-            offset, bit = int(match[2]) * _UNITS[match[1].upper()], int(match[3]) if match[3] else None
-            if (bit is not None) != (match[1].upper() == "X") or bit is not None and base(kind) != BOOL:
-                return f"{name} is {kind} and cannot lie at {location.text}"
-            if is_block(kind) and offset % kind.align:
-                return f"an instance lies at a multiple of {kind.align} bytes, not at {location.text}"
+            located = _located(name, kind, location)
+            if isinstance(located, str):
+                return located
+            offset, bit = located
+        elif packed:
+            offset, bit = self._next_bit()
+        else:
+            offset, bit = 0 if self.shared else len(self._content) + -len(self._content) % align, None
         if offset + kind.size > MAX_SIZE:
             return f"{name} would lie beyond the end of any structure"
         start = offset * 8 + (bit or 0)
@@ -81,3 +79,16 @@ class Members:
         """The type of the whole and its initial bytes."""
         self._content += bytes(-len(self._content) % self._align)
         return StructType(name, len(self._content), self._align, self.fields), bytes(self._content)
+
+
+def _located(name: str, kind: Type, location: tree.Location) -> tuple[int, int | None] | str:
+    """Offset and bit of a member with a relative location, or what is wrong with that."""
+    match = _LOCATION.fullmatch(location.text)
+    if match is None:
+        return f"{location.text} is no place in a structure"
+    offset, bit = int(match[2]) * _UNITS[match[1].upper()], int(match[3]) if match[3] else None
+    if (bit is not None) != (match[1].upper() == "X") or bit is not None and base(kind) != BOOL:
+        return f"{name} is {kind} and cannot lie at {location.text}"
+    if is_block(kind) and offset % kind.align:
+        return f"an instance lies at a multiple of {kind.align} bytes, not at {location.text}"
+    return offset, bit

@@ -49,27 +49,32 @@ def assignable(kind: Type, target: Type) -> bool:
 
 
 def converted_by_dialect(kind: Type, target: Type, dialect: Dialect) -> bool:
-    """True if a dialect converts a value where the standard wants to see the conversion."""
-    if isinstance(kind, EnumType) and dialect.numbers_of_enumerations:
-        kind = kind.base
+    """True if a dialect converts a value implicitly where the standard demands a conversion function."""
+    if dialect.numbers_of_enumerations and (isinstance(kind, EnumType) or isinstance(target, EnumType)):
+        kind = kind.base if isinstance(kind, EnumType) else kind
         if kind == target or converts(kind, target):
             return True
-    if isinstance(target, EnumType) and dialect.numbers_of_enumerations:
-        target = target.base
+        target = target.base if isinstance(target, EnumType) else target
         if kind == target or converts(kind, target):
             return True
     kind, target = base(kind), base(target)
-    if dialect.narrowing and isinstance(kind, RefType) and isinstance(target, RefType):
+    return dialect.narrowing and _narrows(kind, target) or dialect.integers_and_bits and _holds_bits(kind, target)
+
+
+def _narrows(kind: Type, target: Type) -> bool:
+    """True for a conversion between any two numbers or bit strings, but to BOOL, and between any two references."""
+    if isinstance(kind, RefType) and isinstance(target, RefType):
         return True
-    if dialect.narrowing and is_any(kind, "ANY_NUM", "ANY_BIT") and is_any(target, "ANY_NUM", "ANY_BIT") and target != BOOL:
-        return True
-    if not dialect.integers_and_bits or not isinstance(kind, Elementary) or not isinstance(target, Elementary) or \
-            BOOL in (kind, target):
+    return is_any(kind, "ANY_NUM", "ANY_BIT") and is_any(target, "ANY_NUM", "ANY_BIT") and target != BOOL
+
+
+def _holds_bits(kind: Type, target: Type) -> bool:
+    """True for a conversion between integers and bit strings that keeps all bits, and of any number to a real; not for BOOL."""
+    if not isinstance(kind, Elementary) or not isinstance(target, Elementary) or BOOL in (kind, target):
         return False
-    whole = is_any(kind, "ANY_INT", "ANY_BIT")
     if is_any(target, "ANY_REAL"):
-        return whole and is_any(kind, "ANY_INT") or is_any(kind, "ANY_REAL")
-    return whole and is_any(target, "ANY_INT", "ANY_BIT") and kind.bits <= target.bits
+        return is_any(kind, "ANY_INT", "ANY_REAL")
+    return is_any(kind, "ANY_INT", "ANY_BIT") and is_any(target, "ANY_INT", "ANY_BIT") and kind.bits <= target.bits
 
 
 def as_number(kind: Type, dialect: Dialect) -> Type:
@@ -117,31 +122,38 @@ _DATES = {
 }
 
 
+_FORMS = {"TRUNC": ("ANY_REAL", "ANY_INT"), "BCD_TO": ("ANY_BIT", "ANY_INT"), "TO_BCD": ("ANY_INT", "ANY_BIT")}
+"""Source and target of the conversions that are none between any two types; BOOL is no BCD number."""
+
+
 def convertible(form: str, source: Type, target: Type) -> bool:
-    """True if the tables (22 to 27, and our additions) have the conversion."""
-    if form == "TRUNC":
-        return is_any(source, "ANY_REAL") and is_any(target, "ANY_INT")
-    if form == "BCD_TO":
-        return is_any(source, "ANY_BIT") and is_any(target, "ANY_INT") and source.name != "BOOL"
-    if form == "TO_BCD":
-        return is_any(source, "ANY_INT") and is_any(target, "ANY_BIT") and target.name != "BOOL"
+    """True if the tables (22 to 27, and our additions) have the conversion; `form` is TO, TRUNC, BCD_TO or TO_BCD."""
+    if form in _FORMS:
+        of, to = _FORMS[form]
+        return is_any(source, of) and is_any(target, to) and BOOL not in (source, target)
     if not isinstance(source, Elementary | StringType | EnumType):
         return False
+    both = source, target
     if isinstance(source, EnumType) or isinstance(target, EnumType):
-        return is_any(source, "ANY_INT", "ANY_BIT", "ANY_STRING") or is_any(target, "ANY_INT", "ANY_BIT", "ANY_STRING")
+        return any(is_any(kind, "ANY_INT", "ANY_BIT", "ANY_STRING") for kind in both)
     if isinstance(source, StringType) or isinstance(target, StringType):
         return True
-    if is_any(source, "ANY_CHAR") or is_any(target, "ANY_CHAR"):
-        return all(is_any(kind, "ANY_CHAR", "ANY_INT", "ANY_BIT") and kind != BOOL for kind in (source, target))
-    timed = [is_any(kind, *_TIMES) for kind in (source, target)]
-    if all(timed):
-        short = [kind.name.removeprefix("L") for kind in (source, target)]
-        return short[0] == short[1] or (source.name, target.name) in _DATES
-    if any(timed):
-        return is_any(target if timed[0] else source, "ANY_NUM", "ANY_BIT")
-    if is_any(source, "ANY_REAL") and is_any(target, "ANY_BIT") or is_any(source, "ANY_BIT") and is_any(target, "ANY_REAL"):
-        return "BOOL" in (source.name, target.name) or source.size == target.size
+    if any(is_any(kind, "ANY_CHAR") for kind in both):
+        return all(is_any(kind, "ANY_CHAR", "ANY_INT", "ANY_BIT") and kind != BOOL for kind in both)
+    if any(is_any(kind, *_TIMES) for kind in both):
+        return _time_convertible(source, target)
+    if any(is_any(one, "ANY_REAL") and is_any(other, "ANY_BIT") for one, other in (both, both[::-1])):
+        return BOOL in both or source.size == target.size  # the bits of a real; those of a BOOL are its truth
     return True
+
+
+def _time_convertible(source: Type, target: Type) -> bool:
+    """True for a conversion between a time or date and another one or a number."""
+    timed = [is_any(kind, *_TIMES) for kind in (source, target)]
+    if not all(timed):
+        return is_any(target if timed[0] else source, "ANY_NUM", "ANY_BIT")
+    short = [kind.name.removeprefix("L") for kind in (source, target)]
+    return short[0] == short[1] or (source.name, target.name) in _DATES
 
 
 # --- advice ---------------------------------------------------------------------------------------------------------

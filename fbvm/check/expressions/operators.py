@@ -123,10 +123,10 @@ def _meant(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type 
         return _folded(scope, expr, timed, timed)
     kind = _operand_type(scope, expr, left, right, want)
     if kind is None or not _defined(scope, expr, kind):
-        lent = _lent(scope, expr, left, right, want)
-        if lent is not None:
-            return lent
-        _undefined(scope, expr, left, right, want)
+        numbers = _as_numbers(scope, expr, left, right, want)
+        if numbers is not None:
+            return numbers
+        _report_undefined(scope, expr, left, right, want)
         return None
     kind = _widened(scope, expr.op, kind)
     if not is_untyped(kind):
@@ -137,30 +137,37 @@ def _meant(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type 
 
 
 def _reference(scope: Scope, expr: tree.Binary) -> Type | None:
-    """References are compared; pointers are ordered too, and moved by numbers of bytes; in a dialect that counts
-    elements all references are moved."""
+    """The type of an operator with a reference: references are compared; pointers are ordered too, and moved by numbers of
+    bytes; in a dialect that counts elements all references are moved."""
     left, right = (_beside_reference(scope, expr, side) for side in (expr.left, expr.right))
-    moves = [isinstance(kind, RefType) and kind.moves for kind in (left, right)]
     counts = scope.dialect.pointers_count_elements
-    moved = [isinstance(kind, RefType) and kind.target is not None for kind in (left, right)] if counts else moves
-    refers = isinstance(left, RefType) and isinstance(right, RefType)
-    result: Type | None = None
-    if expr.op in COMPARISONS:
-        same = expr.op in ("=", "<>") and refers and common(left, right) is not None
-        result = BOOL if all(moves) or same else None
-    elif expr.op == "-" and all(moves):
-        result = DINT
-    elif expr.op in ("+", "-") and moved[0] and is_any(right, "ANY_INT", "ANY_BIT"):
-        result = left
-    elif expr.op == "+" and moved[1] and is_any(left, "ANY_INT", "ANY_BIT"):
-        result = right
+    result = _compared_references(expr.op, left, right) if expr.op in COMPARISONS else _moved(expr.op, left, right, counts)
     if result is None:
-        _undefined(scope, expr, left, right, None)
+        _report_undefined(scope, expr, left, right, None)
         return None
     scope.facts.operands[expr] = NULL
     if counts and isinstance(result, RefType) and not _made_by_adr(scope, expr):
         scope.facts.by_elements.add(expr)
     return result
+
+
+def _compared_references(op: str, left: Type, right: Type) -> Type | None:
+    """BOOL if two references are compared for equality, or two pointers in any way; else None."""
+    if not isinstance(left, RefType) or not isinstance(right, RefType):
+        return None
+    return BOOL if left.moves and right.moves or op in ("=", "<>") and common(left, right) is not None else None
+
+
+def _moved(op: str, left: Type, right: Type, counts: bool) -> Type | None:
+    """The type of a sum or difference with a reference, None if there is none; with `counts` all references are moved."""
+    moves = [isinstance(kind, RefType) and kind.moves for kind in (left, right)]
+    if op == "-" and all(moves):
+        return DINT
+    if counts:
+        moves = [isinstance(kind, RefType) and kind.target is not None for kind in (left, right)]
+    if op in ("+", "-") and moves[0] and is_any(right, "ANY_INT", "ANY_BIT"):
+        return left
+    return right if op == "+" and moves[1] and is_any(left, "ANY_INT", "ANY_BIT") else None
 
 
 def _made_by_adr(scope: Scope, expr: tree.Expr) -> bool:
@@ -170,7 +177,7 @@ def _made_by_adr(scope: Scope, expr: tree.Expr) -> bool:
     return isinstance(expr, tree.Call) and isinstance(expr.callee, tree.NameRef) and fold(expr.callee.text) == "ADR"
 
 
-def _lent(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
+def _as_numbers(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
     """What an operator yields in a dialect that takes bit strings and enumerations as numbers; None if it does not."""
     dialect = scope.dialect
     number = is_untyped(left) or is_any(left, "ANY_NUM")
@@ -297,34 +304,53 @@ def _family(scope: Scope, op: str) -> tuple[str, ...]:
     return (*family, "ANY_INT") if family == ("ANY_BIT",) and scope.dialect.integers_and_bits else family
 
 
-def _undefined(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> None:
-    hint = ""
+def _report_undefined(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> None:
+    """Report an operator on types for which it is not defined."""
+    hint = _time_hint(scope, expr, left, right)
+    if hint is None:
+        hint = _logic_hint(expr.op, left, right, want)
+    if hint is None:
+        hint = _number_hint(scope, expr, left, right)
+    scope.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)
+
+
+def _time_hint(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> str | None:
+    """What to write where one operand is a duration; None if that is not the mistake."""
     timed = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
     if expr.op == "*" and timed == [False, True]:
-        hint = f"the {right} stands in front: {scope.text(expr.right)} * {scope.text(expr.left)}"
-    elif expr.op in "+-" and left == DATE and timed[1]:
+        return f"the {right} stands in front: {scope.text(expr.right)} * {scope.text(expr.left)}"
+    if expr.op in "+-" and left == DATE and timed[1]:
         date, time = scope.text(expr.left), scope.text(expr.right)
-        hint = f"a DATE has no time of day: write DT_TO_DATE(CONCAT_DATE_TOD({date}, TOD#0:0:0) {expr.op} {time})"
-    elif any(timed) and expr.op not in ("*", "/") and UNTYPED_INT in (left, right):
-        hint = "a duration is written T#500ms"
-    elif expr.op in ("AND", "OR") and want == BOOL and not is_any(left, "ANY_BIT") and not is_any(right, "ANY_BIT"):
-        hint = "compare each of them, for example with <> 0"
-    elif expr.op in ("+", "AND") and isinstance(left, StringType):
-        hint = "CONCAT(...) joins texts"
-    elif expr.op in ("AND", "OR", "XOR"):
-        wrong, other = (right, left) if is_any(left, "ANY_BIT") else (left, right)
-        hint = _bit_hint(wrong, other)
-    elif isinstance(left, StructType) or isinstance(right, StructType):
-        hint = "compare or combine the members"
-    elif expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
+        return f"a DATE has no time of day: write DT_TO_DATE(CONCAT_DATE_TOD({date}, TOD#0:0:0) {expr.op} {time})"
+    if any(timed) and expr.op not in ("*", "/") and UNTYPED_INT in (left, right):
+        return "a duration is written T#500ms"
+    return None
+
+
+def _logic_hint(op: str, left: Type, right: Type, want: Type | None) -> str | None:
+    """What to write where AND, OR, XOR or + meets operands of other kinds; None if that is not the mistake."""
+    bits = [is_any(kind, "ANY_BIT") for kind in (left, right)]
+    if op in ("AND", "OR") and want == BOOL and not any(bits):
+        return "compare each of them, for example with <> 0"
+    if op in ("+", "AND") and isinstance(left, StringType):
+        return "CONCAT(...) joins texts"
+    if op in ("AND", "OR", "XOR"):
+        wrong, other = (right, left) if bits[0] else (left, right)
+        return _bit_hint(wrong, other)
+    return None
+
+
+def _number_hint(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> str:
+    """What to write where arithmetic or a comparison meets operands that it does not take."""
+    if isinstance(left, StructType) or isinstance(right, StructType):
+        return "compare or combine the members"
+    if expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
         number = UNSIGNED.get(left.name, "INT")
-        hint = f"{left} has no arithmetic: convert with {left}_TO_{number}(...), or take {takers('arithmetic_of_bits')}"
-    elif left == right and isinstance(left, EnumType):
+        return f"{left} has no arithmetic: convert with {left}_TO_{number}(...), or take {takers('arithmetic_of_bits')}"
+    if left == right and isinstance(left, EnumType):
         numbers = (f"TO_{left.base}({scope.text(side)})" for side in (expr.left, expr.right))
-        hint = f"write {f' {expr.op} '.join(numbers)}, or take {takers('numbers_of_enumerations')}"
-    elif common(left, right) is None:
-        hint = _meeting_hint(left, right)
-    scope.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)
+        return f"write {f' {expr.op} '.join(numbers)}, or take {takers('numbers_of_enumerations')}"
+    return _meeting_hint(left, right) if common(left, right) is None else ""
 
 
 def _time(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> Type | None:
@@ -351,7 +377,7 @@ def _power(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type 
     if is_untyped(left) and is_untyped(right):
         return _folded(scope, expr, UNTYPED_REAL, UNTYPED_REAL)
     if not all(is_untyped(k) or is_any(k, "ANY_NUM") for k in (left, right)):
-        _undefined(scope, expr, left, right, want)
+        _report_undefined(scope, expr, left, right, want)
         return None
     kind: Type = left if is_any(left, "ANY_REAL") else LREAL
     single = is_untyped(left) and right == REAL or left is UNTYPED_REAL and is_any(right, "ANY_INT")

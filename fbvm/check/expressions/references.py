@@ -171,7 +171,7 @@ def bind(scope: Scope, node: tree.Assign) -> None:
         scope.error("S0301", target, "REF= binds a variable that is declared REFERENCE TO",
                     "assign REF(...) to a REF_TO")
         return
-    if writable(scope, target, "be bound", bound=True):
+    if writable(scope, target, "be bound", rebinds=True):
         lend(scope, node.value, kind, "S0301", scope.text(target))
 
 

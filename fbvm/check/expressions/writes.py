@@ -9,59 +9,72 @@ from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.facts import Facts, Variable
 from fbvm.syntax import tree
 
-_OWN = {"VAR": "a variable of its own body", "VAR_OUTPUT": "an output"}
-"""What members are that only their own body writes."""
+_WRITTEN_BY_OWN_BODY = {"VAR": "a variable of its own body", "VAR_OUTPUT": "an output"}
+"""Kinds of members of instances that only their own body writes."""
 _ROLES = {"step": "a step", "action": "an ACTION of a chart"}
 Path = tuple[object, ...]
 """A variable or address, and the steps from it to a part."""
 
 
-def writable(scope: Scope, expr: tree.Expr, purpose: str, bound: bool = False) -> bool:
-    """True if the place may be written here; else a diagnostic that says why not.
+def writable(scope: Scope, expr: tree.Expr, purpose: str, rebinds: bool = False) -> bool:
+    """True if the place may be written here; else a diagnostic with the reason.
 
-    What a REFERENCE TO is bound to may be written by everybody who sees it; `bound` asks whether it can be bound anew."""
-    facts = scope.facts
-    inner = expr
+    What a REFERENCE TO is bound to may be written by everybody who sees it.  With `rebinds` the place is a REFERENCE TO that is
+    bound anew.  `purpose` says in the message what is done, such as "be written"."""
+    facts, inner = scope.facts, expr
     while True:
-        if inner in facts.followed and not (bound and inner is expr):
+        if inner in facts.followed and not (rebinds and inner is expr):
             return True
-        member = facts.fields.get(inner)
-        if member is not None and (member.constant or member.kind in ("VAR", "VAR_OUTPUT")) and \
-                not _written_from_outside(scope, inner, member):
-            what = "a constant" if member.constant else _OWN[member.kind]
-            scope.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here",
-                        _writers(scope, inner) if member.kind == "VAR" and not member.constant else "")
+        if inner in facts.fields and not _is_writable_member(scope, expr, inner, purpose):
             return False
-        if not (facts.is_part(inner) or inner is expr and bound and isinstance(inner, tree.Member | tree.Index)):
+        if not (facts.is_part(inner) or inner is expr and rebinds and isinstance(inner, tree.Member | tree.Index)):
             break
         inner = inner.of
-    address = facts.directs.get(inner)
-    variable = facts.variables.get(inner)
+    address, variable = facts.directs.get(inner), facts.variables.get(inner)
     if variable is not None:
         address = variable.location
-        if variable.constant:
-            scope.error("S0501", expr, f"{variable.name} is CONSTANT and cannot {purpose}", "",
-                        (variable.source, variable.node.start, "declared here"))
+        if not _is_writable_variable(scope, expr, variable, purpose):
             return False
-        if variable.role and expr.end > expr.start:
-            scope.error("S0501", expr, f"{variable.name} is {_ROLES[variable.role]} and cannot {purpose}",
-                        "transitions and the qualifiers of actions decide it")
-            return False
-        _note_input(scope, expr, variable)
     if address is not None and _is_read_only(scope, address):
         scope.error("S0501", expr, f"{address} is read-only for programs and cannot {purpose}")
         return False
     return True
 
 
-def _writers(scope: Scope, expr: tree.Expr) -> str:
-    """Which dialects write a variable of another body."""
+def _is_writable_member(scope: Scope, expr: tree.Expr, inner: tree.Expr, purpose: str) -> bool:
+    """True if `inner`, a part of what `expr` writes, is no member that only its own body writes; else a diagnostic."""
+    member = scope.facts.fields[inner]
+    if not (member.constant or member.kind in _WRITTEN_BY_OWN_BODY) or _is_written_by_others(scope, inner, member):
+        return True
+    what = "a constant" if member.constant else _WRITTEN_BY_OWN_BODY[member.kind]
+    scope.error("S0501", expr, f"{member.name} is {what} and cannot {purpose} from here",
+                _hint(scope, inner) if member.kind == "VAR" and not member.constant else "")
+    return False
+
+
+def _is_writable_variable(scope: Scope, expr: tree.Expr, variable: Variable, purpose: str) -> bool:
+    """True for a variable that is no constant, step or action; else a diagnostic.  Marks the variable as written."""
+    if variable.constant:
+        scope.error("S0501", expr, f"{variable.name} is CONSTANT and cannot {purpose}", "",
+                    (variable.source, variable.node.start, "declared here"))
+        return False
+    if variable.role and expr.end > expr.start:
+        scope.error("S0501", expr, f"{variable.name} is {_ROLES[variable.role]} and cannot {purpose}",
+                    "transitions and the qualifiers of actions decide it")
+        return False
+    variable.written = True
+    _warn_of_written_input(scope, expr, variable)
+    return True
+
+
+def _hint(scope: Scope, expr: tree.Expr) -> str:
+    """The hint for a VAR of another body: which dialects write that."""
     whole = scope.facts.types.get(expr.of) if isinstance(expr, tree.Member) else None
     program = isinstance(whole, StructType) and whole.block and scope.context.block_of(whole).kind == "PROGRAM"
     return f"make it a VAR_INPUT, or take {takers('programs_are_written' if program else 'locals_are_written')}"
 
 
-def _written_from_outside(scope: Scope, expr: tree.Expr, member: Field) -> bool:
+def _is_written_by_others(scope: Scope, expr: tree.Expr, member: Field) -> bool:
     """True for a member of an instance that the dialect lets others write."""
     dialect, whole = scope.dialect, scope.facts.types.get(expr.of) if isinstance(expr, tree.Member) else None
     if member.constant or not isinstance(whole, StructType) or not whole.block:
@@ -71,22 +84,21 @@ def _written_from_outside(scope: Scope, expr: tree.Expr, member: Field) -> bool:
 
 
 def _is_read_only(scope: Scope, address: Address) -> bool:
-    """Whether the source may only read the address."""
+    """True for an address that the source may only read."""
     if address.area not in AREAS or address.number >= AREAS[address.area].read_only:
         return False
     return address.area not in scope.project.libraries.writes(scope.source.library)
 
 
-def _note_input(scope: Scope, expr: tree.Expr, variable: Variable) -> None:
+def _warn_of_written_input(scope: Scope, expr: tree.Expr, variable: Variable) -> None:
     """Warn of an input that is written inside its block."""
     pou = scope.pou
-    variable.written = True
     if pou is None:
         return
     raw = any(edge.hidden is variable for edge in pou.owner.edges)
     if raw or variable.kind == "VAR_INPUT" and variable.owner is pou.owner:
         scope.error("S0591", expr, f"{variable.name.removesuffix(' edge')} is an input of {pou.name}"
-                                         " and is written inside it")
+                                   " and is written inside it")
 
 
 def place(facts: Facts, expr: tree.Expr) -> Path | None:
@@ -104,7 +116,7 @@ def place(facts: Facts, expr: tree.Expr) -> Path | None:
     return None if outer is None else (*outer, step)
 
 
-def note_count(scope: Scope, expr: tree.Expr) -> None:
+def warn_of_written_counter(scope: Scope, expr: tree.Expr) -> None:
     """Warn of a write to the counter of a loop around it, to a part of it, or to what it is part of."""
     if not scope.counters:
         return

@@ -273,7 +273,7 @@ class Facts:
     """Targets of assignment attempts that get NULL."""
     assigned: set[tree.Call] = field(default_factory=set)
     """Calls whose result is the whole value of an assignment."""
-    turned: set[tree.Call] = field(default_factory=set)
+    reversed_bytes: set[tree.Call] = field(default_factory=set)
     """Calls whose result is what lies in memory, its bytes in another order."""
     aggregates: dict[tree.Expr, Aggregate] = field(default_factory=dict)
     bare: dict[tree.CallStatement, tree.Call] = field(default_factory=dict)

@@ -239,7 +239,7 @@ class BodyLowering:
     def assign(self, target: tree.Expr, value: tree.Expr, site: int) -> None:
         """`target := value`: the subscripts of the target first, then the value."""
         kind = self.facts.types[target]
-        if isinstance(value, tree.Call) and value in self.facts.turned:
+        if isinstance(value, tree.Call) and value in self.facts.reversed_bytes:
             called = self.facts.calls[value]
             assert isinstance(called, StandardCall)
             byte_order.assign(self, target, called, site)
