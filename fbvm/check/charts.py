@@ -28,7 +28,7 @@ class _Rules:
         self.pou = pou
 
     def is_free(self, declared: tree.VarDecl) -> bool:
-        """Whether a name of a step or action is not taken by a variable, which was told."""
+        """True if no variable has the name of a step or an action; if one has, that is reported already."""
         name = declared.names[0]
         found = self.pou.variables.get(fold(name.text))
         return found is not None and found.node is name

@@ -30,7 +30,7 @@ RULES = Rules(
 
 
 def _no_progress(done: int, known: int) -> None:
-    """Nobody waits."""
+    """The default of `progress`."""
 
 
 class Checker(Context):

@@ -80,7 +80,7 @@ class _Statements:
                            conversion_hint(value_kind, kind))
 
     def _attempt(self, node: tree.Assign, kinds: list[Type | None]) -> None:
-        """`r ?= s`: r takes the reference if it is one to its type, else NULL; without classes that is known now."""
+        """`r ?= s`: r becomes s if the types agree, else NULL; without classes the compiler knows which."""
         kind = self.scope.infer(node.value, kinds[-1])
         for target, wanted in zip(node.targets, kinds, strict=True):
             if wanted is None or kind is None:
@@ -218,7 +218,7 @@ class _Statements:
         self.scope.counters.pop()
 
     def _step(self, expr: tree.Expr, kind: Type) -> None:
-        """A step may be negative where the variable may not: it is then a literal, and worked out in LINT."""
+        """A step may be negative where the variable may not: it is then a literal of type LINT or smaller."""
         if self.scope.infer(expr) is None:
             return
         value = self.facts.constants.get(expr)

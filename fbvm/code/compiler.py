@@ -16,7 +16,7 @@ from fbvm.base.repeats import gathered
 from fbvm.base.types import Type, fold
 from fbvm.check.checker import Checker
 from fbvm.check.lint.linter import lint as look_for_slips
-from fbvm.check.lint.suppression import Silence, Wanted
+from fbvm.check.lint.suppression import Suppressions, Wanted
 from fbvm.check.symbols.facts import Pou, Report, TaskFact
 from fbvm.check.symbols.library import Libraries, LibraryError
 from fbvm.check.symbols.project import Project
@@ -109,7 +109,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
                     lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False,
                     progress: Progress = _nobody, drawn: bool = False) -> Compilation:
     """Compile texts; see `compile_files`."""
-    wanted, silence, report = Wanted.of(no_warn, warnings_as_errors), Silence(), Report()
+    wanted, suppressions, report = Wanted.of(no_warn, warnings_as_errors), Suppressions(), Report()
     spoken = named_dialect(dialect)
     try:
         shelves = Libraries([Path(folder) for folder in libraries], preferred=spoken.libraries)
@@ -120,7 +120,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         damage = Damage()
         for source in sources:
             text, diagnostics = parse(source, partial(_read_so_far, progress, source))
-            report.diagnostics += diagnostics + silence.note(source, text, spoken)
+            report.diagnostics += diagnostics + suppressions.add(source, text, spoken)
             damage.note(source, text, errors(diagnostics))
             project.collect(text, source)
         unread = len(report.diagnostics)
@@ -133,7 +133,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         if lint and not errors(report.diagnostics):
             look_for_slips(checker, program)
         found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not damage.explains(d)]
-        diagnostics = gathered(sorted(silence.heard(found, wanted), key=Diagnostic.order))
+        diagnostics = gathered(sorted(suppressions.apply(found, wanted), key=Diagnostic.order))
         image = None if errors(diagnostics) else _image(checker, shelf, progress, drawn)
         project.let_go()
     return Compilation(image, diagnostics)

@@ -20,7 +20,7 @@ PARAMETER_KINDS = ("VAR_INPUT", "VAR_IN_OUT", "VAR_OUTPUT")
 
 
 def bind(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None:
-    """Match arguments with parameters, complain about what does not fit or is missing."""
+    """Match the arguments of a call with the parameters of a POU; report those that do not fit or are missing."""
     scope.note_call(pou, call)
     other = mixed(call, scope.dialect)
     if other is not None:
@@ -158,7 +158,7 @@ def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
 
 
 def _long_enough(kind: Type, variable: Variable) -> bool:
-    """True for a STRING that is longer than an in-out declared without a length, which uses its beginning.
+    """True for a STRING that is longer than an in-out declared without a length, which uses the first characters of it.
 
     The standard leaves open what such an in-out takes; a reference carries no length, so a shorter one is refused."""
     wanted = variable.type

@@ -29,25 +29,25 @@ def variables(declared: tree.Pou) -> dict[str, str]:
             for name in variable.names}
 
 
-def looks_into(pou: Pou, project: Project) -> frozenset[str]:
+def passed_as_is(pou: Pou, project: Project) -> frozenset[str]:
     """Names of which the body asks what only a parameter of type ANY tells, or another function that it calls."""
-    if pou.looked is None:
-        pou.looked = frozenset()
+    if pou.passed_as_is is None:
+        pou.passed_as_is = frozenset()
         found: set[str] = set()
         for node in walk(pou.tree.body):
             if isinstance(node, tree.Member) and isinstance(node.of, tree.NameRef) and fold(node.name.text) in MEMBERS:
                 found.add(fold(node.of.text))
             elif isinstance(node, tree.Call) and isinstance(node.callee, tree.NameRef):
                 found |= _passed_on(node, project.pou(node.callee.text, pou.source), project)
-        pou.looked = frozenset(found)
-    return pou.looked
+        pou.passed_as_is = frozenset(found)
+    return pou.passed_as_is
 
 
 def _passed_on(call: tree.Call, called: Pou | None, project: Project) -> set[str]:
     """Names that are passed to a function which looks into them."""
     if called is None or not called.is_function:
         return set()
-    looked = looks_into(called, project)
+    looked = passed_as_is(called, project)
     return {fold(value.text) for name, value, _ in _given(call, called)
             if name in looked and isinstance(value, tree.NameRef)}
 
@@ -76,7 +76,7 @@ def is_generic(pou: Pou, project: Project) -> bool:
     names = variables(pou.tree)
     if isinstance(result, tree.NamedType) and fold(result.text) in ANYTHING:
         return True
-    return bool(names.keys() - looks_into(pou, project)) if names else False
+    return bool(names.keys() - passed_as_is(pou, project)) if names else False
 
 
 def function(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> Pou | None:
@@ -85,13 +85,13 @@ def function(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> Pou 
     if types is None:
         return None
     key = pou, tuple(sorted((name, kind.name) for name, kind in types.items()))
-    if key not in scope.project.made:
+    if key not in scope.project.instantiated:
         made = Pou(pou.name, pou.kind, pou.source, copied(pou.tree), types=types, as_written=False)
-        scope.project.made[key] = made
+        scope.project.instantiated[key] = made
         if not scope.context.interface(made, pou.source, call):
             return None
         scope.context.check_body(made)
-    return scope.project.made[key]
+    return scope.project.instantiated[key]
 
 
 def _types(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> dict[str, Type] | None:
@@ -121,7 +121,7 @@ def _types(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> dict[s
 def _arguments(scope: Scope, call: tree.Call, pou: Pou) -> Iterator[tuple[str, Type | None, tree.Expr, bool]]:
     """Generic type, type, argument, and whether it has to be of exactly that type, for each generic parameter."""
     names = variables(pou.tree)
-    looked = looks_into(pou, scope.project)
+    looked = passed_as_is(pou, scope.project)
     for name, value, section in _given(call, pou):
         if name in names and name not in looked:
             yield names[name], scope.infer(value), value, section != "VAR_INPUT"

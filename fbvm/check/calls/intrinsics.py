@@ -1,6 +1,6 @@
-"""What looks like a function and asks the compiler: SIZEOF, LOWER_BOUND, BITADR, __ISVALIDREF and their like.
+"""Intrinsics: calls that the compiler answers, such as SIZEOF, LOWER_BOUND, BITADR and __ISVALIDREF.
 
-Source: IEC 61131-3 ed. 3 table 15, and the operators of CODESYS, of which some ask for what no compiled program here has."""
+Source: IEC 61131-3 ed. 3 table 15, and the operators of CODESYS, of which some need what no program has here."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ _SEGMENTS = {"M": 0x40000000, "I": 0x80000000, "Q": 0xC0000000}
 """What BITADR adds to the number of the bit, by area (CODESYS online help, BITADR)."""
 
 
-def answer(scope: Scope, call: tree.Call, name: str) -> Type | None:
-    """The type of such a call, or None after a diagnostic."""
+def intrinsic(scope: Scope, call: tree.Call, name: str) -> Type | None:
+    """The type of a call of the intrinsic `name`, folded; None after a diagnostic."""
     if name in REFUSED:
         code, what, hint = REFUSED[name]
         scope.error(code, call.callee, f"{name} {what}: it is understood but not executed", hint)
@@ -58,7 +58,7 @@ def answer(scope: Scope, call: tree.Call, name: str) -> Type | None:
 
 
 def _is_bound(scope: Scope, call: tree.Call, value: tree.Expr) -> Type | None:
-    """__ISVALIDREF(r): whether a REFERENCE TO is bound."""
+    """__ISVALIDREF(r): TRUE if a REFERENCE TO is bound."""
     kind = scope.infer(value)
     if kind is None:
         return None

@@ -56,7 +56,7 @@ def call(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value: 
 
 
 def _fold(scope: Scope, call: tree.Call, called: StandardCall) -> None:
-    """The value of a call of constants; what would trap is left to the program."""
+    """Fold a call of constants; a call that would trap is left to the program."""
     values = [value for argument, _ in called.arguments if (value := scope.facts.constants.get(argument)) is not None]
     if len(values) < len(called.arguments):
         return
@@ -71,7 +71,7 @@ def _fold(scope: Scope, call: tree.Call, called: StandardCall) -> None:
 
 def _typed(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:
     if name in intrinsics.NAMES:
-        return intrinsics.answer(scope, call, name)
+        return intrinsics.intrinsic(scope, call, name)
     if name in MAKERS:
         values = Arguments(scope, call, ["IN"]).in_order()
         return references.make(scope, call, name, values[0]) if values is not None else None
@@ -365,8 +365,8 @@ def _own(scope: Scope, value: tree.Expr, row: Conversion) -> Type | None:
     number = scope.facts.constants.get(value)
     if row.form != "BCD_TO" or kind is not UNTYPED_INT or not isinstance(number, int):
         return scope.settle(value)
-    fitting = next((name for name in ("BYTE", "WORD", "DWORD", "LWORD") if 0 <= number <= ELEMENTARY[name].high), "LWORD")
-    return scope.adopt(value, ELEMENTARY[fitting], "S0405")
+    smallest = next((name for name in ("BYTE", "WORD", "DWORD", "LWORD") if 0 <= number <= ELEMENTARY[name].high), "LWORD")
+    return scope.adopt(value, ELEMENTARY[smallest], "S0405")
 
 
 def _named(scope: Scope, name: str) -> Type | None:

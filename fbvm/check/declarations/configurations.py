@@ -24,24 +24,24 @@ class Configurations:
         """Instances of programs that a task runs."""
 
     def choose(self, wanted: str | None, program: str | None) -> tree.Resource | None:
-        """The RESOURCE that is to run: a PLC is one of them.  Its global variables are declared, and not those of others."""
+        """The RESOURCE that is to run, since a PLC is one of them; its global variables are declared, those of others are not."""
         if not self.project.configurations:
             return None
         configuration, source = self.project.configurations[0]
         names = [r.name.text for r in configuration.resources if r.name is not None]
-        fitting = [r for r in configuration.resources
+        candidates = [r for r in configuration.resources
                    if wanted is None or r.name is not None and fold(r.name.text) == fold(wanted)]
-        if wanted is not None and not fitting:
+        if wanted is not None and not candidates:
             self.report.add("S0801", source, configuration.name, f"there is no RESOURCE {wanted}",
                             self.project.choices(wanted, names))
-        elif len(fitting) > 1 and program is None:
-            self.report.add("S0801", source, fitting[1].name or fitting[1],
-                            f"{configuration.name.text} has {len(fitting)} resources, and a PLC is one of them",
+        elif len(candidates) > 1 and program is None:
+            self.report.add("S0801", source, candidates[1].name or candidates[1],
+                            f"{configuration.name.text} has {len(candidates)} resources, and a PLC is one of them",
                             f"choose one with --resource {' or --resource '.join(names)}")
-        if not fitting:
+        if not candidates:
             return None
-        self.project.sections += [(section, source) for section in fitting[0].sections]
-        return fitting[0]
+        self.project.sections += [(section, source) for section in candidates[0].sections]
+        return candidates[0]
 
     def resolve(self, program: str | None) -> None:
         """Fill the tasks of the context: from the CONFIGURATION, or with the one program that there is or that is named."""
@@ -83,7 +83,7 @@ class Configurations:
         task.runs.append(Run(instance, pou))
 
     def _unconnected(self, pou: Pou, source: Source, node: tree.Node, connection: str) -> None:
-        """Complain about an in-out of a program that nothing is connected to."""
+        """Report an in-out of a program that nothing is connected to."""
         in_outs = pou.parameters("VAR_IN_OUT")
         if in_outs:
             name = in_outs[0].name

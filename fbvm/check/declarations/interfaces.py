@@ -1,8 +1,8 @@
 """Declarations of variables: sections of a POU become its variables and the layout of its instances or frame.
 
 Instance of a block or program: an 8-byte header that begins with the type identifier, then its variables in order of
-writing, naturally aligned.  Frame of a function (one, fixed: POUs never recurse and tasks never preempt): inputs and
-in-outs first, which the caller writes; the rest gets its initial values at each entry.
+writing, naturally aligned.  Frame of a function (one, fixed: POUs never recurse and tasks never preempt): first inputs and
+in-outs, which the caller writes; all others get their initial values at each entry.
 """
 
 from __future__ import annotations
@@ -203,7 +203,7 @@ class _Interface:
             variable.initial = b"\x01"  # EN is TRUE where nobody connects it
 
     def _completed(self, variable: Variable, location: tree.Location) -> None:
-        """`AT %I*`: where VAR_CONFIG says, for each instance another place; without that it is a variable as others."""
+        """`AT %I*`: VAR_CONFIG gives each instance its place; without VAR_CONFIG it is a variable like others."""
         variable.open = self.project.completes(variable.name)
         variable.reference = variable.reference or variable.open
         if not variable.open:
@@ -212,7 +212,7 @@ class _Interface:
                         "it keeps its value as a variable of its own; a place in the area is %MW10 or %IX0.3")
 
     def _open(self, variable: Variable, declared: tree.VarDecl) -> None:
-        """ARRAY [*] and ANY are parameters that borrow bounds, size and type from what is passed."""
+        """Report ARRAY [*] and ANY that are no in-outs: they take bounds, size and type from the argument."""
         kind = variable.type
         if isinstance(kind, BORROWED) and variable.kind != "VAR_IN_OUT":
             what = kind.name if isinstance(kind, AnyType) else "ARRAY [*]"

@@ -34,7 +34,7 @@ def location_of(context: Context, declared: tree.VarDecl, kind: Type, source: So
 
 
 def _meant(text: str, declared: tree.VarDecl, kind: Type) -> str:
-    """What to write where a text is no address: a `%` more, or for the name of a variable a reference."""
+    """The hint for a text that is no address: a `%` in front, or for the name of a variable a reference."""
     if _WITHOUT_SIGN.fullmatch(text):
         return f"write %{text.upper()}"
     name = declared.names[0].text if declared.names else "x"
@@ -42,7 +42,7 @@ def _meant(text: str, declared: tree.VarDecl, kind: Type) -> str:
 
 
 def _fits(context: Context, address: Address, kind: Type, source: Source, node: tree.Node) -> bool:
-    """True if the address has room for the type; else a diagnostic."""
+    """True if a variable of the type can lie at the address; else a diagnostic."""
     is_bit = address.bit is not None or address.area in FLAG_AREAS
     if is_bit and isinstance(kind, ArrayType) and kind.element == BOOL:
         context.use_area(address.area)

@@ -90,7 +90,7 @@ def _refuse_by_dialect(scope: Scope, spec: tree.TypeSpec, name: str = "") -> Non
 
 
 def _reference(scope: Scope, spec: tree.RefSpec, name: str) -> Resolved | None:
-    """REF_TO, POINTER TO and REFERENCE TO.  The target may be what is being resolved just now: a list's node names itself."""
+    """REF_TO, POINTER TO and REFERENCE TO.  The target may be the type that is being resolved: a node of a list names itself."""
     target = spec.target
     if isinstance(target, tree.NamedType):
         entry = scope.project.type_entry(target.text, scope.source)
@@ -139,7 +139,7 @@ def _without_space(scope: Scope, name: str) -> str:
 
 
 def _meant(scope: Scope, name: str) -> str:
-    """A hint for a type that there is not."""
+    """The hint for a name that means no type."""
     if fold(name) in vendor_names.TYPES:
         also = ", and BIT in structures" if fold(name) == "BIT" else ""
         return f"its name here is {vendor_names.TYPES[fold(name)]}{also}"
@@ -248,7 +248,7 @@ def _array(scope: Scope, spec: tree.ArraySpec, name: str) -> Resolved | None:
 
 
 def _open_array(scope: Scope, spec: tree.ArraySpec) -> Resolved | None:
-    """ARRAY [*], which only an in-out can be; who declares the variable looks after that."""
+    """ARRAY [*], which only an in-out can be; `interfaces` reports it elsewhere."""
     element = resolve(scope, spec.element)
     if element is None:
         return None

@@ -1,4 +1,4 @@
-"""The members of a structure or a union, each put in its place: behind the others, or where it says.
+"""The layout of a structure or a union: each member lies behind the others, or at its own relative location.
 
 Relative locations count from the structure's start, in units of their own size: `%B2`, `%W1` and `%X2.0` begin at byte 2
 (IEC 61131-3 ed. 3, table 11, features 8 and 9)."""

@@ -1,7 +1,7 @@
 """Arrays and structures that are written out in statements: `a := [1, x, 3]`, `F((left := 2, right := y))`.
 
-Some tools take them; the standard has them in declarations only.  What they leave out has the first value of its type.
-Each lies in a place of its own in the frame of its POU, where its values are put whenever it is worked out."""
+Some tools take them; the standard has them in declarations only.  What they leave out has the initial value of its type.
+Each has a variable of its own in the frame of its POU, to which its values are written whenever the statement is executed."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from fbvm.syntax import tree
 
 Written = tree.ArrayInit | tree.StructInit
 Value = tuple[tuple[int, ...], int | None, Type, tree.Expr]
-"""Where one value lies in the whole, several times if it is repeated; its bit; its type; what gives it."""
+"""Offsets of one value in the whole (several if it is repeated), its bit, its type and its expression."""
 
 
 def aggregate(scope: Scope, expr: Written, want: Type | None) -> Type | None:
-    """The type of what is written out, which is that of its place; None after a diagnostic."""
+    """The type of an array or structure that is written out: the type of its place; None after a diagnostic."""
     if not _has_place(scope, expr, want) or want is None:
         return None
     dialect, pou = scope.dialect, scope.pou
@@ -36,7 +36,7 @@ def aggregate(scope: Scope, expr: Written, want: Type | None) -> Type | None:
     values = list(_values(scope, want, expr, (0,)))
     content = bytearray(_initial_bytes(scope.project, want))
     parts = [part for part in (_part(scope, value, content) for value in values) if part is not None]
-    scope.project.dependencies.repeatable = False  # it makes the frame larger
+    scope.project.dependencies.repeatable = False  # the frame becomes larger
     scope.facts.aggregates[expr] = Aggregate(_place(scope, expr, want), bytes(content), tuple(parts))
     return want
 
@@ -58,7 +58,7 @@ def _form(expr: Written) -> str:
 
 
 def _place(scope: Scope, expr: Written, kind: Type) -> Variable:
-    """A variable for it in the frame of the POU that is executed."""
+    """A new variable for the whole in the frame of the POU that is executed."""
     pou = scope.pou
     assert pou is not None
     owner = pou.owner
@@ -73,7 +73,7 @@ def _place(scope: Scope, expr: Written, kind: Type) -> Variable:
 
 
 def _values(scope: Scope, kind: Type, expr: tree.Expr, places: tuple[int, ...], bit: int | None = None) -> Iterator[Value]:
-    """The single values that something written out consists of."""
+    """The single values of an array or structure that is written out."""
     if isinstance(expr, tree.ArrayInit) and isinstance(kind, ArrayType):
         yield from _elements(scope, kind, flattened(expr) if len(kind.bounds) > 1 else expr, places)
     elif isinstance(expr, tree.StructInit) and isinstance(kind, StructType) and not kind.block:
@@ -115,7 +115,7 @@ def _member(scope: Scope, kind: StructType, name: tree.Name) -> Field | None:
 
 
 def _part(scope: Scope, value: Value, content: bytearray) -> AggregatePart | None:
-    """A value that is worked out when the program runs; a constant goes into the content, and is none."""
+    """The part for a value that is computed when the program runs; None for a constant, which is written into `content`."""
     places, bit, kind, expr = value
     if isinstance(kind, RefType) and kind.follows:
         good = references.lend(scope, expr, followed(kind), "S0301", str(kind))

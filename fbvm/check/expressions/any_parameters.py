@@ -1,4 +1,4 @@
-"""ANY parameters: what a block may ask of what was passed to it, whatever its type.
+"""ANY parameters: the members by which a block reads the argument, whatever type it has.
 
     x.pValue        a pointer to its first byte (POINTER TO BYTE)
     x.diSize        how many bytes it fills (DINT)              x.BITS[i]    BOOL number i: an element of an array of BOOL,

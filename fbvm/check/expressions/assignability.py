@@ -1,4 +1,4 @@
-"""What may stand where: assignment, in-outs, conversions, and the hints for what does not fit."""
+"""Assignability: which values a variable, an in-out and a conversion take, and the hints for those that they do not."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Value
 from fbvm.syntax import tree
 
-_BORROWED = OpenArrayType | AnyType
+_PASSED_WITH_BOUNDS = OpenArrayType | AnyType
 
 
 def is_untyped(kind: Type | None) -> bool:
@@ -39,7 +39,7 @@ def assignable(kind: Type, target: Type) -> bool:
     """True if a value of `kind` may be stored where `target` is declared, arrays and structures as a whole included."""
     if kind is target and isinstance(kind, Elementary):
         return True
-    if isinstance(target, _BORROWED) or isinstance(kind, _BORROWED):
+    if isinstance(target, _PASSED_WITH_BOUNDS) or isinstance(kind, _PASSED_WITH_BOUNDS):
         return False
     if isinstance(target, ArrayType) and isinstance(kind, ArrayType):
         return kind.bounds == target.bounds and same(kind.element, target.element) and not (kind.packed or target.packed)
@@ -91,7 +91,7 @@ UNSIGNED = {"BYTE": "USINT", "WORD": "UINT", "DWORD": "UDINT", "LWORD": "ULINT"}
 
 
 def holds(target: Type, kind: Type) -> bool:
-    """True if an integer type has room for every value of a subrange, as for the parts that SPLIT_DATE gives."""
+    """True if an integer type holds every value of a subrange, as of the parts that SPLIT_DATE gives."""
     if not isinstance(kind, SubrangeType) or not is_any(target, "ANY_INT"):
         return False
     low, high = limits(target) or (1, 0)
@@ -169,7 +169,7 @@ def hidden_hint(expr: tree.Expr, target: Type) -> str:
 BOUNDS_HINT = "how long an array is say LOWER_BOUND(a, 1) and UPPER_BOUND(a, 1)"
 
 
-def fitting_hint(expr: tree.Expr, kind: Type, target: Type) -> str:
+def mismatch_hint(expr: tree.Expr, kind: Type, target: Type) -> str:
     """What to write where `expr` of type `kind` stands and `target` is needed: a literal another way, else a conversion."""
     wanted = base(target)
     if isinstance(expr, tree.Literal) and isinstance(expr.value, str) and isinstance(wanted, StringType):

@@ -99,7 +99,7 @@ _LOGIC = {"AND": "and", "OR": "or", "XOR": "xor", "AND_THEN": "and", "OR_ELSE": 
 
 
 def binary(op: str, kind: Type, a: Value, b: Value) -> Value:
-    """The value of `a op b`, worked out in the type `kind` of both operands.  Raises NotConstant."""
+    """The value of `a op b`, computed in the type `kind` of both operands.  Raises NotConstant."""
     if op in _COMPARE:
         return bool(_COMPARE[op](a, b))
     if op == "**":

@@ -97,14 +97,14 @@ def binary(scope: Scope, expr: tree.Binary, want: Type | None) -> Type | None:
     left, right = base(left), base(right)
     if expr.left in scope.facts.constants or expr.right in scope.facts.constants:
         return _meant(scope, expr, left, right, want)
-    known = scope.project.meanings.get((expr.op, left, right))
+    known = scope.project.operator_types.get((expr.op, left, right))
     if known is not None:
         scope.facts.operands[expr], result = known
         return result
     found = _meant(scope, expr, left, right, want)
     if isinstance(left, Elementary) and isinstance(right, Elementary) and found is not None and \
             expr not in scope.facts.rewritten:
-        scope.project.meanings[expr.op, left, right] = scope.facts.operands[expr], found
+        scope.project.operator_types[expr.op, left, right] = scope.facts.operands[expr], found
     return found
 
 
@@ -171,14 +171,14 @@ def _moved(op: str, left: Type, right: Type, counts: bool) -> Type | None:
 
 
 def _made_by_adr(scope: Scope, expr: tree.Expr) -> bool:
-    """Whether a sum begins with ADR(x), which is a plain number of bytes for who counts elements."""
+    """True for a sum with ADR(x) as its pointer: ADR gives bytes, also in a dialect that counts elements."""
     while isinstance(expr, tree.Binary):
         expr = expr.left if isinstance(scope.facts.types[expr.left], RefType) else expr.right
     return isinstance(expr, tree.Call) and isinstance(expr.callee, tree.NameRef) and fold(expr.callee.text) == "ADR"
 
 
 def _as_numbers(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> Type | None:
-    """What an operator yields in a dialect that takes bit strings and enumerations as numbers; None if it does not."""
+    """The type of an operator in a dialect that takes bit strings and enumerations as numbers; None if the dialect does not."""
     dialect = scope.dialect
     number = is_untyped(left) or is_any(left, "ANY_NUM")
     if expr.op == "*" and dialect.number_times_duration and is_any(right, "ANY_DURATION") and number:
@@ -230,7 +230,7 @@ def _beside_reference(scope: Scope, expr: tree.Binary, side: tree.Expr) -> Type:
 
 
 def _chained(scope: Scope, expr: tree.Binary, right: Type) -> bool:
-    """Complain about `a < b < c`, which compares a BOOL with a number."""
+    """Report `a < b < c`, which compares a BOOL with a number; True if it did."""
     first = expr.left
     if expr.op not in COMPARISONS[2:] or not isinstance(first, tree.Binary) or first.op not in COMPARISONS or right == BOOL:
         return False

@@ -5,7 +5,7 @@
     PLC_PRG.step        a variable of a program, of which there is one instance then
     word.READY          the bit of that number, where READY is a constant
 
-What stands in front never decides between two declarations of a library: it only has to be known.
+The qualifier only has to be known: it never decides between two declarations of a library.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def refer(scope: Scope, expr: tree.Expr, lasting: bool) -> Type | None:
 
 
 def _holder(scope: Scope, expr: tree.Expr) -> Holder:
-    """What a reference to this place can be moved in."""
+    """The variable, or member of an instance, within which a reference to this place can be moved."""
     facts = scope.facts
     while facts.is_part(expr):
         whole = facts.types[expr.of]
@@ -67,7 +67,7 @@ def _holder(scope: Scope, expr: tree.Expr) -> Holder:
 
 
 def _held(scope: Scope, expr: tree.Expr, variable: Variable) -> Holder:
-    """The holder for a variable, which is an object from now on."""
+    """The holder for a variable, which becomes an object by that."""
     facts = scope.facts
     if variable.kind == "VAR_IN_OUT" or variable.place == "frame":
         number = facts.leases.setdefault(variable, len(facts.leases))
@@ -114,11 +114,11 @@ def make(scope: Scope, call: tree.Call, name: str, value: tree.Expr) -> Type | N
 
 
 MARK = 0xFFFFFF << 40
-"""In initial bytes, the references that are still to be made have this object number, which no object has."""
+"""The object number, which no object has, of references in initial bytes that layout has to place."""
 
 
 def named(init: tree.Expr) -> tree.Expr:
-    """The variable that the initial value of a reference names: x of REF(x), ADR(x) or x itself."""
+    """The variable of an initial value of a reference: x of REF(x), ADR(x) or x itself."""
     if isinstance(init, tree.Call) and isinstance(init.callee, tree.NameRef) and fold(init.callee.text) in MAKERS:
         assert init.arguments[0].value is not None
         return init.arguments[0].value
@@ -132,7 +132,7 @@ def placeholder(facts: Facts, start: Start) -> bytes:
 
 
 def check_initial(scope: Scope, start: Start) -> None:
-    """Check what a reference is made to before anything runs: a place that is known by then."""
+    """Check the target of an initial reference: its place must be known before the program runs."""
     if not _fits(scope, start):
         return
     place, facts = start.place, scope.facts

@@ -22,7 +22,7 @@ def contact(scope: Scope, expr: ladder.Element, want: Type | None) -> Type | Non
 
 
 def memory(scope: Scope, expr: ladder.Memory, want: Type | None) -> Type | None:
-    """The type of a place in memory whose address is worked out when the program runs."""
+    """The type of a place in memory whose address is computed when the program runs."""
     scope.fit(expr.address, UDINT)
     return ELEMENTARY[expr.kind] if expr.kind else any_parameters.VIEWS["WORDS"]
 

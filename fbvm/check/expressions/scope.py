@@ -25,10 +25,10 @@ from fbvm.check.expressions.assignability import (
     assignable,
     conversion_hint,
     converted_by_dialect,
-    fitting_hint,
     hidden_hint,
     is_untyped,
     literal_hint,
+    mismatch_hint,
 )
 from fbvm.check.expressions.constants import convert, cut, limits
 from fbvm.check.expressions.values import is_any
@@ -76,9 +76,10 @@ class Scope:
     # --- entry points -----------------------------------------------------------------------------------------------
 
     def infer(self, expr: tree.Expr, want: Type | None = None) -> Type | None:
-        """The type of an expression, or None after a diagnostic.  `want` helps literals that meet nothing else.
+        """The type of an expression, or None after a diagnostic.
 
-        An expression is worked out once; calls ask for their arguments' types more than once."""
+        `want` is the type that the place of the expression has; a literal takes it where no operand decides.  The first call
+        runs the rule of the expression, further calls return the same type."""
         if expr in self.facts.types or expr in self.facts.wrong:
             return self.facts.types.get(expr)
         kind = self._rules[type(expr)](self, expr, want)
@@ -92,7 +93,7 @@ class Scope:
         return kind
 
     def settle(self, expr: tree.Expr, want: Type | None = None) -> Type | None:
-        """As `infer`, but a literal without a context takes its own smallest type."""
+        """As `infer`, but an untyped literal becomes INT, DINT, LINT, ULINT or LREAL, the first that holds it."""
         kind = self.infer(expr, want)
         if kind is UNTYPED_INT:
             value = self.facts.constants[expr]
@@ -105,7 +106,7 @@ class Scope:
         return self.adopt(expr, LREAL) if kind is UNTYPED_REAL else kind
 
     def fit(self, expr: tree.Expr, target: Type, code: str = "S0301", role: str = "") -> bool:
-        """Type `expr` for a place of type `target`; False after a diagnostic."""
+        """Infer `expr` for a place of type `target`; False after a diagnostic with `code`, in which `role` names the value."""
         kind = self.infer(expr, target)
         if kind is None:
             return False
@@ -118,10 +119,10 @@ class Scope:
             if expr in self.facts.constants:
                 self.facts.constants[expr] = cut(self.facts.constants[expr], base(target))
             return True
-        known = code in _CONSTANT_PLACES and not is_block(kind)
+        constant, value = code in _CONSTANT_PLACES and not is_block(kind), self.facts.constants.get(expr)
         self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
                    hidden_hint(expr, target) or
-                   (literal_hint(self.facts.constants.get(expr), base(target)) if known else fitting_hint(expr, kind, target)))
+                   (literal_hint(value, base(target)) if constant else mismatch_hint(expr, kind, target)))
         return False
 
     def _in_range(self, expr: tree.Expr, value: Value, target: Type, code: str) -> bool:
@@ -133,11 +134,11 @@ class Scope:
         return True
 
     def _loses(self, expr: tree.Expr, code: str, message: str) -> None:
-        """Remember a constant that its place does not keep as it is written."""
+        """Record a warning for a constant that its place does not hold as it is written."""
         self.facts.losses.append((self.source, expr, code, message))
 
     def condition(self, expr: tree.Expr, what: str) -> None:
-        """An expression that must be BOOL."""
+        """Infer an expression that must be BOOL; `what` names the statement in the message."""
         kind = self.infer(expr, BOOL)
         if is_untyped(kind):
             kind = self.adopt(expr, BOOL, "S0303")
@@ -147,7 +148,7 @@ class Scope:
                        f"write {self.text(expr)}.X" if step else conversion_hint(kind, BOOL))
 
     def adopt(self, expr: tree.Expr, target: Type, code: str = "S0301") -> Type | None:
-        """Give an expression of nothing but untyped literals the type `target`."""
+        """Give an expression of untyped literals the type `target`, and convert its constant; None after a diagnostic."""
         value = self.facts.constants[expr]
         kind = base(target)
         untyped = self.facts.types[expr]
@@ -175,7 +176,7 @@ class Scope:
         return target
 
     def note_call(self, pou: Pou, node: tree.Node) -> None:
-        """Remember who calls whom, for the check of recursion."""
+        """Record that the POU of this scope calls another one."""
         if self.pou is not None:
             self.pou.calls.setdefault(pou, node)
 

@@ -1,9 +1,9 @@
-"""Subscripts of arrays, with bounds that are known now or come with what is passed."""
+"""Subscripts of arrays, of strings and behind pointers."""
 
 from __future__ import annotations
 
 from fbvm.base.types import DINT, ArrayType, EnumType, OpenArrayType, RefType, StringType, Type, characters
-from fbvm.check.expressions.assignability import as_number, fitting_hint
+from fbvm.check.expressions.assignability import as_number, mismatch_hint
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.syntax import tree
@@ -59,7 +59,7 @@ def _open(scope: Scope, expr: tree.Index, whole: OpenArrayType, kinds: list[Type
 
 
 def _behind(scope: Scope, expr: tree.Index, whole: RefType, kinds: list[Type | None]) -> Type | None:
-    """`p[i]` of a pointer: what lies i times the size of its target further on."""
+    """`p[i]` of a pointer: the object that lies i times the size of its target behind the target."""
     if len(kinds) != 1:
         _wrong_number(scope, expr, whole, 1)
         return None
@@ -76,7 +76,7 @@ def _fits(scope: Scope, expr: tree.Expr, kind: Type | None, low: int, high: int,
     assert kind is not None
     counted = as_number(kind, scope.dialect)
     if not is_any(counted, "ANY_INT") and not isinstance(kind, EnumType):
-        scope.error("S0301", expr, f"a subscript is an integer, not {kind}", fitting_hint(expr, kind, DINT))
+        scope.error("S0301", expr, f"a subscript is an integer, not {kind}", mismatch_hint(expr, kind, DINT))
         return False
     value = scope.facts.constants.get(expr)
     if isinstance(value, int) and not low <= value <= high:

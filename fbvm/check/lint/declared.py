@@ -13,7 +13,7 @@ from fbvm.syntax import tree
 from fbvm.syntax.tree import sfc
 
 OWN = ("VAR", "VAR_TEMP", "VAR_STAT")
-"""Sections whose variables nobody outside can have asked for."""
+"""Sections whose variables only the POU itself can use."""
 
 
 class Uses:
@@ -61,7 +61,7 @@ def pins(report: Report, pou: Pou, uses: Uses) -> None:
 
 
 def _has_statements(pou: Pou) -> bool:
-    """True for a body that is more than a stub, and of which all is known."""
+    """True for a body that is more than a stub, without names that failed."""
     statements = [pou.tree.body, *(action.tree.body for action in pou.actions.values())]
     return any(not isinstance(s, tree.Empty | sfc.Sfc) for body in statements for s in body) and \
         not any(isinstance(s, sfc.Sfc) for body in statements for s in body)

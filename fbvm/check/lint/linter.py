@@ -1,7 +1,7 @@
 """Warnings: what is allowed, does something, and is hardly what was meant.
 
 A pass of its own over the bodies of a project without errors, linear in their size.  It looks at what the user wrote,
-never at libraries.  Which of the warnings are wanted is asked elsewhere (`silence`).
+never at libraries.  `suppression` removes those that a pragma or the caller switches off.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ Situation = frozenset[str]
 def look_at(body: Body, chart: sfc.Sfc) -> None:
     """Warn of all networks of a chart."""
     for steps, transitions in networks(chart.steps, chart.transitions):
-        _Network(body, steps, transitions).complain()
+        _Network(body, steps, transitions).warn()
 
 
 class _Network:
@@ -38,7 +38,7 @@ class _Network:
         """The first transition that can enter a step which is active, and that step."""
         self.reached: set[str] = set()
 
-    def complain(self) -> None:
+    def warn(self) -> None:
         """Look at every situation, and tell."""
         situations = self._situations()
         if situations is None:

@@ -1,4 +1,4 @@
-"""Which warnings are wanted: the pragmas of a text, and what the caller asks for.
+"""Suppression of warnings: by pragmas of a text, and by codes that the caller gives.
 
     {warning disable S0390}          from here on S0390 is not warned of; several codes with commas
     {warning restore S0390}          from here on again
@@ -28,7 +28,7 @@ _OURS = re.compile(r"S\d{4}")
 
 @dataclass(frozen=True)
 class Wanted:
-    """What the caller asks for: codes that are not wanted ("all" for every warning), and whether warnings forbid running.
+    """The caller's choice of warnings: codes that are suppressed ("all" for every warning), and whether warnings forbid running.
 
     Raises ValueError for what is no code of a warning."""
 
@@ -50,15 +50,15 @@ ANY = Wanted()
 """Every warning, and none forbids running."""
 
 
-class Silence:
-    """Where in the texts of a project warnings are switched off."""
+class Suppressions:
+    """The places in the texts of a project at which pragmas switch warnings off and on."""
 
     def __init__(self) -> None:
         self._switches: dict[tuple[str, str], list[tuple[int, bool]]] = {}
         """Source and code -> places from which on it is off (True) or on."""
 
-    def note(self, source: Source, text: SourceText, dialect: Dialect) -> list[Diagnostic]:
-        """Take the pragmas of one text; warnings for codes that there are not, and for pragmas of other dialects."""
+    def add(self, source: Source, text: SourceText, dialect: Dialect) -> list[Diagnostic]:
+        """Add the pragmas of one text.  Returns warnings for unknown codes, and for pragmas of other dialects."""
         unknown = []
         for pragma in text.pragmas:
             if dialectal(pragma.text) and not (dialect.pragmas_act and in_place(source, pragma)):
@@ -75,20 +75,20 @@ class Silence:
                                               "`fbvm explain` lists all codes"))
         return unknown
 
-    def covers(self, warning: Diagnostic) -> bool:
-        """Whether a pragma has switched a warning off where it stands."""
+    def suppresses(self, warning: Diagnostic) -> bool:
+        """True if a pragma switches a warning off at its place."""
         switches = self._switches.get((warning.source.name, warning.code))
         if not switches:
             return False
         at = bisect.bisect_right(switches, warning.start, key=lambda switch: switch[0])
         return at > 0 and switches[at - 1][1]
 
-    def heard(self, diagnostics: Iterable[Diagnostic], wanted: Wanted) -> list[Diagnostic]:
-        """The diagnostics without warnings that are not wanted; the others are errors if that is asked for."""
+    def apply(self, diagnostics: Iterable[Diagnostic], wanted: Wanted) -> list[Diagnostic]:
+        """The diagnostics without suppressed warnings; with `wanted.as_errors` the remaining warnings count as errors."""
         kept = []
         for each in diagnostics:
             if each.severity == "warning":
-                if "ALL" in wanted.no_warn or each.code in wanted.no_warn or self.covers(each):
+                if "ALL" in wanted.no_warn or each.code in wanted.no_warn or self.suppresses(each):
                     continue
                 each = replace(each, raised=wanted.as_errors)
             kept.append(each)

@@ -42,7 +42,7 @@ def _overflow(body: Body, node: tree.Binary, kind: Type) -> None:
 
 
 def _converted(body: Body, node: tree.Call, called: StandardCall) -> None:
-    """Warn of a conversion that cuts bits off a number which is known.  The same bits as another number are meant."""
+    """Warn of a conversion that cuts bits off a constant.  One that only reads the same bits as another number is deliberate."""
     value, target = body.facts.constants.get(called.arguments[0][0]), called.detail[1]
     if is_any(target, "ANY_INT", "ANY_BIT") and target != BOOL and type(value) is int:
         bits = target.size * 8
@@ -120,14 +120,15 @@ def _statement(body: Body, node: tree.CallStatement) -> None:
     if not isinstance(call, tree.Call) or call not in facts.types or call in facts.guards:
         return
     called = facts.calls.get(call)
-    if isinstance(called, PouCall) and (called.outputs or called.in_outs or called.enabled or not _silent(body, called.pou, {})):
+    if isinstance(called, PouCall) and (called.outputs or called.in_outs or called.enabled
+                                        or not _has_no_effect(body, called.pou, {})):
         return
     name = body.text(call.callee)
     body.warn("S0491", call, f"the result of {name} is not used, and the call does nothing else",
               f"assign it: x := {name}(...)")
 
 
-def _silent(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
+def _has_no_effect(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
     """True for a function that changes nothing but variables of its own; `known` is what was found of those it calls."""
     if pou not in known:
         known[pou] = pou.is_function and _changes_nothing(body, pou, known)
@@ -137,7 +138,7 @@ def _silent(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
 def _changes_nothing(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
     for node in Body(pou, body.facts, body.report).nodes:
         called = body.facts.calls.get(node) if isinstance(node, tree.Call) else None
-        if isinstance(called, PouCall) and not _silent(body, called.pou, known):
+        if isinstance(called, PouCall) and not _has_no_effect(body, called.pou, known):
             return False
         targets = node.targets if isinstance(node, tree.Assign) else (node.variable,) if isinstance(node, tree.For) else ()
         if isinstance(called, PouCall):

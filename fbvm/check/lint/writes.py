@@ -1,6 +1,6 @@
 """Warnings about what is done in two places, or only now and then: outputs written twice, timers called conditionally.
 
-One pass over a body in the order of execution.  An output is what somebody else sees: a located variable, an address, a
+One pass over a body in the order of execution.  An output is visible outside of its body: a located variable, an address, a
 global variable, an output of the POU.  A value that is given to it counts as lost if the same block gives it another one
 before anything may have read the first.  A default that a branch overrides is therefore none of these.
 """
@@ -54,13 +54,13 @@ class Writes:
     def __init__(self) -> None:
         self._writers: dict[Key, list[tuple[Body, tree.Node]]] = {}
         self._numbers: dict[Address, tuple[Body, tree.Call]] = {}
-        """Who executes the timer or counter of a number, by its completion flag."""
+        """The first instruction with each timer or counter number, by its completion flag."""
 
     def body(self, body: Body) -> None:
         """Look at one body."""
         order = _Order(body)
         definite = order.block(body.pou.tree.body)
-        order.complain_of_calls(definite)
+        order.warn_of_conditional_calls(definite)
         self._count(body)
         for key, node in definite.items():
             if _is_coil(key):
@@ -88,7 +88,7 @@ class Writes:
 
 
 def _is_coil(key: Key) -> bool:
-    """True for a bit that somebody else sees, and for any output address."""
+    """True for a bit that is visible outside of its body, and for any output address."""
     if isinstance(key, Address):
         return key.bit is not None or key.area == "Q"
     return isinstance(key, Variable) and key.owner is None and base(key.type) == BOOL
@@ -179,7 +179,7 @@ class _Order:
         if not isinstance(node, tree.While):
             definite.update((key, call) for key, call in inside.items() if isinstance(call, tree.Call))
 
-    def inside(self, node: ladder.Ladder | ladder.Rung | sfc.Sfc, definite: Definite) -> None:
+    def body_of(self, node: ladder.Ladder | ladder.Rung | sfc.Sfc, definite: Definite) -> None:
         """Rungs are executed one after the other, as if they were not there; so is what a chart does."""
         self.in_rung = isinstance(node, ladder.Rung)
         for statement in node.body:
@@ -281,10 +281,10 @@ class _Order:
 
     # --- timers -----------------------------------------------------------------------------------------------------
 
-    def complain_of_calls(self, definite: Definite) -> None:
+    def warn_of_conditional_calls(self, definite: Definite) -> None:
         """Warn of a timer or its like that is called in one place only, and not on every way.
 
-        Where it is called in two places, somebody has thought of the other way."""
+        Two calls are taken as a deliberate choice."""
         for key, calls in self.calls.items():
             if len(calls) == 1 and key not in definite:
                 pou = self.facts.calls[calls[0]]
@@ -299,6 +299,6 @@ _STEPS: dict[type, Callable[[_Order, Any, Definite], None]] = {
     tree.Assign: _Order.assign, tree.CallStatement: _Order.call, tree.If: _Order.choice, tree.Case: _Order.case,
     tree.For: _Order.loop, tree.While: _Order.loop, tree.Repeat: _Order.loop, tree.Return: _Order.leave,
     tree.Exit: _Order.leave, tree.Continue: _Order.leave, tree.Empty: _Order.nothing,
-    tree.RefusedStatement: _Order.nothing, ladder.Ladder: _Order.inside, ladder.Rung: _Order.inside,
-    sfc.Sfc: _Order.inside,
+    tree.RefusedStatement: _Order.nothing, ladder.Ladder: _Order.body_of, ladder.Rung: _Order.body_of,
+    sfc.Sfc: _Order.body_of,
 }

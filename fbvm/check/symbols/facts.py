@@ -47,7 +47,7 @@ class Variable:
     value: Value | None = None
     """The value of a CONSTANT of elementary type."""
     wrong: bool = False
-    """True for a CONSTANT whose value is wrong, which was said."""
+    """True for a CONSTANT whose value has an error that is reported."""
     constant: bool = False
     retain: bool = False
     reference: bool = False
@@ -114,7 +114,7 @@ class Pou:
     """Of these the CONSTANTs that were named before: type and value; None while they are being resolved."""
     busy: bool = False
     awaited: list[RefType] = field(default_factory=list)
-    """References to instances that were met while the POU was being resolved."""
+    """References to instances that were made while the POU was being resolved; they get their target afterwards."""
     edges: list[Edge] = field(default_factory=list)
     referred: list[Variable] = field(default_factory=list)
     """Variables of an instance that something refers to; each is an object of its own."""
@@ -124,9 +124,9 @@ class Pou:
     home: Pou | None = None
     """The POU that an ACTION belongs to."""
     types: dict[str, Type] = field(default_factory=dict)
-    """What generic types stand for in a function that was made for one call."""
-    looked: frozenset[str] | None = None
-    """Folded names of the parameters of generic type that are taken as they are passed, once somebody asked."""
+    """What generic types stand for in a function that was instantiated for one call."""
+    passed_as_is: frozenset[str] | None = None
+    """Folded names of the parameters of generic type that are taken as they are passed; None until `generics` finds them."""
     leases: list[int] = field(default_factory=list)
     """Leases that its body holds until it ends."""
     tasked: dict[Variable, Variable] = field(default_factory=dict)
@@ -212,8 +212,8 @@ class Holder:
 
 @dataclass(frozen=True, eq=False)
 class AggregatePart:
-    """A value of something written out in a statement that is worked out when the program runs: where it lies, several times
-    if it is repeated, its bit, its type and what gives it."""
+    """One value of an aggregate that is computed when the program runs: its offsets in the aggregate (several if it is
+    repeated), its bit, its type and its expression."""
 
     places: tuple[int, ...]
     bit: int | None
@@ -223,7 +223,8 @@ class AggregatePart:
 
 @dataclass(frozen=True, eq=False)
 class Aggregate:
-    """An array or structure that is written out in a statement: its place in the frame, what is known of it, and the rest."""
+    """An array or structure written out in a statement: its variable in the frame, its bytes with all constant values, and
+    the parts that are computed when the program runs."""
 
     place: Variable
     content: bytes
@@ -251,7 +252,7 @@ class Facts:
 
     types: dict[tree.Expr, Type] = field(default_factory=dict)
     wrong: set[tree.Expr] = field(default_factory=set)
-    """Expressions that have no type, which was said."""
+    """Expressions without a type: a diagnostic says why."""
     constants: dict[tree.Expr, Value] = field(default_factory=dict)
     undefined: dict[tree.Expr, tuple[Source, str]] = field(default_factory=dict)
     """Calls of constants that have no value, where they stand, and the code of the trap that they become."""
@@ -277,7 +278,7 @@ class Facts:
     """Calls whose result is what lies in memory, its bytes in another order."""
     aggregates: dict[tree.Expr, Aggregate] = field(default_factory=dict)
     bare: dict[tree.CallStatement, tree.Call] = field(default_factory=dict)
-    """Statements that name an ACTION without (), and the calls that they mean."""
+    """Statements that name an ACTION without (), with the calls that they mean."""
     text_cases: set[tree.Case] = field(default_factory=set)
     """CASE statements that choose by a STRING."""
     sources: dict[tree.Node, Source] = field(default_factory=dict)
@@ -300,7 +301,7 @@ class Facts:
             expr not in self.followed and not isinstance(self.types.get(expr.of), RefType)
 
     def root(self, expr: tree.Expr) -> tree.Expr:
-        """The variable, address, dereference or element behind a pointer that a place begins with."""
+        """The variable, address, dereference or element behind a pointer of which a place is a part."""
         while self.is_part(expr):
             expr = expr.of
         return expr
@@ -365,7 +366,7 @@ class TaskFact:
 
 
 class Report:
-    """Collects diagnostics; the same place is not complained about twice with one code."""
+    """Collects diagnostics; one code is reported once for one place."""
 
     def __init__(self) -> None:
         self.diagnostics: list[Diagnostic] = []
@@ -379,7 +380,7 @@ class Report:
             self.diagnostics.append(Diagnostic(code, source, node.start, node.end, message, hint, related))
 
     def refuse(self, source: Source, node: tree.Refused | tree.RefusedStatement) -> None:
-        """Say of something that was read why it is not executed."""
+        """Report why something that was read is not executed."""
         why = "is object-oriented text, which fbvm does not execute" if node.code == "S0902" else \
             "is understood but not executed by this version"
         self.add(node.code, source, node, f"{node.what} {why}")

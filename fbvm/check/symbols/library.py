@@ -54,9 +54,9 @@ class Library:
     writes: tuple[str, ...] = ()
     """Areas that programs may only read, and this library writes."""
     by_dialect: bool = False
-    """True for blocks in place of others, which only a dialect brings in."""
+    """True for blocks that replace others in the dialects that name the library."""
     shipped: bool = False
-    """True for one that comes with fbvm, which stays as it is."""
+    """True for one that comes with fbvm, whose files do not change."""
     loaded: set[str] = field(default_factory=set)
 
 
@@ -69,7 +69,7 @@ class LibraryError(ValueError):
 
     @property
     def diagnostic(self) -> Diagnostic:
-        """The same for those who compile."""
+        """The error as a diagnostic."""
         text = self.described.read_text(encoding="utf-8", errors="replace") if self.described.is_file() else ""
         return Diagnostic("P0201", Source(str(self.described), text), 0, len(text.partition("\n")[0]), self.why)
 
@@ -121,7 +121,7 @@ def _flag(table: dict[str, object], key: str, described: Path) -> bool:
 
 @cache
 def _shipped() -> tuple[Library, ...]:
-    """The libraries that come with fbvm, which stay as they are while it runs."""
+    """The libraries that come with fbvm, whose files do not change while it runs."""
     return tuple(replace(library, shipped=True) for library in _libraries_below(data_folder("fblib")))
 
 
@@ -166,7 +166,7 @@ def _mailbox(table: dict[str, object], described: Path) -> Mailbox | None:
 
 
 class Libraries:
-    """The shipped libraries and the user's own; own ones are asked first."""
+    """The shipped libraries and the user's own; names are looked up in own ones first."""
 
     def __init__(self, own: Sequence[Path] = (), shipped: bool = True, preferred: Sequence[str] = ()) -> None:
         shelves = [list(_libraries_below(Path(root))) for root in own]

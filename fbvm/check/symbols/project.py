@@ -1,6 +1,6 @@
-"""All declarations of a program: the user's own, and those of libraries, which are read when a name asks for them.
+"""The symbol table: all declarations of a program, the user's own and those of libraries, whose files are read on demand.
 
-A user's own POU or type shadows a library's of the same name, but not inside libraries."""
+A user's own POU or type shadows a library's of the same name, except for names that libraries use."""
 
 from __future__ import annotations
 
@@ -100,26 +100,27 @@ class Project:
         self._owners: dict[str, tuple[str, ...]] = {}
         self._found_pous: dict[str, dict[str, Pou | None]] = {}
         self._found_types: dict[str, dict[str, TypeEntry | None]] = {}
-        """What was looked for, by folded name, and what each library that asked for it sees."""
+        """Results of look-ups: by folded name, and by the library in which the name is used."""
         self._compared = 0
-        self.meanings: dict[tuple[str, Type, Type], tuple[Type, Type]] = {}
-        """For operators between elementary types that are no constants: the type in which they work, and that of the result."""
-        self.made: dict[tuple[Pou, tuple[tuple[str, str], ...]], Pou] = {}
-        """Functions made of generic ones, by the types that these stand for."""
+        self.operator_types: dict[tuple[str, Type, Type], tuple[Type, Type]] = {}
+        """For an operator between values of elementary types that are no constants: the type of its operation and of its result."""
+        self.instantiated: dict[tuple[Pou, tuple[tuple[str, str], ...]], Pou] = {}
+        """Functions that were instantiated of generic ones, by the types that the generic types stand for."""
         self.new_pous: deque[Pou] = deque()
         """POUs that have been named but not checked yet."""
 
     def let_go(self) -> None:
-        """Forget everything: POUs, variables and facts refer to each other in circles, and would stay until somebody
-        looks for garbage."""
-        for pou in {*self.pous.values(), *self.made.values(), *(v.owner for v in self.facts.variables.values() if v.owner)}:
+        """Drop everything.  POUs, variables and facts refer to each other in circles, and would stay in memory until the next
+        garbage collection."""
+        owners = (variable.owner for variable in self.facts.variables.values() if variable.owner)
+        for pou in {*self.pous.values(), *self.instantiated.values(), *owners}:
             vars(pou).clear()
         for table in vars(self.facts).values():
             table.clear()
         vars(self).clear()
 
     def collect(self, text: tree.SourceText, source: Source) -> None:
-        """Take the declarations of one text; complain about names declared twice."""
+        """Add the declarations of one text; report names that are declared twice."""
         last: Pou | None = None
         for declaration in text.declarations:
             if isinstance(declaration, tree.Refused):
@@ -201,7 +202,7 @@ class Project:
         self.dependencies = before
 
     def owners(self, source: Source) -> tuple[str, ...]:
-        """Whose names `source` sees, nearest first; a library never sees the user's own."""
+        """The libraries whose names `source` sees, nearest first, "" for the user's own names, which a library never sees."""
         own = source.library
         if own not in self._owners:
             others = [name for name in self.libraries.names if name != own]
@@ -233,7 +234,7 @@ class Project:
         return answer
 
     def _look(self, table: dict[tuple[str, str], T], folded: str, source: Source) -> T | None:
-        """What a name means for `source`, in the file of that name if it was not read before."""
+        """What a name means in `source`; reads the libraries' files of that name first."""
         in_file = self.libraries.has_file(folded)
         for owner in self.owners(source):
             if in_file and owner and (owner, folded) not in table:
@@ -299,7 +300,7 @@ _PART = re.compile(r"\w+\s+(?:(?:PUBLIC|PRIVATE|PROTECTED|INTERNAL|FINAL|ABSTRAC
 
 
 def _refused_name(node: tree.Refused, source: Source) -> str:
-    """The name of an ACTION, METHOD or INTERFACE that is refused, folded: uses of it are not complained about again."""
+    """The name of an ACTION, METHOD or INTERFACE that is refused, folded: uses of it are not reported again."""
     if node.what.endswith("of a structure"):
         return fold(source.text[node.start:node.end].split(None, 1)[0].rstrip(":"))
     match = _PART.match(source.text, node.start)

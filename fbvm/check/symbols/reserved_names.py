@@ -12,7 +12,7 @@ RESERVED = frozenset(ELEMENTARY) | {"STRING", "WSTRING", "TOD", "LTOD", "DT", "L
 
 
 def refuse_reserved(report: Report, source: Source, name: tree.Name) -> None:
-    """Complain about a declaration under the name of an elementary type.
+    """Report a declaration under the name of an elementary type.
 
     Members of structures may have one: they stand behind a point."""
     if fold(name.text) in RESERVED:

@@ -1,4 +1,4 @@
-"""The statement lists inside statements, and what is searched for in all of them."""
+"""The statement lists inside statements, and searches through them."""
 
 from __future__ import annotations
 

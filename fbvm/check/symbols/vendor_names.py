@@ -1,4 +1,4 @@
-"""Names that programs bring along: words of other languages, and what comes with libraries of vendors."""
+"""Names of other languages and of vendors' libraries, with the hints for programs that use them."""
 
 from __future__ import annotations
 
