@@ -1,4 +1,4 @@
-"""The page of a block or function of the libraries that come along: what it does, and its pins as they are declared."""
+"""The page of a block or function of the shipped libraries: what it does, and its pins as they are declared."""
 
 from __future__ import annotations
 

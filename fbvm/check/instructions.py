@@ -1,4 +1,4 @@
-"""What there is to say of each instruction of ladder: made of the table and of the library that executes it."""
+"""The page of each ladder instruction, made of the instruction table and of the library that executes it."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ class _Statements:
                        "write () behind an instance to call it, or := to assign")
 
     def _bare_action(self, node: tree.CallStatement) -> None:
-        """An ACTION without (), which is a call of it in some dialects."""
+        """Check an ACTION that is named without (): a call in some dialects."""
         called = tree.Call(node.call.start, node.call.end, node.call, ())
         if self.scope.dialect.bare_actions:
             self.facts.bare[node] = called
@@ -263,7 +263,7 @@ class _Statements:
             self.block(node.body)
 
     def _empty(self, node: tree.Empty) -> None:
-        """Nothing is wrong with `;`."""
+        """`;` is always correct."""
 
     def _refused(self, node: tree.RefusedStatement) -> None:
         self.scope.project.report.refuse(self.pou.source, node)

@@ -21,14 +21,19 @@ NAMED = 3
 
 
 def mixed(call: tree.Call, dialect: Dialect) -> tree.Argument | None:
-    """The first argument given another way than the first one of its call; None if all are alike, or a dialect takes both."""
+    """The first argument that is named where the first of its call is not, or the other way round.
+
+    None if there is no such argument, or the dialect takes both."""
     if dialect.mixed_arguments:
         return None
     return next((a for a in call.arguments if bool(a.kind) != bool(call.arguments[0].kind)), None)
 
 
 class Arguments:
-    """The arguments of one call; `names` are its parameters, of which the last may repeat; `others` name the first ones too."""
+    """The arguments of one call.
+
+    `names` are the parameters of the function, of which the last one repeats if `repeats`; `others` are second names of the
+    first ones."""
 
     def __init__(self, scope: Scope, call: tree.Call, names: Sequence[str], repeats: bool = False,
                  others: Sequence[str] = ()) -> None:
@@ -114,7 +119,7 @@ class Arguments:
         return None
 
     def _guard(self, argument: tree.Argument) -> bool:
-        """True for EN and ENO, which every function has; noted unless they are named without a value."""
+        """True for EN and ENO, which every function has; with a value they become the guard of the call."""
         name = fold(argument.name.text) if argument.name is not None else ""
         if (name, argument.kind) not in (("EN", ":="), ("ENO", "=>")):
             return False

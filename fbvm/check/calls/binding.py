@@ -67,7 +67,7 @@ def _positional(scope: Scope, call: tree.Call, arguments: Sequence[tree.Argument
 
 
 def _compared(scope: Scope, argument: tree.Argument, pou: Pou) -> str:
-    """The parameter that `IN = x` names for `IN := x`; "" if it is none of that."""
+    """The parameter of an argument that is written `IN = x`, probably for `IN := x`; "" for other arguments."""
     value = argument.value
     if argument.kind or not isinstance(value, tree.Binary) or value.op != "=" or not isinstance(value.left, tree.NameRef):
         return ""
@@ -97,7 +97,7 @@ def _named(scope: Scope, argument: tree.Argument, pou: Pou, bound: PouCall, give
 
 
 def _implicit(scope: Scope, argument: tree.Argument, name: str, pou: Pou, bound: PouCall) -> None:
-    """EN and ENO of a POU that does not declare them; anything else is unknown."""
+    """Bind EN and ENO of a POU that does not declare them; report any other name as unknown."""
     assert argument.name is not None
     if name == "EN" and argument.kind == ":=":
         if argument.value is not None and scope.fit(argument.value, BOOL, "S0405", "EN"):

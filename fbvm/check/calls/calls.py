@@ -13,7 +13,7 @@ from fbvm.syntax import tree
 
 
 def value(scope: Scope, call: tree.Call, want: Type | None) -> Type | None:
-    """A call as part of an expression."""
+    """The type of a call in an expression; None after a diagnostic."""
     result = _resolve(scope, call, want, as_value=True)
     if result == "":
         scope.error("S0409", call, f"{_shown(call.callee)} gives no value",
@@ -23,7 +23,7 @@ def value(scope: Scope, call: tree.Call, want: Type | None) -> Type | None:
 
 
 def statement(scope: Scope, call: tree.Call) -> None:
-    """A call as a statement; a result is thrown away."""
+    """Check a call that is a statement; it may drop a result."""
     result = _resolve(scope, call, None, as_value=False)
     if isinstance(result, Type):
         scope.facts.types[call] = result
@@ -53,7 +53,9 @@ def _resolve(scope: Scope, call: tree.Call, want: Type | None, as_value: bool) -
 
 
 def action(scope: Scope, callee: tree.Expr) -> tuple[Pou, tree.Expr | None] | None:
-    """The ACTION that an expression names, and the instance of which; None for one of the POU itself."""
+    """The ACTION that an expression names, and its instance: None for an ACTION of the POU itself.
+
+    None for an expression that names no ACTION."""
     hides = scope.variable(callee.text) if isinstance(callee, tree.NameRef) else None
     if hides is not None and hides.role != "action":
         return None

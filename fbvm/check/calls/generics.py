@@ -1,8 +1,8 @@
-"""Functions with parameters of generic type: one text, made anew for each set of types that it is called with.
+"""Generic functions: one text, instantiated for each set of types that it is called with.
 
-All places of one generic type in the head of a function have the same type in a call, ANY_NUM and ANY_INT are two.  What
-looks into a parameter instead (x.pValue, x.diSize, x.BYTES ...), or passes it on to what does, takes it as it is passed,
-whatever its type.
+All parameters of one generic type have the same type in a call; ANY_NUM and ANY_INT are two generic types.  A parameter whose
+members are read (x.pValue, x.diSize, x.BYTES ...), or that is passed on to such a parameter, takes any argument as it is: the
+function is not instantiated for its type.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from fbvm.syntax.tree.node import copied, walk
 
 
 def variables(declared: tree.Pou) -> dict[str, str]:
-    """The parameters and variables of generic type, folded, and the names of their types."""
+    """The folded names of parameters and variables of generic type, each with the folded name of that type."""
     return {fold(name.text): fold(spec.text) for section in declared.sections for variable in section.variables
             if isinstance(spec := variable.spec, tree.NamedType) and fold(spec.text) in ANYTHING
             for name in variable.names}
 
 
 def passed_as_is(pou: Pou, project: Project) -> frozenset[str]:
-    """Names of which the body asks what only a parameter of type ANY tells, or another function that it calls."""
+    """Folded names of parameters that take any argument as it is: the body, or a function that it calls, reads members of ANY."""
     if pou.passed_as_is is None:
         pou.passed_as_is = frozenset()
         found: set[str] = set()
@@ -44,12 +44,12 @@ def passed_as_is(pou: Pou, project: Project) -> frozenset[str]:
 
 
 def _passed_on(call: tree.Call, called: Pou | None, project: Project) -> set[str]:
-    """Names that are passed to a function which looks into them."""
+    """Folded names that a call passes to parameters that take any argument as it is."""
     if called is None or not called.is_function:
         return set()
-    looked = passed_as_is(called, project)
+    as_is = passed_as_is(called, project)
     return {fold(value.text) for name, value, _ in _given(call, called)
-            if name in looked and isinstance(value, tree.NameRef)}
+            if name in as_is and isinstance(value, tree.NameRef)}
 
 
 def _given(call: tree.Call, called: Pou) -> Iterator[tuple[str, tree.Expr, str]]:
@@ -69,7 +69,7 @@ def _given(call: tree.Call, called: Pou) -> Iterator[tuple[str, tree.Expr, str]]
 
 
 def is_generic(pou: Pou, project: Project) -> bool:
-    """True for a function that is made anew for the types of each call."""
+    """True for a function that is instantiated for the types of each call."""
     if not pou.is_function or pou.types:
         return False
     result = pou.tree.result
@@ -80,7 +80,7 @@ def is_generic(pou: Pou, project: Project) -> bool:
 
 
 def function(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> Pou | None:
-    """The function for the types of this call, or None after a diagnostic."""
+    """The instantiated function for the types of a call; None after a diagnostic."""
     types = _types(scope, call, pou, want)
     if types is None:
         return None
@@ -121,14 +121,14 @@ def _types(scope: Scope, call: tree.Call, pou: Pou, want: Type | None) -> dict[s
 def _arguments(scope: Scope, call: tree.Call, pou: Pou) -> Iterator[tuple[str, Type | None, tree.Expr, bool]]:
     """Generic type, type, argument, and whether it has to be of exactly that type, for each generic parameter."""
     names = variables(pou.tree)
-    looked = passed_as_is(pou, scope.project)
+    as_is = passed_as_is(pou, scope.project)
     for name, value, section in _given(call, pou):
-        if name in names and name not in looked:
+        if name in names and name not in as_is:
             yield names[name], scope.infer(value), value, section != "VAR_INPUT"
 
 
 def _settled(scope: Scope, call: tree.Call, pou: Pou, name: str, kind: Type | None, want: Type | None) -> Type | None:
-    """The type that a generic type stands for, if it belongs to it."""
+    """The type that a generic type stands for; None after a diagnostic if it is none of the generic type."""
     if kind is None or is_untyped(kind):
         wanted = base(want) if want is not None and name in families(want) else None
         literal = "DINT" if kind is UNTYPED_INT else "LREAL" if kind is UNTYPED_REAL else None
@@ -145,9 +145,9 @@ def _settled(scope: Scope, call: tree.Call, pou: Pou, name: str, kind: Type | No
 
 
 def _joined(met: Type | None, kind: Type, exact: bool) -> Type | None:
-    """The type in which another argument meets those before it; None if there is none.
+    """The type in which another argument and those before it meet; None if there is none.
 
-    Of a subrange an input has the base; an in-out makes it what all have."""
+    For a subrange an input has the base type; an in-out makes it the type of all."""
     if exact and isinstance(kind, SubrangeType):
         return kind if met in (None, kind, kind.base) or met is UNTYPED_INT else None
     kind = kind if exact else base(kind)

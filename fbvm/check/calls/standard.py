@@ -1,4 +1,4 @@
-"""Calls of standard functions: which one, in which types."""
+"""Calls of standard functions: which function is meant, and in which types it works."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ Passed = list[tuple[tree.Expr, Type]]
 
 
 def is_known(name: str) -> bool:
-    """True for the folded name of what can be called without being declared: a standard function, or what looks like one."""
+    """True for the folded name of a standard function or of an intrinsic that is not refused."""
     return functions.is_standard(name) or name in MAKERS or name in intrinsics.NAMES and name not in intrinsics.REFUSED
 
 
@@ -252,7 +252,7 @@ def _is_result(scope: Scope, value: tree.Expr) -> bool:
 
 
 def _parameter(scope: Scope, value: tree.Expr, name: str) -> Type | None:
-    """The type in which an argument is wanted whose parameter has its own type."""
+    """The type of a parameter that is no type variable; of a generic one the type of its argument."""
     if name not in GENERIC:
         return ELEMENTARY[name]
     kind = scope.settle(value)
@@ -263,7 +263,7 @@ def _parameter(scope: Scope, value: tree.Expr, name: str) -> Type | None:
 
 
 def _bind(scope: Scope, call: tree.Call, values: list[tree.Expr], row: Signature, want: Type | None) -> Type | None:
-    """The one type that all arguments of a type variable meet in."""
+    """The one type in which all arguments of a type variable meet; None after a diagnostic."""
     inferred = [scope.infer(value, want) for value in values]
     kinds = [kind for kind in inferred if kind is not None]
     if len(kinds) < len(inferred):
@@ -286,7 +286,7 @@ def _bind(scope: Scope, call: tree.Call, values: list[tree.Expr], row: Signature
 
 
 def _met(bound: Type | None, kind: Type) -> Type | None:
-    """The type in which one more argument meets those before it; None if there is none."""
+    """The type in which one more argument and those before it meet; None if there is none."""
     if isinstance(kind, EnumType) or isinstance(bound, EnumType):
         return kind if bound in (None, kind) else None
     met = base(kind) if bound is None or same(kind, bound) else common(bound, kind)

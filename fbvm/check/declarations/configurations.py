@@ -14,7 +14,7 @@ LOWEST = 65536
 
 
 class Configurations:
-    """Finds the programs to run and makes their instances."""
+    """Chooses the programs that run, and makes their instances and tasks."""
 
     def __init__(self, context: Context) -> None:
         self.context = context
@@ -44,7 +44,7 @@ class Configurations:
         return candidates[0]
 
     def resolve(self, program: str | None) -> None:
-        """Fill the tasks of the context: from the CONFIGURATION, or with the one program that there is or that is named."""
+        """Add the tasks to the context: those of the CONFIGURATION, or one task for the program that is named or the only one."""
         configurations = self.project.configurations
         if program is None and configurations:
             for extra, source in configurations[1:]:
@@ -160,7 +160,7 @@ class Configurations:
         return False
 
     def _connect(self, program: tree.ProgramInstance, task: TaskFact, source: Source) -> None:
-        """Connections are copied before and after each run: the task runs a body that calls the instance with them."""
+        """Make a body for a program with connections: the task runs the body, which calls the instance with them."""
         name = program.name
         call = tree.Call(name.start, program.end, tree.NameRef(name.start, name.end, name.text), program.connections)
         runner = tree.Pou(name.start, program.end, "PROGRAM", tree.Name(name.start, name.end, f"{name.text} run"), None, (),

@@ -88,7 +88,7 @@ def _initial_value(scope: Scope, place: tree.Expr) -> tuple[Type, bytes] | None:
 
 
 def _places(expr: tree.Expr) -> Iterator[tree.Expr]:
-    """The places that an expression reads, each as a whole."""
+    """The variables, members and elements that an expression reads, each as a whole."""
     if isinstance(expr, tree.NameRef | tree.Member | tree.Index):
         yield expr
     elif isinstance(expr, tree.Unary):
@@ -103,7 +103,7 @@ def _places(expr: tree.Expr) -> Iterator[tree.Expr]:
 
 
 def _nodes(expr: tree.Expr) -> Iterator[tree.Expr]:
-    """An expression and those that it is made of."""
+    """An expression and all expressions that it is made of."""
     yield expr
     if isinstance(expr, tree.Member | tree.Deref | tree.Part):
         yield from _nodes(expr.of)

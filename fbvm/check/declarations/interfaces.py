@@ -1,4 +1,4 @@
-"""Declarations of variables: sections of a POU become its variables and the layout of its instances or frame.
+"""Interfaces: the sections of a POU become its variables and the layout of its instances or its frame.
 
 Instance of a block or program: an 8-byte header that begins with the type identifier, then its variables in order of
 writing, naturally aligned.  Frame of a function (one, fixed: POUs never recurse and tasks never preempt): first inputs and
@@ -34,11 +34,11 @@ from fbvm.syntax.st.pragmas import passes_places
 OBJECTS_AT = 4
 """Where an instance has the number of the first of its objects: behind its type identifier, 32 bits each."""
 _SECTIONS = ("VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT", "VAR_TEMP", "VAR_EXTERNAL", "VAR_STAT")
-"""What every POU may have."""
+"""Sections that every POU may have."""
 _LOCATED = ("VAR", "VAR_INPUT", "VAR_OUTPUT")
 """Sections of blocks and programs whose variables may lie AT an address."""
-BORROWED = (OpenArrayType, AnyType)
-"""Types whose slot holds a reference and more."""
+_WITH_BOUNDS = (OpenArrayType, AnyType)
+"""Types of parameters whose slot holds a reference, and the bounds or the type of the argument."""
 _NOT_EXECUTED = ("VAR_INST", "VAR_GENERIC", "VAR_ACCESS", "VAR_CONFIG")
 
 
@@ -98,7 +98,7 @@ class _Interface:
             self.pou.tasked[block] = flag
 
     def _action(self, action: tree.Action, source: Source) -> None:
-        """An ACTION is a body of its own over the variables of its POU."""
+        """Make the POU of an ACTION: a body of its own, with the variables of the POU that it belongs to."""
         name = fold(action.name.text)
         if self.pou.is_function:
             self.context.report.add("S0205", source, action.name, "a FUNCTION has no ACTION", "make it a FUNCTION_BLOCK")
@@ -182,7 +182,7 @@ class _Interface:
 
     def _place(self, variable: Variable, declared: tree.VarDecl) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"
-        self._open(variable, declared)
+        self._check_bounds(variable, declared)
         variable.any_length = variable.reference and isinstance(declared.spec, tree.StringSpec) and declared.spec.length is None
         if variable.kind == "VAR_STAT":
             variable.place = "abs"  # one for all instances and calls
@@ -191,7 +191,7 @@ class _Interface:
         if declared.location is not None:
             located = variable.kind in _LOCATED and not self.pou.is_function
             if located and is_open(declared.location, variable.type):
-                self._completed(variable, declared.location)
+                self._place_by_var_config(variable, declared.location)
             else:
                 variable.place = "area"
             if not located:
@@ -202,7 +202,7 @@ class _Interface:
         if fold(variable.name) == "EN" and variable.kind == "VAR_INPUT" and not variable.explicit:
             variable.initial = b"\x01"  # EN is TRUE where nobody connects it
 
-    def _completed(self, variable: Variable, location: tree.Location) -> None:
+    def _place_by_var_config(self, variable: Variable, location: tree.Location) -> None:
         """`AT %I*`: VAR_CONFIG gives each instance its place; without VAR_CONFIG it is a variable like others."""
         variable.open = self.project.completes(variable.name)
         variable.reference = variable.reference or variable.open
@@ -211,10 +211,10 @@ class _Interface:
             self._error("S0692", location, f"{said} where {variable.name} AT {location.text} lies",
                         "it keeps its value as a variable of its own; a place in the area is %MW10 or %IX0.3")
 
-    def _open(self, variable: Variable, declared: tree.VarDecl) -> None:
+    def _check_bounds(self, variable: Variable, declared: tree.VarDecl) -> None:
         """Report ARRAY [*] and ANY that are no in-outs: they take bounds, size and type from the argument."""
         kind = variable.type
-        if isinstance(kind, BORROWED) and variable.kind != "VAR_IN_OUT":
+        if isinstance(kind, _WITH_BOUNDS) and variable.kind != "VAR_IN_OUT":
             what = kind.name if isinstance(kind, AnyType) else "ARRAY [*]"
             self._error("S0205", declared.spec, f"{what} cannot be {variable.kind}",
                         "declare it in VAR_IN_OUT")
@@ -243,7 +243,9 @@ class _Interface:
             self._add_edge(variable)
 
     def _add_edge(self, raw: Variable) -> None:
-        """The body reads a hidden variable instead of the pin; names with a space cannot be written in a program."""
+        """Add the hidden variables of an input with R_EDGE or F_EDGE: the body reads the edge instead of the pin.
+
+        Their names have a space, so that no program can name them."""
         memory = Variable(f"{raw.name} memory", BOOL, "VAR", raw.source, raw.node, self.pou, initial=b"\0")
         hidden = Variable(f"{raw.name} edge", BOOL, "VAR", raw.source, raw.node, self.pou, initial=b"\0")
         self.pou.order += [hidden, memory]
@@ -318,7 +320,7 @@ class _Interface:
 
 
 def _slot(variable: Variable) -> int:
-    return variable.type.size if isinstance(variable.type, BORROWED) else 8
+    return variable.type.size if isinstance(variable.type, _WITH_BOUNDS) else 8
 
 
 def _append(content: bytearray, variable: Variable) -> None:

@@ -23,7 +23,7 @@ def location_of(context: Context, declared: tree.VarDecl, kind: Type, source: So
     try:
         address = parse_address(node.text, context.areas)
     except AddressError as error:
-        context.report.add("S0601", source, node, str(error), _meant(node.text, declared, kind))
+        context.report.add("S0601", source, node, str(error), _hint(node.text, declared, kind))
         return None
     if address.area in ("T", "C") and base(kind) == BOOL:
         address = Address("TF" if address.area == "T" else "CNF", address.number)
@@ -33,7 +33,7 @@ def location_of(context: Context, declared: tree.VarDecl, kind: Type, source: So
     return address if _fits(context, address, kind, source, node) else None
 
 
-def _meant(text: str, declared: tree.VarDecl, kind: Type) -> str:
+def _hint(text: str, declared: tree.VarDecl, kind: Type) -> str:
     """The hint for a text that is no address: a `%` in front, or for the name of a variable a reference."""
     if _WITHOUT_SIGN.fullmatch(text):
         return f"write %{text.upper()}"

@@ -25,7 +25,7 @@ from fbvm.base.types import (
     reference,
     string,
 )
-from fbvm.check.declarations.initial_values import initial_bytes
+from fbvm.check.declarations.initial_bytes import initial_bytes
 from fbvm.check.declarations.structures import RELATIVE, Members
 from fbvm.check.expressions.constant_integers import integer
 from fbvm.check.expressions.constants import default
@@ -128,7 +128,7 @@ def _named(scope: Scope, spec: tree.NamedType, name: str) -> Resolved | None:
         scope.error("S0205", spec, f"{folded} is no type of a variable", "it is one of a parameter only")
         return None
     if not scope.project.is_refused(folded, scope.source):
-        scope.error("S0204", spec, f"there is no type or block {spec.text}", _meant(scope, spec.text))
+        scope.error("S0204", spec, f"there is no type or block {spec.text}", _hint(scope, spec.text))
     return None
 
 
@@ -138,7 +138,7 @@ def _without_space(scope: Scope, name: str) -> str:
     return rest if dot and scope.project.is_space(space) else name
 
 
-def _meant(scope: Scope, name: str) -> str:
+def _hint(scope: Scope, name: str) -> str:
     """The hint for a name that means no type."""
     if fold(name) in vendor_names.TYPES:
         also = ", and BIT in structures" if fold(name) == "BIT" else ""

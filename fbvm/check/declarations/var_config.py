@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from fbvm.base.areas import AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, Field, StructType, Type, fold
-from fbvm.check.declarations.initial_values import initial_bytes
+from fbvm.check.declarations.initial_bytes import initial_bytes
 from fbvm.check.declarations.locations import location_of
 from fbvm.check.declarations.specs import resolve
 from fbvm.check.expressions.constant_integers import integer
@@ -101,7 +101,7 @@ class VarConfig:
     # --- paths ------------------------------------------------------------------------------------------------------
 
     def _spot(self, path: tree.Expr, source: Source, program: Spot | None = None) -> Spot | None:
-        """What a path names, seen from a program or from the configuration, or None after a diagnostic."""
+        """The variable that a path in a program or in the configuration names; None after a diagnostic."""
         if isinstance(path, tree.Direct):
             return self._direct(path.text, path, source)
         if isinstance(path, tree.NameRef) and program is not None:
@@ -176,7 +176,7 @@ class VarConfig:
     # --- what is left out -------------------------------------------------------------------------------------------
 
     def _left_out(self) -> None:
-        """Each instance needs a place for each of its variables that some VAR_CONFIG completes."""
+        """Report instances with a variable AT %I* for which no VAR_CONFIG gives an address."""
         done = {(row.spot.root, _key(row.spot)) for row in self.completed if row.address is not None}
         for root in self.context.global_order:
             for path, key, variable in () if root.reference else self._open_in(root.type, root.name, ()):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fbvm.base.areas import FLAG_AREAS
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import ArrayType, StructType, fold, on_bits
-from fbvm.check.declarations.initial_values import initial_bytes
+from fbvm.check.declarations.initial_bytes import initial_bytes
 from fbvm.check.declarations.locations import location_of
 from fbvm.check.declarations.specs import resolve, resolve_parameter
 from fbvm.check.expressions.scope import Scope

@@ -31,7 +31,7 @@ _PASSED_WITH_BOUNDS = OpenArrayType | AnyType
 
 
 def is_untyped(kind: Type | None) -> bool:
-    """True for a literal, or an expression of nothing but literals, that has not met a context yet."""
+    """True for a literal, or an expression of nothing but literals, that has no type yet."""
     return kind is UNTYPED_INT or kind is UNTYPED_REAL
 
 
@@ -226,7 +226,7 @@ def comparison_hint(kind: Type) -> str:
 
 
 def literal_hint(value: Value | None, kind: Type) -> str:
-    """How a literal of `kind` is written, where another one does not fit."""
+    """How a literal of `kind` is written; the hint where another literal stands."""
     if kind == BOOL:
         return "write TRUE or FALSE, or a comparison"
     if isinstance(kind, StringType):

@@ -43,7 +43,7 @@ def decode(kind: Type, data: bytes) -> Value:
 
 
 def default(kind: Type) -> bytes:
-    """The bytes of a variable of `kind` that nobody initialises, for types without initial values of their own."""
+    """The bytes of a variable of `kind` without an initial value, for types without initial values of their own."""
     if isinstance(kind, SubrangeType):
         return encode(kind, kind.low)
     if isinstance(kind, EnumType):

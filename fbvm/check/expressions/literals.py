@@ -1,4 +1,4 @@
-"""Types of literals; one without a prefix stays untyped until it meets a context."""
+"""Types of literals; one without a prefix stays untyped until an operand or its place gives it a type."""
 
 from __future__ import annotations
 

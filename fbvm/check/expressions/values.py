@@ -1,4 +1,4 @@
-"""Small tests of types and of expressions as they are written."""
+"""Tests of types, and of expressions by their form alone."""
 
 from __future__ import annotations
 

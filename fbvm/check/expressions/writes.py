@@ -1,4 +1,4 @@
-"""What a program may write, and what it is warned of when it does."""
+"""Writes: which places a program may write, and warnings about inputs and loop counters that it writes."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ class Body:
         self.report.add(code, self.pou.source, node, message, hint, related)
 
     def there(self, node: tree.Node, what: str) -> tuple[Source, int, str]:
-        """A second place in the same source."""
+        """A second place of a warning in the same source, with the words for it."""
         return self.pou.source, node.start, what
 
     def text(self, node: tree.Node) -> str:
@@ -55,7 +55,7 @@ class Body:
     def numbered(self) -> Iterator[tuple[tree.Call, Address]]:
         """Timers and counters of rungs that have a number, each with its completion flag.
 
-        What an interlock does with an instruction are more calls in the same place; they are one."""
+        An interlock makes several calls of one instruction in the same place; they count as one."""
         seen: set[int] = set()
         for node in self.nodes:
             if (isinstance(node, tree.Call) and isinstance(node.callee, tree.NameRef) and node.callee.text.startswith("$")
@@ -67,7 +67,7 @@ class Body:
                         yield node, flag
 
     def constant(self, expr: tree.Expr) -> Any:
-        """The value of an expression in which no name stands, so that nobody meant to change it; else None."""
+        """The value of a constant expression without names; None for others, since a named constant may be changed."""
         value = self.facts.constants.get(expr)
         if value is None:
             return None

@@ -31,7 +31,7 @@ class Uses:
 
 
 def unused(report: Report, pou: Pou, uses: Uses) -> None:
-    """Warn of variables of a POU that it does not use; a name that begins with `_` is meant to be so."""
+    """Warn of variables of a POU that it does not use; a name that begins with `_` is unused on purpose."""
     for variable in pou.order:
         if variable.kind not in OWN or " " in variable.name or variable.name.startswith("_") or variable.constant:
             continue
@@ -42,9 +42,9 @@ def unused(report: Report, pou: Pou, uses: Uses) -> None:
 
 
 def pins(report: Report, pou: Pou, uses: Uses) -> None:
-    """Warn of inputs that a function or block does not look at, and of outputs that it never sets.
+    """Warn of inputs that a function or block never reads, and of outputs that it never sets.
 
-    What has no statements yet is passed over, and programs, whose pins are looked at from outside."""
+    POUs without statements are skipped, and programs, whose pins are read from outside."""
     if pou.kind not in ("FUNCTION", "FUNCTION_BLOCK") or not _has_statements(pou):
         return
     hidden = {edge.raw: edge.hidden for edge in pou.edges}
@@ -98,9 +98,9 @@ def result(body: Body) -> None:
 
 
 def overlaps(report: Report, variables: Iterable[Variable]) -> None:
-    """Warn of located variables, declared side by side, that share memory without it being a way to look at its parts.
+    """Warn of located variables of one list of declarations that share memory, unless one is a part of the other.
 
-    Bits within words, and elements within arrays, structures and bit strings are such ways."""
+    Parts are bits of words, and elements of arrays, structures and bit strings."""
     spans: dict[str, list[tuple[int, int, Variable]]] = {}
     for variable in variables:
         hidden = variable.name.startswith("$")  # what rungs have at an address: others may have it as another type
@@ -119,7 +119,7 @@ def overlaps(report: Report, variables: Iterable[Variable]) -> None:
 
 
 def _neighbours(placed: list[tuple[int, int, Variable]]) -> Iterable[tuple[tuple[int, int, Variable], ...]]:
-    """Each span and the one before it that reaches farthest."""
+    """Each span that begins within an earlier one, with the earlier one that reaches farthest."""
     farthest = placed[0]
     for span in placed[1:]:
         if span[0] < farthest[1]:

@@ -1,4 +1,4 @@
-"""Warnings about the way through a body: what is never executed, what always holds, the member that a CASE forgets."""
+"""Warnings about control flow: what is never executed, conditions that always hold, the member that a CASE forgets."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _TURNED = {"<": ">", ">": "<", "<=": ">=", ">=": "<="}
 
 
 def flow(body: Body) -> None:
-    """Warn of what is wrong with the way through a body."""
+    """Warn of unreachable statements, conditions that never change and CASE statements that forget one member."""
     _Flow(body).block(body.pou.tree.body)
 
 
@@ -24,12 +24,12 @@ class _Flow:
     def __init__(self, body: Body) -> None:
         self.body = body
         self.left: list[bool] = []
-        """For each loop around, innermost last, whether an EXIT leaves it."""
+        """For each enclosing loop, the innermost last: True if an EXIT leaves it."""
         self.returns = False
-        """Whether a RETURN was met."""
+        """True if a RETURN was met."""
 
     def block(self, statements: tree.Block) -> bool:
-        """Look at statements; whether the end of them is never reached."""
+        """Check statements; True if their end is never reached."""
         over: tree.Statement | None = None
         for statement in statements:
             if over is not None and not isinstance(statement, tree.Empty):
@@ -42,7 +42,7 @@ class _Flow:
         return over is not None
 
     def ends(self, statement: tree.Statement) -> bool:
-        """Look at a statement; whether what stands behind it is never reached."""
+        """Check a statement; True if the next one is never reached."""
         if isinstance(statement, _GOES_ON):
             return False
         if isinstance(statement, tree.If):
@@ -71,7 +71,7 @@ class _Flow:
         return node.otherwise is not None and self.block(node.otherwise) and all(ends)
 
     def loop(self, node: tree.For | tree.While | tree.Repeat) -> bool:
-        """A loop without end needs a way out."""
+        """Check a loop, and warn if it never ends; True if the next statement is never reached."""
         before, self.returns = self.returns, False
         self.left.append(False)
         self.block(node.body)
@@ -90,7 +90,7 @@ class _Flow:
         return endless
 
     def always(self, condition: tree.Expr) -> bool | None:
-        """What a condition always is, None if it may be either.  Named constants count as what may be changed."""
+        """The value that a condition always has, None if it may have both.  Named constants count as variables."""
         value = self.body.constant(condition)
         if value is not None:
             return bool(value)
@@ -106,7 +106,7 @@ class _Flow:
         return None
 
     def members(self, node: tree.Case) -> None:
-        """Warn of the one member of an enumeration that a CASE without ELSE has no branch for; several are meant."""
+        """Warn of the one member of an enumeration that a CASE without ELSE has no branch for; several are deliberate."""
         kind = self.body.facts.types.get(node.selector)
         if not isinstance(kind, EnumType) or node.otherwise is not None:
             return
@@ -118,7 +118,7 @@ class _Flow:
 
 
 def _within(op: str, kind: Elementary, bound: int) -> bool | None:
-    """What `x op bound` always is for an x of an integer type, None if it may be either."""
+    """The value that `x op bound` has for all x of an integer type, None if both occur."""
     if op in ("<", ">="):
         return op == ">=" if bound <= kind.low else op == "<" if bound > kind.high else None
     return op == "<=" if bound >= kind.high else op == ">" if bound < kind.low else None

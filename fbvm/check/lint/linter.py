@@ -1,4 +1,4 @@
-"""Warnings: what is allowed, does something, and is hardly what was meant.
+"""The linter: warnings about what is allowed and probably a mistake.
 
 A pass of its own over the bodies of a project without errors, linear in their size.  It looks at what the user wrote,
 never at libraries.  `suppression` removes those that a pragma or the caller switches off.
@@ -20,7 +20,7 @@ from fbvm.check.symbols.facts import Pou, Variable
 from fbvm.syntax.tree import sfc
 
 _RULES: dict[type, Callable[[Body, Any], None]] = {**lint_values.RULES, sfc.Sfc: lint_sfc.look_at}
-"""What looks at a node, by its kind."""
+"""By class of node the rule that looks at it."""
 
 
 def lint(context: Context, program: str | None) -> None:
@@ -50,7 +50,7 @@ def lint(context: Context, program: str | None) -> None:
 
 
 def _globals(context: Context, uses: declared.Uses) -> None:
-    """Look at global variables; those of one source stand side by side."""
+    """Check global variables; those of one source count as one list of declarations."""
     by_source: dict[str, list[Variable]] = {}
     for variable in context.global_order:
         if not variable.source.library and variable.kind == "VAR_GLOBAL":

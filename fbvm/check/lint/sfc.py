@@ -39,7 +39,7 @@ class _Network:
         self.reached: set[str] = set()
 
     def warn(self) -> None:
-        """Look at every situation, and tell."""
+        """Try every situation, and warn."""
         situations = self._situations()
         if situations is None:
             self._follow_links()
@@ -62,7 +62,7 @@ class _Network:
         self._times(situations)
 
     def _situations(self) -> set[Situation] | None:
-        """All that can be reached; None if they are too many."""
+        """All situations that can be reached; None if there are more than MOST."""
         first = frozenset(name for name, step in self.steps.items() if step.initial)
         found, left = {first}, deque([first])
         while left:
@@ -84,7 +84,7 @@ class _Network:
         return found
 
     def _follow_links(self) -> None:
-        """What can be reached if a transition needs only one of its steps."""
+        """Fill the reached steps as if a transition needed only one of its steps to be active."""
         grown = True
         while grown:
             grown = False
@@ -95,7 +95,7 @@ class _Network:
                     grown = True
 
     def _times(self, situations: set[Situation]) -> None:
-        """Two times for one stored action at once: the standard's error, here the time of the upper step counts."""
+        """Warn of two times for one stored action at once, an error by the standard; here the time of the upper step counts."""
         used: dict[tuple[str, str], list[tuple[str, sfc.Association]]] = {}
         for name, step in self.steps.items():
             for one in step.associations:

@@ -51,7 +51,7 @@ def _converted(body: Body, node: tree.Call, called: StandardCall) -> None:
 
 
 def _equality(body: Body, node: tree.Expr, op: str, sides: Sequence[tree.Expr], kind: Type) -> None:
-    """A comparison with 0 guards a division, one with itself finds what is no number: both are meant."""
+    """Warn of reals that are compared for equality, but with 0 (guards a division) or with themselves (finds NaN)."""
     constants = body.facts.constants
     left, right = (body.text(side) for side in sides[:2])
     if left.casefold() != right.casefold() and not any(constants.get(side) == 0 for side in sides) and node not in constants:
@@ -115,7 +115,7 @@ def _call(body: Body, node: tree.Call) -> None:
 
 
 def _statement(body: Body, node: tree.CallStatement) -> None:
-    """A call for nothing but its result, which nobody takes."""
+    """Warn of a call that has no effect but its result, which the statement drops."""
     call, facts = node.call, body.facts
     if not isinstance(call, tree.Call) or call not in facts.types or call in facts.guards:
         return
@@ -129,7 +129,7 @@ def _statement(body: Body, node: tree.CallStatement) -> None:
 
 
 def _has_no_effect(body: Body, pou: Pou, known: dict[Pou, bool]) -> bool:
-    """True for a function that changes nothing but variables of its own; `known` is what was found of those it calls."""
+    """True for a function that changes nothing but variables of its own; `known` has the results so far."""
     if pou not in known:
         known[pou] = pou.is_function and _changes_nothing(body, pou, known)
     return known[pou]
@@ -157,4 +157,4 @@ _EXACT: dict[str, Callable[[int, int], int]] = {"+": operator.add, "-": operator
 RULES: dict[type, Callable[[Body, Any], None]] = {
     tree.Binary: _binary, tree.Assign: _assign, tree.Call: _call, tree.CallStatement: _statement,
 }
-"""What looks at a node, by its kind."""
+"""By class of node the rule that looks at it."""

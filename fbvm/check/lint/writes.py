@@ -1,4 +1,4 @@
-"""Warnings about what is done in two places, or only now and then: outputs written twice, timers called conditionally.
+"""Warnings about outputs that are written twice, and timers that are called conditionally.
 
 One pass over a body in the order of execution.  An output is visible outside of its body: a located variable, an address, a
 global variable, an output of the POU.  A value that is given to it counts as lost if the same block gives it another one
@@ -45,11 +45,11 @@ class _Store:
 
 
 Definite = dict[Key, tree.Node]
-"""Places that a block writes, and instances that it calls, on every way through it, and where."""
+"""Places that a block writes and instances that it calls on every path through it, each with the node."""
 
 
 class Writes:
-    """What the bodies of a project write; `finish` warns of what several do."""
+    """What the bodies of a project write; `finish` warns of outputs that several bodies write."""
 
     def __init__(self) -> None:
         self._writers: dict[Key, list[tuple[Body, tree.Node]]] = {}
@@ -77,7 +77,7 @@ class Writes:
                       "and its present value", f"each {kind} needs a number of its own", first.there(call, "used here, too"))
 
     def finish(self) -> None:
-        """Warn of outputs that several POUs write whatever happens: the last one decides."""
+        """Warn of outputs that several POUs write on every path: the last one decides."""
         for key, writers in self._writers.items():
             first = writers[0]
             for body, node in writers[1:]:
@@ -100,7 +100,7 @@ class _Order:
     def __init__(self, body: Body) -> None:
         self.body, self.facts = body, body.facts
         self.stores: dict[Key, dict[tuple[Key, int], _Store]] = {}
-        """By what a read would name: the variable, or the word of an area."""
+        """Values that nothing has read yet, by what a read would name: the variable, or the word of an area."""
         self.coils: dict[tuple[Key, int], tree.Node] = {}
         """Outputs of rungs by their blocks, also those that were read since."""
         self.in_rung = False
@@ -110,7 +110,7 @@ class _Order:
         """Calls of timers and the like by instance."""
 
     def block(self, statements: Iterable[tree.Statement]) -> Definite:
-        """What a block does on every way through it."""
+        """Go through a block; returns what it does on every path."""
         self._count += 1
         self.blocks.append(self._count)
         definite: Definite = {}
@@ -158,7 +158,7 @@ class _Order:
         self.meet(ways, definite)
 
     def meet(self, ways: list[Definite], definite: Definite) -> None:
-        """What every branch does is done."""
+        """Add what every branch does to `definite`."""
         for key, node in min(ways, key=len).items():
             if all(key in way for way in ways):
                 if isinstance(node, tree.Call):
@@ -180,14 +180,14 @@ class _Order:
             definite.update((key, call) for key, call in inside.items() if isinstance(call, tree.Call))
 
     def body_of(self, node: ladder.Ladder | ladder.Rung | sfc.Sfc, definite: Definite) -> None:
-        """Rungs are executed one after the other, as if they were not there; so is what a chart does."""
+        """Go through the statements of rungs or of a chart as through those of the block around them."""
         self.in_rung = isinstance(node, ladder.Rung)
         for statement in node.body:
             _STEPS[type(statement)](self, statement, definite)
         self.in_rung = False
 
     def leave(self, node: tree.Return | tree.Exit | tree.Continue, definite: Definite) -> None:
-        """Whatever was written may be the last word."""
+        """Forget unread values: after RETURN, EXIT or CONTINUE they may be read."""
         if isinstance(node, tree.Return):
             self.read(node.value)
         self.stores.clear()
@@ -198,7 +198,7 @@ class _Order:
     # --- reading and writing ----------------------------------------------------------------------------------------
 
     def read(self, expr: tree.Expr | None) -> None:
-        """All that an expression may read has been read."""
+        """Forget the unread values of all that an expression may read."""
         todo: list[tree.Node | None] = [expr]
         while todo and self.stores:
             node = todo.pop()
@@ -241,7 +241,7 @@ class _Order:
                            if not isinstance(root, tuple) or root[0] != address.area}
 
     def shared_is_read(self) -> None:
-        """Another POU runs: it may read everything but the outputs of this one."""
+        """Forget the unread values that another POU may read: all but outputs of this one."""
         self.stores = {root: kept for root, kept in self.stores.items()
                        if isinstance(root, Variable) and root.owner is self.body.pou and root.location is None}
 
@@ -257,7 +257,7 @@ class _Order:
         self.store(root if len(path) == 1 else (root, *path[1:]), node, literal, definite)
 
     def store(self, key: Key, node: tree.Node, literal: bool, definite: Definite) -> None:
-        """A place gets a value in the present block."""
+        """Record that a place gets a value in the present block, and warn if its last value was not read."""
         root = key[0] if isinstance(key, tuple) else key
         if isinstance(root, Address):
             root = (root.area, root.byte_offset() // 2)
@@ -282,7 +282,7 @@ class _Order:
     # --- timers -----------------------------------------------------------------------------------------------------
 
     def warn_of_conditional_calls(self, definite: Definite) -> None:
-        """Warn of a timer or its like that is called in one place only, and not on every way.
+        """Warn of a timer or its like that is called in one place only, and not on every path.
 
         Two calls are taken as a deliberate choice."""
         for key, calls in self.calls.items():

@@ -54,16 +54,16 @@ class Context:
         self.evaluate = evaluate
         self.report = project.report
         self.facts: Facts = project.facts
-        brought = project.libraries.mailboxes
+        mailboxes = project.libraries.mailboxes
         self.areas: dict[str, Area] = {**AREAS, **{name: e_bank(name, 0) for name in E_NAMES},
-                                       **{name: box.at(0) for name, box in brought.items()}}
+                                       **{name: box.at(0) for name, box in mailboxes.items()}}
         """Areas that a program may name; where the optional ones lie is known after layout."""
         self.e_banks: set[str] = set()
         """Names of the banks of E memory that the program uses."""
         self.mailboxes: dict[str, Mailbox] = {}
         """Mailboxes of units that the program uses, by area."""
         self.tasks: list[TaskFact] = []
-        """What runs, filled by the CONFIGURATION."""
+        """The tasks that run, in the order of the CONFIGURATION."""
         self.resource: tree.Resource | None = None
         """The RESOURCE that the PLC is."""
         self.global_order: list[Variable] = []

@@ -19,11 +19,11 @@ Value = int | float | bool | bytes | str
 for WSTRING a str of UTF-16 units."""
 
 PartOf = tree.Member | tree.Index | tree.Part
-"""What may name a part of something."""
+"""Expressions that may name a part of a variable."""
 
 UNTYPED_INT = Elementary("an integer literal", 0, 1, "i64", frozenset())
 UNTYPED_REAL = Elementary("a real literal", 0, 1, "f64", frozenset())
-"""Types of literals (and of expressions of nothing but literals) that have not met a context yet."""
+"""Types of literals (and of expressions of nothing but literals) to which no operand and no place has given a type yet."""
 
 
 @dataclass(eq=False)
@@ -69,7 +69,7 @@ class Variable:
 
     @property
     def hexadecimal(self) -> bool:
-        """True if its declaration says that people read it in hexadecimal."""
+        """True if the declaration asks tools to show it in hexadecimal."""
         return shown_in_hexadecimal(self.source.text, self.node.start)
 
 
@@ -83,7 +83,7 @@ class Pou:
     tree: tree.Pou
     variables: dict[str, Variable] = field(default_factory=dict)
     other_names: dict[str, str] = field(default_factory=dict)
-    """Names under which callers may know a pin, folded, and its own."""
+    """Other names of pins that callers may use, folded, each with the pin's own name."""
     order: list[Variable] = field(default_factory=list)
     result: Variable | None = None
     type: StructType | None = None
@@ -98,7 +98,7 @@ class Pou:
     frame_offset: int = 0
     number: int = -1
     as_written: bool = True
-    """False if its tree is another one than that of its source, made for one call or one program."""
+    """False if its tree is not that of its source, but was made for one call or one program."""
     resolved: bool = False
     calls: dict[Pou, Node] = field(default_factory=dict)
     writes_eno: bool = False
@@ -107,7 +107,7 @@ class Pou:
     failed_names: set[str] = field(default_factory=set)
     """Folded names whose declaration has an error: using them is not reported again."""
     inherits: bool = False
-    """True if it EXTENDS another one, which was refused: any name may come from that."""
+    """True if it EXTENDS another POU, which was refused: any unknown name may come from that."""
     later: dict[str, tuple[VarDecl, VarSection]] = field(default_factory=dict)
     """By folded name the declarations behind the one that is being resolved."""
     later_constants: dict[VarDecl, tuple[Type, bytes] | None] = field(default_factory=dict)
@@ -202,8 +202,8 @@ class Guard:
 
 @dataclass(frozen=True, eq=False)
 class Holder:
-    """What lies around a place that a reference is made to: `expr` is the variable or the address, None where the
-    place lies behind a reference already.  A `lease` ends with the body."""
+    """The object around a target of a reference: `expr` is the variable or the address, None where the
+    target is reached by a reference already.  A `lease` ends with the body."""
 
     expr: tree.Expr | None = None
     variable: Variable | None = None
@@ -233,7 +233,7 @@ class Aggregate:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """What a reference is made to before anything runs: `place` is the variable that REF(x) or ADR(x) names.
+    """An initial value of a reference: `place` is the variable that REF(x) or ADR(x) names.
 
     `pou` is whose variables the place is looked for in, None for types and global variables.  A `late` one is made at
     each start of its body, since the variable that holds it lives in the frame."""
@@ -259,7 +259,7 @@ class Facts:
     variables: dict[tree.Expr, Variable] = field(default_factory=dict)
     fields: dict[tree.Expr, Field] = field(default_factory=dict)
     bits: dict[tree.Expr, tree.Part] = field(default_factory=dict)
-    """What looks like a member and is a bit, named by a constant."""
+    """Member expressions that name a bit by a constant, and the bit."""
     directs: dict[tree.Expr, Address] = field(default_factory=dict)
     operands: dict[tree.Expr, Type] = field(default_factory=dict)
     """The type in which a binary operator works on its operands."""
@@ -275,7 +275,7 @@ class Facts:
     assigned: set[tree.Call] = field(default_factory=set)
     """Calls whose result is the whole value of an assignment."""
     reversed_bytes: set[tree.Call] = field(default_factory=set)
-    """Calls whose result is what lies in memory, its bytes in another order."""
+    """Calls whose result is the argument with its bytes in another order."""
     aggregates: dict[tree.Expr, Aggregate] = field(default_factory=dict)
     bare: dict[tree.CallStatement, tree.Call] = field(default_factory=dict)
     """Statements that name an ACTION without (), with the calls that they mean."""
@@ -287,12 +287,12 @@ class Facts:
     starts: list[Start] = field(default_factory=list)
     """References of initial values, in which each stands as its number here (see `initial_references`)."""
     holders: dict[tree.Expr, Holder] = field(default_factory=dict)
-    """For each place that a reference is made to, what the reference can be moved in."""
+    """For each target of a reference the object within which the reference can be moved."""
     leases: dict[Variable, int] = field(default_factory=dict)
     referred: list[Variable] = field(default_factory=list)
     """Variables with one place that something refers to."""
     losses: list[tuple[Source, tree.Expr, str, str]] = field(default_factory=list)
-    """Constants that their places do not keep as they are written: where, code and message of the warning."""
+    """Constants that their variables do not hold as they are written: source, node, code and message of the warning."""
 
     def is_part(self, expr: tree.Expr) -> TypeGuard[PartOf]:
         """True for a member, element or bit, which lies in what it is of; not for an element behind a pointer, nor for
@@ -308,7 +308,7 @@ class Facts:
 
 @dataclass(frozen=True, eq=False)
 class Spot:
-    """A variable that is named by its path: members and numbers of elements behind a program or global variable.
+    """A variable that is named by a path: a program or global variable, then members and numbers of elements.
 
     Without a root it is an address."""
 
@@ -320,7 +320,7 @@ class Spot:
 
 @dataclass(frozen=True, eq=False)
 class Completed:
-    """What VAR_CONFIG says about a variable: the address that it is a name for from now on, or its initial bytes."""
+    """What VAR_CONFIG says about a variable: its address, or its initial bytes."""
 
     spot: Spot
     address: Address | None
@@ -329,7 +329,7 @@ class Completed:
 
 @dataclass(frozen=True, eq=False)
 class AccessPath:
-    """What VAR_ACCESS says: another name, and whether it can be written by that."""
+    """What VAR_ACCESS says about a variable: another name, and whether that name can be written."""
 
     name: str
     spot: Spot

@@ -245,7 +245,7 @@ def _file(library: str, path: Path) -> Parsed | Diagnostic:
 
 
 _shipped_file = cache(_file)
-"""The trees of what comes with fbvm are kept: trees are values, and tests compile them often."""
+"""Parsed shipped files, kept while the process runs: trees are values, and tests compile them often."""
 
 
 @lru_cache(maxsize=512)

@@ -103,7 +103,7 @@ class Project:
         """Results of look-ups: by folded name, and by the library in which the name is used."""
         self._compared = 0
         self.operator_types: dict[tuple[str, Type, Type], tuple[Type, Type]] = {}
-        """For an operator between values of elementary types that are no constants: the type of its operation and of its result."""
+        """By operator and elementary types of its operands, if none is constant: the types of the operation and the result."""
         self.instantiated: dict[tuple[Pou, tuple[tuple[str, str], ...]], Pou] = {}
         """Functions that were instantiated of generic ones, by the types that the generic types stand for."""
         self.new_pous: deque[Pou] = deque()
@@ -158,7 +158,7 @@ class Project:
                 self.sections += [(s, source) for s in declaration.sections]
 
     def _add_action(self, action: tree.Action, source: Source, owner: tree.Name | None, last: Pou | None) -> None:
-        """An ACTION belongs to the POU that is named, else to the one in front of it."""
+        """Add an ACTION to the POU that it names, else to the POU in front of it."""
         pou = self.pous.get((source.library, fold(owner.text))) if owner is not None else last
         if pou is not None and not pou.is_function:
             pou.written_actions.append((action, source))
@@ -248,7 +248,7 @@ class Project:
         return any((owner, name) in self._refused for owner in self.owners(source))
 
     def is_space(self, name: str) -> bool:
-        """True for what may stand in front of a name and a point without being a variable."""
+        """True for the name of a list of global variables or of a library, which may qualify other names."""
         return fold(name) in self.lists or self.libraries.has_space(name)
 
     def is_failed_global(self, name: str, source: Source) -> bool:
@@ -256,7 +256,7 @@ class Project:
         return any((owner, fold(name)) in self.failed_globals for owner in self.owners(source))
 
     def nearest_global(self, name: str, more: Iterable[str] = ()) -> str:
-        """A hint for a name that means no global variable and, beside them, nothing else of `more`."""
+        """A hint for a name that means no global variable, and none of the names in `more`."""
         for variable in self.globals.values():
             if variable.qualified and fold(variable.name) == fold(name):
                 return f"its list is qualified_only: write {variable.space}.{variable.name}"
@@ -287,7 +287,7 @@ class Project:
     def nearest(self, name: str, candidates: Iterable[str]) -> str:
         """A hint that names the candidates most like a misspelt name, "" if none is.
 
-        Where thousands of names are unknown, they have one cause, and it is none of spelling."""
+        After `COMPARISONS` comparisons there are no more hints: thousands of unknown names have another cause than spelling."""
         shown = {fold(c): c for c in candidates}
         self._compared += len(shown)
         if self._compared > COMPARISONS:

@@ -1,4 +1,4 @@
-"""Initial values: trees in, bytes out."""
+"""The bytes of initial values: an initializer of the tree in, bytes out."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def _array(scope: Scope, kind: Type, init: tree.ArrayInit, default: bytes) -> by
 
 
 def _elements(scope: Scope, kind: Type, value: tree.Initial, content: bytearray, places: list[int]) -> None:
-    """The same initial value for some elements of an array; each keeps its own default where that says nothing."""
+    """Write one initial value to several elements of an array; each keeps its own bytes where the value says nothing."""
     made: dict[bytes, bytes] = {}
     for start in places:
         before = bytes(content[start:start + kind.size])
