@@ -10,7 +10,7 @@ from fbvm.check.calls import calls, generics
 from fbvm.check.declarations import globals, interfaces, specs, variables
 from fbvm.check.declarations.configurations import Configurations
 from fbvm.check.declarations.var_config import VarConfig
-from fbvm.check.expressions import references, table
+from fbvm.check.expressions import references, rules
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.statements import check_body
 from fbvm.check.symbols.context import Context, Evaluate, Rules
@@ -20,7 +20,7 @@ from fbvm.check.symbols.project import Project
 from fbvm.syntax import tree
 
 RULES = Rules(
-    expressions={**table.RULES, tree.Call: calls.value},
+    expressions={**rules.RULES, tree.Call: calls.value},
     type_declaration=specs.type_declaration,
     global_variable=globals.declare_early,
     interface=interfaces.resolve_interface,

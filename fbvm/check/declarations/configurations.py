@@ -30,7 +30,7 @@ class Configurations:
         configuration, source = self.project.configurations[0]
         names = [r.name.text for r in configuration.resources if r.name is not None]
         candidates = [r for r in configuration.resources
-                   if wanted is None or r.name is not None and fold(r.name.text) == fold(wanted)]
+                      if wanted is None or r.name is not None and fold(r.name.text) == fold(wanted)]
         if wanted is not None and not candidates:
             self.report.add("S0801", source, configuration.name, f"there is no RESOURCE {wanted}",
                             self.project.choices(wanted, names))

@@ -104,7 +104,7 @@ class _Interface:
             self.context.report.add("S0205", source, action.name, "a FUNCTION has no ACTION", "make it a FUNCTION_BLOCK")
         elif name in self.pou.variables and self.pou.variables[name].role != "action" or name in self.pou.actions:
             self.context.report.add("S0202", source, action.name, f"{action.name.text} is declared twice in {self.pou.name}",
-                            "an ACTION needs a name of its own")
+                                    "an ACTION needs a name of its own")
         else:
             body = tree.Pou(action.start, action.end, "ACTION", action.name, None, (), action.body)
             pou = self.pou

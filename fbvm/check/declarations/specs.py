@@ -169,7 +169,7 @@ def _string(scope: Scope, spec: tree.StringSpec, name: str) -> Resolved | None:
             return None
         if not 1 <= length <= MAX_STRING:
             scope.error("S0704", spec.length, f"a {'WSTRING' if spec.wide else 'STRING'} has 1 to "
-                                                          f"{MAX_STRING} characters, not {length}")
+                        f"{MAX_STRING} characters, not {length}")
             return None
         kind = string(length, spec.wide)
     return kind, default(kind)

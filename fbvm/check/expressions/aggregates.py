@@ -134,8 +134,6 @@ def _part(scope: Scope, value: Value, content: bytearray) -> AggregatePart | Non
     return None
 
 
-
-
 def _initial_bytes(project: Project, kind: Type) -> bytes:
     """The bytes of a variable of a type that is declared without an initial value."""
     if isinstance(kind, ArrayType):

@@ -156,7 +156,7 @@ def _time_convertible(source: Type, target: Type) -> bool:
     return short[0] == short[1] or (source.name, target.name) in _DATES
 
 
-# --- advice ---------------------------------------------------------------------------------------------------------
+# --- hints ----------------------------------------------------------------------------------------------------------
 
 
 def hidden_hint(expr: tree.Expr, target: Type) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fbvm.base.dialects import takers
 from fbvm.base.types import (
     BOOL,
     DATE,
@@ -20,7 +19,6 @@ from fbvm.base.types import (
     EnumType,
     RefType,
     StringType,
-    StructType,
     Type,
     base,
     common,
@@ -29,8 +27,9 @@ from fbvm.base.types import (
     machine,
 )
 from fbvm.check.expressions import constants
-from fbvm.check.expressions.assignability import UNSIGNED, as_number, conversion_hint, convertible, is_untyped
+from fbvm.check.expressions.assignability import as_number, is_untyped
 from fbvm.check.expressions.literals import as_character
+from fbvm.check.expressions.operator_hints import bit_hint, report_undefined
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL
@@ -42,7 +41,7 @@ _FAMILY = {
     "AND": ("ANY_BIT",), "OR": ("ANY_BIT",), "XOR": ("ANY_BIT",),
 }
 _L: dict[Type, Type] = {DATE: ELEMENTARY["LDATE"], TOD: ELEMENTARY["LTIME_OF_DAY"], DT: ELEMENTARY["LDATE_AND_TIME"],
-      TIME: ELEMENTARY["LTIME"]}
+                        TIME: ELEMENTARY["LTIME"]}
 
 
 def _time_rows() -> dict[tuple[str, Type, Type], Type]:
@@ -76,7 +75,7 @@ def unary(scope: Scope, expr: tree.Unary, want: Type | None) -> Type | None:
         good = is_untyped(kind) or is_any(kind, "ANY_NUM", "ANY_DURATION")
     if not good:
         scope.error("S0302", expr, f"{expr.op} is not defined for {kind}",
-                    _bit_hint(kind, want) if expr.op == "NOT" else "")
+                    bit_hint(kind, want) if expr.op == "NOT" else "")
         return None
     kind = base(kind)
     value = scope.facts.constants.get(expr.operand)
@@ -126,7 +125,7 @@ def _meant(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type 
         numbers = _as_numbers(scope, expr, left, right, want)
         if numbers is not None:
             return numbers
-        _report_undefined(scope, expr, left, right, want)
+        report_undefined(scope, expr, left, right, want)
         return None
     kind = _widened(scope, expr.op, kind)
     if not is_untyped(kind):
@@ -143,7 +142,7 @@ def _reference(scope: Scope, expr: tree.Binary) -> Type | None:
     counts = scope.dialect.pointers_count_elements
     result = _compared_references(expr.op, left, right) if expr.op in COMPARISONS else _moved(expr.op, left, right, counts)
     if result is None:
-        _report_undefined(scope, expr, left, right, None)
+        report_undefined(scope, expr, left, right, None)
         return None
     scope.facts.operands[expr] = NULL
     if counts and isinstance(result, RefType) and not _made_by_adr(scope, expr):
@@ -304,55 +303,6 @@ def _family(scope: Scope, op: str) -> tuple[str, ...]:
     return (*family, "ANY_INT") if family == ("ANY_BIT",) and scope.dialect.integers_and_bits else family
 
 
-def _report_undefined(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type | None) -> None:
-    """Report an operator on types for which it is not defined."""
-    hint = _time_hint(scope, expr, left, right)
-    if hint is None:
-        hint = _logic_hint(expr.op, left, right, want)
-    if hint is None:
-        hint = _number_hint(scope, expr, left, right)
-    scope.error("S0302", expr, f"{expr.op} is not defined for {left} and {right}", hint)
-
-
-def _time_hint(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> str | None:
-    """What to write where one operand is a duration; None if that is not the mistake."""
-    timed = [is_any(kind, "ANY_DURATION") for kind in (left, right)]
-    if expr.op == "*" and timed == [False, True]:
-        return f"the {right} stands in front: {scope.text(expr.right)} * {scope.text(expr.left)}"
-    if expr.op in "+-" and left == DATE and timed[1]:
-        date, time = scope.text(expr.left), scope.text(expr.right)
-        return f"a DATE has no time of day: write DT_TO_DATE(CONCAT_DATE_TOD({date}, TOD#0:0:0) {expr.op} {time})"
-    if any(timed) and expr.op not in ("*", "/") and UNTYPED_INT in (left, right):
-        return "a duration is written T#500ms"
-    return None
-
-
-def _logic_hint(op: str, left: Type, right: Type, want: Type | None) -> str | None:
-    """What to write where AND, OR, XOR or + meets operands of other kinds; None if that is not the mistake."""
-    bits = [is_any(kind, "ANY_BIT") for kind in (left, right)]
-    if op in ("AND", "OR") and want == BOOL and not any(bits):
-        return "compare each of them, for example with <> 0"
-    if op in ("+", "AND") and isinstance(left, StringType):
-        return "CONCAT(...) joins texts"
-    if op in ("AND", "OR", "XOR"):
-        wrong, other = (right, left) if bits[0] else (left, right)
-        return _bit_hint(wrong, other)
-    return None
-
-
-def _number_hint(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> str:
-    """What to write where arithmetic or a comparison meets operands that it does not take."""
-    if isinstance(left, StructType) or isinstance(right, StructType):
-        return "compare or combine the members"
-    if expr.op in _FAMILY and is_any(left, "ANY_BIT") and (left == right or right is UNTYPED_INT):
-        number = UNSIGNED.get(left.name, "INT")
-        return f"{left} has no arithmetic: convert with {left}_TO_{number}(...), or take {takers('arithmetic_of_bits')}"
-    if left == right and isinstance(left, EnumType):
-        numbers = (f"TO_{left.base}({scope.text(side)})" for side in (expr.left, expr.right))
-        return f"write {f' {expr.op} '.join(numbers)}, or take {takers('numbers_of_enumerations')}"
-    return _meeting_hint(left, right) if common(left, right) is None else ""
-
-
 def _time(scope: Scope, expr: tree.Binary, left: Type, right: Type) -> Type | None:
     """The result of an operator on times and dates, or None if it is none of those."""
     result = TIMES.get((expr.op, left, right))
@@ -377,7 +327,7 @@ def _power(scope: Scope, expr: tree.Binary, left: Type, right: Type, want: Type 
     if is_untyped(left) and is_untyped(right):
         return _folded(scope, expr, UNTYPED_REAL, UNTYPED_REAL)
     if not all(is_untyped(k) or is_any(k, "ANY_NUM") for k in (left, right)):
-        _report_undefined(scope, expr, left, right, want)
+        report_undefined(scope, expr, left, right, want)
         return None
     kind: Type = left if is_any(left, "ANY_REAL") else LREAL
     single = is_untyped(left) and right == REAL or left is UNTYPED_REAL and is_any(right, "ANY_INT")
@@ -409,18 +359,3 @@ def _folded(scope: Scope, expr: tree.Binary, operand: Type, result: Type) -> Typ
     if operand is UNTYPED_INT and result is BOOL or operand is UNTYPED_REAL and result is BOOL:
         scope.facts.operands[expr] = LREAL if operand is UNTYPED_REAL else LINT
     return result
-
-
-def _bit_hint(kind: Type, other: Type | None) -> str:
-    """How to make bits of a number; a BOOL if the other operand or the place of the result is one."""
-    if other == BOOL:
-        return conversion_hint(kind, BOOL)
-    names = {1: "BYTE", 2: "WORD", 4: "DWORD", 8: "LWORD"}
-    if kind is UNTYPED_INT:
-        return "write a typed literal such as WORD#16#FF"
-    return f"convert with {kind}_TO_{names[kind.size]}(...)" if is_any(kind, "ANY_INT") else ""
-
-
-def _meeting_hint(left: Type, right: Type) -> str:
-    named = all(isinstance(k, Elementary) and k.bits for k in (left, right)) and convertible("TO", right, left)
-    return f"convert one side, for example with {right}_TO_{left}(...)" if named else ""

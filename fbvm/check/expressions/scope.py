@@ -195,13 +195,13 @@ class Scope:
         return self.context.named_type(name, self.source)
 
     def is_in_memory(self, expr: tree.Expr) -> bool:
-        """True for a place in memory, and for a value that is read of one, such as a member of an ANY parameter."""
+        """True for a variable, an address, what a reference refers to, or a part of one of these."""
         expr = self.facts.root(expr)
         return isinstance(expr, _BEHIND_REFERENCE) or expr in self.facts.variables or expr in self.facts.directs or \
             expr in self.facts.followed
 
     def is_variable(self, expr: tree.Expr) -> bool:
-        """True for an expression that names a place in memory."""
+        """True for an expression that names a place in memory, which can be written, passed by reference and referred to."""
         if isinstance(expr, tree.Member) and isinstance(self.facts.types.get(expr.of), AnyType):
             return any_parameters.is_array(expr)
         return expr not in self.facts.rewritten and self.is_in_memory(expr) and \

@@ -209,7 +209,9 @@ class Context:
 
     def check_body(self, pou: Pou) -> None:
         """Check the body of a POU and of its ACTIONs, once; for a library's POU, repeat recorded dependencies instead."""
-        if pou.number >= 0 or not self.interface(pou, pou.source, pou.tree.name) or pou.number >= 0:
+        if pou.number >= 0 or not self.interface(pou, pou.source, pou.tree.name):
+            return
+        if pou.number >= 0:  # its interface has led back here
             return
         pou.number = len(self.bodies)
         self.bodies.append(pou)

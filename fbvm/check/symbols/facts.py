@@ -306,6 +306,7 @@ class Facts:
             expr = expr.of
         return expr
 
+
 @dataclass(frozen=True, eq=False)
 class Spot:
     """A variable that is named by a path: a program or global variable, then members and numbers of elements.

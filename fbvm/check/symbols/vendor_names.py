@@ -71,6 +71,8 @@ def library_of(name: str) -> str:
         if re.fullmatch(pattern, name.rpartition(".")[2] if "." in name else name, re.IGNORECASE):
             return f"it comes from {library}, which fbvm does not bring: give its source, or one of your own, with the files"
     return ""
+
+
 _COMMA = re.compile(r"(?<![\w.#,\[])([0-9]+),([0-9]+)(?![\w#,\]])")
 
 

@@ -44,7 +44,7 @@ def test_folders_can_be_ordered() -> None:
 
 def test_only_the_checker_imports_the_parts() -> None:
     parts = ("fbvm.check.calls.calls", "fbvm.check.declarations.interfaces", "fbvm.check.declarations.globals",
-             "fbvm.check.expressions.table")  # fmt: skip
+             "fbvm.check.expressions.rules")  # fmt: skip
     importers = {part: {name for name, others in IMPORTS.items() if part in others} for part in parts}
     assert importers == {part: {"fbvm.check.checker"} | ({"fbvm.check.statements"} if part.endswith("calls") else set())
                          for part in parts}  # fmt: skip
