@@ -15,7 +15,7 @@ from fbvm.check.checker import Checker
 from fbvm.check.dependencies import Asked, Key, key_of
 from fbvm.check.facts import Pou, Variable
 from fbvm.code.image import Body, Site
-from fbvm.code.lowering.bodies import BodyLowering
+from fbvm.code.lowering.bodies import lower_body
 from fbvm.code.lowering.program import Origin, Program
 from fbvm.syntax import tree
 
@@ -102,7 +102,7 @@ class Shelf:
                     self.asked[pou.tree] = checker.asked[pou]
             self.met.add(pou.tree)
         known = self.code.get(pou.tree)
-        return known.link(program, checker, pou) if known is not None else BodyLowering(program, checker, pou).body()
+        return known.link(program, checker, pou) if known is not None else lower_body(program, checker, pou)
 
 
 _shelves: dict[Dialect, Shelf] = {}
@@ -121,7 +121,7 @@ class _Apart(Program):
     """Stands for the program in which a body will be: whoever asks for more than symbols is told that there is no more."""
 
     def __init__(self, checker: Checker) -> None:
-        self.drawn, self.late_starts = False, {}
+        self.drawn, self.entry_references = False, {}
         self.checker = checker
         self.places: dict[int, _Place] = {}
         self.known_sites: list[tuple[int, Site]] = []
@@ -180,7 +180,7 @@ def made(checker: Checker, pou: Pou) -> ObjectCode | None:
         return None
     program = _Apart(checker)
     try:
-        body = BodyLowering(program, checker, pou).body()
+        body = lower_body(program, checker, pou)
     except _Bound:
         return None
     return ObjectCode(body.name, body.kind, _kept(body.code), body.instance_size, body.statements,

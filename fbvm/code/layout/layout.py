@@ -12,7 +12,7 @@ from fbvm.check.checker import Checker
 from fbvm.check.containment import Inside
 from fbvm.check.facts import Completed, Pou, Spot, Variable, holds_block
 from fbvm.code.image import Layout, Objects, Retained
-from fbvm.code.objects import Numbering
+from fbvm.code.layout.objects import Numbering
 from fbvm.code.operations import BUFFER_OBJECT, LEASE_BYTES, OBJECT_SHIFT, OFFSET_SHIFT
 
 _CHUNK = 64
@@ -20,7 +20,7 @@ _CHUNK = 64
 
 
 @dataclass
-class Placed:
+class Placement:
     """The finished layout: sizes, symbols, initial bytes, retained places."""
 
     layout: Layout
@@ -28,11 +28,11 @@ class Placed:
     initial: list[tuple[int, bytes]] = field(default_factory=list)
     retained: list[Retained] = field(default_factory=list)
     objects: Objects = field(default_factory=Objects)
-    completed: list[tuple[int, Type, bytes]] = field(default_factory=list)
+    config_initials: list[tuple[int, Type, bytes]] = field(default_factory=list)
     """First values that VAR_CONFIG gives: where each lies, its type and its bytes."""
 
 
-def place(checker: Checker) -> Placed:
+def lay_out(checker: Checker) -> Placement:
     """Give every variable its place; blocks' types learn where their located variables lie."""
     slots = bytearray()
     for variable in checker.global_order:
@@ -48,34 +48,34 @@ def place(checker: Checker) -> Placed:
     frames += -frames % 8
     leases, leases_at = len(checker.project.facts.leases), SLOTS_OFFSET + frames
     frames += leases * LEASE_BYTES
-    placed = Placed(Layout(frames, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values())))
+    placement = Placement(Layout(frames, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values())))
     located = [v for v in checker.global_order if v.place == "area"]
     for pou in checker.bodies:
         located += [v for v in pou.order if v.place == "area"]
-    _place_located(located, placed)
+    _place_located(located, placement)
     for pou in checker.bodies:
         _fill_in(pou)
     for row in checker.settings.completed:
-        _complete(row, slots, placed)
-    placed.objects = Objects(_numbered(checker, slots), leases, leases_at)
-    placed.initial += _runs(slots)
+        _complete(row, slots, placement)
+    placement.objects = Objects(_numbered(checker, slots), leases, leases_at)
+    placement.initial += _runs(slots)
     retaining = Inside(checker, lambda pou: any(variable.retain for variable in pou.order))
     for variable in checker.global_order:
-        placed.symbols.setdefault(fold(_path(variable)), _symbol(variable))
+        placement.symbols.setdefault(fold(_path(variable)), _symbol(variable))
         if variable.place == "abs" and not variable.reference:
-            placed.retained += _retained_in(variable.type, variable.offset, _path(variable), retaining, variable.retain)
+            placement.retained += _retained_in(variable.type, variable.offset, _path(variable), retaining, variable.retain)
     for access in checker.settings.accesses:
-        offset, bit = _where(access.spot, placed)
-        placed.symbols.setdefault(fold(access.name), Field(
+        offset, bit = _where(access.spot, placement)
+        placement.symbols.setdefault(fold(access.name), Field(
             access.name, access.spot.type, offset, "VAR_ACCESS", bit, absolute=True, constant=not access.writable))
-    return placed
+    return placement
 
 
-def _where(spot: Spot, placed: Placed) -> tuple[int, int | None]:
+def _where(spot: Spot, placement: Placement) -> tuple[int, int | None]:
     """Where in the buffer, and on which bit, a path leads."""
     if spot.root is None:
         assert spot.address is not None
-        return _at(spot.address, placed)
+        return _at(spot.address, placement)
     offset, bit, kind = spot.root.offset, variable_bit(spot.root), spot.root.type
     for step in spot.steps:
         if isinstance(step, int):
@@ -89,29 +89,29 @@ def _where(spot: Spot, placed: Placed) -> tuple[int, int | None]:
     return offset, bit
 
 
-def _at(address: Address, placed: Placed) -> tuple[int, int | None]:
+def _at(address: Address, placement: Placement) -> tuple[int, int | None]:
     is_bit = address.bit is not None or address.area in FLAG_AREAS
-    return placed.layout.areas[address.area].offset + address.byte_offset(), address.bit_in_byte() if is_bit else None
+    return placement.layout.areas[address.area].offset + address.byte_offset(), address.bit_in_byte() if is_bit else None
 
 
-def _complete(row: Completed, slots: bytearray, placed: Placed) -> None:
+def _complete(row: Completed, slots: bytearray, placement: Placement) -> None:
     """Put what VAR_CONFIG says into the initial bytes: a reference to the place, and the first value there."""
-    offset, bit = _where(row.spot, placed)
+    offset, bit = _where(row.spot, placement)
     if row.address is not None:
-        there, bit = _at(row.address, placed)
+        there, bit = _at(row.address, placement)
         reference = BUFFER_OBJECT << OBJECT_SHIFT | there << OFFSET_SHIFT | (WHOLE_BYTES if bit is None else bit)
         slots[offset - SLOTS_OFFSET:offset - SLOTS_OFFSET + 8] = reference.to_bytes(8, "little")
         offset = there
     if row.initial is None:
         return
-    placed.completed.append((offset, row.spot.type, row.initial))
+    placement.config_initials.append((offset, row.spot.type, row.initial))
     if bit is not None:
         value = 1 << bit if any(row.initial) else 0
-        placed.initial.append((offset, bytes((_begins(placed, offset) & ~(1 << bit) | value,))))
+        placement.initial.append((offset, bytes((_begins(placement, offset) & ~(1 << bit) | value,))))
     elif SLOTS_OFFSET <= offset < SLOTS_OFFSET + len(slots):
         slots[offset - SLOTS_OFFSET:offset - SLOTS_OFFSET + len(row.initial)] = row.initial
     else:
-        placed.initial.append((offset, row.initial))
+        placement.initial.append((offset, row.initial))
 
 
 def _numbered(checker: Checker, slots: bytearray) -> tuple[tuple[int, int], ...]:
@@ -130,8 +130,8 @@ def _numbered(checker: Checker, slots: bytearray) -> tuple[tuple[int, int], ...]
     return tuple(numbering.extents)
 
 
-def _place_located(variables: list[Variable], placed: Placed) -> None:
-    areas = placed.layout.areas
+def _place_located(variables: list[Variable], placement: Placement) -> None:
+    areas = placement.layout.areas
     bits: dict[int, int] = {}
     for variable in variables:
         assert variable.location is not None
@@ -139,7 +139,7 @@ def _place_located(variables: list[Variable], placed: Placed) -> None:
         if not variable.explicit:
             continue
         if variable_bit(variable) is None:
-            placed.initial.append((variable.offset, variable.initial))
+            placement.initial.append((variable.offset, variable.initial))
         elif isinstance(variable.type, ArrayType):
             start = variable.location.bit_in_byte()
             for number in (start + index for index, value in enumerate(variable.initial) if value):
@@ -147,12 +147,12 @@ def _place_located(variables: list[Variable], placed: Placed) -> None:
                 bits[at] = bits.get(at, 0) | 1 << number % 8
         elif variable.initial != b"\0":
             bits[variable.offset] = bits.get(variable.offset, 0) | 1 << variable.location.bit_in_byte()
-    placed.initial += [(offset, bytes((_begins(placed, offset) | value,))) for offset, value in bits.items()]
+    placement.initial += [(offset, bytes((_begins(placement, offset) | value,))) for offset, value in bits.items()]
 
 
-def _begins(placed: Placed, offset: int) -> int:
+def _begins(placement: Placement, offset: int) -> int:
     """What a byte holds at power-on by what has been placed so far: the others of its bits stay as they are."""
-    return next((data[offset - at] for at, data in reversed(placed.initial) if at <= offset < at + len(data)), 0)
+    return next((data[offset - at] for at, data in reversed(placement.initial) if at <= offset < at + len(data)), 0)
 
 
 def variable_bit(variable: Variable) -> int | None:

@@ -20,11 +20,11 @@ from fbvm.check.library import Libraries, LibraryError
 from fbvm.check.lint.linter import lint as look_for_slips
 from fbvm.check.lint.suppression import Silence, Wanted
 from fbvm.check.project import Project
-from fbvm.code.damage import Damage
+from fbvm.code.builder.evaluation import evaluate
+from fbvm.code.compiler.follow_on_errors import FollowOnErrors
 from fbvm.code.image import Image, ProgramRun, TaskRow
-from fbvm.code.lowering.evaluation import evaluate
+from fbvm.code.layout.layout import lay_out
 from fbvm.code.lowering.initial_references import InitialReferences
-from fbvm.code.lowering.layout import place
 from fbvm.code.lowering.program import Program
 from fbvm.code.store import cache as image_cache
 from fbvm.code.store.object_code import Shelf, shelf_of
@@ -117,11 +117,11 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         return Compilation(None, [error.diagnostic])
     with _deep(sources):
         project = Project(shelves, report, spoken)
-        damage = Damage()
+        follow_on = FollowOnErrors()
         for source in sources:
             text, diagnostics = parse(source, partial(_read_so_far, progress, source))
             report.diagnostics += diagnostics + silence.note(source, text, spoken)
-            damage.note(source, text, errors(diagnostics))
+            follow_on.add(source, text, errors(diagnostics))
             project.collect(text, source)
         unread = len(report.diagnostics)
         checker = Checker(project, evaluate)
@@ -134,7 +134,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
             _demand_program(checker, program, sources, report)
         if lint and not errors(report.diagnostics):
             look_for_slips(checker, program)
-        found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not damage.explains(d)]
+        found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not follow_on.has(d)]
         diagnostics = gathered(sorted(silence.heard(found, wanted), key=Diagnostic.order))
         image = None if errors(diagnostics) else _image(checker, shelf, progress, drawn)
         project.let_go()
@@ -184,19 +184,19 @@ def _deep(sources: Sequence[Source]) -> Iterator[None]:
 
 
 def _image(checker: Checker, shelf: Shelf, progress: Progress, drawn: bool) -> Image:
-    placed = place(checker)
-    program = Program(placed, drawn)
-    program.held = held = InitialReferences(program, checker, placed)
-    held.in_frames()
+    placement = lay_out(checker)
+    program = Program(checker, placement, drawn)
+    references = InitialReferences(program, checker, placement)
+    references.in_frames()
     bodies = tuple(shelf.body(program, checker, pou) for pou in _told(checker.bodies, partial(progress, "compiled")))
     tasks = sorted((_task(task) for task in checker.tasks), key=lambda row: row.priority)
     types: dict[str, Type] = {fold(p.type.name): p.type for p in checker.bodies if p.type is not None}
     for (_, name), entry in checker.project.types.items():
         if entry.resolved is not None:
             types.setdefault(name, entry.resolved[0])
-    del program.held  # which leads back to it
-    return Image(placed.layout, bodies, tuple(tasks), placed.symbols, (*placed.initial, *held.in_slots()), tuple(placed.retained),
-                 tuple(program.sites), types, program.objects, tuple(program.rungs), tuple(program.charts))
+    return Image(placement.layout, bodies, tuple(tasks), placement.symbols, (*placement.initial, *references.in_slots()),
+                 tuple(placement.retained), tuple(program.sites), types, program.objects, tuple(program.rungs),
+                 tuple(program.charts))
 
 
 def _told(pous: Sequence[Pou], reached: Callable[[int, int], None]) -> Iterator[Pou]:
