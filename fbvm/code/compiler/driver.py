@@ -27,7 +27,7 @@ from fbvm.code.layout.layout import lay_out
 from fbvm.code.lowering.initial_references import InitialReferences
 from fbvm.code.lowering.program import Program
 from fbvm.code.store import cache as image_cache
-from fbvm.code.store.object_code import Shelf, shelf_of
+from fbvm.code.store.object_code import ObjectLibrary, library_for
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
@@ -127,8 +127,8 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
         checker = Checker(project, evaluate)
         checker.progress = partial(progress, "checked")
         checker.keeps = not libraries and not project.settings
-        shelf = shelf_of(spoken) if checker.keeps else Shelf()
-        checker.known = shelf.asked
+        library = library_for(spoken) if checker.keeps else ObjectLibrary()
+        checker.known = library.dependencies
         checker.check(program, resource)
         if runnable and not errors(report.diagnostics):
             _demand_program(checker, program, sources, report)
@@ -136,7 +136,7 @@ def compile_sources(sources: Sequence[Source], program: str | None = None, libra
             look_for_slips(checker, program)
         found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not follow_on.has(d)]
         diagnostics = gathered(sorted(silence.heard(found, wanted), key=Diagnostic.order))
-        image = None if errors(diagnostics) else _image(checker, shelf, progress, drawn)
+        image = None if errors(diagnostics) else _image(checker, library, progress, drawn)
         project.let_go()
     return Compilation(image, diagnostics)
 
@@ -183,12 +183,12 @@ def _deep(sources: Sequence[Source]) -> Iterator[None]:
             gc.enable()
 
 
-def _image(checker: Checker, shelf: Shelf, progress: Progress, drawn: bool) -> Image:
+def _image(checker: Checker, library: ObjectLibrary, progress: Progress, drawn: bool) -> Image:
     placement = lay_out(checker)
     program = Program(checker, placement, drawn)
     references = InitialReferences(program, checker, placement)
     references.in_frames()
-    bodies = tuple(shelf.body(program, checker, pou) for pou in _told(checker.bodies, partial(progress, "compiled")))
+    bodies = tuple(library.body(program, checker, pou) for pou in _told(checker.bodies, partial(progress, "compiled")))
     tasks = sorted((_task(task) for task in checker.tasks), key=lambda row: row.priority)
     types: dict[str, Type] = {fold(p.type.name): p.type for p in checker.bodies if p.type is not None}
     for (_, name), entry in checker.project.types.items():
