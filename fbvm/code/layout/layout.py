@@ -16,12 +16,12 @@ from fbvm.code.layout.objects import Numbering
 from fbvm.code.operations import BUFFER_OBJECT, LEASE_BYTES, OBJECT_SHIFT, OFFSET_SHIFT
 
 _CHUNK = 64
-"""Initial bytes are kept in runs of chunks that are not all zero."""
+"""Initial bytes are kept in runs of whole chunks of so many bytes that are not all zero."""
 
 
 @dataclass
 class Placement:
-    """The finished layout: sizes, symbols, initial bytes, retained places."""
+    """What layout decides besides the offsets of variables: parts of the Image."""
 
     layout: Layout
     symbols: dict[str, Field] = field(default_factory=dict)
@@ -29,11 +29,14 @@ class Placement:
     retained: list[Retained] = field(default_factory=list)
     objects: Objects = field(default_factory=Objects)
     config_initials: list[tuple[int, Type, bytes]] = field(default_factory=list)
-    """First values that VAR_CONFIG gives: where each lies, its type and its bytes."""
+    """Initial values that VAR_CONFIG gives: the offset of each in the buffer, its type and its bytes."""
 
 
 def lay_out(checker: Checker) -> Placement:
-    """Give every variable its place; blocks' types learn where their located variables lie."""
+    """Give each global variable, program instance and frame its place in the buffer.
+
+    The offsets of variables and frames are written into the facts of the checker; types of blocks are completed with the
+    places of their located variables.  The result is what the Image needs of it."""
     slots = bytearray()
     for variable in checker.global_order:
         if variable.place == "abs":
@@ -54,9 +57,9 @@ def lay_out(checker: Checker) -> Placement:
         located += [v for v in pou.order if v.place == "area"]
     _place_located(located, placement)
     for pou in checker.bodies:
-        _fill_in(pou)
+        _complete_type(pou)
     for row in checker.settings.completed:
-        _complete(row, slots, placement)
+        _apply_config(row, slots, placement)
     placement.objects = Objects(_numbered(checker, slots), leases, leases_at)
     placement.initial += _runs(slots)
     retaining = Inside(checker, lambda pou: any(variable.retain for variable in pou.order))
@@ -65,14 +68,14 @@ def lay_out(checker: Checker) -> Placement:
         if variable.place == "abs" and not variable.reference:
             placement.retained += _retained_in(variable.type, variable.offset, _path(variable), retaining, variable.retain)
     for access in checker.settings.accesses:
-        offset, bit = _where(access.spot, placement)
+        offset, bit = _offset_of(access.spot, placement)
         placement.symbols.setdefault(fold(access.name), Field(
             access.name, access.spot.type, offset, "VAR_ACCESS", bit, absolute=True, constant=not access.writable))
     return placement
 
 
-def _where(spot: Spot, placement: Placement) -> tuple[int, int | None]:
-    """Where in the buffer, and on which bit, a path leads."""
+def _offset_of(spot: Spot, placement: Placement) -> tuple[int, int | None]:
+    """The offset in the buffer of what a path of VAR_CONFIG or VAR_ACCESS names, and its bit."""
     if spot.root is None:
         assert spot.address is not None
         return _at(spot.address, placement)
@@ -94,9 +97,9 @@ def _at(address: Address, placement: Placement) -> tuple[int, int | None]:
     return placement.layout.areas[address.area].offset + address.byte_offset(), address.bit_in_byte() if is_bit else None
 
 
-def _complete(row: Completed, slots: bytearray, placement: Placement) -> None:
+def _apply_config(row: Completed, slots: bytearray, placement: Placement) -> None:
     """Put what VAR_CONFIG says into the initial bytes: a reference to the place, and the first value there."""
-    offset, bit = _where(row.spot, placement)
+    offset, bit = _offset_of(row.spot, placement)
     if row.address is not None:
         there, bit = _at(row.address, placement)
         reference = BUFFER_OBJECT << OBJECT_SHIFT | there << OFFSET_SHIFT | (WHOLE_BYTES if bit is None else bit)
@@ -107,7 +110,7 @@ def _complete(row: Completed, slots: bytearray, placement: Placement) -> None:
     placement.config_initials.append((offset, row.spot.type, row.initial))
     if bit is not None:
         value = 1 << bit if any(row.initial) else 0
-        placement.initial.append((offset, bytes((_begins(placement, offset) & ~(1 << bit) | value,))))
+        placement.initial.append((offset, bytes((_initial_byte(placement, offset) & ~(1 << bit) | value,))))
     elif SLOTS_OFFSET <= offset < SLOTS_OFFSET + len(slots):
         slots[offset - SLOTS_OFFSET:offset - SLOTS_OFFSET + len(row.initial)] = row.initial
     else:
@@ -115,22 +118,23 @@ def _complete(row: Completed, slots: bytearray, placement: Placement) -> None:
 
 
 def _numbered(checker: Checker, slots: bytearray) -> tuple[tuple[int, int], ...]:
-    """Give numbers to all objects; instances learn those of their variables in their initial bytes."""
+    """The extents of all objects by number; the headers of instances get the numbers of theirs (see `objects`)."""
     numbering = Numbering(checker)
-    numbering.single()
+    numbering.add_single()
     for variable in checker.global_order:
         if variable.place == "abs" and not variable.reference:
-            numbering.instances(slots, variable.type, variable.offset)
+            numbering.add_instances(slots, variable.type, variable.offset)
     for pou in checker.bodies:
         frame = bytearray(pou.frame_initial)
         for variable in pou.order:
             if variable.place == "frame" and not variable.reference:
-                numbering.instances(frame, variable.type, pou.frame_offset + variable.offset, pou.frame_offset)
+                numbering.add_instances(frame, variable.type, pou.frame_offset + variable.offset, pou.frame_offset)
         pou.frame_initial = bytes(frame)
     return tuple(numbering.extents)
 
 
 def _place_located(variables: list[Variable], placement: Placement) -> None:
+    """Give variables with an address their offsets, and collect their initial values; bits of one byte are put together."""
     areas = placement.layout.areas
     bits: dict[int, int] = {}
     for variable in variables:
@@ -147,11 +151,11 @@ def _place_located(variables: list[Variable], placement: Placement) -> None:
                 bits[at] = bits.get(at, 0) | 1 << number % 8
         elif variable.initial != b"\0":
             bits[variable.offset] = bits.get(variable.offset, 0) | 1 << variable.location.bit_in_byte()
-    placement.initial += [(offset, bytes((_begins(placement, offset) | value,))) for offset, value in bits.items()]
+    placement.initial += [(offset, bytes((_initial_byte(placement, offset) | value,))) for offset, value in bits.items()]
 
 
-def _begins(placement: Placement, offset: int) -> int:
-    """What a byte holds at power-on by what has been placed so far: the others of its bits stay as they are."""
+def _initial_byte(placement: Placement, offset: int) -> int:
+    """What a byte of the buffer holds at power-on, by the initial values that are placed so far."""
     return next((data[offset - at] for at, data in reversed(placement.initial) if at <= offset < at + len(data)), 0)
 
 
@@ -163,7 +167,8 @@ def variable_bit(variable: Variable) -> int | None:
     return location.bit_in_byte() if location.bit is not None or location.area in FLAG_AREAS else None
 
 
-def _fill_in(pou: Pou) -> None:
+def _complete_type(pou: Pou) -> None:
+    """Complete the type of a block with the places of variables that lie in no instance."""
     if pou.type is None:
         return
     for variable in pou.order:
@@ -173,8 +178,8 @@ def _fill_in(pou: Pou) -> None:
 
 
 def _path(variable: Variable) -> str:
-    """The name under which a variable is found from outside; a VAR_STAT has that of its POU in front, a global variable that
-    of its list if it must."""
+    """The name under which a variable is found from outside: with that of its POU in front for a VAR_STAT, with that of its
+    list for a global variable that has to be qualified."""
     if variable.owner is not None:
         return f"{variable.owner.name}.{variable.name}"
     return f"{variable.space}.{variable.name}" if variable.qualified and variable.space else variable.name
@@ -198,7 +203,9 @@ def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:
 
 
 def _retained_in(kind: Type, offset: int, path: str, retaining: Inside, whole: bool) -> Iterator[Retained]:
-    """A `whole` value, or RETAIN variables of instances inside it; headers of instances belong to the program."""
+    """What a warm start keeps of a value: all of it if `whole`, else RETAIN variables of instances inside it.
+
+    Headers of instances, which hold numbers of objects, are never kept, since they belong to the program."""
     if not whole and not retaining(kind):
         return
     if whole and not holds_block(kind):
