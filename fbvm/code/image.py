@@ -1,6 +1,6 @@
 """The Image: everything that is needed to run, trace and draw a program, and nothing of its tree.
 
-All code is plain data (see `operations`).  Names of sources stand in `sites`' table of files only.
+All code is plain data (see `operations`).
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from fbvm.base.types import Field, Type
 from fbvm.code.operations import Block
 
 SAME_FOR_EQUAL = 2
-"""The version of the host's form for data in which equal data are equal bytes, whatever shares their objects."""
+"""The version of `marshal` in which equal data are equal bytes, whether or not parts of them are one object."""
 
 
 @dataclass(frozen=True)
 class Site:
-    """A place in the source: file name, POU, line, column."""
+    """A place in the source: name of the file, name of the POU, line and column from 1 on."""
 
     file: str
     pou: str
@@ -34,21 +34,21 @@ class Site:
 
 @dataclass(frozen=True)
 class Body:
-    """The code of one POU.
+    """The code of one POU: its name, the word of its declaration (FUNCTION_BLOCK ...), and its operations.
 
-    `instance_size` is the size of an instance in bytes, 0 for a function, whose frame lies at a fixed place."""
+    `instance_size` is the size of an instance in bytes; 0 for a function, which has a frame at a fixed place instead."""
 
     name: str
     kind: str
     code: Block
     instance_size: int
     statements: int
-    """Statements of the body outside loops: what an execution charges at its start."""
+    """The number of statements of the body outside loops: what an execution charges to the step budget at its start."""
 
 
 @dataclass(frozen=True)
 class ProgramRun:
-    """One program instance: its path name, the number of its body, the place of its instance."""
+    """One program instance that a task runs: its path, the number of its body, the offset of the instance in the buffer."""
 
     name: str
     body: int
@@ -57,9 +57,9 @@ class ProgramRun:
 
 @dataclass(frozen=True)
 class TaskRow:
-    """A task: `interval_ns` 0 means in every cycle; `single` is the path of the BOOL that starts it, or "".
+    """A task.  An `interval_ns` of 0 means in every cycle; `single` is the path of the BOOL whose rising edge starts it, or "".
 
-    Smaller `priority` goes first; programs run in the order of writing."""
+    The task with the smaller `priority` goes first; its programs run in the order of writing."""
 
     name: str
     priority: int
@@ -70,7 +70,10 @@ class TaskRow:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where things lie in the flat buffer of a PLC."""
+    """How large the parts of the flat buffer of a PLC are, and where they begin.
+
+    `slots_size` is the number of bytes of variables, instances, frames and leases; `e_banks` names the optional banks of the
+    E area that the program uses; `mailboxes` are areas that units bring."""
 
     slots_size: int
     e_banks: tuple[str, ...] = ()
@@ -98,7 +101,7 @@ def _page_up(size: int) -> int:
 
 @dataclass(frozen=True)
 class Retained:
-    """Bytes that a warm start keeps, by the name under which they are found after a change of program."""
+    """Bytes that a warm start keeps: their offset and number, and the name by which they are found in a changed program."""
 
     name: str
     offset: int
@@ -107,11 +110,14 @@ class Retained:
 
 @dataclass(frozen=True)
 class Objects:
-    """What pointers may be moved in.  `extents` are offsets of first bytes and of first bytes behind, of variables that
-    live as long as the program, for the objects from FIRST_OBJECT on.
+    """What pointers may be moved in.
 
-    `leases` are so many rows in the buffer, from `leases_at` on (see LEASE_BYTES).  The object of one is LEASED + row <<
-    `held_bits` + the number under which it is held: a pointer of an earlier lease of the same row is told from it."""
+    `extents` has a row for each variable that lives as long as the program and that something refers to, for the objects
+    from FIRST_OBJECT on: the offset of its first byte, and of the first behind it.
+
+    `leases` is the number of rows in the buffer, from `leases_at` on (see LEASE_BYTES), for what ends while pointers to it are
+    kept.  The object of a lease is LEASED + (row << `held_bits`) + the number under which it is held, which is another one
+    each time: so a pointer of an earlier lease of the same row is found out."""
 
     extents: tuple[tuple[int, int], ...] = ()
     leases: int = 0
@@ -119,13 +125,14 @@ class Objects:
 
     @property
     def held_bits(self) -> int:
+        """Bits for the number under which a lease is held."""
         return 23 - max(self.leases - 1, 0).bit_length()
 
 
 @dataclass(frozen=True)
 class RungPicture:
-    """A rung as it was written, for those who draw it: the number of its body, its place, and its steps, each with the
-    place that observations of it name, prefix, mnemonic and operands."""
+    """A rung as it was written, for those who draw it: the number of its body, its site, its number in the body, its comment,
+    and its steps.  A step is the site that observations of it name, prefix, mnemonic and operands."""
 
     body: int
     site: int
@@ -133,17 +140,17 @@ class RungPicture:
     comment: str
     steps: tuple[tuple[int, str, str, tuple[str, ...]], ...]
     is_text: bool = False
-    """Whether it is a statement of Structured Text that is drawn as a rung."""
+    """True for a statement of Structured Text that is drawn as a rung; `comment` says why if it has no steps."""
 
 
 @dataclass(frozen=True)
 class SfcPicture:
-    """A sequential function chart as it was written, for those who draw it: the number of its body, the place at which
+    """A sequential function chart as it was written, for those who draw it: the number of its body, the site at which
     each call of it begins, its steps and its transitions.
 
-    A step is its name, whether it is an initial one, where in an instance its flag lies, and (qualifier with time, action,
-    indicators) of each association.  A transition is the place that observations of it name, its name, its priority (0
-    for none), the numbers of the steps before and behind it, and its condition."""
+    A step is its name, whether it is an initial one, the offset of its flag in an instance, and for each association
+    (qualifier with time, action, indicators).  A transition is the site that observations of it name, its name, its priority
+    (0 for none), the numbers of the steps in front of and behind it, and its condition."""
 
     body: int
     site: int
@@ -153,14 +160,14 @@ class SfcPicture:
 
 @dataclass(frozen=True)
 class Image:
-    """A compiled program."""
+    """A compiled program.  See `fbvm list` for how one looks."""
 
     layout: Layout
     bodies: tuple[Body, ...]
     tasks: tuple[TaskRow, ...]
     symbols: dict[str, Field]
-    """Programs and global variables by folded name; their offsets count from the start of the buffer.
-    Members are found through their types."""
+    """Programs and global variables by folded name; their offsets count from the start of the buffer.  Members are found through
+    their types."""
     initial: tuple[tuple[int, bytes], ...]
     """Bytes to write at power-on over a buffer of zeros."""
     retained: tuple[Retained, ...]
@@ -173,17 +180,17 @@ class Image:
 
     @cached_property
     def fingerprint(self) -> str:
-        """A number in hexadecimal that another program, or the same in another layout, does not have."""
+        """A hash in hexadecimal of all that decides what the program does, its layout included: another program has another."""
         around = repr((self.layout, self.tasks, self.initial, self.retained, self.objects)).encode()
-        said = hashlib.sha256(b"%d:" % len(around) + around)
+        digest = hashlib.sha256(b"%d:" % len(around) + around)
         for body in self.bodies:
             content = _plain_bytes((body.name, body.code, body.instance_size))
-            said.update(b"%d:" % len(content) + content)
-        return said.hexdigest()[:32]
+            digest.update(b"%d:" % len(content) + content)
+        return digest.hexdigest()[:32]
 
 
 def _plain_bytes(data: Any) -> bytes:
-    """Plain data as bytes that other data does not have; in the host's form, if they are not nested too deep for that."""
+    """Plain data as bytes that other data does not have: by `marshal`, or where data are nested too deep for that, flattened."""
     try:
         return marshal.dumps(data, SAME_FOR_EQUAL)
     except ValueError:

@@ -21,7 +21,13 @@ LONGEST_BYTES = 32
 
 
 def listing(image: Image, observations: bool = False) -> str:
-    """The whole image; `observations` shows what an observed build would report as statements of their own."""
+    """An image as text.
+
+    observations: list the `observe` statements too, which only builds that look inside a scan execute.
+
+    >>> from fbvm import compile_text
+    >>> print(listing(compile_text("PROGRAM Main VAR n : INT; END_VAR n := 1; END_PROGRAM").image).splitlines()[-1].strip())
+    1:35      store i16 self+8 <- 1"""
     lines = [*_layout(image), *_tasks(image), *_symbols(image), *_initial(image), *_retained(image), *_objects(image)]
     for number, body in enumerate(image.bodies):
         lines += ["", *_Writer(image, observations).body(number, body)]
@@ -125,7 +131,7 @@ class _Writer:
         return self.lines
 
     def line(self, text: str) -> None:
-        """One line with what stands beside it once."""
+        """Write one line; the place of the statement stands beside the first line of it."""
         self.lines.append(f"{self.mark:{MARGIN}}{'  ' * self.indent}{text}".rstrip())
         self.mark = ""
 
@@ -162,7 +168,7 @@ class _Writer:
         return " ".join([name, *texts])
 
     def operand(self, word: str, item: Any) -> str:
-        """An operand by the word of its row."""
+        """An operand, by its word in the table of operations."""
         if word == "site":
             return f"@{self.place(item)}"
         if word == "bit":

@@ -1,4 +1,4 @@
-"""The standard functions: names, parameters, types.  What each does is lowered by `code.lowering.functions`, under the same key.
+"""The standard functions: names, parameters, types.  What each does is lowered by `code.builder.functions`, under the same key.
 
 Parameter types: a data type, a generic type, or `T`, a type variable bound to one type for all its places; `T` is limited
 to the generic types in `limits`; ENUMERATION adds enumerations, ANY also arrays and structures.  A last parameter with

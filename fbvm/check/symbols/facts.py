@@ -285,7 +285,7 @@ class Facts:
     followed: dict[tree.Expr, RefType] = field(default_factory=dict)
     """Expressions that name a REFERENCE TO, and its type; they stand for what it is bound to."""
     starts: list[Start] = field(default_factory=list)
-    """References of initial values, in which each stands as its number here (see `initial_references`)."""
+    """References of initial values, in which each stands as its number here (see `code.layout.reference_marks`)."""
     holders: dict[tree.Expr, Holder] = field(default_factory=dict)
     """For each target of a reference the object within which the reference can be moved."""
     leases: dict[Variable, int] = field(default_factory=dict)

@@ -1,41 +1,41 @@
-"""Lowering of arrays and structures that are written out in statements."""
+"""Lowering of arrays and structures that are written out in statements: `a := [1, 2, x]`."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from fbvm.base.types import RefType, machine
+from fbvm.base.types import RefType, Type, machine
+from fbvm.check.symbols.facts import AggregatePart
+from fbvm.code.builder.places import Place
+from fbvm.code.lowering import pointers
+from fbvm.code.lowering.context import BodyContext, PlaceRules, ValueRules
+from fbvm.code.lowering.variables import loaded
 from fbvm.code.operations import Node
 from fbvm.syntax import tree
 
-if TYPE_CHECKING:
-    from fbvm.check.symbols.facts import AggregatePart
-    from fbvm.code.lowering.bodies import BodyLowering
-    from fbvm.code.lowering.places import Place
 
-
-def written_out(body: BodyLowering, expr: tree.ArrayInit | tree.StructInit) -> Place:
-    """The place of the whole, with its values put there: all are worked out first, in order."""
+def written_out(body: BodyContext, expr: tree.ArrayInit | tree.StructInit, kind: Type) -> Place:
+    """The place of the whole in the frame of the POU, with its values stored there: all are evaluated first, in order."""
     whole = body.facts.aggregates[expr]
-    place, site = body.places.slot(whole.place), body.site(expr)
+    place, site = body.slot(whole.place), body.site(expr)
     single = [part for part in whole.parts if machine(part.kind)]
-    nodes = body.values.sequence(_value(body, part) for part in single)
-    body.out.append(("fill", place.address, whole.content))
-    for at, start in body.program.held.within(place.type, whole.content):
-        body.out.append(body.places.store(place.moved(at, start.kind), body.pointers.to(start.place), site))
+    nodes = body.sequence(_value(body, part) for part in single)
+    body.emit(("fill", place.address, whole.content))
+    for at, start in body.program.references_in(place.type, whole.content):
+        body.emit(place.moved(at, start.kind).store(pointers.reference_to(body, start.place), site))
     for part, node in zip(single, nodes, strict=True):
-        kept = body.keep(node)
-        for at in part.places:
-            body.out.append(body.places.store(place.moved(at, part.kind, part.bit), kept, site))
+        value = body.to_temporary(node)
+        body.emit(*(place.moved(at, part.kind, part.bit).store(value, site) for at in part.places))
     for part in whole.parts:
-        source = None if machine(part.kind) else body.places.fixed(body.aggregate(part.value))
-        for at in part.places if source is not None else ():
-            assert source is not None
-            body.out.append(("copy", place.moved(at, part.kind).address, source.address, part.kind.size))
+        if not machine(part.kind):
+            source = body.reusable(body.aggregate(part.value))
+            body.emit(*(("copy", place.moved(at, part.kind).address, source.address, part.kind.size) for at in part.places))
     return place
 
 
-def _value(body: BodyLowering, part: AggregatePart) -> Node:
+def _value(body: BodyContext, part: AggregatePart) -> Node:
     if isinstance(part.kind, RefType) and part.kind.follows:
-        return body.pointers.lent(part.value)
+        return pointers.binding(body, part.value)
     return body.value(part.value, part.kind)
+
+
+PLACES: PlaceRules = dict.fromkeys((tree.ArrayInit, tree.StructInit), written_out)
+VALUES: ValueRules = dict.fromkeys((tree.ArrayInit, tree.StructInit), loaded)

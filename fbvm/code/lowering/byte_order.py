@@ -1,22 +1,19 @@
 """Big-endian forms: which bytes of a type change places, and the assignment that does it (IEC 61131-3 ed. 3, table 37).
 
-Values lie in memory with the lowest byte first; each number in an array or a structure is turned by itself.  A REAL is
-turned in memory, never as a value: its bytes in the other order may be those of a NaN, which values do not keep apart."""
+Values lie in memory with the lowest byte first; in an array or a structure the bytes of each number are reversed by
+themselves.  This is done in memory, never to a value: the bytes of a REAL in the other order may be those of a NaN, and
+values do not keep NaNs apart."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from fbvm.base.types import ArrayType, Elementary, EnumType, StringType, StructType, SubrangeType, Type, base
 from fbvm.check.symbols.facts import StandardCall
-from fbvm.code.lowering.values import is_aggregate
+from fbvm.code.builder.places import is_aggregate
+from fbvm.code.lowering.context import BodyContext
 from fbvm.syntax import tree
 
-if TYPE_CHECKING:
-    from fbvm.code.lowering.bodies import BodyLowering
-
 Run = tuple[int, int, int, int]
-"""Items of equal size: offset of the first, how many, bytes from one to the next, size."""
+"""Items of equal size, as the operation `reverse` has them: offset of the first, number, bytes from one to the next, size."""
 
 
 def runs(kind: Type) -> list[Run]:
@@ -34,7 +31,7 @@ def runs(kind: Type) -> list[Run]:
 
 
 def _repeated(inner: Run, count: int, width: int) -> list[Run]:
-    """A run in each element of an array, as few runs as it takes."""
+    """A run in each of the `count` elements of an array, as few runs as possible."""
     offset, items, stride, size = inner
     if items * stride == width:
         return [(offset, items * count, stride, size)]
@@ -43,17 +40,17 @@ def _repeated(inner: Run, count: int, width: int) -> list[Run]:
     return [(offset + n * width, items, stride, size) for n in range(count)]
 
 
-def assign(body: BodyLowering, target: tree.Expr, called: StandardCall, site: int) -> None:
-    """`target := TO_BIG_ENDIAN(x)` and its relatives, where the value is turned in memory."""
+def assign(body: BodyContext, target: tree.Expr, called: StandardCall, site: int) -> None:
+    """`target := TO_BIG_ENDIAN(x)` and its relatives: x is copied, then its bytes are reversed in the target."""
     value, kind = called.arguments[0]
-    to = body.places.fixed(body.places.of(target))
+    to = body.reusable(body.place(target))
     if is_aggregate(kind):
         body.copy(to, body.aggregate(value), site)
     elif isinstance(kind, Elementary) and isinstance(value, tree.NameRef | tree.Member | tree.Index | tree.Deref):
-        body.copy(to, body.places.of(value), site)
+        body.copy(to, body.place(value), site)
     else:
         body.write(to, body.value(value, kind), site)
-    turned = tuple(runs(to.type))
-    if turned and called.key.endswith("BIG_ENDIAN"):
-        body.out.append(("reverse", to.address, to.type.size, turned))
+    reversed_runs = tuple(runs(to.type))
+    if reversed_runs and called.key.endswith("BIG_ENDIAN"):
+        body.emit(("reverse", to.address, to.type.size, reversed_runs))
         body.observe_write(to, site)

@@ -1,199 +1,199 @@
-"""Lowering of calls of POUs: inputs in, body, outputs out; EN and ENO."""
+"""Lowering of calls of POUs: inputs in, body, outputs out; EN and ENO.
+
+With EN FALSE nothing of the call happens but that EN and ENO become FALSE: inputs are neither evaluated nor passed, the body
+is not run, outputs keep their values, a function's result is the default of its type."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, RefType, followed, machine
+from fbvm.base.types import BOOL, DINT, LINT, AnyType, OpenArrayType, RefType, base, followed, machine
 from fbvm.check.expressions.constants import default
 from fbvm.check.symbols.facts import PouCall, Variable
-from fbvm.code.lowering.any_parameters import described
-from fbvm.code.lowering.places import Place
-from fbvm.code.lowering.values import is_aggregate, nothing
-from fbvm.code.operations import INTEGERS, Address, Block, Node
+from fbvm.code.builder.constants import FALSE, TRUE, zero
+from fbvm.code.builder.conversions import implicit
+from fbvm.code.builder.places import Place, is_aggregate
+from fbvm.code.lowering import pointers
+from fbvm.code.lowering.any_arguments import described
+from fbvm.code.lowering.arrays import bounds
+from fbvm.code.lowering.context import BodyContext
+from fbvm.code.operations import INTEGERS, Block, Node
 from fbvm.syntax import tree
 
-if TYPE_CHECKING:
-    from fbvm.code.lowering.bodies import BodyLowering
 
-TRUE: Node = ("const", "b", 1)
-FALSE: Node = ("const", "b", 0)
+def run(body: BodyContext, call: tree.Call, called: PouCall) -> None:
+    """A call whose result, if it has one, is not used.
+
+    body: the caller.
+    call: the call in the tree.
+    called: what the checker found out about it."""
+    if called.pou.home is None:
+        _enabled(body, call, called, ())
+        return
+    instance = body.place(called.instance) if called.instance is not None else Place(("self", 0, ()), BOOL)
+    body.emit(("call", body.program.number(called.pou), instance.address))
 
 
-class CallLowering:
-    """Lowers the calls of POUs in one body.
+def value(body: BodyContext, call: tree.Call, called: PouCall) -> Node:
+    """A call of a function; its result as a temporary."""
+    result = called.pou.result
+    assert result is not None
+    number = body.new_temporary()
+    form = machine(result.type)
+    place = body.slot(result)
+    if called.enable is not None:
+        initial = zero(form)
+        if form in INTEGERS:  # an enumeration begins with its first member
+            initial = ("const", form, int.from_bytes(default(result.type), "little"))
+        body.emit(("let", number, form, initial))
+    _enabled(body, call, called, (("let", number, form, place.load()),))
+    return ("tmp", form, number)
 
-    With EN FALSE nothing of the call happens but that EN and ENO become FALSE: inputs are neither worked out nor
-    passed, the body is not run, outputs keep their values, a function's result is the default of its type."""
 
-    def __init__(self, body: BodyLowering) -> None:
-        self.body = body
+def aggregate(body: BodyContext, call: tree.Call, called: PouCall) -> Place:
+    """A call of a function whose result is an array or a structure; the place of the result."""
+    result = called.pou.result
+    assert result is not None
+    place = body.slot(result)
+    if called.enable is not None:
+        body.emit(("fill", place.address, result.initial))
+    _enabled(body, call, called, ())
+    return place
 
-    def statement(self, call: tree.Call, called: PouCall) -> None:
-        """A call whose result, if there is one, is thrown away."""
-        if called.pou.home is None:
-            self._guarded(call, called, None)
-            return
-        instance = self.body.places.of(called.instance) if called.instance is not None else Place(("self", 0, ()), BOOL)
-        self.body.out.append(("call", self.body.program.number(called.pou), instance.address))
 
-    def value(self, call: tree.Call, called: PouCall) -> Node:
-        """A call of a function for its result."""
-        result = called.pou.result
-        assert result is not None
-        number = self.body.temporary()
-        form = machine(result.type)
-        place = self._place(called, result, None)
-        after: Block = (("let", number, form, self.body.places.load(place)),)
-        if called.enable is not None:
-            empty = nothing(form)
-            if form in INTEGERS:  # an enumeration begins with its first member
-                empty = ("const", form, int.from_bytes(default(result.type), "little"))
-            self.body.out.append(("let", number, form, empty))
-        self._guarded(call, called, after)
-        return ("tmp", form, number)
+# --- EN and ENO -------------------------------------------------------------------------------------------------------
 
-    def aggregate(self, call: tree.Call, called: PouCall) -> Place:
-        """A call of a function whose result is an array or a structure: the place of the result."""
-        result = called.pou.result
-        assert result is not None
-        place = self._place(called, result, None)
-        if called.enable is not None:
-            self.body.out.append(("fill", place.address, result.initial))
-        self._guarded(call, called, None)
-        return place
 
-    # --- parts ------------------------------------------------------------------------------------------------------
+def _enabled(body: BodyContext, call: tree.Call, called: PouCall, after: Block) -> None:
+    """The whole call and the statements `after` it, inside an IF where EN is given or declared."""
+    site = body.site(call)
+    instance = body.reusable(body.place(called.instance)) if called.instance is not None else None
+    eno = _parameter(called, "ENO", "VAR_OUTPUT")
+    enable = _enable(body, called, instance, site)
+    if enable is None:
+        _execute(body, called, instance, site, eno)
+        body.emit(*after)
+        _report(body, called, TRUE, site)
+        return
+    enable = body.to_temporary(enable)
+    with body.block() as inner:
+        _execute(body, called, instance, site, eno)
+        body.emit(*after)
+    otherwise: Block = ()
+    if eno is not None and (instance is not None or called.outputs):
+        with body.block() as disabled:
+            body.emit(_slot(body, eno, instance).store(FALSE, site))
+            _outputs(body, [output for output in called.outputs if output[0] is eno], instance, site)
+        otherwise = tuple(disabled)
+    body.emit(("if", ((enable, tuple(inner)),), otherwise))
+    _report(body, called, enable, site)
 
-    def _guarded(self, call: tree.Call, called: PouCall, after: Block | None) -> None:
-        """The whole call, inside an IF where EN is given or declared."""
-        body = self.body
-        site = body.site(call)
-        instance = body.places.fixed(body.places.of(called.instance)) if called.instance is not None else None
-        own_en = self._parameter(called, "EN", "VAR_INPUT")
-        own_eno = self._parameter(called, "ENO", "VAR_OUTPUT")
-        enable = body.value(called.enable, BOOL) if called.enable is not None else None
-        if own_en is not None:
-            place = self._place(called, own_en, instance)
-            if enable is not None:
-                body.write(place, enable, site)
-            elif called.pou.is_function:
-                body.write(place, TRUE, site)
-            enable = body.places.load(place)
-        if enable is None:
-            self._run(call, called, instance, site, own_eno)
-            body.out += after or ()
-            self._report(called, TRUE, site)
-            return
-        enable = body.keep(enable)
-        with body.block() as inner:
-            self._run(call, called, instance, site, own_eno)
-            inner += after or ()
-        otherwise: Block = ()
-        if own_eno is not None and (instance is not None or called.outputs):
-            otherwise = (body.places.store(self._place(called, own_eno, instance), FALSE, site),)
-            with body.block() as falls:
-                self._outputs([o for o in called.outputs if o[0] is own_eno], called, instance, site)
-            otherwise += tuple(falls)
-        body.out.append(("if", ((enable, tuple(inner)),), otherwise))
-        self._report(called, enable, site)
 
-    def _report(self, called: PouCall, enable: Node, site: int) -> None:
-        """ENO of a POU that declares none: whether it was run."""
-        for target, negated in called.enabled:
-            node: Node = ("not", "b", enable) if negated else enable
-            self.body.write(self.body.places.of(target), node, site)
+def _enable(body: BodyContext, called: PouCall, instance: Place | None, site: int) -> Node | None:
+    """The value of EN, which is stored if the POU declares it; None if it is neither given nor declared."""
+    declared = _parameter(called, "EN", "VAR_INPUT")
+    enable = body.value(called.enable, BOOL) if called.enable is not None else None
+    if declared is None:
+        return enable
+    place = _slot(body, declared, instance)
+    if enable is not None:
+        body.write(place, enable, site)
+    elif called.pou.is_function:
+        body.write(place, TRUE, site)
+    return place.load()
 
-    def _run(self, call: tree.Call, called: PouCall, instance: Place | None, site: int, eno: Variable | None) -> None:
-        self._inputs(called, instance, site)
-        if eno is not None and (called.pou.enables_itself or not called.pou.writes_eno):
-            self.body.out.append(self.body.places.store(self._place(called, eno, instance), TRUE, site))
-        address: Address | None = instance.address if instance is not None else None
-        self._execute(called, address)
-        self._outputs(called.outputs, called, instance, site)
-        for variable, expr in called.in_outs if called.pou.actions else ():
-            if self._ends(expr):  # an ACTION that is called later finds nothing instead of what has ended
-                body = self.body
-                body.out.append(("store", "ref", self._place(called, variable, instance).address, ("const", "ref", 0)))
 
-    def _execute(self, called: PouCall, address: Address | None) -> None:
-        """Run the body, unless a task of its own does."""
-        run: Node = ("call", self.body.program.number(called.pou), address)
-        if called.tasked is None:
-            self.body.out.append(run)
-            return
-        places = self.body.places
-        self.body.out.append(("if", ((("not", "b", places.load(places.slot(called.tasked))), (run,)),), ()))
+def _report(body: BodyContext, called: PouCall, enable: Node, site: int) -> None:
+    """ENO of a POU that declares none: whether it was run."""
+    for target, negated in called.enabled:
+        node: Node = ("not", "b", enable) if negated else enable
+        body.write(body.place(target), node, site)
 
-    def _ends(self, expr: tree.Expr) -> bool:
-        """True for what an in-out is bound to and may end with the body that passes it."""
-        variable = self.body.facts.variables.get(self.body.facts.root(expr))
-        return variable is not None and (variable.kind == "VAR_IN_OUT" or variable.place == "frame")
 
-    def _inputs(self, called: PouCall, instance: Place | None, site: int) -> None:
-        body = self.body
-        passed = sorted([*called.inputs, *called.in_outs], key=lambda pair: pair[1].start)
-        aggregates = [(v, e) for v, e in passed if v.kind == "VAR_INPUT" and is_aggregate(v.type)]
-        passed = [pair for pair in passed if pair not in aggregates]
-        nodes = body.values.sequence(self._argument(variable, expr) for variable, expr in passed)
-        for variable, expr in aggregates:
-            body.copy(self._place(called, variable, instance), body.aggregate(expr), site)
-        for (variable, expr), node in zip(passed, nodes, strict=True):
-            place = self._place(called, variable, instance)
-            if variable.kind == "VAR_IN_OUT":
-                body.out.append(("store", "ref", place.address, node))
-                if isinstance(variable.type, OpenArrayType):
-                    self._bounds(place, expr)
-                elif isinstance(variable.type, AnyType):
-                    self._described(place, expr)
-            else:
-                body.write(place, node, site)
-        if called.pou.is_function:
-            given = {id(v) for v, _ in called.inputs}
-            for variable in called.pou.parameters("VAR_INPUT"):
-                if id(variable) not in given and variable.name.upper() != "EN":
-                    place = self._place(called, variable, instance)
-                    body.out.append(("fill", place.address, variable.initial))
+def _parameter(called: PouCall, name: str, kind: str) -> Variable | None:
+    return next((v for v in called.pou.parameters(kind) if v.name.upper() == name), None)
 
-    def _bounds(self, slot: Place, expr: tree.Expr) -> None:
-        """Store the bounds of what is passed to ARRAY [*] beside its reference."""
-        for number, node in enumerate(self.body.places.bounds(expr)):
-            self.body.out.append(("store", "i64", slot.moved(8 + 8 * number, LINT).address, node))
 
-    def _described(self, slot: Place, expr: tree.Expr) -> None:
-        """Store the size and type of what is passed to an ANY beside its reference."""
-        for offset, node in described(self.body, expr):
-            self.body.out.append(("store", "i32", slot.moved(offset, DINT).address, node))
+def _slot(body: BodyContext, variable: Variable, instance: Place | None) -> Place:
+    """The slot of a callee's variable; of one to which VAR_CONFIG gives a place, that place."""
+    if instance is None or variable.place != "self":
+        return body.slot(variable)
+    slot = instance.moved(variable.offset, variable.type)
+    return slot.target(body.entry_site) if variable.open else slot
 
-    def _argument(self, variable: Variable, expr: tree.Expr) -> Node:
+
+# --- what is passed and executed --------------------------------------------------------------------------------------
+
+
+def _execute(body: BodyContext, called: PouCall, instance: Place | None, site: int, eno: Variable | None) -> None:
+    """Inputs, the body unless a task of its own runs it, outputs."""
+    _inputs(body, called, instance, site)
+    if eno is not None and (called.pou.enables_itself or not called.pou.writes_eno):
+        body.emit(_slot(body, eno, instance).store(TRUE, site))
+    statement: Node = ("call", body.program.number(called.pou), instance.address if instance is not None else None)
+    if called.tasked is not None:
+        statement = ("if", ((("not", "b", body.slot(called.tasked).load()), (statement,)),), ())
+    body.emit(statement)
+    _outputs(body, called.outputs, instance, site)
+    for variable, expr in called.in_outs if called.pou.actions else ():
+        if _may_end(body, expr):  # an ACTION that is called later finds NULL instead of what has ended
+            body.emit(("store", "ref", _slot(body, variable, instance).address, ("const", "ref", 0)))
+
+
+def _may_end(body: BodyContext, expr: tree.Expr) -> bool:
+    """True if what an in-out is bound to may end with the body that passes it."""
+    variable = body.facts.variables.get(body.facts.root(expr))
+    return variable is not None and (variable.kind == "VAR_IN_OUT" or variable.place == "frame")
+
+
+def _inputs(body: BodyContext, called: PouCall, instance: Place | None, site: int) -> None:
+    """Evaluate all arguments in the order of writing, then store them; aggregates are copied in between."""
+    passed = sorted([*called.inputs, *called.in_outs], key=lambda pair: pair[1].start)
+    aggregates = [(v, e) for v, e in passed if v.kind == "VAR_INPUT" and is_aggregate(v.type)]
+    passed = [pair for pair in passed if pair not in aggregates]
+    nodes = body.sequence(_argument(body, variable, expr) for variable, expr in passed)
+    for variable, expr in aggregates:
+        body.copy(_slot(body, variable, instance), body.aggregate(expr), site)
+    for (variable, expr), node in zip(passed, nodes, strict=True):
+        place = _slot(body, variable, instance)
         if variable.kind == "VAR_IN_OUT":
-            return self.body.places.reference(self.body.places.of(expr))
-        if isinstance(variable.type, RefType) and variable.type.follows:
-            return self.body.pointers.lent(expr)
-        return self.body.value(expr, variable.type)
+            _bind(body, variable, place, expr, node)
+        else:
+            body.write(place, node, site)
+    if called.pou.is_function:
+        given = {id(v) for v, _ in called.inputs}
+        for variable in called.pou.parameters("VAR_INPUT"):
+            if id(variable) not in given and variable.name.upper() != "EN":
+                body.emit(("fill", _slot(body, variable, instance).address, variable.initial))
 
-    def _outputs(self, outputs: list[tuple[Variable, tree.Expr, bool]], called: PouCall, instance: Place | None,
-                 site: int) -> None:
-        body = self.body
-        for variable, target, negated in outputs:
-            source = self._place(called, variable, instance)
-            if source.type is not (kind := followed(source.type)):
-                source = Place((("ref", body.places.load(source), site), 0, ()), kind)
-            place = body.places.of(target)
-            if is_aggregate(source.type):
-                body.copy(place, source, site)
-                continue
-            node = body.places.load(source)
-            if negated:
-                node = ("not", "b", node)
-            body.write(place, body.converted(node, source.type, place.type), site)
 
-    def _parameter(self, called: PouCall, name: str, kind: str) -> Variable | None:
-        return next((v for v in called.pou.parameters(kind) if v.name.upper() == name), None)
+def _argument(body: BodyContext, variable: Variable, expr: tree.Expr) -> Node:
+    if variable.kind == "VAR_IN_OUT":
+        return body.place(expr).reference()
+    if isinstance(variable.type, RefType) and variable.type.follows:
+        return pointers.binding(body, expr)
+    return body.value(expr, variable.type)
 
-    def _place(self, called: PouCall, variable: Variable, instance: Place | None) -> Place:
-        """The slot of a callee's variable; of one that VAR_CONFIG gives a place, that place."""
-        if instance is None or variable.place != "self":
-            return self.body.places.slot(variable)
-        slot = instance.moved(variable.offset, variable.type)
-        return self.body.places.behind(slot, self.body.entry_site) if variable.open else slot
+
+def _bind(body: BodyContext, variable: Variable, slot: Place, expr: tree.Expr, reference: Node) -> None:
+    """Store the reference of an in-out, and beside it the bounds of ARRAY [*], or what an ANY tells of its argument."""
+    body.emit(("store", "ref", slot.address, reference))
+    if isinstance(variable.type, OpenArrayType):
+        for number, node in enumerate(bounds(body, expr)):
+            body.emit(("store", "i64", slot.moved(8 + 8 * number, LINT).address, node))
+    elif isinstance(variable.type, AnyType):
+        for offset, node in described(body, expr):
+            body.emit(("store", "i32", slot.moved(offset, DINT).address, node))
+
+
+def _outputs(body: BodyContext, outputs: list[tuple[Variable, tree.Expr, bool]], instance: Place | None, site: int) -> None:
+    for variable, target, negated in outputs:
+        source = _slot(body, variable, instance)
+        if source.type is not (kind := followed(source.type)):
+            source = Place((("ref", source.load(), site), 0, ()), kind)
+        place = body.place(target)
+        if is_aggregate(source.type):
+            body.copy(place, source, site)
+            continue
+        node = source.load()
+        if negated:
+            node = ("not", "b", node)
+        body.write(place, implicit(body, node, source.type, base(place.type)), site)

@@ -1,43 +1,47 @@
-"""What the lowering of all bodies of a program shares: sites, pictures, objects, and where everything lies."""
+"""The program: what the lowering of all its bodies shares, such as sites, pictures, objects, and where everything lies."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from fbvm.base.areas import Area
+from fbvm.base.types import Type
+from fbvm.check.checker import Checker
 from fbvm.check.symbols.facts import Pou, Start, Variable
 from fbvm.code.image import Objects, RungPicture, SfcPicture, Site
-from fbvm.code.lowering.layout import Placed
+from fbvm.code.layout.layout import Placement
+from fbvm.code.layout.reference_marks import references_in
 from fbvm.code.operations import FIRST_OBJECT
 from fbvm.syntax import tree
 
-if TYPE_CHECKING:
-    from fbvm.code.lowering.initial_references import InitialReferences
-
 Origin = tuple[str, int]
-"""The first two parts of an address: what the offset counts from, and the offset."""
+"""The first two parts of an address: what the offset counts from, and the offset in bytes."""
 
 
 class Program:
-    """What the lowering of all bodies shares."""
+    """What the lowering of one body needs to know of the others, and what it leaves for the Image.
 
-    def __init__(self, placed: Placed, drawn: bool = False) -> None:
+    `drawn` says whether statements of Structured Text get pictures as rungs."""
+
+    def __init__(self, checker: Checker, placement: Placement, drawn: bool = False) -> None:
+        self.checker = checker
         self.drawn = drawn
-        self.areas: dict[str, Area] = placed.layout.areas
+        self.areas: dict[str, Area] = placement.layout.areas
         self.sites: list[Site] = []
         self.rungs: list[RungPicture] = []
         self.charts: list[SfcPicture] = []
-        self.held: InitialReferences
-        self.late_starts: dict[Pou, list[tuple[int, Start]]] = {}
-        """References in frames that bodies make when they start, by POU, and where in the buffer they lie."""
-        self.leases_at, self.held_bits = placed.objects.leases_at, placed.objects.held_bits
-        self._objects = placed.objects
+        self.entry_references: dict[Pou, list[tuple[int, Start]]] = {}
+        """By POU the references that its body makes when it starts, and where in the buffer each lies."""
+        self.leases_at, self.held_bits = placement.objects.leases_at, placement.objects.held_bits
+        self._objects = placement.objects
         self._area_objects: dict[str, tuple[int, int]] = {}
         self._numbers: dict[tuple[str, str, int], int] = {}
 
+    # --- what bodies leave --------------------------------------------------------------------------------------------
+
     def site(self, pou: Pou, node: tree.Node) -> int:
-        """The number of a place in the source."""
+        """The number of the place in the source at which a node of a POU begins."""
         key = pou.source.name, pou.name, node.start
         number = self._numbers.get(key)
         if number is None:
@@ -47,27 +51,27 @@ class Program:
         return number
 
     def known_site(self, pou: Pou, start: int, site: Site) -> int:
-        """The number of a place that was looked up before."""
+        """The number of a place in the source whose line and column are known already."""
         number = self._numbers.setdefault((pou.source.name, pou.name, start), len(self.sites))
         if number == len(self.sites):
             self.sites.append(site)
         return number
 
     def area_object(self, area: str) -> int:
-        """The number of the object that a whole area is."""
+        """The number of the object that a whole area is, for pointers that may be moved all over it."""
         row = self.areas[area]
         self._area_objects.setdefault(area, (row.offset, row.offset + row.size_bytes))
         return FIRST_OBJECT + len(self._objects.extents) + list(self._area_objects).index(area)
 
     @property
     def objects(self) -> Objects:
-        """What pointers may be moved in, areas that were asked for included."""
+        """All objects, those of `area_object` included."""
         return replace(self._objects, extents=(*self._objects.extents, *self._area_objects.values()))
 
     # --- where things lie ---------------------------------------------------------------------------------------------
 
     def number(self, pou: Pou) -> int:
-        """The number of a body."""
+        """The number of the body of a POU."""
         return pou.number
 
     def frame(self, pou: Pou) -> Origin:
@@ -86,3 +90,8 @@ class Program:
             assert variable.owner is not None
             offset += variable.owner.frame_offset
         return "abs", offset
+
+    def references_in(self, kind: Type, content: bytes) -> Iterator[tuple[int, Start]]:
+        """The references in the bytes of a value that a body makes, each with its offset; all are to global variables."""
+        for at, start, _ in references_in(self.checker, kind, content):
+            yield at, start

@@ -1,4 +1,4 @@
-"""What a piece of a program charges to the step budget."""
+"""Step costs: how much of the step budget a piece of a program charges."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from fbvm.syntax import tree
 _LOOPS = tree.For | tree.While | tree.Repeat
 
 
-def counted(statements: tree.Block) -> int:
-    """Statements of a block that are not inside a loop: what it charges to the step budget."""
+def step_cost(statements: tree.Block) -> int:
+    """What a block charges at its start: the number of its statements, without those inside loops."""
     total = 0
     for statement in statements:
         total += 1
         if not isinstance(statement, _LOOPS):
-            total += sum(counted(inner) for inner in bodies(statement))
+            total += sum(step_cost(inner) for inner in bodies(statement))
     return total

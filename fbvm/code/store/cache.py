@@ -1,5 +1,7 @@
-"""Compilations on disk: what was compiled once with the same sources, libraries, options and version is read the next
-time.  Only what compiled without error is kept."""
+"""Compilations on disk.
+
+One with the same sources, libraries and options, by the same version of this package, is read instead of done again.  Only
+compilations without an error are kept."""
 
 from __future__ import annotations
 
@@ -18,17 +20,23 @@ from fbvm.code.store.encoding import decode, encode
 FILES = Cache("images", b"fbvm image 1\n", 128 << 20)
 LENGTH_BYTES = 4
 ROOMS = ("base", "syntax", "check", "code")
-"""Where what makes images is."""
+"""The folders of this package that decide what an image holds."""
 
 
 def name(sources: Sequence[Source], libraries: Sequence[Path], options: Sequence[object]) -> str:
-    """The name for the compilation of these."""
+    """The name of the cache entry for a compilation: a hash of all that its result depends on.
+
+    sources: the texts and their names.
+    libraries: the folders of libraries besides the shipped ones.
+    options: all other parameters that make a difference."""
     texts = [part for source in sources for part in (source.name, source.library, source.text)]
     return name_of((*texts, repr(tuple(options)), *map(_library, libraries), _own()))
 
 
 def read(named: str, sources: Sequence[Source]) -> tuple[Image, list[Diagnostic]] | None:
-    """The image and the warnings of a compilation of these sources; None if there is none that can be trusted."""
+    """The image and the warnings of the cache entry `named`; None if there is no entry, or one that is damaged.
+
+    sources: those of which the name was made; diagnostics refer to them."""
     content = FILES.read(named)
     if content is None:
         return None
@@ -42,7 +50,7 @@ def read(named: str, sources: Sequence[Source]) -> tuple[Image, list[Diagnostic]
 
 
 def write(named: str, sources: Sequence[Source], image: Image, diagnostics: Sequence[Diagnostic]) -> None:
-    """Keep a compilation, unless something in it cannot be written down."""
+    """Keep a compilation under a name, unless it has a warning about a library, or code that is nested too deep."""
     numbers = {id(source): number for number, source in enumerate(sources)}
     try:
         rows = json.dumps([_row(diagnostic, numbers) for diagnostic in diagnostics]).encode()
@@ -66,12 +74,12 @@ def _diagnostic(row: list[Any], sources: Sequence[Source]) -> Diagnostic:
 
 @cache
 def _own() -> str:
-    """What stands for the modules that make images, the grammar and the libraries that come along."""
+    """A hash of the state of the modules that make images, of the grammar and of the shipped libraries."""
     return state_of(*(PACKAGE / room for room in ROOMS), data_folder("grammar"), data_folder("fblib"))
 
 
 def _library(folder: Path) -> str:
-    """All that compiling may find in a folder of libraries."""
+    """A hash of all that compiling may find in a folder of libraries."""
     parts = [part for path in sorted(folder.rglob("*")) if path.suffix in (".st", ".toml")
              for part in (path.relative_to(folder).as_posix(), path.read_text(encoding="latin-1"))]  # fmt: skip
     return name_of([str(folder), *parts])

@@ -1,5 +1,8 @@
-"""Images as bytes and back: JSON, in which types stand once and are meant by their numbers, and code is a text that is
-read when somebody wants to execute, list or draw it; machine code needs none."""
+"""Images as bytes and back, as JSON.
+
+Each type is a row of a table, and everything else names it by its number.  The code of a body is a text inside the JSON, which is
+parsed when the body is executed in Python, listed or drawn for the first time; a program that has machine code in the
+cache never needs it."""
 
 from __future__ import annotations
 
@@ -33,7 +36,7 @@ from fbvm.code.operations import Block
 
 
 def encode(image: Image) -> bytes:
-    """The image as bytes.  Raises RecursionError for code that is nested deeper than the host's JSON goes."""
+    """An image as bytes, for `decode`.  Raises RecursionError for code that is nested deeper than Python's JSON goes."""
     types = _Writer()
     document = {
         "fingerprint": image.fingerprint,
@@ -54,7 +57,7 @@ def encode(image: Image) -> bytes:
 
 
 def decode(content: bytes) -> Image:
-    """The image of such bytes.  Raises ValueError, LookupError or TypeError if they are none."""
+    """The image that `encode` made these bytes of.  Raises ValueError, LookupError or TypeError for other bytes."""
     stored = json.loads(content.decode("utf-8", "surrogatepass"), object_hook=_bytes)
     types = _Reader(stored["types"])
     slots_size, e_banks, mailboxes = stored["layout"]
@@ -77,11 +80,11 @@ def decode(content: bytes) -> Image:
 
 
 DEEPEST = 20_000
-"""Frames that suffice for the deepest code that the parser lets through."""
+"""Python frames that suffice for the deepest code that the parser lets through."""
 
 
 class _StoredBody(Body):
-    """A body whose code is read when somebody wants it."""
+    """A body whose code is parsed when it is asked for."""
 
     @classmethod
     def of(cls, name: str, kind: str, instance_size: int, statements: int, text: str) -> _StoredBody:
@@ -136,7 +139,7 @@ _PARTS = attrgetter(*FIELD)
 
 @dataclass(frozen=True)
 class _Kind:
-    """How types of a class are written: a row's parts behind name, size and alignment."""
+    """How types of a class are encoded."""
 
     parts: Callable[[Any, _Writer], list[Any]]
     make: Callable[[dict[str, Any], list[Any], _Reader], Type]

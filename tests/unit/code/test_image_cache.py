@@ -10,8 +10,7 @@ from click.testing import CliRunner
 
 from fbvm.base import cache
 from fbvm.cli.main import main
-from fbvm.code import compiler
-from fbvm.code.compiler import Compilation, compile_files
+from fbvm.code.compiler import Compilation, compile_files, driver
 from fbvm.code.store import cache as image_cache
 from fbvm.code.store.encoding import encode
 
@@ -42,13 +41,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def anew(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Grows with each compilation that is done anew."""
     counted: list[int] = []
-    compile_sources = compiler.compile_sources
+    compile_sources = driver.compile_sources
 
     def counting(*arguments: object, **options: object) -> Compilation:
         counted.append(1)
         return compile_sources(*arguments, **options)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(compiler, "compile_sources", counting)
+    monkeypatch.setattr(driver, "compile_sources", counting)
     return counted
 
 

@@ -25,11 +25,11 @@ SHIPPED = sorted({path.stem: path for path in data_folder("fblib").rglob("*.st")
 @pytest.fixture(autouse=True)
 def nothing_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each test begins as a process does."""
-    monkeypatch.setattr(object_code, "_shelves", {})
+    monkeypatch.setattr(object_code, "_libraries", {})
 
 
-def kept(dialect: str = "standard") -> object_code.Shelf:
-    return object_code.shelf_of(DIALECTS[dialect])
+def kept(dialect: str = "standard") -> object_code.ObjectLibrary:
+    return object_code.library_for(DIALECTS[dialect])
 
 
 def whole(made: Compilation) -> tuple[bytes, str, list[str]]:
@@ -40,11 +40,11 @@ def whole(made: Compilation) -> tuple[bytes, str, list[str]]:
 
 def by_itself(text: str, dialect: str = "standard") -> tuple[bytes, str, list[str]]:
     """What becomes of a program for which nothing is known."""
-    known = dict(object_code._shelves)
-    object_code._shelves.clear()
+    known = dict(object_code._libraries)
+    object_code._libraries.clear()
     made = compile_text(text, dialect=dialect)
-    object_code._shelves.clear()
-    object_code._shelves.update(known)
+    object_code._libraries.clear()
+    object_code._libraries.update(known)
     return whole(made)
 
 
@@ -156,7 +156,7 @@ def test_what_is_kept_has_an_end() -> None:
         for name in ("CTUD", "MTCP_ETN_Fn03"):
             for size in range(3):
                 compile_text(with_blocks([name], f"pad{number} : ARRAY [0..{size}] OF INT;"))
-        sizes.append((len(kept().code), len(kept().dependencies), len(kept().met)))
+        sizes.append((len(kept().code), len(kept().dependencies), len(kept().seen)))
     assert sizes[0] == sizes[1] == sizes[2] and sizes[0][0] > 5
 
 

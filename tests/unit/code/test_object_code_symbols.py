@@ -157,19 +157,19 @@ def test_linked_is_lowered_whatever_lies_before(each: tuple[tuple[str, ...], ...
     texts = [program(names, front) for front in AROUND for names in (*each, BLOCKS, BLOCKS[::-1])]
     alone = {}
     for text in texts:
-        monkeypatch.setattr(object_code, "_shelves", {})
+        monkeypatch.setattr(object_code, "_libraries", {})
         alone[text] = image_of(text)
     for order in (texts, texts[::-1])[:1 + len(each)]:
-        monkeypatch.setattr(object_code, "_shelves", {})
+        monkeypatch.setattr(object_code, "_libraries", {})
         for text in (*order, *order):
             assert image_of(text) == alone[text], text
-        kept = {code.name for code in object_code.shelf_of(STANDARD).code.values() if code is not None}
+        kept = {code.name for code in object_code.library_for(STANDARD).code.values() if code is not None}
         assert kept >= APART and not kept & {"Refers", "Acts", "Sum_In", "Most_Of", "Holds"}
 
 
 @pytest.mark.parametrize("name", first_quick(BLOCKS))
 def test_what_one_program_had_made_known_another_has_too(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(object_code, "_shelves", {})
+    monkeypatch.setattr(object_code, "_libraries", {})
     alone = image_of(program((name,)))
     for _ in range(3):
         image_of(program(BLOCKS))
@@ -178,7 +178,7 @@ def test_what_one_program_had_made_known_another_has_too(name: str, monkeypatch:
 
 def test_libraries_of_the_users_own_and_var_config_are_lowered_with_their_program(
         tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(object_code, "_shelves", {})
+    monkeypatch.setattr(object_code, "_libraries", {})
     own = tmp_path / "own"
     own.mkdir()
     (own / "Mine.st").write_text("FUNCTION_BLOCK Mine\nVAR s : Static; END_VAR\ns();\nEND_FUNCTION_BLOCK\n", encoding="utf-8")
@@ -188,4 +188,4 @@ def test_libraries_of_the_users_own_and_var_config_are_lowered_with_their_progra
                      "RESOURCE r ON cpu\nTASK t(PRIORITY := 1);\nPROGRAM m WITH t : Main;\nEND_RESOURCE\n"
                      "VAR_CONFIG r.m.x AT %IX0.0 : BOOL; END_VAR\nEND_CONFIGURATION\n")
         assert compile_text(completed).image is not None
-    assert not any(shelf.code or shelf.met for shelf in object_code._shelves.values())
+    assert not any(library.code or library.seen for library in object_code._libraries.values())

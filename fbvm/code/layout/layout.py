@@ -12,28 +12,31 @@ from fbvm.check.checker import Checker
 from fbvm.check.symbols.containment import Containment
 from fbvm.check.symbols.facts import Completed, Pou, Spot, Variable, holds_block
 from fbvm.code.image import Layout, Objects, Retained
-from fbvm.code.objects import Numbering
+from fbvm.code.layout.objects import Numbering
 from fbvm.code.operations import BUFFER_OBJECT, LEASE_BYTES, OBJECT_SHIFT, OFFSET_SHIFT
 
 _CHUNK = 64
-"""Initial bytes are kept in runs of chunks that are not all zero."""
+"""Initial bytes are kept in runs of whole chunks of so many bytes that are not all zero."""
 
 
 @dataclass
-class Placed:
-    """The finished layout: sizes, symbols, initial bytes, retained places."""
+class Placement:
+    """What layout decides besides the offsets of variables: parts of the Image."""
 
     layout: Layout
     symbols: dict[str, Field] = field(default_factory=dict)
     initial: list[tuple[int, bytes]] = field(default_factory=list)
     retained: list[Retained] = field(default_factory=list)
     objects: Objects = field(default_factory=Objects)
-    completed: list[tuple[int, Type, bytes]] = field(default_factory=list)
-    """First values that VAR_CONFIG gives: where each lies, its type and its bytes."""
+    config_initials: list[tuple[int, Type, bytes]] = field(default_factory=list)
+    """Initial values that VAR_CONFIG gives: the offset of each in the buffer, its type and its bytes."""
 
 
-def place(checker: Checker) -> Placed:
-    """Give every variable its place; blocks' types learn where their located variables lie."""
+def lay_out(checker: Checker) -> Placement:
+    """Give each global variable, program instance and frame its place in the buffer.
+
+    The offsets of variables and frames are written into the facts of the checker; types of blocks are completed with the
+    places of their located variables.  The result is what the Image needs of it."""
     slots = bytearray()
     for variable in checker.global_order:
         if variable.place == "abs":
@@ -48,34 +51,34 @@ def place(checker: Checker) -> Placed:
     frames += -frames % 8
     leases, leases_at = len(checker.project.facts.leases), SLOTS_OFFSET + frames
     frames += leases * LEASE_BYTES
-    placed = Placed(Layout(frames, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values())))
+    placement = Placement(Layout(frames, tuple(sorted(checker.e_banks)), tuple(checker.mailboxes.values())))
     located = [v for v in checker.global_order if v.place == "area"]
     for pou in checker.bodies:
         located += [v for v in pou.order if v.place == "area"]
-    _place_located(located, placed)
+    _place_located(located, placement)
     for pou in checker.bodies:
-        _fill_in(pou)
+        _complete_type(pou)
     for row in checker.var_config.completed:
-        _complete(row, slots, placed)
-    placed.objects = Objects(_numbered(checker, slots), leases, leases_at)
-    placed.initial += _runs(slots)
+        _apply_config(row, slots, placement)
+    placement.objects = Objects(_numbered(checker, slots), leases, leases_at)
+    placement.initial += _runs(slots)
     retaining = Containment(checker, lambda pou: any(variable.retain for variable in pou.order))
     for variable in checker.global_order:
-        placed.symbols.setdefault(fold(_path(variable)), _symbol(variable))
+        placement.symbols.setdefault(fold(_path(variable)), _symbol(variable))
         if variable.place == "abs" and not variable.reference:
-            placed.retained += _retained_in(variable.type, variable.offset, _path(variable), retaining, variable.retain)
+            placement.retained += _retained_in(variable.type, variable.offset, _path(variable), retaining, variable.retain)
     for access in checker.var_config.accesses:
-        offset, bit = _where(access.spot, placed)
-        placed.symbols.setdefault(fold(access.name), Field(
+        offset, bit = _offset_of(access.spot, placement)
+        placement.symbols.setdefault(fold(access.name), Field(
             access.name, access.spot.type, offset, "VAR_ACCESS", bit, absolute=True, constant=not access.writable))
-    return placed
+    return placement
 
 
-def _where(spot: Spot, placed: Placed) -> tuple[int, int | None]:
-    """Where in the buffer, and on which bit, a path leads."""
+def _offset_of(spot: Spot, placement: Placement) -> tuple[int, int | None]:
+    """The offset in the buffer of what a path of VAR_CONFIG or VAR_ACCESS names, and its bit."""
     if spot.root is None:
         assert spot.address is not None
-        return _at(spot.address, placed)
+        return _at(spot.address, placement)
     offset, bit, kind = spot.root.offset, variable_bit(spot.root), spot.root.type
     for step in spot.steps:
         if isinstance(step, int):
@@ -89,49 +92,50 @@ def _where(spot: Spot, placed: Placed) -> tuple[int, int | None]:
     return offset, bit
 
 
-def _at(address: Address, placed: Placed) -> tuple[int, int | None]:
+def _at(address: Address, placement: Placement) -> tuple[int, int | None]:
     is_bit = address.bit is not None or address.area in FLAG_AREAS
-    return placed.layout.areas[address.area].offset + address.byte_offset(), address.bit_in_byte() if is_bit else None
+    return placement.layout.areas[address.area].offset + address.byte_offset(), address.bit_in_byte() if is_bit else None
 
 
-def _complete(row: Completed, slots: bytearray, placed: Placed) -> None:
+def _apply_config(row: Completed, slots: bytearray, placement: Placement) -> None:
     """Put what VAR_CONFIG says into the initial bytes: a reference to the place, and the first value there."""
-    offset, bit = _where(row.spot, placed)
+    offset, bit = _offset_of(row.spot, placement)
     if row.address is not None:
-        there, bit = _at(row.address, placed)
+        there, bit = _at(row.address, placement)
         reference = BUFFER_OBJECT << OBJECT_SHIFT | there << OFFSET_SHIFT | (WHOLE_BYTES if bit is None else bit)
         slots[offset - SLOTS_OFFSET:offset - SLOTS_OFFSET + 8] = reference.to_bytes(8, "little")
         offset = there
     if row.initial is None:
         return
-    placed.completed.append((offset, row.spot.type, row.initial))
+    placement.config_initials.append((offset, row.spot.type, row.initial))
     if bit is not None:
         value = 1 << bit if any(row.initial) else 0
-        placed.initial.append((offset, bytes((_begins(placed, offset) & ~(1 << bit) | value,))))
+        placement.initial.append((offset, bytes((_initial_byte(placement, offset) & ~(1 << bit) | value,))))
     elif SLOTS_OFFSET <= offset < SLOTS_OFFSET + len(slots):
         slots[offset - SLOTS_OFFSET:offset - SLOTS_OFFSET + len(row.initial)] = row.initial
     else:
-        placed.initial.append((offset, row.initial))
+        placement.initial.append((offset, row.initial))
 
 
 def _numbered(checker: Checker, slots: bytearray) -> tuple[tuple[int, int], ...]:
-    """Give numbers to all objects; instances learn those of their variables in their initial bytes."""
+    """The extents of all objects by number; the headers of instances get the numbers of theirs (see `objects`)."""
     numbering = Numbering(checker)
-    numbering.single()
+    numbering.add_single()
     for variable in checker.global_order:
         if variable.place == "abs" and not variable.reference:
-            numbering.instances(slots, variable.type, variable.offset)
+            numbering.add_instances(slots, variable.type, variable.offset)
     for pou in checker.bodies:
         frame = bytearray(pou.frame_initial)
         for variable in pou.order:
             if variable.place == "frame" and not variable.reference:
-                numbering.instances(frame, variable.type, pou.frame_offset + variable.offset, pou.frame_offset)
+                numbering.add_instances(frame, variable.type, pou.frame_offset + variable.offset, pou.frame_offset)
         pou.frame_initial = bytes(frame)
     return tuple(numbering.extents)
 
 
-def _place_located(variables: list[Variable], placed: Placed) -> None:
-    areas = placed.layout.areas
+def _place_located(variables: list[Variable], placement: Placement) -> None:
+    """Give variables with an address their offsets, and collect their initial values; bits of one byte are put together."""
+    areas = placement.layout.areas
     bits: dict[int, int] = {}
     for variable in variables:
         assert variable.location is not None
@@ -139,7 +143,7 @@ def _place_located(variables: list[Variable], placed: Placed) -> None:
         if not variable.explicit:
             continue
         if variable_bit(variable) is None:
-            placed.initial.append((variable.offset, variable.initial))
+            placement.initial.append((variable.offset, variable.initial))
         elif isinstance(variable.type, ArrayType):
             start = variable.location.bit_in_byte()
             for number in (start + index for index, value in enumerate(variable.initial) if value):
@@ -147,12 +151,12 @@ def _place_located(variables: list[Variable], placed: Placed) -> None:
                 bits[at] = bits.get(at, 0) | 1 << number % 8
         elif variable.initial != b"\0":
             bits[variable.offset] = bits.get(variable.offset, 0) | 1 << variable.location.bit_in_byte()
-    placed.initial += [(offset, bytes((_begins(placed, offset) | value,))) for offset, value in bits.items()]
+    placement.initial += [(offset, bytes((_initial_byte(placement, offset) | value,))) for offset, value in bits.items()]
 
 
-def _begins(placed: Placed, offset: int) -> int:
-    """What a byte holds at power-on by what has been placed so far: the others of its bits stay as they are."""
-    return next((data[offset - at] for at, data in reversed(placed.initial) if at <= offset < at + len(data)), 0)
+def _initial_byte(placement: Placement, offset: int) -> int:
+    """What a byte of the buffer holds at power-on, by the initial values that are placed so far."""
+    return next((data[offset - at] for at, data in reversed(placement.initial) if at <= offset < at + len(data)), 0)
 
 
 def variable_bit(variable: Variable) -> int | None:
@@ -163,7 +167,8 @@ def variable_bit(variable: Variable) -> int | None:
     return location.bit_in_byte() if location.bit is not None or location.area in FLAG_AREAS else None
 
 
-def _fill_in(pou: Pou) -> None:
+def _complete_type(pou: Pou) -> None:
+    """Complete the type of a block with the places of variables that lie in no instance."""
     if pou.type is None:
         return
     for variable in pou.order:
@@ -173,8 +178,8 @@ def _fill_in(pou: Pou) -> None:
 
 
 def _path(variable: Variable) -> str:
-    """The name under which a variable is found from outside; a VAR_STAT has that of its POU in front, a global variable that
-    of its list if it must."""
+    """The name under which a variable is found from outside: with that of its POU in front for a VAR_STAT, with that of its
+    list for a global variable that has to be qualified."""
     if variable.owner is not None:
         return f"{variable.owner.name}.{variable.name}"
     return f"{variable.space}.{variable.name}" if variable.qualified and variable.space else variable.name
@@ -198,7 +203,9 @@ def _runs(content: bytearray) -> Iterator[tuple[int, bytes]]:
 
 
 def _retained_in(kind: Type, offset: int, path: str, retaining: Containment, whole: bool) -> Iterator[Retained]:
-    """A `whole` value, or RETAIN variables of instances inside it; headers of instances belong to the program."""
+    """What a warm start keeps of a value: all of it if `whole`, else RETAIN variables of instances inside it.
+
+    Headers of instances, which hold numbers of objects, are never kept, since they belong to the program."""
     if not whole and not retaining(kind):
         return
     if whole and not holds_block(kind):

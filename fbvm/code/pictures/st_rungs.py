@@ -1,8 +1,7 @@
 """Statements of Structured Text as rungs: boolean assignments and calls of blocks as contacts, coils and boxes.
 
-Nothing is executed differently: a rung says which parts of a statement are drawn as which steps, so that those who lower
-it can observe the values that these parts have.
-"""
+The statement is executed as ever.  Its rung says which part of it each step shows, so that lowering can observe the value of that
+part."""
 
 from __future__ import annotations
 
@@ -15,36 +14,42 @@ from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Pin
 from fbvm.syntax.ladder.drawing.steps import steps
 
 COMPARISONS = {"=": "<>", "<>": "=", "<": ">=", ">=": "<", ">": "<=", "<=": ">"}
-"""Comparisons and their opposites."""
+"""Comparisons and their negations."""
 MOST_CONTACTS = 60
-"""Of one rung; XOR doubles them."""
+"""Contacts of one rung; each XOR doubles those of its operands."""
 _CHAINS = {"AND": False, "AND_THEN": False, "OR": True, "OR_ELSE": True}
-"""Operators of chains of contacts: whether they are branches."""
+"""Operators that join contacts: True for branches side by side, False for one behind the other."""
 _LEAVES = (tree.NameRef, tree.Member, tree.Index, tree.Direct, tree.Part, tree.Literal, tree.Deref)
 _NAMES = {"If": "IF", "For": "FOR", "While": "WHILE", "Repeat": "REPEAT", "Case": "CASE", "Return": "RETURN", "Exit": "EXIT",
           "Assign": "this assignment", "CallStatement": "this call"}
 
 
 class NoRung(Exception):
-    """A statement is no rung; the argument says what is not drawn."""
+    """A statement cannot be drawn as a rung; the argument names what is not drawn."""
 
 
 class Mark(NamedTuple):
-    """An expression is seen at a step: its value, or the opposite."""
+    """A step that shows the value of an expression, negated if it is drawn so."""
 
     step: int
     negated: bool
 
 
 class StRung(NamedTuple):
-    """The steps of a statement, each with the part of it that it shows, and what is seen of which expression."""
+    """The steps of a statement, each with the part that it shows, and by expression the steps that show its value."""
 
     steps: list[tuple[tree.Node | None, StepText]]
     marks: dict[tree.Expr, list[Mark]]
 
 
 def st_rung(statement: tree.Statement, facts: Facts, text: str) -> StRung:
-    """The rung of a statement of `text`.  Raises NoRung."""
+    """A statement as a rung.
+
+    statement: a statement that the checker has found right.
+    facts: what the checker found out about it.
+    text: the source text, of which operands are shown as they are written.
+
+    Raises NoRung if it cannot be drawn."""
     reader = _Reader(facts, text)
     try:
         made = reader.rung(statement)
@@ -58,7 +63,7 @@ class _Reader:
     def __init__(self, facts: Facts, text: str) -> None:
         self.facts, self.text = facts, text
         self.shown: dict[int, tuple[tree.Expr, bool]] = {}
-        """What contacts, coils and boxes show, and whether its opposite."""
+        """By identity of a contact, coil or box the expression whose value it shows, and whether negated."""
 
     def rung(self, statement: tree.Statement) -> StRung:
         bar = Point(Series(), [self._point(statement)])
@@ -71,6 +76,7 @@ class _Reader:
         return StRung([(shown[0] if (shown := self.shown.get(id(step.drawn))) else None, step[:3]) for step in coded], marks)
 
     def _point(self, statement: tree.Statement) -> Point | Box:
+        """What stands between the bars: contacts and what they act on, or a box alone."""
         if isinstance(statement, tree.Assign):
             return self._assignment(statement)
         if isinstance(statement, tree.If):
@@ -88,12 +94,12 @@ class _Reader:
         return Point(self.condition(node.value), [self._coil(marks[node.op], target, node.value) for target in node.targets])
 
     def _coil(self, mark: str, target: tree.Expr, power: tree.Expr) -> Coil:
-        coil = Coil(-1, mark, (self.said(target),))
+        coil = Coil(-1, mark, (self.written(target),))
         self.shown[id(coil)] = power, False
         return coil
 
     def _setting(self, node: tree.If) -> Point:
-        """IF c THEN x := TRUE; y := FALSE; END_IF."""
+        """IF c THEN x := TRUE; y := FALSE; END_IF: contacts in front of coils that set and reset."""
         (condition, body), *more = node.branches
         outs: list[Coil | Box | Point] = []
         for inner in body:
@@ -117,10 +123,10 @@ class _Reader:
             if self.facts.types.get(value) == BOOL and not isinstance(value, tree.Literal) and (path := self._path(value)):
                 entries.append((name, value, path))
             else:
-                pins.append(Pin(name, self.said(value)))
-        pins += [Pin(variable.name, self.said(value)) for variable, value in called.in_outs]
-        pins += [Pin(variable.name, self.said(value), True) for variable, value, _ in called.outputs]
-        box = Box(-1, called.pou.name, (), tuple(path for _, _, path in entries[1:]), False, self.said(called.instance),
+                pins.append(Pin(name, self.written(value)))
+        pins += [Pin(variable.name, self.written(value)) for variable, value in called.in_outs]
+        pins += [Pin(variable.name, self.written(value), True) for variable, value, _ in called.outputs]
+        box = Box(-1, called.pou.name, (), tuple(path for _, _, path in entries[1:]), False, self.written(called.instance),
                   tuple(pins), tuple(name for name, _, _ in entries))
         if not entries:
             return box
@@ -136,7 +142,7 @@ class _Reader:
     # --- conditions -------------------------------------------------------------------------------------------------
 
     def condition(self, expr: tree.Expr) -> Series:
-        """An expression of BOOL as contacts."""
+        """An expression of BOOL as contacts.  Raises NoRung if it has too many, or anything else in it."""
         made = self._contacts(expr, False)
         if _count(made) > MOST_CONTACTS:
             raise NoRung(f"an expression of more than {MOST_CONTACTS} contacts")
@@ -151,7 +157,7 @@ class _Reader:
             return self._binary(expr, negated)
         if not isinstance(expr, _LEAVES):
             raise NoRung("a call in an expression" if isinstance(expr, tree.Call) else "this expression")
-        return self._leaf(expr, "/" if negated else " ", (self.said(expr),), negated)
+        return self._leaf(expr, "/" if negated else " ", (self.written(expr),), negated)
 
     def _binary(self, expr: tree.Binary, negated: bool) -> Series:
         if expr.op in _CHAINS:
@@ -166,20 +172,20 @@ class _Reader:
         if expr.op not in COMPARISONS:
             raise NoRung("this expression")
         mark = COMPARISONS[expr.op] if negated else expr.op
-        return self._leaf(expr, mark, (self.said(expr.left), self.said(expr.right)), negated)
+        return self._leaf(expr, mark, (self.written(expr.left), self.written(expr.right)), negated)
 
     def _leaf(self, expr: tree.Expr, mark: str, operands: tuple[str, ...], negated: bool) -> Series:
         contact = Contact(-1, mark, operands)
         self.shown[id(contact)] = expr, negated
         return Series([contact])
 
-    def said(self, expr: tree.Node) -> str:
+    def written(self, expr: tree.Node) -> str:
         """An expression as it is written, on one line."""
         return " ".join(self.text[expr.start:expr.end].split())
 
 
 def _branches(left: Series, right: Series) -> Series:
-    """Two paths as branches; one that is nothing but branches is taken apart."""
+    """Two paths as branches; a path that consists of branches only adds these."""
     made: list[Series] = []
     for path in (left, right):
         first = path.parts[0]

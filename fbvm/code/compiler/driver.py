@@ -15,64 +15,71 @@ from fbvm.base.dialects import dialect as named_dialect
 from fbvm.base.repeats import gathered
 from fbvm.base.types import Type, fold
 from fbvm.check.checker import Checker
-from fbvm.check.lint.linter import lint as look_for_slips
+from fbvm.check.lint.linter import lint as lint_program
 from fbvm.check.lint.suppression import Suppressions, Wanted
 from fbvm.check.symbols.facts import Pou, Report, TaskFact
 from fbvm.check.symbols.library import Libraries, LibraryError
 from fbvm.check.symbols.project import Project
-from fbvm.code.damage import Damage
+from fbvm.code.builder.evaluation import evaluate
+from fbvm.code.compiler.follow_on_errors import FollowOnErrors
 from fbvm.code.image import Image, ProgramRun, TaskRow
-from fbvm.code.lowering.evaluation import evaluate
+from fbvm.code.layout.layout import lay_out
 from fbvm.code.lowering.initial_references import InitialReferences
-from fbvm.code.lowering.layout import place
 from fbvm.code.lowering.program import Program
 from fbvm.code.store import cache as image_cache
-from fbvm.code.store.object_code import Shelf, shelf_of
+from fbvm.code.store.object_code import ObjectLibrary, library_for
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 
 LONG = 50_000
-"""Characters of sources from which on looking for garbage takes tenths of a second."""
+"""Characters of sources from which on a garbage collection takes tenths of a second."""
 _FRAMES = 20_000
 """Python frames that checking and lowering may use for the deepest tree that the parser lets through."""
 
-
 Progress = Callable[[str, int, int], None]
-"""Told what has been done ("read", "checked", "compiled"), how much of it, and of how much: characters, then POUs."""
+"""Called with a stage, and how much of how much is done in it: ("read", characters, characters), ("checked", POUs, POUs),
+("compiled", POUs, POUs)."""
 
 
-def _nobody(what: str, done: int, known: int) -> None:
-    """Nobody waits."""
+def _no_progress(stage: str, done: int, known: int) -> None:
+    """The progress that nobody is told."""
 
 
 @dataclass(frozen=True)
 class Compilation:
-    """What became of some sources: the image (None if there are errors) and all messages in order of place."""
+    """The result of compiling sources: the image, None if there are errors, and all diagnostics in the order of their places."""
 
     image: Image | None
     diagnostics: list[Diagnostic]
 
     @property
     def errors(self) -> list[Diagnostic]:
+        """The diagnostics that are errors."""
         return errors(self.diagnostics)
 
 
 def compile_files(paths: Sequence[Path | str], program: str | None = None, libraries: Sequence[Path | str] = (),
                   runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
                   lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False, cache: bool = True,
-                  progress: Progress = _nobody, drawn: bool = False) -> Compilation:
-    """Compile source files, or with `cache` read what became of the same ones the last time.
+                  progress: Progress = _no_progress, drawn: bool = False) -> Compilation:
+    """Compile source files.
 
-    `program` names the PROGRAM to run, `resource` the RESOURCE of a CONFIGURATION that has several; `libraries` are folders
-    asked before the shipped ones.
+    paths: the files, of Structured Text, ladder mnemonics or charts.
+    program: the name of the PROGRAM to run, where no CONFIGURATION says.
+    libraries: folders of libraries that are looked into before the shipped ones.
+    runnable: it is an error (S0209) if there is not exactly one thing to run.
+    resource: the RESOURCE to run of a CONFIGURATION that has several.
+    dialect: the name of the answers to what compilers disagree about (`base.dialects`).
+    lint: warn of what is allowed and hardly meant.
+    no_warn: codes of warnings that are not wanted, or "all".
+    warnings_as_errors: a warning that is wanted is an error.
+    cache: read the result from the user's cache folder if the same files were compiled before, and keep it there.
+    progress: is called as the work goes on.
+    drawn: statements of Structured Text get pictures as rungs in the image, where they can be drawn.
 
-    With `runnable` it is an error if there is not exactly one thing to run.  `lint` looks for what is allowed and hardly
-    meant; `no_warn` are codes of warnings that are not wanted, or "all".  `dialect` says how to answer what compilers
-    disagree about (`base.dialects`).  `progress` is told how far the work is.  Never raises for what files contain; a file
-    that cannot be read gives a diagnostic.  With `drawn` statements of Structured Text are rungs of the image, too, where they
-    can be drawn as such.  Raises ValueError for a dialect that there is not, or a code that is none of a
-    warning."""
+    Nothing in the files raises, and none that cannot be read: there are diagnostics.  Raises ValueError for an unknown dialect,
+    or for a code in `no_warn` that no warning has."""
     sources: list[Source] = []
     unreadable: list[Diagnostic] = []
     for path in paths:
@@ -81,25 +88,27 @@ def compile_files(paths: Sequence[Path | str], program: str | None = None, libra
             sources.append(source)
         else:
             unreadable.append(source)
-    silenced = sorted(no_warn)
-    kept = None if unreadable or not cache else image_cache.name(
+    unwanted = sorted(no_warn)
+    entry = None if unreadable or not cache else image_cache.name(
         sources, [Path(folder) for folder in libraries],
-        (program, runnable, resource, dialect, lint, silenced, warnings_as_errors, drawn))
-    if kept and (known := image_cache.read(kept, sources)):
+        (program, runnable, resource, dialect, lint, unwanted, warnings_as_errors, drawn))
+    if entry and (known := image_cache.read(entry, sources)):
         return Compilation(*known)
     with _deep(sources):
         made = compile_sources(sources, program, libraries, runnable, resource=resource, dialect=dialect, lint=lint,
-                               no_warn=silenced, warnings_as_errors=warnings_as_errors, progress=progress, drawn=drawn)
-        if kept and made.image:
-            image_cache.write(kept, sources, made.image, made.diagnostics)
+                               no_warn=unwanted, warnings_as_errors=warnings_as_errors, progress=progress, drawn=drawn)
+        if entry and made.image:
+            image_cache.write(entry, sources, made.image, made.diagnostics)
     return Compilation(None, unreadable + made.diagnostics) if unreadable else made
 
 
 def compile_text(text: str, name: str = "text.st", program: str | None = None, libraries: Sequence[Path | str] = (), *,
-                 resource: str | None = None, dialect: str = "standard",
-                  lint: bool = True, no_warn: Iterable[str] = (),
+                 resource: str | None = None, dialect: str = "standard", lint: bool = True, no_warn: Iterable[str] = (),
                  warnings_as_errors: bool = False, drawn: bool = False) -> Compilation:
-    """Compile one text; see `compile_files`."""
+    """Compile one text; diagnostics call it `name`.  All other parameters are those of `compile_files`.
+
+    >>> compile_text("PROGRAM Main VAR n : INT; END_VAR n := 1.5; END_PROGRAM").errors[0].code
+    'S0301'"""
     return compile_sources([Source(name, text)], program, libraries, resource=resource, dialect=dialect, lint=lint,
                            no_warn=no_warn, warnings_as_errors=warnings_as_errors, drawn=drawn)
 
@@ -107,43 +116,45 @@ def compile_text(text: str, name: str = "text.st", program: str | None = None, l
 def compile_sources(sources: Sequence[Source], program: str | None = None, libraries: Sequence[Path | str] = (),
                     runnable: bool = False, *, resource: str | None = None, dialect: str = "standard",
                     lint: bool = True, no_warn: Iterable[str] = (), warnings_as_errors: bool = False,
-                    progress: Progress = _nobody, drawn: bool = False) -> Compilation:
-    """Compile texts; see `compile_files`."""
+                    progress: Progress = _no_progress, drawn: bool = False) -> Compilation:
+    """Compile texts, each with the name that diagnostics give it.  All other parameters are those of `compile_files`."""
     wanted, suppressions, report = Wanted.of(no_warn, warnings_as_errors), Suppressions(), Report()
-    spoken = named_dialect(dialect)
+    answers = named_dialect(dialect)
     try:
-        shelves = Libraries([Path(folder) for folder in libraries], preferred=spoken.libraries)
+        searched = Libraries([Path(folder) for folder in libraries], preferred=answers.libraries)
     except LibraryError as error:
         return Compilation(None, [error.diagnostic])
     with _deep(sources):
-        project = Project(shelves, report, spoken)
-        damage = Damage()
+        project = Project(searched, report, answers)
+        follow_on = FollowOnErrors()
         for source in sources:
-            text, diagnostics = parse(source, partial(_read_so_far, progress, source))
-            report.diagnostics += diagnostics + suppressions.add(source, text, spoken)
-            damage.note(source, text, errors(diagnostics))
+            text, diagnostics = parse(source, partial(_parsed, progress, source))
+            report.diagnostics += diagnostics + suppressions.add(source, text, answers)
+            follow_on.add(source, text, errors(diagnostics))
             project.collect(text, source)
-        unread = len(report.diagnostics)
+        before_check = len(report.diagnostics)
         shared = not libraries and not project.config_sections
-        shelf = shelf_of(spoken) if shared else Shelf()
-        checker = Checker(project, evaluate, shelf.dependencies if shared else None, partial(progress, "checked"))
+        library = library_for(answers) if shared else ObjectLibrary()
+        checker = Checker(project, evaluate, library.dependencies if shared else None, partial(progress, "checked"))
         checker.check(program, resource)
         if runnable and not errors(report.diagnostics):
-            _demand_program(checker, program, sources, report)
+            _check_runnable(checker, program, sources, report)
         if lint and not errors(report.diagnostics):
-            look_for_slips(checker, program)
-        found = report.diagnostics[:unread] + [d for d in report.diagnostics[unread:] if not damage.explains(d)]
+            lint_program(checker, program)
+        found = report.diagnostics[:before_check] + [d for d in report.diagnostics[before_check:] if not follow_on.has(d)]
         diagnostics = gathered(sorted(suppressions.apply(found, wanted), key=Diagnostic.order))
-        image = None if errors(diagnostics) else _image(checker, shelf, progress, drawn)
+        image = None if errors(diagnostics) else _image(checker, library, progress, drawn)
         project.let_go()
     return Compilation(image, diagnostics)
 
 
-def _read_so_far(progress: Progress, source: Source, reached: int) -> None:
+def _parsed(progress: Progress, source: Source, reached: int) -> None:
+    """Report how many characters of a source are parsed."""
     progress("read", reached, len(source.text))
 
 
-def _demand_program(checker: Checker, program: str | None, sources: Sequence[Source], report: Report) -> None:
+def _check_runnable(checker: Checker, program: str | None, sources: Sequence[Source], report: Report) -> None:
+    """Report S0209 unless there is exactly one thing to run."""
     if checker.tasks or not sources:
         return
     programs = [p for p in checker.project.pous.values() if p.kind == "PROGRAM" and not p.source.library]
@@ -162,11 +173,11 @@ def _demand_program(checker: Checker, program: str | None, sources: Sequence[Sou
 
 @contextmanager
 def _deep(sources: Sequence[Source]) -> Iterator[None]:
-    """Room for deep trees; the parser limits how deep they get.
+    """Allow the recursion that deep trees need (the parser limits how deep they get), and stop the garbage collector.
 
-    Nobody looks for garbage meanwhile: nodes and facts live until the end, and to visit them all again and again takes a
-    third of the time.  What is left of a long text is an image, which lives on: it counts as old at once.  After short
-    texts, of which tests compile thousands, to ask for that would take longer, and what they leave behind would stay."""
+    Nodes and facts live until the end; to visit them all again and again would take a third of the time.  After a long text
+    the image, which lives on, is made old at once, so that the next collection does not visit it.  After short ones, of which
+    tests compile thousands, that would cost more than it saves."""
     before, collects = sys.getrecursionlimit(), gc.isenabled()
     sys.setrecursionlimit(max(before, _FRAMES))
     gc.disable()
@@ -181,26 +192,27 @@ def _deep(sources: Sequence[Source]) -> Iterator[None]:
             gc.enable()
 
 
-def _image(checker: Checker, shelf: Shelf, progress: Progress, drawn: bool) -> Image:
-    placed = place(checker)
-    program = Program(placed, drawn)
-    program.held = held = InitialReferences(program, checker, placed)
-    held.in_frames()
-    bodies = tuple(shelf.body(program, checker, pou) for pou in _told(checker.bodies, partial(progress, "compiled")))
+def _image(checker: Checker, library: ObjectLibrary, progress: Progress, drawn: bool) -> Image:
+    """The image of a program that was checked without an error."""
+    placement = lay_out(checker)
+    program = Program(checker, placement, drawn)
+    references = InitialReferences(program, checker, placement)
+    references.in_frames()
+    bodies = tuple(library.body(program, checker, pou) for pou in _reported(checker.bodies, partial(progress, "compiled")))
     tasks = sorted((_task(task) for task in checker.tasks), key=lambda row: row.priority)
     types: dict[str, Type] = {fold(p.type.name): p.type for p in checker.bodies if p.type is not None}
     for (_, name), entry in checker.project.types.items():
         if entry.resolved is not None:
             types.setdefault(name, entry.resolved[0])
-    del program.held  # which leads back to it
-    return Image(placed.layout, bodies, tuple(tasks), placed.symbols, (*placed.initial, *held.in_slots()), tuple(placed.retained),
-                 tuple(program.sites), types, program.objects, tuple(program.rungs), tuple(program.charts))
+    return Image(placement.layout, bodies, tuple(tasks), placement.symbols, (*placement.initial, *references.in_slots()),
+                 tuple(placement.retained), tuple(program.sites), types, program.objects, tuple(program.rungs),
+                 tuple(program.charts))
 
 
-def _told(pous: Sequence[Pou], reached: Callable[[int, int], None]) -> Iterator[Pou]:
-    """The POUs, and a word to the caller at each."""
+def _reported(pous: Sequence[Pou], progress: Callable[[int, int], None]) -> Iterator[Pou]:
+    """The POUs; `progress` is called in front of each."""
     for number, pou in enumerate(pous):
-        reached(number, len(pous))
+        progress(number, len(pous))
         yield pou
 
 

@@ -1,4 +1,4 @@
-"""Standard functions of constants: what a call gives before anything runs, by the same lowering as when it runs."""
+"""Constant folding of standard functions: a call of constants is lowered as ever, then its operations are evaluated."""
 
 from __future__ import annotations
 
@@ -11,40 +11,45 @@ from fbvm.base.dialects import Dialect
 from fbvm.base.types import base, machine
 from fbvm.check.expressions.constants import convert
 from fbvm.check.symbols.facts import StandardCall, Value
-from fbvm.code.lowering.functions import FUNCTIONS
-from fbvm.code.lowering.values import constant
+from fbvm.code.builder.constants import constant
+from fbvm.code.builder.emitter import Emitter
+from fbvm.code.builder.functions import FUNCTIONS
 from fbvm.code.operations import FLOATS, INTEGERS, TEXT_UNITS, Node
 from fbvm.syntax.st import texts
 
-VARYING = frozenset(("TIME", "LTIME", "__DUE"))
-"""Functions whose value is another one each time."""
+VARYING = frozenset(("TIME", "LTIME", "__DUE", "__STOP"))
+"""Functions that have another value each time, or an effect."""
 
 
-class _Body:
-    """The place in a body for calls that need none: what is kept is what it was."""
+class _ConstantEmitter(Emitter):
+    """Where calls of constants are lowered: no statement is needed in front, so an expression stands for its own value."""
 
-    def __init__(self, dialect: Dialect) -> None:
-        self.dialect = dialect
-
-    def keep(self, node: Node) -> Node:
+    def to_temporary(self, node: Node, always: bool = False) -> Node:
         return node
 
-    measured = keep
+    def cut_if_deep(self, node: Node) -> Node:
+        return node
 
 
 def evaluate(call: StandardCall, arguments: Sequence[Value], dialect: Dialect) -> Value | None:
-    """The value of a call of constants, or None if it has none before the program runs.  Raises Undefined for a trap."""
+    """The value of a call of a standard function.
+
+    call: what the checker found out about the call.
+    arguments: the values of its arguments.
+    dialect: decides what compilers disagree about.
+
+    None if only the running program can tell.  Raises `arithmetic.Undefined` for a trap."""
     kinds = [base(kind) for _, kind in call.arguments]
     if call.key not in FUNCTIONS or call.key in VARYING or not all(map(machine, kinds)):
         return None
     nodes = [constant(kind, convert(value, kind)) for kind, value in zip(kinds, arguments, strict=True)]
-    node = FUNCTIONS[call.key](cast("Any", _Body(dialect)), nodes, call, 0)
+    node = FUNCTIONS[call.key](_ConstantEmitter(dialect), nodes, call, 0)
     value = value_of(node)
     return bool(value) if node[1] == "b" else cast("Value", value)
 
 
 def value_of(node: Node) -> Any:
-    """What an expression of constants yields."""
+    """The value of an expression that has only constants as operands.  Raises `arithmetic.Undefined` for a trap."""
     name, form, *operands = node
     if name == "const":
         return operands[0]
@@ -59,8 +64,8 @@ def value_of(node: Node) -> Any:
     return _ROWS[name](form, *values)
 
 
-def _brought(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Arithmetic of which the low bits count, or 32 bits of a float."""
+def _wrapped(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Arithmetic whose result is wrapped to the width of an integer, or rounded to 32 bits for f32."""
     def answer(form: str, *values: Any) -> Any:
         value = function(*values)
         return arithmetic.wrap(value, form) if form in INTEGERS else arithmetic.single(value) if form == "f32" else value
@@ -77,16 +82,16 @@ def _compare(function: Callable[..., bool]) -> Callable[..., Any]:
 
 def _divide(form: str, a: Any, b: Any, site: int) -> Any:
     if form in FLOATS:
-        return _brought(arithmetic.divide)(form, a, b)
+        return _wrapped(arithmetic.divide)(form, a, b)
     if b == 0:
         raise arithmetic.Undefined("R0101", a, b)
     return arithmetic.wrap(arithmetic.quotient(a, b), form)
 
 
 _ROWS: dict[str, Callable[..., Any]] = {
-    "add": _brought(operator.add), "sub": _brought(operator.sub), "mul": _brought(operator.mul), "div": _divide,
-    "abs": _brought(abs), "pow": _brought(arithmetic.power), "atan2": _brought(arithmetic.arctangent),
-    "math": lambda form, name, a: _brought(arithmetic.FUNCTIONS[name])(form, a),
+    "add": _wrapped(operator.add), "sub": _wrapped(operator.sub), "mul": _wrapped(operator.mul), "div": _divide,
+    "abs": _wrapped(abs), "pow": _wrapped(arithmetic.power), "atan2": _wrapped(arithmetic.arctangent),
+    "math": lambda form, name, a: _wrapped(arithmetic.FUNCTIONS[name])(form, a),
     "and": lambda form, a, b: a & b, "or": lambda form, a, b: a | b, "xor": lambda form, a, b: a ^ b,
     "shl": lambda form, a, n, site: arithmetic.shift_left(a, n, form),
     "shr": lambda form, a, n, site: arithmetic.shift_right(a, n, form),
@@ -114,4 +119,4 @@ _ROWS: dict[str, Callable[..., Any]] = {
     "from_text": lambda form, kind, a, site: texts.from_text(kind, a),
     "from_leading": lambda form, kind, whole, a: texts.from_leading(kind, whole, a),
 }
-"""What each operation yields for values, called with its type and the operands of its row."""
+"""What each operation yields, from its machine type and the values of the operands of its row."""

@@ -1,7 +1,8 @@
-"""Objects: the numbers of what references are made to, and where in each instance a pointer finds those of its variables.
+"""Objects: what pointers may be moved in, by number.
 
-Only what something refers to is an object.  Variables with one place have a number each; of an instance the first is
-written in its header, and its variables follow in a fixed order."""
+Only a variable that something refers to is an object.  One with a single place has a number of its own.  Variables of instances
+are numbered instance by instance, in a fixed order: the header of each instance holds the number of its first, so that code which
+all instances share finds the others by adding."""
 
 from __future__ import annotations
 
@@ -14,40 +15,44 @@ from fbvm.code.operations import FIRST_OBJECT
 
 
 class Numbering:
-    """Numbers objects while it goes through everything that has a place; `extents` are theirs."""
+    """Gives numbers to objects; `extents` has the first byte of each, and the first behind it, as offsets in the buffer."""
 
     def __init__(self, checker: Checker) -> None:
         self.checker = checker
         self.extents: list[tuple[int, int]] = []
         self._has_objects = Containment(checker, lambda pou: bool(pou.referred))
 
-    def single(self) -> None:
+    def add_single(self) -> None:
         """Number the variables that have one place."""
         for variable in self.checker.project.facts.referred:
-            variable.object = self.add(variable.offset, variable.type.size)
+            variable.object = self._add(variable.offset, variable.type.size)
 
-    def add(self, start: int, size: int) -> int:
+    def _add(self, start: int, size: int) -> int:
         """The number of one more object."""
         self.extents.append((start, start + size))
         return FIRST_OBJECT + len(self.extents) - 1
 
-    def instances(self, content: bytearray, kind: Type, at: int, start: int = SLOTS_OFFSET) -> None:
-        """Number what lies in the instances inside a value; `content` are initial bytes, the first of which is at `start`."""
+    def add_instances(self, content: bytearray, kind: Type, at: int, start: int = SLOTS_OFFSET) -> None:
+        """Number the variables of all instances inside a value, and write the headers of those.
+
+        content: initial bytes of the part of the buffer that begins at the offset `start`.
+        kind: the type of the value.
+        at: the offset of the value in the buffer."""
         if not self._has_objects(kind):
             return
         if isinstance(kind, ArrayType):
             for index in range(kind.count):
-                self.instances(content, kind.element, at + index * kind.element.size, start)
+                self.add_instances(content, kind.element, at + index * kind.element.size, start)
         elif isinstance(kind, StructType) and kind.block:
             pou = self.checker.block_of(kind)
             if pou.referred:
                 header = at - start + OBJECTS_AT
                 content[header:header + 4] = (FIRST_OBJECT + len(self.extents)).to_bytes(4, "little")
                 for variable in pou.referred:
-                    self.add(at + variable.offset, variable.type.size)
+                    self._add(at + variable.offset, variable.type.size)
             for variable in pou.order:
                 if variable.place == "self" and not variable.reference:
-                    self.instances(content, variable.type, at + variable.offset, start)
+                    self.add_instances(content, variable.type, at + variable.offset, start)
         elif isinstance(kind, StructType):
             for member in kind.fields.values():
-                self.instances(content, member.type, at + member.offset, start)
+                self.add_instances(content, member.type, at + member.offset, start)

@@ -1,4 +1,4 @@
-"""What an Image keeps of a sequential function chart for those who draw it."""
+"""Pictures of sequential function charts: what an Image keeps for those who draw them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,10 @@ from fbvm.syntax.tree import Assign, Node, sfc
 
 
 def sfc_picture(chart: sfc.Sfc, pou: Pou, site: Callable[[Node], int]) -> SfcPicture:
-    """The picture of a chart, conditions as they are written."""
+    """The picture of a chart, with conditions as they are written in the source.
+
+    chart: the chart, in the body of `pou`.
+    site: numbers the place in the source at which a node begins."""
     numbers = {fold(step.name.text): number for number, step in enumerate(chart.steps)}
     text = pou.source.text
 
@@ -31,14 +34,14 @@ def sfc_picture(chart: sfc.Sfc, pou: Pou, site: Callable[[Node], int]) -> SfcPic
 
 
 def _condition(transition: sfc.Transition) -> Node:
-    """What says when a transition fires: of statements the value that is assigned, if that is all they do."""
+    """The condition of a transition; where it is written in statements that only assign it, the value that they assign."""
     body = transition.body or ()
     only = body[0] if len(body) == 1 else None
     return only.value if isinstance(only, Assign) else transition.condition
 
 
 def _flag(pou: Pou, step: sfc.Step) -> int:
-    """Where in an instance the flag of a step lies."""
+    """The offset of the flag of a step (`step.X`) in an instance."""
     variable = pou.variables[fold(step.name.text)]
     assert isinstance(variable.type, StructType)
     return variable.offset + variable.type.fields["X"].offset

@@ -1,0 +1,114 @@
+"""Lowering of calls: which kind a call is of, and calls of standard functions; those of POUs are in `pou_calls`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from fbvm.base.types import ANY_SIZE, BOOL, NULL, Type, machine
+from fbvm.check.symbols.facts import Guard, PouCall, StandardCall
+from fbvm.code.builder.constants import TRUE, zero
+from fbvm.code.builder.functions import FUNCTIONS
+from fbvm.code.builder.places import Place
+from fbvm.code.lowering import any_parameters, arrays, plc_addresses, pointers, pou_calls
+from fbvm.code.lowering.context import BodyContext, PlaceRules, StatementRules, ValueRules
+from fbvm.code.lowering.variables import loaded
+from fbvm.code.operations import Node
+from fbvm.syntax import tree
+
+
+def _statement(body: BodyContext, node: tree.CallStatement, site: int) -> None:
+    """A call whose result, if it has one, is not used."""
+    call = body.facts.bare.get(node, node.call)
+    assert isinstance(call, tree.Call)
+    called = body.facts.calls.get(call)
+    if isinstance(called, PouCall):
+        pou_calls.run(body, call, called)
+    elif called is not None and call not in body.facts.types:
+        _standard(body, called, call)
+    else:
+        body.to_temporary(body.value(call))
+
+
+def _value(body: BodyContext, call: tree.Call) -> Node:
+    guard = body.facts.guards.get(call)
+    return _unguarded(body, call) if guard is None else _guarded(body, call, guard)
+
+
+def _guarded(body: BodyContext, call: tree.Call, guard: Guard) -> Node:
+    """A standard function with EN or ENO: with EN FALSE the result is the default of its type."""
+    enable = body.to_temporary(body.value(guard.enable, BOOL)) if guard.enable is not None else TRUE
+    form = machine(body.facts.types[call])
+    result = body.to_temporary(zero(form), always=True)
+    with body.block() as inner:
+        inner.append(("let", result[2], form, _unguarded(body, call)))
+    body.emit(("if", ((enable, tuple(inner)),), ()))
+    for target, negated in guard.enabled:
+        body.write(body.place(target), ("not", "b", enable) if negated else enable, body.site(call))
+    return result
+
+
+def _unguarded(body: BodyContext, call: tree.Call) -> Node:
+    meaning = body.facts.rewritten.get(call)
+    if meaning is not None:
+        return body.value(meaning)
+    return loaded(body, call) if call in body.facts.followed else _result(body, call)
+
+
+def _result(body: BodyContext, call: tree.Call) -> Node:
+    """What a call yields: its value, or the reference of a function that yields a REFERENCE TO."""
+    called = body.facts.calls[call]
+    return pou_calls.value(body, call, called) if isinstance(called, PouCall) else _standard(body, called, call)
+
+
+def _place(body: BodyContext, call: tree.Call, kind: Type) -> Place:
+    """Where the array or structure lies that a call yields, or what a REFERENCE TO that it yields is bound to."""
+    if call in body.facts.followed:
+        return Place((("ref", _result(body, call), body.site(call)), 0, ()), kind)
+    called = body.facts.calls[call]
+    return pou_calls.aggregate(body, call, called) if isinstance(called, PouCall) else _chosen(body, called, call)
+
+
+def _chosen(body: BodyContext, called: StandardCall, call: tree.Call) -> Place:
+    """The place of the array or structure that MOVE, SEL or MUX chooses."""
+    if called.key == "MOVE":
+        return body.aggregate(called.arguments[0][0])
+    (chooser, wanted), *rest = called.arguments
+    places = [body.aggregate(expr) for expr, _ in rest]
+    arguments = [body.value(chooser, wanted), *(place.reference() for place in places)]
+    site = body.site(call)
+    chosen = FUNCTIONS[called.key](body, arguments, replace(called, detail=(NULL,)), site)
+    return Place((("ref", chosen, site), 0, ()), body.facts.types[call])
+
+
+# --- standard functions -----------------------------------------------------------------------------------------------
+
+
+def _standard(body: BodyContext, called: StandardCall, call: tree.Call) -> Node:
+    """The result of a standard function."""
+    intrinsic = _INTRINSICS.get(called.key)
+    if intrinsic is not None:
+        return intrinsic(body, called)
+    arguments, site = body.operands(*called.arguments), body.site(call)
+    if called.key == "__PLC_WORDS":
+        return plc_addresses.words_from(body, arguments[0])
+    return FUNCTIONS[called.key](body, arguments, called, site)
+
+
+def _bound(body: BodyContext, called: StandardCall) -> Node:
+    return ("convert", "i32", "i64", arrays.bound_of_dimension(body, called))
+
+
+_INTRINSICS: dict[str, Callable[[BodyContext, StandardCall], Node]] = {
+    "REF": lambda body, called: pointers.reference_to(body, called.arguments[0][0]),
+    "__ISVALIDREF": lambda body, called: pointers.is_valid(body, called.arguments[0][0]),
+    "SIZEOF": lambda body, called: (
+        "convert", "u32", "i64", any_parameters.number(body, called.arguments[0][0], ANY_SIZE)),
+    "LOWER_BOUND": _bound, "UPPER_BOUND": _bound,
+    "__PLC_ADDRESS": lambda body, called: plc_addresses.address_of(body, called.arguments[0][0]),
+}
+"""Functions of places, by their keys: what they take is not the value of an argument, but where it lies."""
+
+VALUES: ValueRules = {tree.Call: _value}
+PLACES: PlaceRules = {tree.Call: _place}
+STATEMENTS: StatementRules = {tree.CallStatement: _statement}

@@ -1,0 +1,1 @@
+"""What an Image keeps for those who draw a program: charts, and statements of Structured Text as rungs."""
