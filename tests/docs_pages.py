@@ -5,7 +5,8 @@ The blocks of a page are run from top to bottom in one empty folder.
 - A block behind a line such as "`src/pump.st`:" is that file; it is written.  Programs among such files must compile,
   unless a command of the page shows what `fbvm check` says about them.
 - ```console: each line that begins with `$ ` is run, and prints the lines behind it.  A line `...` stands for any number of
-  lines; times such as `in 0.12s` may differ.
+  lines; times such as `in 0.12s` may differ.  A command that ends in ` &` goes on until the end of the page; its `--port` is a
+  free one, there and wherever the page names that port.
 - ```python: executed, all blocks of a page in one namespace; a ```text block behind "It prints:" is what it prints.
 - ```iecst: compiled.  What begins without a POU gets one, with the variables of the block before if it declares none.
 - ```sh: installs.  The extras of fbvm that are named exist.
@@ -20,8 +21,10 @@ import os
 import re
 import shlex
 import shutil
+import socket
 import subprocess
 import sys
+import time
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
@@ -39,7 +42,7 @@ FENCE = re.compile(r"^(?P<fence>`{3,})(?P<language>[\w{}-]*)[^\n]*\n(?P<text>.*?
 FILE = re.compile(r"^(?:.*\s)?`([\w./-]+\.\w+)`:$")
 COMMAND = re.compile(r"^\$ ((?:.*\\\n)*.*)\n((?:(?!\$ ).*\n)*)", re.M)
 INSTALLS = re.compile(r"(python3 -m venv|\. \.venv/|(\S*/)?pip install|cd |git clone|apt(-get)? install)")
-PROCESSES = ("fbvm test", "fbvm demo", "--check", "--class", "python -m", "fbvm serve")
+PROCESSES = ("fbvm test", "fbvm demo", "--check", "--class", "python -m", " &")
 """What commands that start other programs have in them, or take seconds."""
 
 
@@ -90,7 +93,7 @@ def is_slow(page: Path) -> bool:
 def options_of(line: str) -> list[str]:
     """What a command line of fbvm names that fbvm does not know: its verb, or options of its verb."""
     words = re.split(r"\s+", line.partition("fbvm ")[2].partition(" | ")[0].partition(" && ")[0])
-    verb = main.commands.get(words[0])
+    verb = main.get_command(click.Context(main), words[0])
     if verb is None:
         return [words[0]] if re.fullmatch(r"[a-z]+", words[0]) else []
     if words[0] == "test":  # the others are pytest's
@@ -108,18 +111,28 @@ class Reader:
         self.printed = ""
         self.declared = ""
         self.shown = "".join(block.text for block in self.all if block.language == "console")
+        self.ports = {port: str(_free_port()) for port in re.findall(r"--port (\d+).* &$", self.shown, re.M)}
+        self.running: list[subprocess.Popen[bytes]] = []
 
     def read(self) -> None:
         """Run all blocks; AssertionError names the line of the page."""
         if "examples/" in self.page.read_text(encoding="utf-8"):
             shutil.copytree(HOUSE / "examples", "examples")
-        for block in self.all:
-            if block.is_run:
-                try:
-                    self._run(block)
-                except Exception as wrong:
-                    wrong.add_note(f"{self.page.relative_to(HOUSE)}:{block.line}")
-                    raise
+        try:
+            for block in self.all:
+                if block.is_run:
+                    self._noted(block)
+        finally:
+            for process in self.running:
+                process.terminate()
+                process.wait(30)
+
+    def _noted(self, block: Block) -> None:
+        try:
+            self._run(block)
+        except Exception as wrong:
+            wrong.add_note(f"{self.page.relative_to(HOUSE)}:{block.line}")
+            raise
 
     def _run(self, block: Block) -> None:
         if block.file is not None:
@@ -128,7 +141,7 @@ class Reader:
             path.write_text(block.text, encoding="utf-8")
         if block.language == "console":
             for command, output in block.commands:
-                compare(command, self._command(command), output)
+                compare(command, self._command(self._placed(command)), self._placed(output))
         elif block.language == "iecst":
             self._compile(block)
         elif block.language == "python":
@@ -141,7 +154,15 @@ class Reader:
             wrong = [line for line in block.text.splitlines() if line and not line.startswith("#") and not INSTALLS.match(line)]
             assert wrong == [], "commands that are run stand in ```console"
 
+    def _placed(self, text: str) -> str:
+        """The text with the ports that are free here."""
+        for port, free in self.ports.items():
+            text = re.sub(rf"\b{port}\b", free, text)
+        return text
+
     def _command(self, line: str) -> str:
+        if line.endswith(" &"):
+            return self._start(line.removesuffix(" &"))
         if line.startswith("cd "):
             os.chdir(line.removeprefix("cd "))
             return ""
@@ -150,6 +171,17 @@ class Reader:
         if not command.startswith("fbvm ") or any(part in command for part in (*PROCESSES, "|", "&", "; ")):
             return _process(line)
         return CliRunner().invoke(main, shlex.split(command)[1:], input=fed[1].replace("\\n", "\n") if fed else None).output
+
+    def _start(self, line: str) -> str:
+        """What a program prints first, which then goes on."""
+        log = Path(f"{len(self.running)}.log")
+        command = [sys.executable, "-u", "-m", *shlex.split(line)]
+        with log.open("wb") as out:
+            self.running.append(subprocess.Popen(command, stdout=out, stderr=out))
+        until = time.monotonic() + 30
+        while not log.read_text(encoding="utf-8").endswith("\n") and time.monotonic() < until:
+            time.sleep(0.05)
+        return log.read_text(encoding="utf-8")
 
     def _compile(self, block: Block) -> None:
         if block.file is not None and f"{Path(block.file).name}:" in self.shown and "error S" in self.shown:
@@ -175,6 +207,11 @@ class Reader:
         with contextlib.redirect_stdout(io.StringIO()) as printed:
             exec(code, self.names)
         self.printed = printed.getvalue()
+
+
+def _free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        return int(listening.getsockname()[1])
 
 
 def _process(line: str) -> str:
