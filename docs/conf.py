@@ -27,6 +27,9 @@ copybutton_line_continuation_character = "\\"
 
 html_theme = "furo"
 html_title = f"fbvm {release}"
+html_static_path = ["_static"]
+html_css_files = ["pages.css"]
+html_show_copyright = False
 html_show_sourcelink = False
 html_copy_source = False
 pygments_style = "tango"
