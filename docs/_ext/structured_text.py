@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from pygments.lexer import RegexLexer, words
+from pygments.lexer import RegexLexer, bygroups, words
 from pygments.token import Comment, Keyword, Name, Number, Operator, Punctuation, String, Text, Whitespace
 from sphinx.application import Sphinx
 
@@ -12,11 +12,11 @@ DECLARATIONS = (
     "PROGRAM", "FUNCTION_BLOCK", "FUNCTION", "TYPE", "STRUCT", "VAR", "VAR_INPUT", "VAR_OUTPUT", "VAR_IN_OUT",
     "VAR_TEMP", "VAR_EXTERNAL", "VAR_GLOBAL", "VAR_CONFIG", "VAR_ACCESS", "CONFIGURATION", "RESOURCE", "TASK", "WITH",
     "CONSTANT", "RETAIN", "AT", "ARRAY", "OF", "REF_TO", "POINTER", "REFERENCE", "TO", "INITIAL_STEP", "STEP",
-    "TRANSITION", "FROM", "ACTION", "LADDER", "NAMESPACE", "USING",
+    "TRANSITION", "FROM", "ACTION", "NAMESPACE", "USING",
 )  # fmt: skip
 STATEMENTS = (
     "IF", "THEN", "ELSIF", "ELSE", "CASE", "FOR", "BY", "DO", "WHILE", "REPEAT", "UNTIL", "EXIT", "CONTINUE",
-    "RETURN", "JMP", "ASSERT", "RUNG",
+    "RETURN", "JMP", "ASSERT",
 )  # fmt: skip
 TYPES = (
     "BOOL", "BYTE", "WORD", "DWORD", "LWORD", "SINT", "INT", "DINT", "LINT", "USINT", "UINT", "UDINT", "ULINT",
@@ -39,6 +39,7 @@ class StructuredText(RegexLexer):
             (r"'(?:\$.|[^'$])*'|\"(?:\$.|[^\"$])*\"", String),
             (r"(?:L?TIME|L?T|L?DATE|L?D|L?TOD|L?DT|DATE_AND_TIME|TIME_OF_DAY)#[\w.:+-]+", Number),
             (r"\b(?:\w+#)*\d[\d_]*(?:\.\d+)?(?:E[+-]?\d+)?\b|\b\d+#\w+", Number),
+            (r"\bLADDER\b", Keyword.Declaration, "ladder"),
             (words(DECLARATIONS, r"\b(?:END_)?", r"\b"), Keyword.Declaration),
             (words(STATEMENTS, r"\b(?:END_)?", r"\b"), Keyword),
             (words(TYPES, r"\b", r"\b"), Keyword.Type),
@@ -49,6 +50,14 @@ class StructuredText(RegexLexer):
             (r"\w+", Name),
             (r"[()\[\],;:.#@|]", Punctuation),
             (r".", Text),
+        ],
+        "ladder": [
+            (r"\bEND_LADDER\b", Keyword.Declaration, "#pop"),
+            (r"^([^\S\n]*)(RUNG\b)(.*?)$", bygroups(Whitespace, Keyword.Declaration, Comment)),
+            (r"^([^\S\n]*)([@%!]?[A-Z][A-Z0-9_]*)(?=\s)", bygroups(Whitespace, Keyword)),
+            (r"[#&][\da-f]+\b", Number),
+            (r"[^\S\n]+|\n", Whitespace),
+            (r"[^\s#&]+|[#&]", Text),
         ],
     }
 
