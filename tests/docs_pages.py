@@ -27,6 +27,7 @@ import sys
 import time
 import tomllib
 from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
 
 import click
@@ -71,9 +72,19 @@ class Block:
         return [(command.replace("\\\n", ""), output) for command, output in COMMAND.findall(self.text)]
 
 
+def is_made(path: Path) -> bool:
+    """Whether a page under docs is made when the documentation is built, as docs/.gitignore says."""
+    rules, name, made = HOUSE / "docs" / ".gitignore", f"/{path.relative_to(HOUSE / 'docs').as_posix()}", False
+    for line in rules.read_text(encoding="utf-8").splitlines() if rules.is_file() else ():
+        if line.startswith(("/", "!")) and fnmatch(name, line.removeprefix("!")):
+            made = line.startswith("/")
+    return made
+
+
 def pages() -> list[Path]:
-    """README, and all pages under docs that people have written in the form above."""
-    return [HOUSE / "README.md", HOUSE / "docs" / "index.md", *sorted((HOUSE / "docs").glob("*/*.md"))]
+    """README, and all pages under docs that people have written."""
+    written = sorted(path for path in (HOUSE / "docs").glob("*/*.md") if not is_made(path))
+    return [HOUSE / "README.md", HOUSE / "docs" / "index.md", *written]
 
 
 def blocks(page: Path) -> list[Block]:

@@ -12,7 +12,7 @@ from pathlib import Path
 import click
 import pytest
 from click.testing import CliRunner
-from docs_pages import HOUSE, NOT_RUN, Reader, blocks, is_slow, options_of, pages
+from docs_pages import HOUSE, NOT_RUN, Reader, blocks, is_made, is_slow, options_of, pages
 
 from fbvm.cli.main import main
 
@@ -67,7 +67,9 @@ def test_links_lead_somewhere(name: str) -> None:
         if re.match(r"[a-z]+:", link):
             wrong += [link] if not re.fullmatch(r"https://[\w.-]+\.[a-z]+(/[\w./#~-]*)?", link) else []
         else:
-            target = page.parent / file if file else page
+            target = (page.parent / file).resolve() if file else page
+            if target.is_relative_to(HOUSE / "docs") and is_made(target):
+                continue  # the test that builds the pages looks whether they are there
             wrong += [] if target.exists() and (not anchor or anchor in anchors(target)) else [link]
     assert wrong == []
 
