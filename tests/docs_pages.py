@@ -9,6 +9,7 @@ The blocks of a page are run from top to bottom in one empty folder.
   free one, there and wherever the page names that port.
 - ```python: executed, all blocks of a page in one namespace; a ```text block behind "It prints:" is what it prints.
 - ```iecst: compiled.  What begins without a POU gets one, with the variables of the block before if it declares none.
+- ```toml and ```yaml: read.
 - ```sh: installs.  The extras of fbvm that are named exist.
 - A block whose first line is `# not run by the tests: REASON` is not run; the options of its commands exist.
 """
@@ -16,6 +17,7 @@ The blocks of a page are run from top to bottom in one empty folder.
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import io
 import os
 import re
@@ -159,6 +161,8 @@ class Reader:
             self._python(block)
         elif block.language == "toml":
             tomllib.loads(block.text)
+        elif block.language == "yaml" and importlib.util.find_spec("yaml") is not None:
+            assert importlib.import_module("yaml").safe_load(block.text)
         elif block.language == "text" and block.before.endswith("It prints:"):
             compare("Python", self.printed, block.text)
         elif block.language == "sh":
