@@ -7,7 +7,8 @@ The blocks of a page are run from top to bottom in one empty folder.
 - ```console: each line that begins with `$ ` is run, and prints the lines behind it.  A line `...` stands for any number of
   lines; times such as `in 0.12s` may differ.  A command that ends in ` &` goes on until the end of the page; its `--port` is a
   free one, there and wherever the page names that port.
-- ```python: executed, all blocks of a page in one namespace; a ```text block behind "It prints:" is what it prints.
+- ```python: executed, all blocks of a page in one namespace; a ```text block behind "It prints:" is what it prints.  One that
+  begins with `>>> ` is a doctest.
 - ```iecst: compiled.  What begins without a POU gets one, with the variables of the block before if it declares none.
 - ```toml and ```yaml: read.
 - ```sh: installs.  The extras of fbvm that are named exist.
@@ -17,6 +18,7 @@ The blocks of a page are run from top to bottom in one empty folder.
 from __future__ import annotations
 
 import contextlib
+import doctest
 import importlib.util
 import io
 import os
@@ -216,6 +218,12 @@ class Reader:
         assert found.errors == [], "\n".join(each.render() for each in found.errors)
 
     def _python(self, block: Block) -> None:
+        if block.text.startswith(">>> "):
+            example = doctest.DocTestParser().get_doctest(block.text, self.names, self.page.name, str(self.page), block.line)
+            with contextlib.redirect_stdout(io.StringIO()) as printed:
+                failed = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(example, clear_globs=False).failed
+            assert not failed, printed.getvalue()
+            return
         code = compile(block.text, f"{self.page}:{block.line}", "exec")
         if block.file is not None:
             return
