@@ -1,10 +1,11 @@
-"""The wheel works from any folder: grammars, blocks and the example travel in it."""
+"""Wheel and sdist work from any folder: grammars, blocks, examples and pages travel in them."""
 
 from __future__ import annotations
 
 import site
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
@@ -18,6 +19,9 @@ VAR t : TON; c : MTCP_ETN_Connect; END_VAR
     c();
 END_PROGRAM
 """
+KINDS = ("*.whl", "*.tar.gz")
+FOLDERS = ("docs", "grammar", "fblib", "examples/lessons", "fbvm", "tests")
+LEFT_BEHIND = {"__pycache__", ".fbvm", ".pytest_cache"}
 
 
 def call(*command: str | Path, cwd: Path) -> str:
@@ -26,22 +30,48 @@ def call(*command: str | Path, cwd: Path) -> str:
     return result.stdout
 
 
+@pytest.fixture(scope="module")
+def dist(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the sdist, and with the wheel that was made of it."""
+    folder = tmp_path_factory.mktemp("dist")
+    call(sys.executable, "-m", "build", "--no-isolation", "--outdir", folder, HOUSE, cwd=folder)
+    return folder
+
+
+def built(dist: Path, kind: str) -> Path:
+    [path] = dist.glob(kind)
+    return path
+
+
 @pytest.mark.slow
-def test_a_wheel_runs_in_a_fresh_environment(tmp_path: Path) -> None:
-    call(sys.executable, "-m", "build", "--wheel", "--no-isolation", "--outdir", tmp_path / "dist", HOUSE, cwd=tmp_path)
-    [wheel] = (tmp_path / "dist").glob("fbvm-*.whl")
-    names = zipfile.ZipFile(wheel).namelist()
-    assert not [name for name in names if name.startswith("tests")]
+def test_the_wheel_holds_what_fbvm_needs(dist: Path) -> None:
+    names = zipfile.ZipFile(built(dist, "*.whl")).namelist()
+    assert not [name for name in names if name.startswith(("tests", "docs"))]
     assert {"fbvm/record/page/chart.js", "fbvm/_data/examples/project/.github/workflows/test.yml",
             "fbvm/_data/examples/project/.gitignore",
             "fbvm/_data/examples/lessons/12-two-plcs-one-wire/solution/program.st"} <= set(names)  # fmt: skip
+
+
+@pytest.mark.slow
+def test_the_sdist_holds_what_is_kept(dist: Path) -> None:
+    with tarfile.open(built(dist, "*.tar.gz")) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    pages = {"CONFORMANCE.md", "README.md", "ARCHITECTURE.md", "CHANGELOG.md", "LICENSE", "pyproject.toml"}
+    kept = [path.relative_to(HOUSE).as_posix() for folder in FOLDERS for path in (HOUSE / folder).rglob("*")
+            if path.is_file() and not LEFT_BEHIND & set(path.parts)]  # fmt: skip
+    assert sorted({*pages, *kept} - names) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_it_runs_in_a_fresh_environment(kind: str, dist: Path, tmp_path: Path) -> None:
     call(sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv", cwd=tmp_path)
     [packages] = (tmp_path / "venv").rglob("site-packages")
     python = tmp_path / "venv" / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
-    # What fbvm needs comes from the environment of the tests, fbvm itself from the wheel alone.
+    # What fbvm needs comes from the environment of the tests, fbvm itself from the file alone.
     (packages / "needs.pth").write_text("\n".join(site.getsitepackages()), encoding="utf-8")
-    call(sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", "--no-index", wheel,
-         cwd=tmp_path)  # fmt: skip
+    call(sys.executable, "-m", "pip", "--python", python, "install", "-q", "--no-deps", "--no-index", "--no-build-isolation",
+         built(dist, kind), cwd=tmp_path)  # fmt: skip
     outside = tmp_path / "outside"
     outside.mkdir()
     (outside / "main.st").write_text(PROGRAM, encoding="utf-8")
@@ -53,3 +83,4 @@ def test_a_wheel_runs_in_a_fresh_environment(tmp_path: Path) -> None:
     assert shown == "Main.t.ET = T#20ms\n"
     assert "fbvm test" in call(python, "-m", "fbvm", "new", "mine", cwd=outside)
     assert "division by zero" in call(python, "-m", "fbvm", "explain", "R0101", cwd=outside)
+    assert "Equal on both sides." in call(python, "-m", "fbvm", "demo", cwd=outside)

@@ -189,9 +189,9 @@ def test_why_wants_one_trace_and_one_place(fbvm: Fbvm) -> None:
     assert "scan 99 is not in the trace" in fbvm("why", "D200", "b.fbtrace", "--scan", "99").output
 
 
-def test_what_the_readme_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    readme = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
-    blocks = re.findall(r"^```(\w+)\n(.*?)^```", readme, re.M | re.S)
+def test_what_the_guide_shows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "howto" / "recording.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```(\w+)\n(.*?)^```", guide, re.M | re.S)
     monkeypatch.chdir(tmp_path)
     Path("pump.st").write_text(next(text for kind, text in blocks if kind == "iecst"), encoding="utf-8")
     shown = next(text for kind, text in blocks if kind == "console" and "fbvm why" in text)

@@ -40,7 +40,7 @@ END_VAR
     END_IF
 END_FUNCTION_BLOCK
 """
-README = (Path(__file__).parents[3] / "README.md").read_text(encoding="utf-8")
+GUIDE = (Path(__file__).parents[3] / "docs" / "howto" / "test.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -377,31 +377,29 @@ def test_other_files_are_left_alone(project: pytest.Pytester, tmp_path: Path) ->
     assert result.ret == pytest.ExitCode.NO_TESTS_COLLECTED
 
 
-# --- the README -------------------------------------------------------------------------------------------------------
+# --- the guide --------------------------------------------------------------------------------------------------------
 
 
-def in_readme(language: str, part: str) -> str:
-    """The block of the README that contains a text."""
-    blocks = re.findall(rf"^```{language}\n(.*?)^```", README, re.M | re.S)
+def in_guide(language: str, part: str) -> str:
+    """The block of the guide that contains a text."""
+    blocks = re.findall(rf"^```{language}\n(.*?)^```", GUIDE, re.M | re.S)
     return next(str(block) for block in blocks if part in block)
 
 
-def test_the_tests_of_the_readme_pass(project: pytest.Pytester) -> None:
-    project.makepyfile(in_readme("python", "def test_the_pump_waits_50_ms"))
-    project.makefile(".st", test_pump=in_readme("iecst", "PROGRAM Test_the_pump_waits"))
+def test_the_tests_of_the_guide_pass(project: pytest.Pytester) -> None:
+    project.makepyfile(in_guide("python", "def test_the_pump_waits_50_ms"))
+    project.makefile(".st", test_pump=in_guide("iecst", "PROGRAM Test_the_pump_waits"))
     result = run(project)
     result.assert_outcomes(passed=2)
     result.stdout.no_fnmatch_line("*warning S*")
 
 
-def test_the_failure_of_the_readme_looks_like_that(project: pytest.Pytester) -> None:
+def test_the_failure_of_the_guide_looks_like_that(project: pytest.Pytester) -> None:
     project.mkdir("tests").joinpath("test_pump.py").write_text(
-        "def test_starts(fb):\n"
-        "    pump = fb('src/pump.st').at('30ms', Start=True).run('200ms')\n"
-        "    assert pump.Starts == 2\n", encoding="utf-8")  # fmt: skip
+        in_guide("python", "def test_starts"), encoding="utf-8")
     lines = run(project).outlines
-    shown = in_readme("text", "assert pump.Starts == 2").splitlines()
-    assert [line for line in shown if line not in lines] == []
+    shown = in_guide("console", "assert pump.Starts == 2").splitlines()[1:]
+    assert [line for line in shown if line != "..." and line not in lines] == []
 
 
 GOLDEN = """
