@@ -92,7 +92,7 @@ class Unit(Protocol):
         program asks for, or a network tells, comes besides."""
 
     @property
-    def news(self) -> bool:
+    def changed_words(self) -> bool:
         """True if the last refresh changed words, so that the program should look at them soon."""
 
     @property

@@ -90,7 +90,7 @@ class Alone:
             return self._machine.trap_at(point)
         if self._idle and not series.changed and exchange.is_idle(now_ns):
             exchange.passed += 1
-            exchange.news = False
+            exchange.changed_words = False
         else:
             self.refresh(now_ns)
         return None
@@ -120,7 +120,7 @@ class Alone:
         most = min(most, (exchange.unit_ns(NEVER) - now_ns - 1) // step_ns)
         if not self._idle or most <= 0 or not exchange.is_idle(now_ns):
             return 0, None
-        exchange.news = False
+        exchange.changed_words = False
         done, point = self._series.run(most, now_ns + step_ns, step_ns, budget, spend)
         exchange.passed += done
         if point or self._series.changed:

@@ -28,7 +28,7 @@ from fbvm.engine.native.scans.code import (  # fmt: skip
     UNFINISHED,
 )
 from fbvm.engine.native.scans.scans import Turn
-from fbvm.engine.native.scans.units import NEWS, Companion
+from fbvm.engine.native.scans.units import CHANGED_WORDS, Companion
 from fbvm.engine.trap import Trap
 from fbvm.machine.clock_words import CLOCKWORK
 from fbvm.machine.refresh import Exchange
@@ -213,7 +213,7 @@ class Accompanied:
         numbers = self._numbers
         if numbers[UNFINISHED]:
             self._finish(now_ns)
-        self._exchange.news = numbers[AGAIN] & NEWS != 0
+        self._exchange.changed_words = numbers[AGAIN] & CHANGED_WORDS != 0
 
     def _finish(self, now_ns: int) -> bool:
         """Have done what the processors ask for that ran; whether that made links have something to tell.

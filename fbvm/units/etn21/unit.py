@@ -67,7 +67,7 @@ class Etn21:
         self._mask = 1 << self.layout.bit
         """Its bit in words for all units."""
         self._service_status, self._error_status = at.LINK_UP, 0
-        self.news = False
+        self.changed_words = False
         self._processor: Inside | None = None
         """Switched on when there is something to do for it: most programs ask nothing of an ETN21."""
         if faults := list(faults):
@@ -94,7 +94,7 @@ class Etn21:
         if self._processor:
             twin._processor = self._processor.copy(self._made["odd_filler"])
         twin._service_status, twin._error_status = self._service_status, self._error_status
-        twin._words, twin.news = self._words, self.news
+        twin._words, twin.changed_words = self._words, self.changed_words
         return twin
 
     @property
@@ -188,7 +188,7 @@ class Etn21:
             self._report(words)
             return []
         self._inside.reset()
-        self.news = self._inside.run(words, 0)
+        self.changed_words = self._inside.run(words, 0)
         return self.finish()
 
     def _look_at(self, memory: AreaMemory) -> Words:
@@ -219,12 +219,12 @@ class Etn21:
             self._inside.mail.post(events)
         elif not self._asks(words):
             if inside is None:
-                self.news = self._report(words)
+                self.changed_words = self._report(words)
                 return False
             if words.switches[0] == inside.seen[0] and words.status[0] == inside.reported[0] and now_ns < self.wake_ns:
-                self.news = False
+                self.changed_words = False
                 return False
-        self.news = self._inside.run(words, now_ns)
+        self.changed_words = self._inside.run(words, now_ns)
         return True
 
     def _asks(self, words: Words) -> bool:

@@ -65,7 +65,7 @@ class Noc:
         self._seen: tuple[bytes, bool, bool] | None = None
         """Mailbox and settings as the last refresh left them."""
         self.wake_ns = NEVER_NS
-        self.news = False
+        self.changed_words = False
         self._port = Port(place + 1, at.PLACES * at.HEAD_WORDS, at.SLOTS, at.number_of)
 
     watched = None
@@ -106,7 +106,7 @@ class Noc:
             return []
         before = (words.tobytes(), self.link_up, self.configured)
         if not events and before == self._seen and (self._ready_ns is None or now_ns < self._ready_ns):
-            self.wake_ns, self.news = self._next_ns(), False
+            self.wake_ns, self.changed_words = self._next_ns(), False
             return []
         head = self._head(words)
         if head[at.REQUEST] & at.RESTART:
@@ -122,7 +122,7 @@ class Noc:
         self._count(head, events, requests)
         self._before = head.tobytes()
         self._seen = (words.tobytes(), self.link_up, self.configured)
-        self.wake_ns, self.news = self._next_ns(), self._seen != before
+        self.wake_ns, self.changed_words = self._next_ns(), self._seen != before
         return requests
 
     def _next_ns(self) -> int:

@@ -38,7 +38,7 @@ class Tianxing:
         self.name = f"Tianxing {model}"
         self.address = address
         self.wake_ns = NEVER_NS
-        self.news = False
+        self.changed_words = False
         self._made = {"address": address, "model": model}
         octets = [int(part) for part in address.split(".")]
         self._head = (1, MODELS[model], octets[0] << 8 | octets[1], octets[2] << 8 | octets[3], 0, 0, 0, 0)
@@ -80,14 +80,14 @@ class Tianxing:
         if words is None:
             return []
         before = words.tobytes()
-        self.wake_ns, self.news = NEVER_NS, False
+        self.wake_ns, self.changed_words = NEVER_NS, False
         if not events and before == self._seen:
             return []
         self._show(words)
         self._port.take(words, events)
         requests = self._port.exchange(words)
         self._seen = words.tobytes()
-        self.news = self._seen != before
+        self.changed_words = self._seen != before
         return requests
 
     def _show(self, words: memoryview) -> None:

@@ -76,7 +76,7 @@ class Toy:
         self.own: OwnProcessor = processor(PROGRAM)
         self.own.view("Bit", "u16")[0], self.own.view("Delay", "i64")[0] = self._bit, self._delay_ns
         self.connect()
-        self.news, self.refreshes, self._has_run = False, 0, False
+        self.changed_words, self.refreshes, self._has_run = False, 0, False
 
     @property
     def wake_ns(self) -> int:
@@ -113,7 +113,7 @@ class Toy:
                  for area, first, variable, count in self.words]  # fmt: skip
         changed = any(plc != own for plc, own in views[::2])
         if not changed and not self._posted[0] and now_ns < self._wake[0] and self._has_run:
-            self.news = False
+            self.changed_words = False
             return False
         self._has_run = True
         for plc, own in views:
@@ -121,7 +121,7 @@ class Toy:
         self.own.run(now_ns)
         for plc, own in views:
             plc[:] = own
-        self.news = bool(self._news[0])
+        self.changed_words = bool(self._news[0])
         return True
 
     def finish(self) -> list[Request]:

@@ -71,7 +71,7 @@ class Companion:
 
 FUNCTION, MEMORY, CONTEXT, POSTED, REQUESTED, WAKE, MOVED, MOVES, HEAD = range(9)
 """Numbers of a companion's row, before those of copies and of what is watched, two for each, and of what may be left."""
-NEWS, AT_ONCE = 1, 2
+CHANGED_WORDS, AT_ONCE = 1, 2
 """Why there should be another scan soon: words have changed that the program may look at, a companion has more to do."""
 
 
@@ -87,7 +87,7 @@ class Told:
     unfinished: int
     """Which ones have left something, or have trapped, since somebody else has set this 0."""
     again: int
-    """NEWS, AT_ONCE, both or neither, after the last refresh."""
+    """CHANGED_WORDS, AT_ONCE, both or neither, after the last refresh."""
     faulty: int
     """The bit of a companion whose run has ended in a trap, 0 if none has."""
     point: int
@@ -130,8 +130,8 @@ $moves
 %next = load i64, ptr %wake_at
 %late = icmp uge i64 %now, %next
 %at_once = select i1 %late, i64 {AT_ONCE}, i64 0
-%news = icmp ne i64 %x$copies, 0
-%again = select i1 %news, i64 {NEWS}, i64 0
+%changed_words = icmp ne i64 %x$copies, 0
+%again = select i1 %changed_words, i64 {CHANGED_WORDS}, i64 0
 %again1 = or i64 %again, %at_once
 %again2 = load i64, ptr %again_at
 %again3 = or i64 %again1, %again2
