@@ -28,7 +28,7 @@ from fbvm.engine.native.scans.code import (  # fmt: skip
     UNFINISHED,
 )
 from fbvm.engine.native.scans.scans import Turn
-from fbvm.engine.native.scans.units import CHANGED_WORDS, Companion
+from fbvm.engine.native.scans.units import CHANGED_WORDS, UnitInCode
 from fbvm.engine.trap import Trap
 from fbvm.machine.clock_words import CLOCKWORK
 from fbvm.machine.refresh import Exchange
@@ -36,7 +36,7 @@ from fbvm.net.journal import Journal
 from fbvm.units.contract import Exchanged, ProcessorUnit, Unit
 
 
-def can_accompany(exchange: Exchange) -> bool:
+def can_run_in_code(exchange: Exchange) -> bool:
     """True if there are units, and each has a processor at work that runs as machine code."""
     for attached in exchange.units:
         exchanged = attached.unit.exchanged
@@ -45,12 +45,12 @@ def can_accompany(exchange: Exchange) -> bool:
     return bool(exchange.units)
 
 
-def companions(exchange: Exchange) -> list[Companion]:
-    """The units as companions of the PLC's program; none if one of them cannot be."""
-    return [_companion(attached.unit, exchange) for attached in exchange.units] if can_accompany(exchange) else []
+def units_in_code(exchange: Exchange) -> list[UnitInCode]:
+    """The units as machine code runs them; none if one of them cannot be."""
+    return [_unit_in_code(attached.unit, exchange) for attached in exchange.units] if can_run_in_code(exchange) else []
 
 
-def _companion(unit: Unit, exchange: Exchange) -> Companion:
+def _unit_in_code(unit: Unit, exchange: Exchange) -> UnitInCode:
     exchanged, groups = unit.exchanged, unit.watched
     assert exchanged and groups is not None
     own = exchanged.processor
@@ -59,7 +59,7 @@ def _companion(unit: Unit, exchange: Exchange) -> Companion:
     watched = [exchange.offset(area, word) for area, word in groups]
     posted, requested, wake = map(own.offset, (exchanged.posted, exchanged.requested, exchanged.wake))
     left = [own.offset(variable) for variable in exchanged.left]
-    return machine.companion(copies, watched, posted, requested, left, wake, _moves(exchanged, exchange))
+    return machine.unit_in_code(copies, watched, posted, requested, left, wake, _moves(exchanged, exchange))
 
 
 def _moves(exchanged: Exchanged, exchange: Exchange) -> tuple[int, int, int]:
@@ -75,12 +75,12 @@ def _moves(exchanged: Exchanged, exchange: Exchange) -> tuple[int, int, int]:
     return own.offset(moves.count), own.offset(moves.rows), moves.ring_bytes
 
 
-class Accompanied:
+class WithUnits:
     """Machine code of whole scans, with their I/O refreshes.  One in which no unit has anything to do is left out."""
 
-    def __init__(self, exchange: Exchange, machine: NativeEngine, turns: list[Turn], found: Sequence[Companion]) -> None:
+    def __init__(self, exchange: Exchange, machine: NativeEngine, turns: list[Turn], found: Sequence[UnitInCode]) -> None:
         self._exchange, self._machine = exchange, machine
-        self._series = machine.series(turns, CLOCKWORK, companions=found)
+        self._series = machine.series(turns, CLOCKWORK, units=found)
         self._numbers, self._numbers_at = self._series.numbers, self._series.numbers_at
         self._is_timed = any(turn.interval_ns for turn in turns)
         self._rows = [(1 << number, cast(ProcessorUnit, attached.unit), attached.link)
@@ -222,7 +222,7 @@ class Accompanied:
         numbers, submitted = self._numbers, False
         if numbers[FAULTY]:
             number = numbers[FAULTY].bit_length() - 1
-            raise RuntimeError(str(self._series.companions[number].trap_at(numbers[POINT])))
+            raise RuntimeError(str(self._series.units[number].trap_at(numbers[POINT])))
         ran, numbers[UNFINISHED] = numbers[UNFINISHED], 0
         for bit, unit, link in self._rows:
             if ran & bit:

@@ -38,7 +38,7 @@ from fbvm.engine.native.scans.code import (  # fmt: skip
     ZERO,
     Clockwork,
 )
-from fbvm.engine.native.scans.units import Companion, Shape
+from fbvm.engine.native.scans.units import Shape, UnitInCode
 
 
 @dataclass
@@ -58,13 +58,13 @@ class Series:
 
     In each scan there is a time, nothing is due, the budget is full, the clockwork is written; then the tasks that are
     due take their turns, and the number of scans grows.  `watched` are offsets of eight bytes each, by who watches them: a
-    scan after which they are not as `expect` saw them last is the last one.  In place of it there may be `companions`: then
+    scan after which they are not as `expect` saw them last is the last one.  In place of it there may be `units`: then
     each scan ends with a refresh, and the one in whose refresh one of them ran is the last one; in a burst, which its caller
     begins by `call_burst`, one that gives no reason for another scan, or in which they ask for something."""
 
     def __init__(self, memory: Memory, memory_at: int, context_at: int, tasks: Sequence[Entry], turns: Sequence[Turn],
                  clockwork: Clockwork, watched: Sequence[Sequence[int]] = (),
-                 companions: Sequence[Companion] = ()) -> None:  # fmt: skip
+                 units: Sequence[UnitInCode] = ()) -> None:  # fmt: skip
         rows: list[tuple[int, ...]] = [
             (tasks[turn.task].function_at, turn.interval_ns, turn.next_ns, 0) for turn in turns]  # fmt: skip
         offsets = [offset for group in watched for offset in group]
@@ -81,11 +81,11 @@ class Series:
         at = count(ROWS + ROW * len(turns) + 1, WATCHED_ROW)
         self._expected = [[(memory.u8[offset : offset + WATCHED_BYTES].cast("q"), next(at)) for offset in group]
                           for group in watched]  # fmt: skip
-        """What is watched, and where what is expected of it is, by who watches it: of each companion, if there are any."""
-        self.companions = companions
-        for companion in companions:
-            self._expected.append([(view, len(numbers) + at) for view, at in companion.expected(memory)])
-            numbers.extend(companion.row(memory_at))
+        """What is watched, and where what is expected of it is, by who watches it: of each unit, if there are any."""
+        self.units = units
+        for unit in units:
+            self._expected.append([(view, len(numbers) + at) for view, at in unit.expected(memory)])
+            numbers.extend(unit.row(memory_at))
         shape = tuple(turn.interval_ns > 0 for turn in turns), clockwork, len(offsets)
         self.numbers_at = numbers.buffer_info()[0]
         self.clock: Clock | None = None
@@ -94,12 +94,12 @@ class Series:
         self.times = array("q")
         """When those of the last one began."""
         self.times_at = 0
-        self.call, self.call_burst = _scans(*shape, tuple(companion.shape for companion in companions))
+        self.call, self.call_burst = _scans(*shape, tuple(unit.shape for unit in units))
         """Machine code of scans, and of a burst: they take the address of the parameters."""
 
     @property
     def changed(self) -> bool:
-        """True if after the last scan something that is watched was not as expected, or a companion ran."""
+        """True if after the last scan something that is watched was not as expected, or a unit ran."""
         return self.numbers[CHANGED] != 0
 
     def expect(self, number: int) -> None:
@@ -153,7 +153,7 @@ Call = Callable[[int], int]
 
 @cache
 def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int, shapes: tuple[Shape, ...]) -> tuple[Call, Call]:
-    """The functions for a shape: scans, and a burst, which is never called where there are no companions."""
+    """The functions for a shape: scans, and a burst, which is never called where there are no units."""
     text = native_scan_code.text(intervals, clockwork, watched, shapes)
     name = name_of("scans", text)
     stored = native_cache.read(name)

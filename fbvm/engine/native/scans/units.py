@@ -1,6 +1,6 @@
-"""Companions: programs over memories of their own that machine code runs inside the scans of a PLC, where the I/O refresh is.
+"""Units in code: programs over memories of their own that machine code runs inside the scans of a PLC, where the I/O refresh is.
 
-A companion runs when something that it watches in the PLC's memory is not as its last run left it, when something is
+Such a unit runs when something that it watches in the PLC's memory is not as its last run left it, when something is
 posted for it, or when its time has come.  Then words go into its memory, it is executed once, and they come back."""
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ MOVE_BYTES = 20
 
 
 @dataclass(frozen=True)
-class Companion:
-    """Where the program of a companion is and what it is to see.  Offsets are in bytes."""
+class UnitInCode:
+    """Where the program of a unit is and what it is to see.  Offsets are in bytes."""
 
     function_at: int
     """Where the address of what it executes lies, at any time."""
@@ -70,9 +70,9 @@ class Companion:
 
 
 FUNCTION, MEMORY, CONTEXT, POSTED, REQUESTED, WAKE, MOVED, MOVES, HEAD = range(9)
-"""Numbers of a companion's row, before those of copies and of what is watched, two for each, and of what may be left."""
+"""Numbers of a unit's row, before those of copies and of what is watched, two for each, and of what may be left."""
 CHANGED_WORDS, AT_ONCE = 1, 2
-"""Why there should be another scan soon: words have changed that the program may look at, a companion has more to do."""
+"""Why there should be another scan soon: words have changed that the program may look at, a unit has more to do."""
 
 
 @dataclass(frozen=True)
@@ -83,19 +83,19 @@ class Told:
     """The address of the PLC's memory."""
 
     ran: int
-    """Which companions ran in the last refresh, a bit each."""
+    """Which units ran in the last refresh, a bit each."""
     unfinished: int
     """Which ones have left something, or have trapped, since somebody else has set this 0."""
     again: int
     """CHANGED_WORDS, AT_ONCE, both or neither, after the last refresh."""
     faulty: int
-    """The bit of a companion whose run has ended in a trap, 0 if none has."""
+    """The bit of a unit whose run has ended in a trap, 0 if none has."""
     point: int
     """The point of that trap."""
 
 
-_COMPANION = Template(f"""
-define internal i32 @companion$number(ptr %p, ptr %w, i64 %now, i64 %bit) {{
+_UNIT = Template(f"""
+define internal i32 @unit$number(ptr %p, ptr %w, i64 %now, i64 %bit) {{
 entry:
 $fields
 $watched
@@ -217,8 +217,8 @@ br label %row
 quiet:
 """)
 """Blocks of bytes go into the PLC's memory, the high byte of a word first."""
-_COMPANIONS = Template("""
-define internal i32 @companions(ptr %p, i64 %now) {
+_REFRESH = Template("""
+define internal i32 @refresh(ptr %p, i64 %now) {
 $told
 store i64 0, ptr %ran_at
 store i64 0, ptr %again_at
@@ -228,12 +228,12 @@ ret i32 %any$count
 """)
 
 
-def text(shapes: Sequence[Shape], first: int, told: Told) -> str:
-    """The function @companions, for parameters in which their rows begin with number `first`: a refresh at a time.
+def refresh_text(shapes: Sequence[Shape], first: int, told: Told) -> str:
+    """The function @refresh, for parameters in which their rows begin with number `first`: a refresh at a time.
 
     It returns 0 if none ran, 1 if one did, -1 if somebody has to look at once: there are requests, or a trap."""
     kinds = list(dict.fromkeys(shapes))
-    functions = [_COMPANION.substitute(
+    functions = [_UNIT.substitute(
         number=number, fields=_lines(_fields(told)), watched=_lines(_watched(HEAD + 2 * len(copies), groups)),
         into=_lines(_into(copies)), outof=_lines(_out_of(copies)), expected=_lines(_expected(groups)), copies=len(copies),
         moves=_MOVES.substitute(mask=ring - 1) if ring else "",
@@ -242,10 +242,10 @@ def text(shapes: Sequence[Shape], first: int, told: Told) -> str:
     calls = ["%any0 = add i32 0, 0"]
     for number, shape in enumerate(shapes):
         calls += [_address(f"w{number}", "p", first),
-                  f"%a{number} = call i32 @companion{kinds.index(shape)}(ptr %p, ptr %w{number}, i64 %now, i64 {1 << number})",
+                  f"%a{number} = call i32 @unit{kinds.index(shape)}(ptr %p, ptr %w{number}, i64 %now, i64 {1 << number})",
                   f"%any{number + 1} = or i32 %any{number}, %a{number}"]  # fmt: skip
         first += size(shape)
-    return "".join(functions) + _COMPANIONS.substitute(told=_lines(_told(told)), calls=_lines(calls), count=len(shapes))
+    return "".join(functions) + _REFRESH.substitute(told=_lines(_told(told)), calls=_lines(calls), count=len(shapes))
 
 
 def size(shape: Shape) -> int:
@@ -274,7 +274,7 @@ def _told(told: Told) -> Iterator[str]:
 
 
 def _fields(told: Told) -> Iterator[str]:
-    """The names that a companion's function uses."""
+    """The names that a unit's function uses."""
     yield from _told(told)
     for number, name in enumerate((
             "function_at", "m", "c", "posted_at", "requested_at", "wake_at", "moved_at", "moves_at")):
@@ -317,7 +317,7 @@ def _pieces(bytes_: int) -> Iterator[tuple[int, int]]:
 
 
 def _into(copies: Sequence[int]) -> Iterator[str]:
-    """The PLC's words go into the companion's memory."""
+    """The PLC's words go into the unit's memory."""
     for n, bytes_ in enumerate(copies):
         yield from _loaded(f"o{n}", HEAD + 2 * n)
         yield from _loaded(f"i{n}", HEAD + 2 * n + 1)
