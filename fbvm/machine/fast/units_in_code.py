@@ -9,31 +9,20 @@ from typing import cast
 
 from fbvm.engine.clock import Clock
 from fbvm.engine.native.engine import NativeEngine
-from fbvm.engine.native.scans.code import (  # fmt: skip
-    AGAIN,
-    ALONE,
-    ASKED,
-    ASKED_BEFORE,
-    BUDGETED,
-    CHANGED,
-    DEFERRED,
-    FAULTY,
-    FIRST,
-    HEARD,
-    KNOWN,
-    OVER,
-    POINT,
-    SCANNED,
-    TIMES,
-    UNFINISHED,
-)
+from fbvm.engine.native.scans.code import ASKED, ASKED_BEFORE, OVER, SCANNED
 from fbvm.engine.native.scans.scans import Turn
+from fbvm.engine.native.scans.slots import Slot
 from fbvm.engine.native.scans.units import CHANGED_WORDS, UnitInCode
 from fbvm.engine.trap import Trap
 from fbvm.machine.clock_words import CLOCKWORK
 from fbvm.machine.refresh import Exchange
 from fbvm.net.journal import Journal
 from fbvm.units.contract import Exchanged, ProcessorUnit, Unit
+
+BUDGETED, TIMES, DEFERRED, FIRST, KNOWN, ALONE = (
+    Slot.BUDGETED, Slot.TIMES, Slot.DEFERRED, Slot.FIRST, Slot.KNOWN, Slot.ALONE)  # fmt: skip
+COLLECTED, CHANGED, UNFINISHED = Slot.COLLECTED, Slot.CHANGED, Slot.UNFINISHED
+"""Slots of every burst, looked up once."""
 
 
 def can_run_in_code(exchange: Exchange) -> bool:
@@ -99,9 +88,9 @@ class WithUnits:
 
     def once(self, now_ns: int, budget: int) -> Trap | None:
         """One scan."""
-        self._numbers[HEARD] = loud = self._is_loud()
-        if loud:
-            self._hear(now_ns)
+        self._numbers[COLLECTED] = has_events = self._has_events()
+        if has_events:
+            self._collect_events(now_ns)
         point = self._series.once(now_ns, budget)
         if point > 0:
             return self._machine.trap_at(point)
@@ -118,7 +107,7 @@ class WithUnits:
         series, numbers, exchange = self._series, self._numbers, self._exchange
         if clock is not series.clock or most != series.most:
             series.follow(clock, most)
-        is_stepped, loud, point = self._counts or not clock.function_at, self._is_loud(), SCANNED
+        is_stepped, has_events, point = self._counts or not clock.function_at, self._has_events(), SCANNED
         numbers[BUDGETED], numbers[TIMES] = budget, series.times_at
         if self._is_timed:
             series.load_turns()
@@ -130,10 +119,10 @@ class WithUnits:
                 if is_stepped and point >= SCANNED:
                     now_ns = numbers[FIRST] = clock.now()
                     numbers[KNOWN] = 1
-                if loud:
-                    loud = self._hear(now_ns)
-                    numbers[HEARD] = 1
-                if loud or is_stepped:
+                if has_events:
+                    has_events = self._collect_events(now_ns)
+                    numbers[COLLECTED] = 1
+                if has_events or is_stepped:
                     numbers[ALONE] = 1
                 point = series.call_burst(self._numbers_at)
                 if point == OVER:
@@ -145,7 +134,7 @@ class WithUnits:
                     self._count()
                 now_ns = numbers[FIRST]
                 if point in (ASKED, ASKED_BEFORE):
-                    loud = self._finish(now_ns) or loud
+                    has_events = self._finish(now_ns) or has_events
         finally:  # Ctrl-C may come between two calls
             if self._is_timed:
                 series.store_turns()
@@ -162,7 +151,7 @@ class WithUnits:
 
         No other begins when all together have executed `spend` statements."""
         series, exchange = self._series, self._exchange
-        if self._is_loud():
+        if self._has_events():
             return 0, None
         done, point = series.run(most, now_ns + step_ns, step_ns, budget, spend)
         exchange.passed += done - 1
@@ -172,20 +161,20 @@ class WithUnits:
         self._end(now_ns + done * step_ns)
         return done, None
 
-    def _is_loud(self) -> bool:
+    def _has_events(self) -> bool:
         """True if a link has something to tell."""
         for _, _, link in self._rows:  # noqa: SIM110 - a generator would cost as much as the rest of it
             if not link.is_quiet:
                 return True
         return False
 
-    def _hear(self, now_ns: int) -> bool:
+    def _collect_events(self, now_ns: int) -> bool:
         """Fetch what links have to tell, for the next refresh; whether they have more before they are asked for anything."""
         if self._exchange.passed:
             self._exchange.pass_by()
         if self._numbers[UNFINISHED]:
             self._finish(now_ns)
-        loud = False
+        has_events = False
         for _, unit, link in self._rows:
             if link.is_quiet:
                 link.pass_by(1)
@@ -194,14 +183,14 @@ class WithUnits:
             if events:
                 unit.post(events)
             if not link.is_quiet:
-                loud = True
-        return loud
+                has_events = True
+        return has_events
 
     def _count(self) -> None:
         """A refresh is over; links that were heard for it know of it, and others are told if it was not left out."""
         numbers = self._numbers
-        if numbers[HEARD]:
-            numbers[HEARD] = 0
+        if numbers[COLLECTED]:
+            numbers[COLLECTED] = 0
             return
         exchange = self._exchange
         exchange.passed += 1
@@ -213,16 +202,16 @@ class WithUnits:
         numbers = self._numbers
         if numbers[UNFINISHED]:
             self._finish(now_ns)
-        self._exchange.changed_words = numbers[AGAIN] & CHANGED_WORDS != 0
+        self._exchange.changed_words = numbers[Slot.AGAIN] & CHANGED_WORDS != 0
 
     def _finish(self, now_ns: int) -> bool:
         """Have done what the processors ask for that ran; whether that made links have something to tell.
 
         Raises RuntimeError if the program of one has trapped, which is a fault of ours."""
         numbers, submitted = self._numbers, False
-        if numbers[FAULTY]:
-            number = numbers[FAULTY].bit_length() - 1
-            raise RuntimeError(str(self._series.units[number].trap_at(numbers[POINT])))
+        if numbers[Slot.FAULTY]:
+            number = numbers[Slot.FAULTY].bit_length() - 1
+            raise RuntimeError(str(self._series.units[number].trap_at(numbers[Slot.POINT])))
         ran, numbers[UNFINISHED] = numbers[UNFINISHED], 0
         for bit, unit, link in self._rows:
             if ran & bit:
@@ -230,4 +219,4 @@ class WithUnits:
                 if requests:
                     link.submit(requests, now_ns)
                     submitted = True
-        return submitted and self._is_loud()
+        return submitted and self._has_events()

@@ -18,26 +18,8 @@ from fbvm.engine.native.cache import Stored, name_of
 from fbvm.engine.native.compiler import Linked, compile_text
 from fbvm.engine.native.entries import Entry
 from fbvm.engine.native.scans import code as native_scan_code
-from fbvm.engine.native.scans.code import (  # fmt: skip
-    BUDGETED,
-    CHANGED,
-    CLOCK,
-    CONTEXT,
-    DONE,
-    ENDS,
-    FIRST,
-    LEFT,
-    MEMORY,
-    NUMBER,
-    ROW,
-    ROWS,
-    SPEND,
-    STEP,
-    WATCHED_BYTES,
-    WATCHED_ROW,
-    ZERO,
-    Clockwork,
-)
+from fbvm.engine.native.scans.code import ROW, WATCHED_BYTES, WATCHED_ROW, Clockwork
+from fbvm.engine.native.scans.slots import ROWS, Slot
 from fbvm.engine.native.scans.units import Shape, UnitInCode
 
 
@@ -51,6 +33,7 @@ class Turn:
 
 
 NO_LIMIT = 1 << 62
+FIRST, BUDGETED, CHANGED = Slot.FIRST, Slot.BUDGETED, Slot.CHANGED  # looked up once, not in each scan
 
 
 class Series:
@@ -74,7 +57,7 @@ class Series:
         """These move on, or others of the same tasks."""
         self._timed = [(row, ROWS + ROW * row + 2) for row, turn in enumerate(turns) if turn.interval_ns]
         """Which turns have an interval, and where their next time is."""
-        given = {MEMORY: memory_at, CONTEXT: context_at, LEFT: 1, SPEND: NO_LIMIT}
+        given: dict[int, int] = {Slot.MEMORY: memory_at, Slot.CONTEXT: context_at, Slot.LEFT: 1, Slot.SPEND: NO_LIMIT}
         self.numbers = numbers = array("q", [given.get(number, 0) for number in range(ROWS)])
         """The parameters, for who calls `call` himself."""
         numbers.extend(number for row in rows for number in row)
@@ -112,9 +95,9 @@ class Series:
         self.clock, self.most = clock, most
         self.times = array("q", bytes(8 * most))
         self.times_at = self.times.buffer_info()[0]
-        told = {ENDS: self.times_at + 8 * most, CLOCK: clock.function_at, NUMBER: clock.number, ZERO: clock.zero_ns}
-        for number, value in told.items():
-            self.numbers[number] = value
+        numbers = self.numbers
+        numbers[Slot.ENDS], numbers[Slot.CLOCK] = self.times_at + 8 * most, clock.function_at
+        numbers[Slot.NUMBER], numbers[Slot.ZERO] = clock.number, clock.zero_ns
 
     def load_turns(self) -> None:
         """Take over when the tasks run next."""
@@ -142,10 +125,10 @@ class Series:
 
         No other begins when all together have executed `spend` statements."""
         numbers = self.numbers
-        numbers[LEFT], numbers[STEP], numbers[SPEND] = n, step_ns, spend
+        numbers[Slot.LEFT], numbers[Slot.STEP], numbers[Slot.SPEND] = n, step_ns, spend
         point = self.once(now_ns, budget)
-        numbers[LEFT], numbers[SPEND] = 1, NO_LIMIT
-        return numbers[DONE], point
+        numbers[Slot.LEFT], numbers[Slot.SPEND] = 1, NO_LIMIT
+        return numbers[Slot.DONE], point
 
 
 Call = Callable[[int], int]

@@ -11,6 +11,7 @@ from string import Template
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW
 from fbvm.base.memory import Memory
+from fbvm.engine.native.scans.slots import addresses_of_slots
 from fbvm.engine.trap import Trap
 
 STATEMENTS = 2_000_000
@@ -75,25 +76,6 @@ CHANGED_WORDS, AT_ONCE = 1, 2
 """Why there should be another scan soon: words have changed that the program may look at, a unit has more to do."""
 
 
-@dataclass(frozen=True)
-class Told:
-    """Where among the parameters machine code says what happened; numbers of 64 bits."""
-
-    memory: int
-    """The address of the PLC's memory."""
-
-    ran: int
-    """Which units ran in the last refresh, a bit each."""
-    unfinished: int
-    """Which ones have left something, or have trapped, since somebody else has set this 0."""
-    again: int
-    """CHANGED_WORDS, AT_ONCE, both or neither, after the last refresh."""
-    faulty: int
-    """The bit of a unit whose run has ended in a trap, 0 if none has."""
-    point: int
-    """The point of that trap."""
-
-
 _UNIT = Template(f"""
 define internal i32 @unit$number(ptr %p, ptr %w, i64 %now, i64 %bit) {{
 entry:
@@ -118,9 +100,9 @@ store i64 {NEVER}, ptr %due_at
 store i64 {STATEMENTS}, ptr %budget_at
 %f = load ptr, ptr %function_at
 %point = call i32 %f(ptr %m, ptr %c)
-%ran = load i64, ptr %ran_at
+%ran = load i64, ptr %changed_at
 %ran1 = or i64 %ran, %bit
-store i64 %ran1, ptr %ran_at
+store i64 %ran1, ptr %changed_at
 %sound = icmp eq i32 %point, 0
 br i1 %sound, label %out, label %trap
 out:
@@ -219,8 +201,8 @@ quiet:
 """Blocks of bytes go into the PLC's memory, the high byte of a word first."""
 _REFRESH = Template("""
 define internal i32 @refresh(ptr %p, i64 %now) {
-$told
-store i64 0, ptr %ran_at
+$slots
+store i64 0, ptr %changed_at
 store i64 0, ptr %again_at
 $calls
 ret i32 %any$count
@@ -228,13 +210,13 @@ ret i32 %any$count
 """)
 
 
-def refresh_text(shapes: Sequence[Shape], first: int, told: Told) -> str:
+def refresh_text(shapes: Sequence[Shape], first: int) -> str:
     """The function @refresh, for parameters in which their rows begin with number `first`: a refresh at a time.
 
     It returns 0 if none ran, 1 if one did, -1 if somebody has to look at once: there are requests, or a trap."""
     kinds = list(dict.fromkeys(shapes))
     functions = [_UNIT.substitute(
-        number=number, fields=_lines(_fields(told)), watched=_lines(_watched(HEAD + 2 * len(copies), groups)),
+        number=number, fields=_lines(_fields()), watched=_lines(_watched(HEAD + 2 * len(copies), groups)),
         into=_lines(_into(copies)), outof=_lines(_out_of(copies)), expected=_lines(_expected(groups)), copies=len(copies),
         moves=_MOVES.substitute(mask=ring - 1) if ring else "",
         left=_lines(_left(HEAD + 2 * (len(copies) + groups), places)),
@@ -245,7 +227,7 @@ def refresh_text(shapes: Sequence[Shape], first: int, told: Told) -> str:
                   f"%a{number} = call i32 @unit{kinds.index(shape)}(ptr %p, ptr %w{number}, i64 %now, i64 {1 << number})",
                   f"%any{number + 1} = or i32 %any{number}, %a{number}"]  # fmt: skip
         first += size(shape)
-    return "".join(functions) + _REFRESH.substitute(told=_lines(_told(told)), calls=_lines(calls), count=len(shapes))
+    return "".join(functions) + _REFRESH.substitute(slots=_lines(addresses_of_slots()), calls=_lines(calls), count=len(shapes))
 
 
 def size(shape: Shape) -> int:
@@ -268,14 +250,9 @@ def _loaded(name: str, number: int, kind: str = "ptr") -> Iterator[str]:
     yield from (_address(f"{name}_in", "w", number), f"%{name} = load {kind}, ptr %{name}_in")
 
 
-def _told(told: Told) -> Iterator[str]:
-    for name, number in vars(told).items():
-        yield _address(f"{name}_at", "p", number)
-
-
-def _fields(told: Told) -> Iterator[str]:
+def _fields() -> Iterator[str]:
     """The names that a unit's function uses."""
-    yield from _told(told)
+    yield from addresses_of_slots()
     for number, name in enumerate((
             "function_at", "m", "c", "posted_at", "requested_at", "wake_at", "moved_at", "moves_at")):
         yield from _loaded(name, number)
