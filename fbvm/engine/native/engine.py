@@ -19,7 +19,7 @@ from fbvm.engine.native.emit.writer import Unsupported
 from fbvm.engine.native.entries import Entry, entry
 from fbvm.engine.native.scans.code import NOTHING, Clockwork
 from fbvm.engine.native.scans.scans import NO_LIMIT, Series, Turn
-from fbvm.engine.native.scans.units import UnitInCode
+from fbvm.engine.native.scans.units import UnitExchange, UnitInCode
 from fbvm.engine.stops import PAUSE, STOPPED, Stops
 from fbvm.engine.trap import Trap, trap
 
@@ -83,11 +83,9 @@ class NativeEngine:
         program of a unit runs."""
         return Series(self.memory, self._memory_at, self._context.at, self._entries, turns, clockwork, watched, units)
 
-    def unit_in_code(self, copies: Sequence[tuple[int, int, int]], watched: Sequence[int], posted: int, requested: int,
-                  left: Sequence[int], wake: int, moves: tuple[int, int, int] = (0, 0, 0)) -> UnitInCode:  # fmt: skip
-        """This program, its first task, as that of a unit in another PLC's scans; see `UnitInCode` for the offsets."""
-        return UnitInCode(self._entries[0].function_at, self._memory_at, self._context.at, self.trap_at, tuple(copies),
-                         tuple(watched), posted, requested, tuple(left), wake, moves)  # fmt: skip
+    def unit_in_code(self, exchange: UnitExchange) -> UnitInCode:
+        """This program, its first task, as that of a unit which exchanges this with a PLC."""
+        return UnitInCode(self._entries[0].function_at, self._memory_at, self._context.at, self.trap_at, exchange)
 
     def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork = NOTHING, *,
                  spend: int = NO_LIMIT) -> tuple[int, Trap | None]:  # fmt: skip

@@ -7,17 +7,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import cast
 
+from fbvm.base.memory import STRUCTS
 from fbvm.engine.clock import Clock
 from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.native.scans.code import ASKED, ASKED_BEFORE, OVER, SCANNED
 from fbvm.engine.native.scans.scans import Turn
 from fbvm.engine.native.scans.slots import Slot
-from fbvm.engine.native.scans.units import CHANGED_WORDS, UnitInCode
+from fbvm.engine.native.scans.units import CHANGED_WORDS, FieldAt, MovesAt, MoveShape, UnitExchange, UnitInCode
 from fbvm.engine.trap import Trap
 from fbvm.machine.clock_words import CLOCKWORK
 from fbvm.machine.refresh import Exchange
 from fbvm.net.journal import Journal
-from fbvm.units.contract import Exchanged, ProcessorUnit, Unit
+from fbvm.units.contract import MOVE_FIELDS, Moves, Processor, ProcessorUnit, Unit
 
 BUDGETED, TIMES, DEFERRED, FIRST, KNOWN, ALONE = (
     Slot.BUDGETED, Slot.TIMES, Slot.DEFERRED, Slot.FIRST, Slot.KNOWN, Slot.ALONE)  # fmt: skip
@@ -40,28 +41,34 @@ def units_in_code(exchange: Exchange) -> list[UnitInCode]:
 
 
 def _unit_in_code(unit: Unit, exchange: Exchange) -> UnitInCode:
-    exchanged, groups = unit.exchanged, unit.watched
-    assert exchanged and groups is not None
-    own = exchanged.processor
-    machine: NativeEngine = own.machine
-    copies = [(exchange.offset(area, word), own.offset(variable), 2 * count) for area, word, variable, count in exchanged.words]
-    watched = [exchange.offset(area, word) for area, word in groups]
-    posted, requested, wake = map(own.offset, (exchanged.posted, exchanged.requested, exchanged.wake))
-    left = [own.offset(variable) for variable in exchanged.left]
-    return machine.unit_in_code(copies, watched, posted, requested, left, wake, _moves(exchanged, exchange))
+    exchanged, watched = unit.exchanged, unit.watched
+    assert exchanged and watched is not None
+    own = exchanged.processor.contract
+    machine: NativeEngine = exchanged.processor.machine
+    return machine.unit_in_code(UnitExchange(
+        copies=tuple((exchange.offset(words.area, words.first), own.offset(words.variable), own.size(words.variable))
+                     for words in exchanged.words),
+        watched=tuple(exchange.offset(area, word) for area, word in watched),
+        posted=own.offset(exchanged.posted),
+        urgent=own.offset(exchanged.urgent),
+        unfinished=tuple(map(own.offset, exchanged.unfinished)),
+        wake=own.offset(exchanged.wake),
+        moves=_moves(exchanged.processor, exchanged.moves, exchange) if exchanged.moves else None,
+    ))  # fmt: skip
 
 
-def _moves(exchanged: Exchanged, exchange: Exchange) -> tuple[int, int, int]:
-    """Where a processor says what is to be moved; it learns where the areas are."""
-    moves, own = exchanged.moves, exchanged.processor
-    if moves is None:
-        return 0, 0, 0
-    variable, areas = moves.targets
-    targets = own.view(variable, "u32")
-    for index, area in areas.items():
+def _moves(processor: Processor, moves: Moves, exchange: Exchange) -> MovesAt:
+    """Where a program says what is to be moved.  The program learns where the areas are that it wants to know of."""
+    own = processor.contract
+    targets, (first_target, _, _) = processor.view(moves.targets), own.array(moves.targets)
+    for subscript, area in moves.areas.items():
         if area in exchange.memory.areas:
-            targets[index] = exchange.offset(area, 0)
-    return own.offset(moves.count), own.offset(moves.rows), moves.ring_bytes
+            targets[subscript - first_target] = exchange.offset(area, 0)
+    row = own.record(moves.rows)
+    first_ring, _, ring_bytes = own.array(moves.rings)
+    fields = {name: FieldAt(row[name].offset, 8 * STRUCTS[row[name].machine].size) for name in MOVE_FIELDS}
+    shape = MoveShape(row_bytes=row.size, first_ring=first_ring, ring_bytes=ring_bytes, **fields)
+    return MovesAt(count=own.offset(moves.count), rows=own.offset(moves.rows), rings=own.offset(moves.rings), shape=shape)
 
 
 class WithUnits:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fbvm.processor.processor import OwnProcessor, processor
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.faults import Faults
-from fbvm.units.etn21.mail import RING_BYTES, Mail
+from fbvm.units.etn21.mail import Mail
 from fbvm.units.etn21.words import Words, numbers
 
 PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
@@ -13,13 +13,13 @@ PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
 
 def power_on(layout: at.Layout, address: str, *, real: bool, seed: int, time_wait_ns: int, odd_filler: int | None) -> Inside:
     """A processor that has just been switched on."""
-    own = processor(PROGRAM, RING_BYTES * len(at.SOCKETS))
-    own.view("ETN21_Unit_Bit", "u16")[0] = 1 << layout.bit
-    ip = own.view("ETN21_IP", "u16")
+    own = processor(PROGRAM)
+    own.view("ETN21_Unit_Bit")[0] = 1 << layout.bit
+    ip = own.view("ETN21_IP")
     ip[0], ip[1] = at.words_of(address)
-    own.view("ETN21_Real", "u8")[0] = real
-    own.view("ETN21_Random", "u64")[0] = _scattered(seed)
-    own.view("ETN21_Time_Wait", "i64")[0] = time_wait_ns
+    own.view("ETN21_Real")[0] = real
+    own.view("ETN21_Random")[0] = _scattered(seed)
+    own.view("ETN21_Time_Wait")[0] = time_wait_ns
     return Inside(own, odd_filler)
 
 
@@ -28,13 +28,13 @@ class Inside:
 
     def __init__(self, own: OwnProcessor, odd_filler: int | None) -> None:
         self.own = own
-        self.n, self.m = own.view("ETN21_N", "u16"), own.view("ETN21_M", "u16")
-        self.initializing, self.restart = own.view("ETN21_Initializing", "u16"), own.view("ETN21_Restart", "u16")
-        self.service_status = own.view("ETN21_Service_Status", "u16")
-        self.error_status = own.view("ETN21_Error_Status", "u16")
+        self.n, self.m = own.view("ETN21_N"), own.view("ETN21_M")
+        self.initializing, self.restart = own.view("ETN21_Initializing"), own.view("ETN21_Restart")
+        self.service_status = own.view("ETN21_Service_Status")
+        self.error_status = own.view("ETN21_Error_Status")
         self.seen, self.reported = numbers(self.n)
         """As they were when the last refresh ended."""
-        self.wake = own.view("ETN21_Wake", "i64")
+        self.wake = own.view("ETN21_Wake")
         self.mail = Mail(own, odd_filler)
         self.faults = Faults(own)
 
@@ -56,14 +56,14 @@ class Inside:
 
     def know(self, lengths: dict[int, int]) -> None:
         """How many words the data areas have, by area code."""
-        table = self.own.view("ETN21_Lengths", "u32")
-        for number in range(len(table)):
-            table[number] = lengths.get(at.FIRST_AREA_CODE + number, 0)
+        table, (first, count, _) = self.own.view("ETN21_Lengths"), self.own.contract.array("ETN21_Lengths")
+        for number in range(count):
+            table[number] = lengths.get(first + number, 0)
 
     def reset(self) -> None:
         """The next run is a power-on."""
         self.mail.forget()
-        self.own.view("ETN21_Reset", "u8")[0] = 1
+        self.own.view("ETN21_Reset")[0] = 1
 
     def run(self, words: Words, now_ns: int) -> bool:
         """The program once, between the two halves of the exchange of words; whether any of them has changed."""

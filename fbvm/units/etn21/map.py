@@ -38,9 +38,6 @@ PARAMETERS_LENGTH = 10
 D_WORDS = 98
 """That the unit exchanges, from m on."""
 
-FIRST_AREA_CODE = 0x80
-"""Of the table of the areas' lengths."""
-
 # --- offsets in a parameter area, W421 6-7-4 p117 --------------------------------------------------------------------
 OPTION_AND_SOCKET, LOCAL_PORT, REMOTE_HOST, REMOTE_PORT, COUNT, DATA_ADDRESS, TIMEOUT, RESPONSE = 0, 1, 2, 4, 5, 6, 8, 9
 
@@ -56,7 +53,6 @@ class Switch(IntEnum):
     SEND = 3
     RECEIVE = 4
     CLOSE = 5
-
 
 
 class TcpState(IntEnum):

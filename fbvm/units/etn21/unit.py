@@ -12,12 +12,12 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any
 
-from fbvm.units.contract import AreaMemory, Exchanged, Moves
+from fbvm.base.areas import NEVER
+from fbvm.units.contract import AreaMemory, Exchanged, ExchangedWords, Moves
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.data import AREA_OF_CODE, lengths
 from fbvm.units.etn21.faults import Fault, Faults
 from fbvm.units.etn21.inside import Inside, power_on
-from fbvm.units.etn21.mail import RING_BYTES
 from fbvm.units.etn21.map import Layout
 from fbvm.units.etn21.names import descriptions, meanings
 from fbvm.units.etn21.words import Words
@@ -26,10 +26,9 @@ from fbvm.wire.link import Event, Request
 __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
 
 TIME_WAIT_NS = 60_000_000_000  # W421 6-9-3 p156
-NEVER_NS = 100_000 * 86_400 * 10**9  # ETN21_NEVER of its program
 TIMINGS = ("exact", "real")
-MOVES = Moves("ETN21_Moved", "ETN21_Moves", RING_BYTES, (
-    "ETN21_Targets", {code - at.FIRST_AREA_CODE: area for code, (area, _) in AREA_OF_CODE.items()}))  # fmt: skip
+MOVES = Moves(count="ETN21_Moved", rows="ETN21_Moves", rings="ETN21_Rings", targets="ETN21_Targets",
+              areas={code: area for code, (area, _) in AREA_OF_CODE.items()})  # fmt: skip
 
 
 class Etn21:
@@ -119,18 +118,20 @@ class Etn21:
         inside = self._processor
         if inside is None:
             return None
-        words = (("CIO", self.layout.n, "ETN21_N", at.CIO_WORDS), ("D", self.layout.m, "ETN21_M", at.D_WORDS),
-                 ("A", at.INITIALIZING, "ETN21_Initializing", 1), ("A", at.RESTART, "ETN21_Restart", 1))  # fmt: skip
-        left = "ETN21_Requested", "ETN21_Behind"
-        return Exchanged(inside.own, words, "ETN21_Posted", "ETN21_Urgent", left, "ETN21_Wake", MOVES)
+        words = (ExchangedWords(area="CIO", first=self.layout.n, variable="ETN21_N"),
+                 ExchangedWords(area="D", first=self.layout.m, variable="ETN21_M"),
+                 ExchangedWords(area="A", first=at.INITIALIZING, variable="ETN21_Initializing"),
+                 ExchangedWords(area="A", first=at.RESTART, variable="ETN21_Restart"))  # fmt: skip
+        return Exchanged(processor=inside.own, words=words, posted="ETN21_Posted", urgent="ETN21_Urgent",
+                         unfinished=("ETN21_Requested", "ETN21_Behind"), wake="ETN21_Wake", moves=MOVES)  # fmt: skip
 
     @property
     def wake_ns(self) -> int:
         """When the unit has something to do by itself."""
         inside = self._processor
         if inside is None:
-            return NEVER_NS
-        return 0 if inside.mail.waits else int(inside.wake[0])
+            return NEVER
+        return 0 if inside.mail.has_events else int(inside.wake[0])
 
     @property
     def link_up(self) -> bool:

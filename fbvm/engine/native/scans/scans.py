@@ -68,7 +68,7 @@ class Series:
         self.units = units
         for unit in units:
             self._expected.append([(view, len(numbers) + at) for view, at in unit.expected(memory)])
-            numbers.extend(unit.row(memory_at))
+            numbers.extend(unit.parameters(memory_at))
         shape = tuple(turn.interval_ns > 0 for turn in turns), clockwork, len(offsets)
         self.numbers_at = numbers.buffer_info()[0]
         self.clock: Clock | None = None
