@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW
@@ -34,11 +35,12 @@ def processor(text: str) -> OwnProcessor:
 
 
 @cache
-def contract(text: str) -> Contract:
+def contract(text: str, libraries: tuple[Path, ...] = ()) -> Contract:
     """What the program `text` (ST) says of its variables and types, for those who run it elsewhere or not at all.
+    `libraries` are folders of libraries beside `fblib/`.
 
     Raises ValueError as `processor` does."""
-    return Contract(_compiled(text))
+    return Contract(_compiled(text, libraries))
 
 
 @cache
@@ -47,13 +49,13 @@ def _first(text: str) -> OwnProcessor:
     return OwnProcessor(contract(text))
 
 
-def _compiled(text: str) -> Image:
+def _compiled(text: str, libraries: tuple[Path, ...]) -> Image:
     sources = [Source("unit.st", text)]
-    name = image_cache.name(sources, [], ())
+    name = image_cache.name(sources, libraries, ())
     known = image_cache.read(name, sources)
     if known:
         return known[0]
-    made = compile_sources(sources, lint=False)
+    made = compile_sources(sources, libraries=libraries, lint=False)
     if made.image is None or len(made.image.tasks) != 1:
         raise ValueError("\n".join(found.render() for found in made.diagnostics) or "one PROGRAM is wanted")
     image_cache.write(name, sources, made.image, [])

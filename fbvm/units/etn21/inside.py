@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fbvm.processor.processor import OwnProcessor, processor
+from fbvm.units.addresses import words_of
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.faults import Faults
 from fbvm.units.etn21.mail import Mail
@@ -16,7 +17,7 @@ def power_on(layout: at.Layout, address: str, *, real: bool, seed: int, time_wai
     own = processor(PROGRAM)
     own.view("ETN21_Unit_Bit")[0] = 1 << layout.bit
     ip = own.view("ETN21_IP")
-    ip[0], ip[1] = at.words_of(address)
+    ip[0], ip[1] = words_of(address)
     own.view("ETN21_Real")[0] = real
     own.view("ETN21_Random")[0] = _scattered(seed)
     own.view("ETN21_Time_Wait")[0] = time_wait_ns

@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 from fbvm.processor.contract import Contract, Packer, Rows
+from fbvm.units.addresses import host_of, words_of
 from fbvm.units.contract import KEEP, MOVE_FIELDS, AreaMemory, Processor
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.codes import code_of
@@ -51,11 +52,11 @@ class EventRow:
 
 
 def _opened(event: Opened, place: int) -> tuple[int, ...]:
-    return event.local_port, *at.words_of(event.remote.host), event.remote.port
+    return event.local_port, *words_of(event.remote.host), event.remote.port
 
 
 def _received(event: Received, place: int) -> tuple[int, ...]:
-    high, low = at.words_of(event.remote.host)
+    high, low = words_of(event.remote.host)
     return high, low, event.remote.port, len(event.data), place
 
 
@@ -91,7 +92,7 @@ MOVE = ("ring", "place", "size", "filler", "data_address[0]", "data_address[1]")
 
 
 def _remote(row: Row) -> Peer:
-    return Peer(at.host_of(row["host[0]"], row["host[1]"]), row["port"])
+    return Peer(host_of(row["host[0]"], row["host[1]"]), row["port"])
 
 
 def _data(row: Row, memory: AreaMemory) -> bytes:

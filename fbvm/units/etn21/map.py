@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import lru_cache
 
 SOCKETS = range(1, 9)
 AREAS = range(1, 9)
@@ -97,15 +96,3 @@ class Layout:
     def status(self, protocol: str, socket: int) -> int:
         """CIO address of a socket's status word."""
         return self.n + (TCP_STATUS if protocol == "TCP" else UDP_STATUS) + socket
-
-
-def host_of(high: int, low: int) -> str:
-    """Dotted address from its two words: C424, 2037 -> "196.36.32.55"."""
-    return f"{high >> 8}.{high & 0xFF}.{low >> 8}.{low & 0xFF}"
-
-
-@lru_cache(1024)
-def words_of(host: str) -> tuple[int, int]:
-    """The two words of a dotted address."""
-    a, b, c, d = (int(part) for part in host.split("."))
-    return a << 8 | b, c << 8 | d

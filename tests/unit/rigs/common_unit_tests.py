@@ -94,6 +94,9 @@ class CommonUnitTests:
         max_examples=times(40), deadline=None, suppress_health_check=[HealthCheck.differing_executors, HealthCheck.too_slow]
     )
 
+    sizes = SIZES
+    """Words of the areas that there are; a unit with a mailbox of its own adds it."""
+
     # --- what a unit's tests say of it -------------------------------------------------------------------------------
 
     def new_unit(self) -> Unit:
