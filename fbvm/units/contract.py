@@ -104,8 +104,8 @@ class Unit(Protocol):
 
     @property
     def wake_ns(self) -> int:
-        """When the unit has something to do by itself: 0 in the next refresh, far away if nothing is timed.  What the
-        program asks for, or a network tells, comes besides."""
+        """When the unit has something to do by itself, in ns of the PLC's time: 0 for the next refresh, NEVER if nothing is
+        timed.  A request of the user's program or an event of the network may come before."""
 
     @property
     def changed_words(self) -> bool:
@@ -143,21 +143,21 @@ class Unit(Protocol):
 
 @runtime_checkable
 class ProcessorUnit(Unit, Protocol):
-    """A unit of which a processor of its own does all that a refresh does, but for what a network has to know.
+    """A unit whose own processor does all of a refresh but what concerns the network.
 
     The machine may copy the words and run the program itself, between `post` and `finish`."""
 
     def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
-        """The first part of `refresh`: posts the events, copies the words in, runs, copies them out.  False if nothing of
-        this was needed; else `finish` comes after the other units have exchanged their words."""
+        """The first part of `refresh`: posts the events, copies the words in, runs the program, copies them out.  Returns False
+        if none of this was needed; else `finish` comes when the other units have exchanged their words."""
 
     def move(self, memory: AreaMemory) -> None:
-        """The second part of `refresh`: has moved what the program left to be moved."""
+        """The second part of `refresh`: stores the bytes that the program left to be moved into the CPU unit's words."""
 
     def post(self, events: Sequence[Event]) -> None:
-        """Events of the network for the next run of its program, behind those that wait already.  If it has left something,
-        `finish` comes before."""
+        """Gives events of the network to the next run of the program, behind those that wait already.  If the program has left
+        requests, `finish` comes first."""
 
     def finish(self) -> list[Request]:
-        """After a run of the program: what the network has to do.  At once if it requested something, else if something is
-        left, at the latest before something is posted."""
+        """The requests that the program has left for the network.  To be called at once after a run that left an urgent one,
+        else, if the run left any, before events are posted again."""

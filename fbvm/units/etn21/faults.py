@@ -26,9 +26,9 @@ class Fault:
 
 
 class Faults(MutableSequence[Fault]):
-    """Those that wait for a request, in order.
+    """The faults that wait for a request, in order: a list whose rows lie in the processor's memory.
 
-    Raises ValueError for more than there is room for (255), and for a code that is no word."""
+    Raises ValueError for more than the program has room for (255), and for a code that is no word."""
 
     def __init__(self, processor: Processor) -> None:
         contract = processor.contract

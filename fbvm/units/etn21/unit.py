@@ -74,7 +74,7 @@ class Etn21:
 
     @property
     def _inside(self) -> Inside:
-        """The processor, which begins now if it has not yet."""
+        """The processor, which is switched on now if it is not yet."""
         inside = self._processor
         if inside is None:
             made = self._made
@@ -108,7 +108,7 @@ class Etn21:
 
     @property
     def watched(self) -> tuple[tuple[str, int], ...]:
-        """Force-close switch, unit status and request switches, restart bit."""
+        """The groups of four words with the force-close switch, with unit status and request switches, with the restart bit."""
         n = self.layout.n
         return ("CIO", n), ("CIO", n + at.SERVICE_STATUS), ("CIO", n + at.SWITCHES), ("A", at.RESTART)
 
@@ -127,7 +127,7 @@ class Etn21:
 
     @property
     def wake_ns(self) -> int:
-        """When the unit has something to do by itself."""
+        """When the unit has something to do by itself, in ns of the PLC's time; 0 for the next refresh."""
         inside = self._processor
         if inside is None:
             return NEVER
@@ -193,7 +193,7 @@ class Etn21:
         return self.finish()
 
     def _look_at(self, memory: AreaMemory) -> Words:
-        """The words of the PLC that the unit is in now."""
+        """Views of the unit's words in the PLC that the unit is in now; the program learns how long that PLC's areas are."""
         words = self._words = Words(self.layout, memory)
         if self._processor:
             self._processor.know(lengths(memory))
@@ -207,12 +207,13 @@ class Etn21:
         return self.finish()
 
     def move(self, memory: AreaMemory) -> None:
-        """Store what receives were handed."""
+        """Stores the bytes that receives were handed in the CPU unit's words, as far as machine code has not done so."""
         if self._processor:
             self._processor.mail.move(memory)
 
     def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
-        """One I/O refresh but for what network and data have to do with it; False if there was nothing to do."""
+        """Posts events, copies the unit's words in, runs the program once, copies them out.  Returns False if none of this was
+        needed, because no switch, no event and no time asks for it."""
         words, inside = self._words, self._processor
         if words is None or words.memory is not memory:
             words = self._look_at(memory)
@@ -229,13 +230,13 @@ class Etn21:
         return True
 
     def _asks(self, words: Words) -> bool:
-        """Does the program want a force-close, or a restart, or anything of a processor that has nothing to do yet?"""
+        """True if the user's program wants a force-close or a restart, or turned a switch ON before the processor was on."""
         if words.n[0] & at.FORCE_CLOSE or words.restart[0] & self._mask:
             return True
         return self._processor is None and words.switches[0] != 0
 
     def _report(self, words: Words) -> bool:
-        """Show n+17 and n+18 as a processor does that has nothing to do; whether they have changed."""
+        """Shows n+17 and n+18 while the processor is not on.  Returns True if they have changed."""
         status = self._service_status, self._error_status
         if (words.n[at.SERVICE_STATUS], words.n[at.ERROR_STATUS]) == status:
             return False
@@ -247,7 +248,7 @@ class Etn21:
         self._inside.mail.post(events)
 
     def finish(self) -> list[Request]:
-        """What the program asked for since the last time, as far as it is the network's affair; the rest is done."""
+        """The requests that the unit's program has left for the network since the last call, in order."""
         if self._processor is None or self._words is None:
             return []
         return self._processor.mail.collect(self._words.memory)

@@ -14,7 +14,7 @@ from fbvm.units.etn21 import codes
 from fbvm.units.etn21.faults import Fault, Faults
 from fbvm.units.etn21.inside import PROGRAM
 from fbvm.units.etn21.mail import Mail, agreed
-from fbvm.units.etn21.map import Switch, TcpState
+from fbvm.units.etn21.map import CIO_WORDS, D_WORDS, Switch, TcpState
 from fbvm.wire.link import Failed, Opened, Peer, Received, Sent
 
 MAIL = "fbvm.units.etn21.mail"
@@ -97,6 +97,7 @@ def test_names_for_charts_are_those_of_the_program() -> None:
     own.enumeration("ETN21_State").require([state.name for state in TcpState], "map")
     assert {switch: own.enumeration("ETN21_Switch")[switch.name] for switch in Switch} == {switch: switch for switch in Switch}
     assert {state: own.enumeration("ETN21_State")[state.name] for state in TcpState} == {state: state for state in TcpState}
+    assert (own.array("ETN21_N")[1], own.array("ETN21_M")[1]) == (CIO_WORDS, D_WORDS)
     used = own.enumeration("ETN21_Code")
     for name in ("NORMAL_END", "TIMED_OUT", "SOCKET_CLOSED", "LOCAL_ADDRESS_ERROR", "CPU_UNIT_ERROR", "PARAMETER_RANGE",
                  "AREA_CODE", "BIT_NUMBER", "OTHER_PROCESSING", "ALREADY_OPEN", "NOT_OPEN", "OTHER_PROTOCOL", "OTHER_SOCKET"):
