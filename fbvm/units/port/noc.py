@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import KW_ONLY, dataclass, field
-from enum import IntEnum, IntFlag
+from enum import IntEnum
 
-from fbvm.units.port.unit import MailboxUnit, Restart, Table
+from fbvm.units.port.unit import MailboxUnit, Restart, Table, Traffic
 
 RESTART_NS = 5_000_000_000
 """How long a restart takes, unless somebody says another time: assumed."""
@@ -45,24 +45,11 @@ class Statistic(IntEnum):
     IP = 36
 
 
-class Board(IntFlag):
-    """Bits of the board status; the type of the module stands from bit 4 on."""
-
-    RUNNING = 1 << 0
-    CONFIGURED = 1 << 1
-    DUPLEX = 1 << 2
-    FAST = 1 << 12
-    LINK = 1 << 15
-
-
+# bits of the board status, and where the type of the module stands in it
+RUNNING, CONFIGURED, DUPLEX, FAST, LINK = 1 << 0, 1 << 1, 1 << 2, 1 << 12, 1 << 15
 TYPE_SHIFT = 4
-
-
-class Service(IntFlag):
-    """Bits of the words that say which services there are."""
-
-    FTP = 1 << 0
-    HTTP = 1 << 1
+# bits of the words that say which services there are
+FTP, HTTP = 1 << 0, 1 << 1
 
 
 def _statistic(word: int) -> str:
@@ -74,17 +61,25 @@ def _status(noc: Noc) -> str:
 
 
 def _board(noc: Noc) -> int:
-    return (Board.FAST | Board.DUPLEX | noc.module_type << TYPE_SHIFT | Board.LINK * noc.link_up
-            | Board.CONFIGURED * noc.configured | Board.RUNNING * (_status(noc) == "ready"))  # fmt: skip
+    running = RUNNING if noc.configured and not noc.is_restarting else 0
+    return (FAST | DUPLEX | noc.module_type << TYPE_SHIFT | (LINK if noc.link_up else 0)
+            | (CONFIGURED if noc.configured else 0) | running)  # fmt: skip
 
 
 def _services(noc: Noc) -> int:
-    return Service.FTP * noc.ftp | Service.HTTP * noc.http
+    return (FTP if noc.ftp else 0) | (HTTP if noc.http else 0)
 
 
 def _mac(noc: Noc) -> tuple[int, ...]:
     octets = re.sub("[:-]", "", noc.mac)
     return tuple(int(octets[first : first + 4], 16) for first in (0, 4, 8))
+
+
+def _received(noc: Noc, traffic: Traffic) -> int:
+    """Counts a refused connection, too, and one that was reset."""
+    if not traffic.errors:
+        return traffic.received
+    return traffic.received + traffic.errors.count("ECONNRESET") + traffic.errors.count("ECONNREFUSED")
 
 
 @dataclass(eq=False)
@@ -124,8 +119,7 @@ class Noc(MailboxUnit):
         },
         shows={"Status": _status, _statistic(Statistic.BOARD): _board},
         counts={
-            _statistic(Statistic.RECEIVER_INTERRUPTS): lambda noc, traffic: traffic.received + sum(
-                error in ("ECONNRESET", "ECONNREFUSED") for error in traffic.errors),
+            _statistic(Statistic.RECEIVER_INTERRUPTS): _received,
             _statistic(Statistic.TRANSMITTER_INTERRUPTS): lambda noc, traffic: traffic.sent,
             _statistic(Statistic.TRANSMIT_TIMEOUTS): lambda noc, traffic: traffic.errors.count("ETIMEDOUT"),
             _statistic(Statistic.TRANSMIT_BUFFER_ERRORS): lambda noc, traffic: traffic.errors.count("ENOBUFS"),
@@ -138,7 +132,7 @@ class Noc(MailboxUnit):
             restores={"Services": _services},
             lasts_ns=lambda noc: noc.restart_ns,
         ),
-        serves=lambda noc: _status(noc) == "ready",
+        serves=lambda noc: noc.configured and not noc.is_restarting,
         errors=ERRNO,
         other_error=ERRNO["EIO"],  # assumed
         refusals=[

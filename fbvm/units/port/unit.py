@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import cache
+from operator import attrgetter
 from pathlib import Path
 from typing import Any, ClassVar, cast
 
@@ -17,6 +19,8 @@ from fbvm.units.port.port import Port
 from fbvm.units.port.words import mailbox
 from fbvm.wire.link import Broken, Close, Connect, Event, Failed, Opened, PeerClosed, Received, Request, Send
 
+INCOMING, OUTGOING, FAILING = {Opened, Received, PeerClosed}, {Connect, Send, Close}, (Failed, Broken)
+"""Events and requests that are traffic, and events that have an error."""
 Values = int | tuple[int, ...]
 """A number for a word, or numbers for several words in a row."""
 Head = Mapping[str, Callable[[Any], Values | str]]
@@ -24,7 +28,7 @@ Head = Mapping[str, Callable[[Any], Values | str]]
 enumeration."""
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Traffic:
     """What passed between a unit and its network in one refresh."""
 
@@ -110,6 +114,7 @@ class MailboxUnit:
         self.own_ip = words_of(self.address)
         self._ready_ns: int | None = None
         """When a restart ends."""
+        self._area, self._serves = table.area, table.serves
         self._mailbox = mailbox(table.block, table.area, table.lines, table.libraries)
         number = table.number(self)
         self._port = Port(number, self._mailbox.lines, lambda error: table.errors.get(error, table.other_error))
@@ -118,10 +123,17 @@ class MailboxUnit:
         self._own_head = slice(first, first + size)
         self._begins, self._shows = self._placed(table.begins), self._placed(table.shows)
         self._counts = [(self._word(name), added) for name, added in table.counts.items()]
+        self._restart_asked = self._word(table.restart.asked) if table.restart else None
+        """The word by which the program asks for a restart."""
+        self._settings = tuple(each.name for each in fields(self) if not each.init)  # type: ignore[arg-type]
+        self._settings_now: Callable[[MailboxUnit], object] = attrgetter(*self._settings or ("address",))
+        """Takes the unit; says how it is set."""
         self._before = b""
         """The unit's head as the last refresh left it."""
-        self._seen: tuple[object, ...] = ()
-        """Mailbox and settings as the last refresh left them."""
+        self._seen = b""
+        """The mailbox as the last refresh left it."""
+        self._seen_settings: object = None
+        """The settings that it knew."""
 
     @property
     def is_restarting(self) -> bool:
@@ -136,18 +148,21 @@ class MailboxUnit:
     @property
     def settings(self) -> dict[str, Any]:
         """What may be set on the unit while it runs, as plain data."""
-        return {each.name: getattr(self, each.name) for each in fields(self) if not each.init}  # type: ignore[arg-type]
+        return {name: getattr(self, name) for name in self._settings}
 
     @settings.setter
     def settings(self, given: dict[str, Any]) -> None:
-        for name in self.settings:
+        for name in self._settings:
             setattr(self, name, bool(given[name]))
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on: the head as the table says, counters 0, connections broken by RST."""
-        words = self._words(memory)
+        try:
+            words = memory.words(self._area)
+        except KeyError:
+            words = None
         requests = self._port.reset(words)
-        self._ready_ns, self._before, self._seen = None, b"", ()
+        self._ready_ns, self._before, self._seen = None, b"", b""
         self.wake_ns = 0 if words else NEVER
         if words:
             for number in range(self._own_head.start, self._own_head.stop):
@@ -157,29 +172,26 @@ class MailboxUnit:
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
         """One I/O refresh: restart, head, connections, counters.  A PLC whose program has no mailbox leaves the unit idle."""
-        words = self._words(memory)
-        if words is None:
+        try:
+            words = memory.words(self._area)
+        except KeyError:
             return []
-        before = (words.tobytes(), *self.settings.values())
-        if not events and before == self._seen and (self._ready_ns is None or now_ns < self._ready_ns):
+        before, settings = words.tobytes(), self._settings_now(self)
+        if not events and before == self._seen and settings == self._seen_settings and (
+                self._ready_ns is None or now_ns < self._ready_ns):
             self.wake_ns, self.changed_words = self._next_ns(), False
             return []
-        self._go_on_with_restart(words, now_ns)
+        if self._ready_ns is not None or self._restart_asked is not None and words[self._restart_asked]:
+            self._go_on_with_restart(words, now_ns)
         self._show(words)
         self._port.take(words, events)
-        requests = self._port.exchange(words) if self.table.serves(self) else self._port.reset(words)
+        requests = self._port.exchange(words) if self._serves(self) else self._port.reset(words)
         self._count(words, events, requests)
-        self._before = words[self._own_head].tobytes()
-        self._seen = (words.tobytes(), *self.settings.values())
+        if self._begins:
+            self._before = words[self._own_head].tobytes()
+        self._seen, self._seen_settings = words.tobytes(), settings
         self.wake_ns, self.changed_words = self._next_ns(), self._seen != before
         return requests
-
-    def _words(self, memory: AreaMemory) -> memoryview | None:
-        """The words of the mailbox, None in a PLC whose program does not use it."""
-        try:
-            return memory.words(self.table.area)
-        except KeyError:
-            return None
 
     def _next_ns(self) -> int:
         """When something happens by itself."""
@@ -215,9 +227,9 @@ class MailboxUnit:
         if not self._counts or not events and not requests:
             return
         traffic = Traffic(
-            sum(isinstance(event, Opened | Received | PeerClosed) for event in events),
-            sum(isinstance(request, Connect | Send | Close) for request in requests),
-            [event.error for event in events if isinstance(event, Failed | Broken)])  # fmt: skip
+            len([event for event in events if type(event) in INCOMING]),
+            len([request for request in requests if type(request) in OUTGOING]),
+            [event.error for event in events if isinstance(event, FAILING)] if events else ())  # fmt: skip
         for word, added in self._counts:
             if more := added(self, traffic):
                 _set_counter(words, word, _counter(words, word) + more)
@@ -237,17 +249,17 @@ class MailboxUnit:
     def _numbered(self, name: str, shown: Callable[[Any], Values | str]) -> Callable[[Any], Values]:
         if not isinstance(shown(self), str):
             return cast(Callable[[Any], Values], shown)
-        known = self._mailbox.enumeration(self._variable(name))
-        return lambda unit: known[str(shown(unit))]
+        number = cache(self._mailbox.enumeration(self._variable(name)).__getitem__)
+        return lambda unit: number(str(shown(unit)))
 
     def _write(self, words: memoryview, placed: Sequence[tuple[int, Callable[[Any], Values]]]) -> None:
         for word, shown in placed:
             value = shown(self)
-            if isinstance(value, int):
-                words[word] = value
+            if isinstance(value, tuple):
+                for number, each in enumerate(value, word):
+                    words[number] = each
             else:
-                for number, each in enumerate(value):
-                    words[word + number] = each
+                words[word] = value
 
 
 def _counter(words: memoryview, word: int) -> int:

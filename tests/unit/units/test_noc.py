@@ -18,7 +18,7 @@ from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopLink, LoopNetwork
 from fbvm.net.peers import Fin, Reset, Say, ScriptedPeer
 from fbvm.units.contract import Unit
-from fbvm.units.port.noc import ERRNO, RESTART_NS, Noc, Service, Statistic
+from fbvm.units.port.noc import ERRNO, FTP, HTTP, RESTART_NS, Noc, Statistic
 from fbvm.wire.link import (
     Broken,
     Close,
@@ -147,7 +147,7 @@ def test_the_head_of_each_slot(rack_slot: int, place: int) -> None:
     rig = Rig(Noc(rack_slot, http=False))
     head = rig.head(place)
     assert (head[noc_words.STATUS], head[noc_words.RACK_SLOT]) == (noc_words.READY, rack_slot)
-    assert head[noc_words.CONFIGURED] == head[noc_words.SERVICES] == Service.FTP
+    assert head[noc_words.CONFIGURED] == head[noc_words.SERVICES] == FTP
     assert head[OWN_IP : OWN_IP + 2].tolist() == [0xC0A8, 0xFA16]
     assert rig.noc.name == f"NOC {rack_slot}"
 
@@ -170,7 +170,7 @@ def test_a_mode_change_clears_the_words_but_not_what_the_module_knows() -> None:
     rig.step()
     assert (rig.head()[noc_words.SERVICES], rig.counter(4)) == (0, 9)
     rig.noc.reset(rig.memory)
-    assert (rig.head()[noc_words.SERVICES], rig.counter(4)) == (Service.FTP | Service.HTTP, 0)
+    assert (rig.head()[noc_words.SERVICES], rig.counter(4)) == (FTP | HTTP, 0)
 
 
 def test_a_plc_without_a_mailbox_leaves_it_idle() -> None:
@@ -367,7 +367,7 @@ def test_a_restart_breaks_connections_and_restores_the_configuration() -> None:
     assert rig.requests == [Close(0, reset=True)]
     assert (rig.head()[noc_words.STATUS], rig.head()[noc_words.RESTART]) == (noc_words.RESTARTING, 0)
     assert (words[LINE.command], words[LINE.state]) == (COMMAND.close, STATE.closed)
-    assert rig.head()[noc_words.SERVICES] == Service.FTP | Service.HTTP
+    assert rig.head()[noc_words.SERVICES] == FTP | HTTP
     assert (rig.counter(Statistic.DRIVER_RESTARTS), rig.counter(Statistic.RECEIVER_INTERRUPTS)) == (1, 0)
     words[LINE.command] = COMMAND.connect
     rig.step(4)
