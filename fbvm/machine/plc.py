@@ -215,7 +215,7 @@ class Plc:
 
     @property
     def due_ns(self) -> int:
-        """When the next scan is worth while, if no network tells anything before: at once if a unit has news for the
+        """When the next scan is worth while, if no network tells anything before: at once if a unit changed words for the
         program, else when a timer of the program, a task's interval or a unit changes something by itself."""
         return min(self._exchange.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
 

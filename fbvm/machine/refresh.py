@@ -33,7 +33,7 @@ class Exchange:
         self.units, self.memory = units, memory
         self.passed = 0
         """How many refreshes were left out since the last one."""
-        self.news = False
+        self.changed_words = False
         """The units changed words in the last refresh, and no scan has come upon it."""
 
     def refresh(self, now_ns: int, journal: Journal | None = None, seen: Callable[[int], None] | None = None) -> bool:
@@ -42,7 +42,7 @@ class Exchange:
         `seen` is told the number of each unit whose words have been exchanged.  True if nobody has anything left to do."""
         if self.passed:
             self.pass_by()
-        memory, news = self.memory, False
+        memory, changed_words = self.memory, False
         asked: list[list[Request] | None] = []
         """What each unit asks for; None if its program is to be asked."""
         for number, attached in enumerate(self.units):
@@ -65,8 +65,8 @@ class Exchange:
                 requests = own.finish()
             if requests:
                 link.submit(requests, now_ns)
-            news = news or unit.news
-        self.news = news
+            changed_words = changed_words or unit.changed_words
+        self.changed_words = changed_words
         return self.is_idle(now_ns)
 
     def pass_by(self) -> None:
@@ -84,7 +84,7 @@ class Exchange:
 
     def wake_ns(self, latest_ns: int) -> int:
         """When the units want another scan: at once if the program has not seen yet what they changed."""
-        return 0 if self.news else self.unit_ns(latest_ns)
+        return 0 if self.changed_words else self.unit_ns(latest_ns)
 
     def unit_ns(self, latest_ns: int) -> int:
         """When a unit changes something by itself, `latest_ns` if none does before."""

@@ -1,9 +1,13 @@
-"""The processor of a unit that has one: a program over a small memory of its own, whatever PLC the unit is in."""
+"""The processor of a unit that has one: runs the unit's program over a small memory of its own.
+
+The program is one PROGRAM in ST and what it names in `fblib/`.  What units and machine exchange with it they find by the
+names of its variables (`fbvm.processor.contract`).  Knows no unit, no network, no PLC."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW
@@ -15,35 +19,43 @@ from fbvm.code.store import cache as image_cache
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.python.engine import PythonEngine
-from fbvm.watch.paths import Place, find_place
+from fbvm.processor.contract import Contract
 
 BUDGET_STATEMENTS = 2_000_000
 """Statements that one execution of the program may take; a program of ours takes far less."""
 TASK = 0
-"""The one task of its program."""
+"""The number of the program's only task."""
 
 
-def processor(text: str, beside_bytes: int = 0) -> OwnProcessor:
-    """A processor with a program of its own, before its first execution; the text is compiled once.
+def processor(text: str) -> OwnProcessor:
+    """A processor with the program `text` (ST), before its first execution; a text is compiled once.
 
-    Beside what the program uses, its memory has so many bytes (whole pages) for what others keep there.  Raises
-    ValueError for a text that is not one PROGRAM and what it needs."""
-    return _first(text, beside_bytes).another()
+    Raises ValueError for a text that does not compile, or that has not exactly one PROGRAM."""
+    return _first(text).another()
 
 
 @cache
-def _first(text: str, beside_bytes: int) -> OwnProcessor:
-    """The one of a program that stays, and with it the code for all others."""
-    return OwnProcessor(_compiled(text), beside_bytes, {})
+def contract(text: str, libraries: tuple[Path, ...] = ()) -> Contract:
+    """What the program `text` (ST) says of its variables and types, for those who run it elsewhere or not at all.
+    `libraries` are folders of libraries beside `fblib/`.
+
+    Raises ValueError as `processor` does."""
+    return Contract(_compiled(text, libraries))
 
 
-def _compiled(text: str) -> Image:
+@cache
+def _first(text: str) -> OwnProcessor:
+    """The first processor of a program: it is kept, and with it the machine code for all others."""
+    return OwnProcessor(contract(text))
+
+
+def _compiled(text: str, libraries: tuple[Path, ...]) -> Image:
     sources = [Source("unit.st", text)]
-    name = image_cache.name(sources, [], ())
+    name = image_cache.name(sources, libraries, ())
     known = image_cache.read(name, sources)
     if known:
         return known[0]
-    made = compile_sources(sources, lint=False)
+    made = compile_sources(sources, libraries=libraries, lint=False)
     if made.image is None or len(made.image.tasks) != 1:
         raise ValueError("\n".join(found.render() for found in made.diagnostics) or "one PROGRAM is wanted")
     image_cache.write(name, sources, made.image, [])
@@ -51,44 +63,32 @@ def _compiled(text: str) -> Image:
 
 
 class OwnProcessor:
-    """A `fbvm.units.contract.Processor`: machine code where that can be had, else Python."""
+    """A `fbvm.units.contract.Processor`: runs its program as machine code if this host can make any, else in Python."""
 
-    def __init__(self, image: Image, beside_bytes: int, places: dict[str, Place]) -> None:
-        self.image = image
-        self._places = places
-        """Where variables lie, as far as somebody has asked; the same for all with this image."""
-        self.beside_at = image.layout.size
-        self.memory = Memory(self.beside_at + beside_bytes, image.layout.areas)
-        self.beside = self.memory.u8[self.beside_at :]
+    def __init__(self, contract: Contract) -> None:
+        image = contract.image
+        self.contract = contract
+        self.memory = Memory(image.layout.size, image.layout.areas)
         for offset, data in image.initial:
             self.memory.u8[offset : offset + len(data)] = data
         self.machine = NativeEngine(image, self.memory) if native.available() else None
-        """What runs it as machine code, if anything does."""
+        """What runs the program as machine code; None if Python does."""
         self._engine = self.machine or PythonEngine(image, self.memory)
         self._system = self.memory.views["i64"]
 
-    def _place(self, variable: str) -> Place:
-        place = self._places.get(variable)
-        if place is None:
-            place = find_place(self.image.symbols, self.memory.areas, variable)
-            if place.hops or place.bit is not None:
-                raise ValueError(f"{variable} does not lie in bytes of its own")
-            self._places[variable] = place
-        return place
+    def view(self, variable: str) -> memoryview:
+        """All values of a variable, writable, in the form that the program declares: an `ARRAY[0..3] OF WORD` as four numbers
+        of 16 bits, a TIME as nanoseconds in 64 bits, structures as bytes.
 
-    def view(self, variable: str, machine: str) -> memoryview:
-        """All of a variable as values of a machine type.  Raises UnknownPlace, and TypeError for what it has no room for."""
-        place, size = self._place(variable), STRUCTS[machine].size
-        if place.offset % size or place.type.size % size:
-            raise TypeError(f"{variable} is no row of {machine}")
-        return self.memory.views[machine][place.offset // size : (place.offset + place.type.size) // size]
-
-    def offset(self, variable: str) -> int:
-        """Where a variable lies in the processor's memory, in bytes.  Raises UnknownPlace."""
-        return self._place(variable).offset
+        Raises UnknownPlace for a name that the program does not have."""
+        place, form = self.contract.place(variable), self.contract.form(variable)
+        size = STRUCTS[form].size
+        return self.memory.views[form][place.offset // size : (place.offset + place.type.size) // size]
 
     def run(self, now_ns: int) -> None:
-        """One execution of the program.  Raises RuntimeError if it traps: it is a program of ours."""
+        """Executes the program once at `now_ns`, the PLC's time in nanoseconds.
+
+        Raises RuntimeError if the program traps: that is a fault of this product, not of a user."""
         system = self._system
         system[NOW // 8], system[DUE // 8], system[BUDGET // 8] = now_ns, NEVER, BUDGET_STATEMENTS
         trap = self._engine.run(TASK)
@@ -96,11 +96,11 @@ class OwnProcessor:
             raise RuntimeError(str(trap))
 
     def another(self) -> OwnProcessor:
-        """Another processor with the same program, before its first execution."""
-        return OwnProcessor(self.image, len(self.beside), self._places)
+        """Another processor with the same program and a memory of its own, before its first execution."""
+        return OwnProcessor(self.contract)
 
     def copy(self) -> OwnProcessor:
-        """Another processor in the same state."""
+        """Another processor with the same program, and a memory of its own with the same contents."""
         other = self.another()
         other.memory.restore(self.memory.snapshot())
         return other

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterable, Mapping
 
 from fbvm.units.contract import Unit
 from fbvm.units.etn21.unit import Etn21
-from fbvm.units.port import noc_map, tianxing
 from fbvm.units.port.noc import Noc
 from fbvm.units.port.tianxing import Tianxing
 
@@ -19,7 +18,7 @@ KINDS: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "Tianxing": ("Tianxing", {"model": "model"}),
 }  # fmt: skip
 """What a project calls a unit: the class, and the arguments by the keys that are written for them."""
-BRINGERS: Mapping[str, Callable[[], Unit]] = {noc_map.AREA: Noc, tianxing.AREA: Tianxing}
+BRINGERS: Mapping[str, Callable[[], Unit]] = {unit.table.area: unit for unit in (Noc, Tianxing)}
 """What makes the unit that brings a mailbox, by the mailbox's name."""
 ETN21_ADDRESS = "192.168.250.21"
 

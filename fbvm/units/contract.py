@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
+from fbvm.processor.contract import Contract
 from fbvm.wire.link import Event, Request
 
 
@@ -23,57 +24,72 @@ class Processor(Protocol):
 
     @property
     def machine(self) -> Any:
-        """What runs it as machine code (a `NativeEngine`), or None."""
+        """What runs the program as machine code (a `NativeEngine`); None if Python does."""
 
     @property
-    def beside(self) -> memoryview:
-        """Bytes of its memory that its program does not use."""
+    def contract(self) -> Contract:
+        """Where the program's variables lie in that memory, and what they are."""
 
-    @property
-    def beside_at(self) -> int:
-        """Where these begin, in bytes."""
-
-    def view(self, variable: str, machine: str) -> memoryview:
-        """A global variable of the program as a writable memoryview of a machine type (u8, u16, i64 ...)."""
-
-    def offset(self, variable: str) -> int:
-        """Where the variable lies in that memory, in bytes."""
+    def view(self, variable: str) -> memoryview:
+        """All values of a global variable, writable, in the form that the program declares; structures as bytes."""
 
     def run(self, now_ns: int) -> None:
-        """One execution of the program."""
+        """Executes the program once at `now_ns`, the PLC's time in nanoseconds."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
+class ExchangedWords:
+    """Words of the CPU unit that are copied into a variable of a unit's program before it runs, and back behind it."""
+
+    area: str
+    """Of the CPU unit's memory: "CIO", "D", "A" ..."""
+    first: int
+    """Number of the first word in that area."""
+    variable: str
+    """Its size says how many words there are."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Moves:
-    """Blocks of bytes that a processor leaves to be moved into the CPU unit's memory, the high byte of a word first."""
+    """Blocks of received bytes that a program leaves to be moved from its rings into the CPU unit's memory.
+
+    A ring is an array of bytes, a power of two, in which bytes follow one another round and round.  Bytes go into words the
+    high byte first."""
 
     count: str
-    """UDINT variable: how many there are; whoever has moved them sets it 0."""
+    """UDINT variable: how many blocks there are.  Whoever has moved them sets it to 0."""
     rows: str
-    """Variable with a row for each, in 32 bits: offset of the first word in the CPU unit's memory, offset of a ring in the
-    processor's, place of the first byte in it; in 16 bits: how many bytes, the low byte beside an odd last one (above 255:
-    what is there stays), and two words that only the unit knows."""
-    ring_bytes: int
-    """Places in a ring begin again after so many, a power of two."""
-    targets: tuple[str, Mapping[int, str]]
-    """Variable that wants to know the offsets of areas in the CPU unit's memory, and which it wants by index."""
+    """Array of structures, a row for each block, with the integer fields that `MOVE_FIELDS` names."""
+    rings: str
+    """Array of rings."""
+    targets: str
+    """Array of UDINT, by the subscripts of `areas`: the program is told in it at which byte an area begins."""
+    areas: Mapping[int, str]
+    """Which areas the program wants to know of."""
 
 
-@dataclass(frozen=True)
+MOVE_FIELDS = ("target", "ring", "place", "size", "filler")
+"""What a row of `Moves.rows` says to machine code: at which byte of the CPU unit's memory the block's first word lies;
+the subscript of the ring; the number of the block's first byte, which counts on from round to round; how many bytes the
+block has; the low byte beside an odd last byte, or `KEEP`.  Other fields are the unit's own."""
+KEEP = 256
+"""A filler that is no byte: what is beside an odd last byte stays."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Exchanged:
-    """Words that a unit's processor exchanges with the CPU unit in each refresh, and where it says what it wants."""
+    """What a unit's processor exchanges with the CPU unit in each refresh, by the names of its program's variables."""
 
     processor: Processor
-    words: tuple[tuple[str, int, str, int], ...]
-    """Area, first word, variable of the processor's program, how many words."""
+    words: tuple[ExchangedWords, ...]
     posted: str
-    """UDINT variable: how many events of the network wait for the program, which sets it 0 when it took them."""
-    requested: str
-    """UDINT variable: how many requests that cannot wait for the end of a burst it has left."""
-    left: tuple[str, ...]
+    """UDINT variable: how many events of the network wait for the program, which sets it to 0 when it has taken them."""
+    urgent: str
+    """UDINT variable: how many requests the program has left that cannot wait for the end of a burst."""
+    unfinished: tuple[str, ...]
     """UDINT variables: if all are 0 after a run, `finish` has nothing to do."""
     wake: str
-    """64-bit variable: time in ns (of the PLC) from which on the program wants to run although nothing changed."""
+    """TIME or LTIME variable: from when on the program wants to run although nothing changed, in the PLC's time."""
     moves: Moves | None = None
 
 
@@ -88,11 +104,11 @@ class Unit(Protocol):
 
     @property
     def wake_ns(self) -> int:
-        """When the unit has something to do by itself: 0 in the next refresh, far away if nothing is timed.  What the
-        program asks for, or a network tells, comes besides."""
+        """When the unit has something to do by itself, in ns of the PLC's time: 0 for the next refresh, NEVER if nothing is
+        timed.  A request of the user's program or an event of the network may come before."""
 
     @property
-    def news(self) -> bool:
+    def changed_words(self) -> bool:
         """True if the last refresh changed words, so that the program should look at them soon."""
 
     @property
@@ -127,21 +143,21 @@ class Unit(Protocol):
 
 @runtime_checkable
 class ProcessorUnit(Unit, Protocol):
-    """A unit of which a processor of its own does all that a refresh does, but for what a network has to know.
+    """A unit whose own processor does all of a refresh but what concerns the network.
 
     The machine may copy the words and run the program itself, between `post` and `finish`."""
 
     def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
-        """The first part of `refresh`: posts the events, copies the words in, runs, copies them out.  False if nothing of
-        this was needed; else `finish` comes after the other units have exchanged their words."""
+        """The first part of `refresh`: posts the events, copies the words in, runs the program, copies them out.  Returns False
+        if none of this was needed; else `finish` comes when the other units have exchanged their words."""
 
     def move(self, memory: AreaMemory) -> None:
-        """The second part of `refresh`: has moved what the program left to be moved."""
+        """The second part of `refresh`: stores the bytes that the program left to be moved into the CPU unit's words."""
 
     def post(self, events: Sequence[Event]) -> None:
-        """Events of the network for the next run of its program, behind those that wait already.  If it has left something,
-        `finish` comes before."""
+        """Gives events of the network to the next run of the program, behind those that wait already.  If the program has left
+        requests, `finish` comes first."""
 
     def finish(self) -> list[Request]:
-        """After a run of the program: what the network has to do.  At once if it requested something, else if something is
-        left, at the latest before something is posted."""
+        """The requests that the program has left for the network.  To be called at once after a run that left an urgent one,
+        else, if the run left any, before events are posted again."""

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from functools import cache
 
+import noc_words
+
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer, Station
 from fbvm.record.draw.chart import chart
-from fbvm.units.port import noc_map
 from fbvm.units.port.noc import Noc
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus_server import ModbusServer
@@ -157,7 +158,7 @@ class Rig:
 
     def module(self, word: int, place: int = 7) -> int:
         """A word of the head of a module."""
-        return self.plc.memory.words(noc_map.AREA)[place * noc_map.HEAD_WORDS + word]
+        return self.plc.memory.words(noc_words.AREA)[place * noc_words.HEAD_WORDS + word]
 
     def heard(self) -> list[str]:
         """The frames that the peer was sent."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 
+import noc_words
 import pytest
 from mstr_rig import SERVER_IP, Rig
 
 from fbvm.base.data import data_folder
 from fbvm.net.peers import Say, ScriptedPeer
 from fbvm.record.draw.chart import chart
-from fbvm.units.port import noc_map
 
 READ = (2, 0, 3, 1, 0x0700, *SERVER_IP)
 WRITE = (1, 0, 3, 1, 0x0700, *SERVER_IP)
@@ -249,7 +249,7 @@ def test_a_waiting_block_may_be_aborted_or_give_up() -> None:
 def test_a_module_that_restarts_gives_all_paths_back() -> None:
     rig = many(17)
     rig.scan(2)
-    rig.plc.write(f"NOC{7 * noc_map.HEAD_WORDS + noc_map.REQUEST}", noc_map.RESTART)
+    rig.plc.write(f"NOC{7 * noc_words.HEAD_WORDS + noc_words.RESTART}", 1)
     rig.scan(2)
     assert {rig.outputs(number) for number in range(1, 18)} == {"E"}
     rig.scan(12)

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import noc_words
 import pytest
 from mstr_rig import SERVER, SERVER_IP, Rig
 from rows import each_of, first_quick
@@ -15,8 +16,7 @@ from fbvm.machine.plc import Mode
 from fbvm.net.faults import Fault
 from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS
 from fbvm.net.peers import Action, Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer, Station
-from fbvm.units.port import noc_map
-from fbvm.units.port.noc import Noc
+from fbvm.units.port.noc import ERRNO, Noc, Statistic
 from fbvm.wire.modbus_server import ModbusServer
 
 READ = (2, 0, 3, 1, 0x0700, *SERVER_IP)
@@ -183,7 +183,7 @@ def refused(control: tuple[int, ...], **options: str) -> str:
     rig.scan(5)
     assert rig.databuf(2) == [0xEEEE, 0xDDDD]
     assert rig.peer.received == []
-    assert rig.module(noc_map.STATISTICS + noc_map.TRANSMITTER_INTERRUPTS) == 0
+    assert rig.module(noc_words.STATISTICS + Statistic.TRANSMITTER_INTERRUPTS) == 0
     return code
 
 
@@ -357,7 +357,7 @@ def test_503d_refused() -> None:
     assert Rig(refused=True).operate(*READ) == "503D"
 
 
-@each_of(("errno", "number"), [(name, number) for name, number in noc_map.ERRNO.items()])
+@each_of(("errno", "number"), [(name, number) for name, number in ERRNO.items()])
 def test_50xx_an_open_that_fails(errno: str, number: int) -> None:
     rig = Rig()
     rig.network.faults.append(Fault(error=errno))
@@ -476,5 +476,5 @@ def documented() -> set[str]:
 
 def test_each_code_that_a_test_provokes_is_documented() -> None:
     text = Path(__file__).read_text(encoding="utf-8")
-    provoked = set(re.findall(r'"([0-9A-F]{4})"', text)) | {f"50{number:02X}" for number in noc_map.ERRNO.values()}
+    provoked = set(re.findall(r'"([0-9A-F]{4})"', text)) | {f"50{number:02X}" for number in ERRNO.values()}
     assert provoked - {"0000"} <= documented()

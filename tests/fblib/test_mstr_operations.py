@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import noc_words
 import pytest
 from mstr_rig import SERVER_IP, Rig
 from rows import each_of, first_quick
 
 from fbvm.net.peers import Leave, ModbusPeer, Say
-from fbvm.units.port import noc_map
 from fbvm.units.port.noc import Noc
 from fbvm.wire.link import Peer
 
@@ -209,7 +209,7 @@ def test_a_part_of_the_table(length: int, first: int) -> None:
         rig.plc.write(f"MSTR_Modules[8].Statistics[{number}]", 1000 + number)
     rig.fill([0xEEEE] * 50)
     assert rig.operate(3, 0, length, first, 0x0700) == "0000"
-    table = [rig.module(noc_map.STATISTICS + number) for number in range(38)]
+    table = [rig.module(noc_words.STATISTICS + number) for number in range(38)]
     assert rig.databuf(50) == table[first : first + length] + [0xEEEE] * (50 - length)
 
 
@@ -239,7 +239,7 @@ def test_a_restart_ends_when_the_module_is_ready_again() -> None:
     rig = Rig()
     rig.operate(READ, 0, 1, 1, 0x0700, *SERVER_IP)
     rig.operate(0xFFF0, 0, 1, 1, 0x0700, 0, 0, 0, 0)
-    assert rig.module(noc_map.SERVICES) == 0
+    assert rig.module(noc_words.SERVICES) == 0
     rig.control(10, 0xFFFF, 0, 0, 0x0700)
     rig.set("m1_ENABLE", True)
     assert rig.chart(9, "m1.ACTIVE", "m1.SUCCESS", "m1.ERROR", "m1_CONTROL[2]") == """
@@ -250,7 +250,7 @@ def test_a_restart_ends_when_the_module_is_ready_again() -> None:
     """
     rig.set("m1_ENABLE", False)
     rig.scan(10)
-    assert rig.module(noc_map.SERVICES) == 3
+    assert rig.module(noc_words.SERVICES) == 3
     rig.operate(3, 0, 38, 0, 0x0700)
     assert rig.databuf(38)[16:18] == [2, 0]
     assert rig.operate(READ, 0, 1, 1, 0x0700, *SERVER_IP) == "0000"
@@ -269,17 +269,17 @@ def services(rig: Rig, wanted: int) -> str:
 def test_services_are_turned_off_and_on_again(wanted: int) -> None:
     rig = Rig()
     assert services(rig, wanted) == "0000"
-    assert rig.module(noc_map.SERVICES) == wanted
+    assert rig.module(noc_words.SERVICES) == wanted
     rig.scan(200)
     assert services(rig, BOTH) == "0000"
-    assert rig.module(noc_map.SERVICES) == BOTH
+    assert rig.module(noc_words.SERVICES) == BOTH
     assert rig.peer.received == []
 
 
 def test_services_in_the_state_asked_for() -> None:
     rig = Rig()
     assert services(rig, BOTH) == "4001"
-    assert rig.module(noc_map.SERVICES) == BOTH
+    assert rig.module(noc_words.SERVICES) == BOTH
 
 
 def test_a_second_call_within_2_s_whatever_the_first_one_returned() -> None:
@@ -287,9 +287,9 @@ def test_a_second_call_within_2_s_whatever_the_first_one_returned() -> None:
     for first in (BOTH, 0, 4):
         rig.scan(201)
         services(rig, first)
-        before = rig.module(noc_map.SERVICES)
+        before = rig.module(noc_words.SERVICES)
         assert services(rig, HTTP) == "5068"
-        assert rig.module(noc_map.SERVICES) == before
+        assert rig.module(noc_words.SERVICES) == before
         rig.scan(190)
         assert services(rig, HTTP) == "5068", "the refused call counts, too"
 
@@ -308,7 +308,7 @@ def test_each_module_has_its_own_2_s() -> None:
     rig.plc.attach(Noc(9, "192.168.250.29"), rig.network)
     assert services(rig, 0) == "0000"
     assert rig.operate(0xFFF0, 0, 1, 1, 0x0900, 0, 0, 0, 0) == "0000"
-    assert rig.module(noc_map.SERVICES, 9) == 0
+    assert rig.module(noc_words.SERVICES, 9) == 0
 
 
 @each_of(("configured", "wanted", "expected"), [
@@ -319,7 +319,7 @@ def test_services_that_are_configured_off(configured: int, wanted: int, expected
     """Row by row of the sheet's table, for the pair; only a change of what is configured off is refused."""
     rig = Rig(noc=Noc(ftp=bool(configured & FTP), http=bool(configured & HTTP)))
     assert services(rig, wanted) == expected
-    assert rig.module(noc_map.SERVICES) == (wanted if expected == "0000" else configured)
+    assert rig.module(noc_words.SERVICES) == (wanted if expected == "0000" else configured)
 
 
 @pytest.mark.parametrize("wanted", [0, FTP, HTTP, BOTH])
@@ -336,7 +336,7 @@ def test_any_action_is_refused_by_the_letter(wanted: int) -> None:
 def test_wrong_control_data(wrong: tuple[int, ...]) -> None:
     rig = Rig()
     assert rig.operate(*wrong) == "2004"
-    assert rig.module(noc_map.SERVICES) == BOTH
+    assert rig.module(noc_words.SERVICES) == BOTH
 
 
 def test_the_order_of_its_checks_assumed() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from random import Random
 
+import noc_words
 import pytest
 from depth import times
 from hypothesis import HealthCheck, given, settings
@@ -16,7 +17,6 @@ from stream_client import Client
 from fbvm.base.areas import AREAS
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
-from fbvm.units.port import noc_map
 from fbvm.units.port.noc import Noc
 from fbvm.wire.link import Close, Connect, Peer, Send
 from fbvm.wire.modbus import Adu
@@ -213,7 +213,7 @@ def test_another_protocol_is_passed_over() -> None:
 def test_a_server_of_a_module_that_restarts_comes_back() -> None:
     station = Station()
     client = station.client().connect()
-    station.plc.write(f"NOC{9 * noc_map.HEAD_WORDS + noc_map.REQUEST}", noc_map.RESTART)
+    station.plc.write(f"NOC{9 * noc_words.HEAD_WORDS + noc_words.RESTART}", 1)
     client.step(3)
     assert client.end == "ECONNRESET"
     station.scan(500)
@@ -260,7 +260,7 @@ def test_clearing_remote_statistics() -> None:
     rig.scan(2)
     for _ in range(3):
         assert rig.operate(2, 0, 1, 1, 0x0700, *SERVER_IP) == "0000"
-    head = 9 * noc_map.HEAD_WORDS + noc_map.STATISTICS
+    head = 9 * noc_words.HEAD_WORDS + noc_words.STATISTICS
     assert station.plc.read(f"NOC{head + 4}") == 4
     assert rig.operate(8, 0, 0, 0, 0x07FF, *SERVER_IP) == "0000"
     assert station.plc.read(f"NOC{head + 4}") == 0

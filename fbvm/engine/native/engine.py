@@ -19,7 +19,7 @@ from fbvm.engine.native.emit.writer import Unsupported
 from fbvm.engine.native.entries import Entry, entry
 from fbvm.engine.native.scans.code import NOTHING, Clockwork
 from fbvm.engine.native.scans.scans import NO_LIMIT, Series, Turn
-from fbvm.engine.native.scans.units import Companion
+from fbvm.engine.native.scans.units import UnitExchange, UnitInCode
 from fbvm.engine.stops import PAUSE, STOPPED, Stops
 from fbvm.engine.trap import Trap, trap
 
@@ -78,16 +78,14 @@ class NativeEngine:
         return self.trap_at(point) if point else None
 
     def series(self, turns: Sequence[Turn], clockwork: Clockwork = NOTHING, watched: Sequence[Sequence[int]] = (),
-               companions: Sequence[Companion] = ()) -> Series:  # fmt: skip
-        """Scans with the tasks in this order, which write the clockwork and end when what is watched changes or a
-        companion runs."""
-        return Series(self.memory, self._memory_at, self._context.at, self._entries, turns, clockwork, watched, companions)
+               units: Sequence[UnitInCode] = ()) -> Series:  # fmt: skip
+        """Scans with the tasks in this order, which write the clockwork and end when what is watched changes or the
+        program of a unit runs."""
+        return Series(self.memory, self._memory_at, self._context.at, self._entries, turns, clockwork, watched, units)
 
-    def companion(self, copies: Sequence[tuple[int, int, int]], watched: Sequence[int], posted: int, requested: int,
-                  left: Sequence[int], wake: int, moves: tuple[int, int, int] = (0, 0, 0)) -> Companion:  # fmt: skip
-        """This program, its first task, as a companion of another; see `Companion` for the offsets."""
-        return Companion(self._entries[0].function_at, self._memory_at, self._context.at, self.trap_at, tuple(copies),
-                         tuple(watched), posted, requested, tuple(left), wake, moves)  # fmt: skip
+    def unit_in_code(self, exchange: UnitExchange) -> UnitInCode:
+        """This program, its first task, as that of a unit which exchanges this with a PLC."""
+        return UnitInCode(self._entries[0].function_at, self._memory_at, self._context.at, self.trap_at, exchange)
 
     def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork = NOTHING, *,
                  spend: int = NO_LIMIT) -> tuple[int, Trap | None]:  # fmt: skip

@@ -11,7 +11,7 @@ from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.native.scans.scans import Turn
 from fbvm.engine.trap import Trap
 from fbvm.machine.clock_words import CLOCKWORK
-from fbvm.machine.fast.units_in_code import Accompanied, can_accompany, companions
+from fbvm.machine.fast.units_in_code import WithUnits, can_run_in_code, units_in_code
 from fbvm.machine.refresh import Attached, Exchange
 from fbvm.machine.tasks import Schedule
 from fbvm.net.journal import Journal
@@ -40,9 +40,9 @@ class Express:
         if not turns:
             return
         self._machine, self._known = machine, list(self._exchange.units)
-        found = companions(self._exchange)
+        found = units_in_code(self._exchange)
         if found:
-            self._way = Accompanied(self._exchange, machine, turns, found)
+            self._way = WithUnits(self._exchange, machine, turns, found)
         else:
             self._way = Alone(self._exchange, machine, turns)
 
@@ -65,7 +65,7 @@ class Alone:
     is_open = True
     """Any scan may go this way."""
     is_outdated = False
-    """All units could accompany the program by now."""
+    """All units could run inside machine code by now."""
 
     def __init__(self, exchange: Exchange, machine: NativeEngine, turns: list[Turn]) -> None:
         self._exchange, self._machine = exchange, machine
@@ -80,7 +80,7 @@ class Alone:
         """I/O refresh, and a look whether the next ones may be left out."""
         seen = self._series.expect if self._all_watch else None
         self._idle = self._exchange.refresh(now_ns, journal, seen) and self._all_watch
-        self.is_outdated = can_accompany(self._exchange)
+        self.is_outdated = can_run_in_code(self._exchange)
 
     def once(self, now_ns: int, budget: int) -> Trap | None:
         """One scan."""
@@ -90,7 +90,7 @@ class Alone:
             return self._machine.trap_at(point)
         if self._idle and not series.changed and exchange.is_idle(now_ns):
             exchange.passed += 1
-            exchange.news = False
+            exchange.changed_words = False
         else:
             self.refresh(now_ns)
         return None
@@ -120,7 +120,7 @@ class Alone:
         most = min(most, (exchange.unit_ns(NEVER) - now_ns - 1) // step_ns)
         if not self._idle or most <= 0 or not exchange.is_idle(now_ns):
             return 0, None
-        exchange.news = False
+        exchange.changed_words = False
         done, point = self._series.run(most, now_ns + step_ns, step_ns, budget, spend)
         exchange.passed += done
         if point or self._series.changed:
@@ -132,4 +132,4 @@ class Alone:
         return done, None
 
 
-Way = Alone | Accompanied
+Way = Alone | WithUnits

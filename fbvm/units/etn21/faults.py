@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Iterable, MutableSequence
 from dataclasses import dataclass
 from typing import Any, overload
@@ -10,9 +9,8 @@ from typing import Any, overload
 from fbvm.units.contract import Processor
 from fbvm.units.etn21.map import Switch
 
-ANY_SWITCH, ANY_SOCKET = 255, 65535
-ROW = 3
-"""Words of a fault: code, switch, socket."""
+FIELDS = ("code", "switch", "socket")
+"""Of a row of ETN21_Faults."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,32 +26,37 @@ class Fault:
 
 
 class Faults(MutableSequence[Fault]):
-    """Those that wait for a request, in order.
+    """The faults that wait for a request, in order: a list whose rows lie in the processor's memory.
 
-    Raises ValueError for more than there is room for (255), and for a code that is no word."""
+    Raises ValueError for more than the program has room for (255), and for a code that is no word."""
 
     def __init__(self, processor: Processor) -> None:
-        self._count = processor.view("ETN21_Fault_Count", "u16")
-        self._rows = processor.view("ETN21_Faults", "u16")
+        contract = processor.contract
+        self._count, self._rows = processor.view("ETN21_Fault_Count"), processor.view("ETN21_Faults")
+        row = contract.record("ETN21_Faults")
+        row.require(FIELDS, __name__)
+        self._most, self._size = contract.array("ETN21_Faults")[1:]
+        self._pack, self._read = row.packer(*FIELDS), row.rows(*FIELDS)
+        self._any_switch, self._any_socket = map(contract.constant, ("ETN21_ANY_SWITCH", "ETN21_ANY_SOCKET"))
 
     @property
     def _all(self) -> list[Fault]:
-        rows = self._rows[: ROW * self._count[0]].tolist()
-        return [Fault(code, None if switch == ANY_SWITCH else Switch(switch), None if socket == ANY_SOCKET else socket)
-                for code, switch, socket in zip(rows[0::ROW], rows[1::ROW], rows[2::ROW], strict=True)]  # fmt: skip
+        rows = self._read(self._rows[: self._size * self._count[0]])
+        return [Fault(code, None if switch == self._any_switch else Switch(switch),
+                      None if socket == self._any_socket else socket) for code, switch, socket in rows]  # fmt: skip
 
     def _set(self, faults: list[Fault]) -> None:
-        most = len(self._rows) // ROW
-        if len(faults) > most:
-            raise ValueError(f"an ETN21 has room for {most} faults; {len(faults)} were given")
-        rows = array("H")
+        if len(faults) > self._most:
+            raise ValueError(f"an ETN21 has room for {self._most} faults; {len(faults)} were given")
         for fault in faults:
             if not 0 <= fault.code <= 0xFFFF:
                 raise ValueError(f"response code {fault.code} is not in 0..65535")
-            rows.append(fault.code)
-            rows.append(ANY_SWITCH if fault.switch is None else fault.switch)
-            rows.append(ANY_SOCKET if fault.socket is None else fault.socket)
-        self._rows[: len(rows)] = memoryview(rows)
+        rows = bytearray(self._size * len(faults))
+        for number, fault in enumerate(faults):
+            self._pack(rows, self._size * number, fault.code,
+                       self._any_switch if fault.switch is None else fault.switch,
+                       self._any_socket if fault.socket is None else fault.socket)  # fmt: skip
+        self._rows[: len(rows)] = rows
         self._count[0] = len(faults)
 
     def __len__(self) -> int:

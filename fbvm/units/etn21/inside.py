@@ -1,40 +1,43 @@
-"""What is inside an ETN21: the processor with its program, and where the program keeps what is exchanged with it."""
+"""What is inside an ETN21: the processor, and views of those variables of its program that Python exchanges."""
 
 from __future__ import annotations
 
 from fbvm.processor.processor import OwnProcessor, processor
+from fbvm.units.addresses import words_of
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.faults import Faults
-from fbvm.units.etn21.mail import RING_BYTES, Mail
+from fbvm.units.etn21.mail import Mail
 from fbvm.units.etn21.words import Words, numbers
 
 PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
 
 
 def power_on(layout: at.Layout, address: str, *, real: bool, seed: int, time_wait_ns: int, odd_filler: int | None) -> Inside:
-    """A processor that has just been switched on."""
-    own = processor(PROGRAM, RING_BYTES * len(at.SOCKETS))
-    own.view("ETN21_Unit_Bit", "u16")[0] = 1 << layout.bit
-    ip = own.view("ETN21_IP", "u16")
-    ip[0], ip[1] = at.words_of(address)
-    own.view("ETN21_Real", "u8")[0] = real
-    own.view("ETN21_Random", "u64")[0] = _scattered(seed)
-    own.view("ETN21_Time_Wait", "i64")[0] = time_wait_ns
+    """A processor with an ETN21's program that knows how its unit is made, before its first run.
+
+    `real` turns delays and words out of step on, drawn from `seed`; `time_wait_ns` is how long a local port stays taken."""
+    own = processor(PROGRAM)
+    own.view("ETN21_Unit_Bit")[0] = 1 << layout.bit
+    ip = own.view("ETN21_IP")
+    ip[0], ip[1] = words_of(address)
+    own.view("ETN21_Real")[0] = real
+    own.view("ETN21_Random")[0] = _scattered(seed)
+    own.view("ETN21_Time_Wait")[0] = time_wait_ns
     return Inside(own, odd_filler)
 
 
 class Inside:
-    """Views of a processor's memory, by what they are for."""
+    """The processor of one unit, and views of its memory by what they are for."""
 
     def __init__(self, own: OwnProcessor, odd_filler: int | None) -> None:
         self.own = own
-        self.n, self.m = own.view("ETN21_N", "u16"), own.view("ETN21_M", "u16")
-        self.initializing, self.restart = own.view("ETN21_Initializing", "u16"), own.view("ETN21_Restart", "u16")
-        self.service_status = own.view("ETN21_Service_Status", "u16")
-        self.error_status = own.view("ETN21_Error_Status", "u16")
+        self.n, self.m = own.view("ETN21_N"), own.view("ETN21_M")
+        self.initializing, self.restart = own.view("ETN21_Initializing"), own.view("ETN21_Restart")
+        self.service_status = own.view("ETN21_Service_Status")
+        self.error_status = own.view("ETN21_Error_Status")
         self.seen, self.reported = numbers(self.n)
         """As they were when the last refresh ended."""
-        self.wake = own.view("ETN21_Wake", "i64")
+        self.wake = own.view("ETN21_Wake")
         self.mail = Mail(own, odd_filler)
         self.faults = Faults(own)
 
@@ -45,28 +48,28 @@ class Inside:
         return twin
 
     def begin(self) -> None:
-        """Power-on, before any word has been exchanged."""
+        """Runs the program's power-on, before any word has been exchanged."""
         self.reset()
         self.own.run(0)
 
     def report(self, service_status: int, error_status: int) -> None:
-        """What n+17 and n+18 show from the next refresh on."""
+        """Tells the program what n+17 and n+18 show from the next refresh on."""
         self.service_status[0], self.error_status[0] = service_status, error_status
         self.wake[0] = 0
 
     def know(self, lengths: dict[int, int]) -> None:
-        """How many words the data areas have, by area code."""
-        table = self.own.view("ETN21_Lengths", "u32")
-        for number in range(len(table)):
-            table[number] = lengths.get(at.FIRST_AREA_CODE + number, 0)
+        """Tells the program how many words the data areas have, by area code."""
+        table, (first, count, _) = self.own.view("ETN21_Lengths"), self.own.contract.array("ETN21_Lengths")
+        for number in range(count):
+            table[number] = lengths.get(first + number, 0)
 
     def reset(self) -> None:
-        """The next run is a power-on."""
+        """Makes the next run of the program a power-on."""
         self.mail.forget()
-        self.own.view("ETN21_Reset", "u8")[0] = 1
+        self.own.view("ETN21_Reset")[0] = 1
 
     def run(self, words: Words, now_ns: int) -> bool:
-        """The program once, between the two halves of the exchange of words; whether any of them has changed."""
+        """Copies the unit's words in, runs the program at `now_ns`, copies them out.  Returns True if the run changed any."""
         self.n[:], self.m[:] = words.n, words.m
         self.initializing[:], self.restart[:] = words.initializing, words.restart
         before = self._state()
@@ -76,7 +79,7 @@ class Inside:
         return self._state() != before
 
     def _state(self) -> tuple[bytes, bytes, int, int]:
-        """The words that are exchanged, as the program sees them."""
+        """The exchanged words as they are in the processor's memory."""
         return self.n.tobytes(), self.m.tobytes(), self.initializing[0], self.restart[0]
 
 

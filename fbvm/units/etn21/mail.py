@@ -1,13 +1,18 @@
-"""What an ETN21's processor and the network tell each other, as rows in the processor's memory.
+"""What an ETN21's program and the network tell each other, as rows in the memory of the unit's processor.
 
-The rows are ETN21_Event, ETN21_Request and ETN21_Move of fblib/omron/etn21/ETN21_Memory.st."""
+Rows, their fields and the numbers of what they say are declared in fblib/omron/etn21/ETN21_Memory.st.  This module says by
+their names what an event becomes there, and which request a row is."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from struct import Struct
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
-from fbvm.units.contract import AreaMemory, Processor
+from fbvm.processor.contract import Contract, Packer, Rows
+from fbvm.units.addresses import host_of, words_of
+from fbvm.units.contract import KEEP, MOVE_FIELDS, AreaMemory, Processor
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.codes import code_of
 from fbvm.units.etn21.data import fetch, store
@@ -31,71 +36,143 @@ from fbvm.wire.link import (
     Sent,
 )
 
-TCP_PART = 1024  # sends are cut into these, W343 6-1-7 p108
-EVENT = Struct("<7H2xII")
-"""Kind, channel, error, local port, two words of host, port, size, the place behind the last byte that was received."""
-REQUEST = Struct("<10H")
-"""Kind, channel, option, local port, two words of host, port, two of data address, size."""
-MOVE = Struct("<3I4H")
-"""Target, ring, place, size, filler, two words of data address."""
 COUNTER = 0xFFFF_FFFF
-"""Places begin again after this."""
-KEEP = 256
-"""In place of a filler: what is there stays."""
-RING_BYTES = 0x8000
-"""Of each socket; a power of two."""
-LARGEST = 9016
-"""Bytes that a socket keeps at most, those of datagrams (W343 6-1-9 p111)."""
-OPENED, FAILED, SENT, RECEIVED, PEER_CLOSED, BROKEN, CLOSED = range(1, 8)
-CONNECT, LISTEN, BIND, SEND, SEND_TO, GRANT, CLOSE = range(1, 8)
+"""Places in a ring begin again after this: they are UDINT."""
+Values = Callable[[Any, int], tuple[int, ...]]
+"""Takes an event, and the place behind its bytes in the socket's ring; the values of fields of its row."""
 
 
-def _opened(event: Opened) -> tuple[int, ...]:
-    return OPENED, event.channel, 0, event.local_port, *at.words_of(event.remote.host), event.remote.port, 0
+@dataclass(frozen=True)
+class EventRow:
+    """What an event is in ETN21_Events: its name among the program's ETN21_Told, and what goes into which fields."""
+
+    kind: str
+    fields: tuple[str, ...] = ()
+    values: Values = lambda event, place: ()
 
 
-def _received(event: Received) -> tuple[int, ...]:
-    high, low = at.words_of(event.remote.host)
-    return RECEIVED, event.channel, 0, 0, high, low, event.remote.port, len(event.data)
+def _opened(event: Opened, place: int) -> tuple[int, ...]:
+    return event.local_port, *words_of(event.remote.host), event.remote.port
 
 
-_ROWS: dict[type, Callable[..., tuple[int, ...]]] = {
-    Opened: _opened,
-    Failed: lambda event: (FAILED, event.channel, code_of(event.error), 0, 0, 0, 0, 0),
-    Sent: lambda event: (SENT, event.channel, 0, 0, 0, 0, 0, event.size),
-    Received: _received,
-    PeerClosed: lambda event: (PEER_CLOSED, event.channel, 0, 0, 0, 0, 0, 0),
-    Broken: lambda event: (BROKEN, event.channel, code_of(event.error), 0, 0, 0, 0, 0),
-    Closed: lambda event: (CLOSED, event.channel, 0, 0, 0, 0, 0, 0),
+def _received(event: Received, place: int) -> tuple[int, ...]:
+    high, low = words_of(event.remote.host)
+    return high, low, event.remote.port, len(event.data), place
+
+
+EVENTS: Mapping[type, EventRow] = {
+    Opened: EventRow("opened", ("local_port", "host[0]", "host[1]", "port"), _opened),
+    Failed: EventRow("failed", ("error",), lambda event, place: (code_of(event.error),)),
+    Sent: EventRow("sent", ("size",), lambda event, place: (event.size,)),
+    Received: EventRow("received", ("host[0]", "host[1]", "port", "size", "place"), _received),
+    PeerClosed: EventRow("peer_closed"),
+    Broken: EventRow("broken", ("error",), lambda event, place: (code_of(event.error),)),
+    Closed: EventRow("closed"),
 }
-"""An event as a row."""
+NOTHING = "nothing"
+"""The kind of a row that says nothing."""
+EVERY_EVENT = ("kind", "channel")
+"""Fields that each event fills; those that it does not name are 0."""
+REQUEST_FIELDS = ("kind", "channel", "option", "local_port", "host[0]", "host[1]", "port", "data_address[0]", "data_address[1]",
+                  "size")  # fmt: skip
+"""Of a row of ETN21_Requests, in the order in which `Mail.collect` takes them."""
+Row = Mapping[str, int]
+RARE_REQUESTS: Mapping[str, Callable[[Row, AreaMemory], Request]] = {
+    "connect": lambda row, memory: Connect(row["channel"], _remote(row), row["local_port"], bool(row["option"])),
+    "listen": lambda row, memory: Listen(row["channel"], row["local_port"], _remote(row), bool(row["option"])),
+    "bind": lambda row, memory: Bind(row["channel"], row["local_port"]),
+    "send_to": lambda row, memory: SendTo(row["channel"], _remote(row), _data(row, memory)),
+    "close": lambda row, memory: Close(row["channel"], bool(row["option"])),
+}
+"""What is not asked for in each exchange, by its name among the program's ETN21_Asked."""
+SEND, GRANT = "send", "grant"
+"""What `Mail.collect` does itself, because exchanges consist of it."""
+MOVE = ("ring", "place", "size", "filler", "data_address[0]", "data_address[1]")
+"""Fields of a row of ETN21_Moves that `Mail.move` takes; machine code takes `MOVE_FIELDS`."""
+
+
+def _remote(row: Row) -> Peer:
+    return Peer(host_of(row["host[0]"], row["host[1]"]), row["port"])
+
+
+def _data(row: Row, memory: AreaMemory) -> bytes:
+    return fetch(memory, row["data_address[0]"], row["data_address[1]"], row["size"])
+
+
+@dataclass(frozen=True)
+class Agreed:
+    """What the tables of this module are in one program: numbers, sizes in bytes, functions that write and read rows."""
+
+    event_bytes: int
+    most_events: int
+    events: Mapping[type, tuple[Packer, int, Values]]
+    request_bytes: int
+    requests: Rows
+    send: int
+    grant: int
+    rare: Mapping[int, Callable[[Row, AreaMemory], Request]]
+    move_bytes: int
+    moves: Rows
+    ring_bytes: int
+    fresh_bytes: int
+    """Bytes of a ring that may lie behind what the socket has kept: the rest is for a full buffer and, if it is not stored yet,
+    for what the last receive was handed."""
+    part_bytes: int
+    """Sends are cut into parts of so many bytes, W343 6-1-7 p108."""
+
+
+@cache
+def agreed(contract: Contract) -> Agreed:
+    """What this module and a program have in common.  Raises ContractError if they do not name the same rows and kinds."""
+    event, request, move = (contract.record(name) for name in ("ETN21_Events", "ETN21_Requests", "ETN21_Moves"))
+    told, asked = event.enumeration("kind"), request.enumeration("kind")
+    event.require([*EVERY_EVENT, *(name for row in EVENTS.values() for name in row.fields)], __name__)
+    told.require([NOTHING, *(row.kind for row in EVENTS.values())], __name__)
+    request.require(REQUEST_FIELDS, __name__)
+    asked.require([NOTHING, SEND, GRANT, *RARE_REQUESTS], __name__)
+    move.require([*MOVE, *MOVE_FIELDS], __name__)
+    _, _, ring_bytes = contract.array("ETN21_Rings")
+    return Agreed(
+        event_bytes=event.size,
+        most_events=contract.array("ETN21_Events")[1],
+        events={type_: (event.packer(*EVERY_EVENT, *row.fields), told[row.kind], row.values) for type_, row in EVENTS.items()},
+        request_bytes=request.size,
+        requests=request.rows(*REQUEST_FIELDS),
+        send=asked[SEND],
+        grant=asked[GRANT],
+        rare={asked[name]: make for name, make in RARE_REQUESTS.items()},
+        move_bytes=move.size,
+        moves=move.rows(*MOVE),
+        ring_bytes=ring_bytes,
+        fresh_bytes=ring_bytes - 2 * contract.constant("ETN21_UDP_BUFFER"),
+        part_bytes=contract.constant("ETN21_TCP_PART"),
+    )
 
 
 class Mail:
     """The tables of one processor, and the rings in which its sockets have what they received."""
 
     def __init__(self, processor: Processor, odd_filler: int | None) -> None:
-        self._posted = processor.view("ETN21_Posted", "u32")
-        self._behind = processor.view("ETN21_Behind", "u32")
-        self._events = processor.view("ETN21_Events", "u8")
-        self._requested = processor.view("ETN21_Requested", "u32")
-        self._urgent = processor.view("ETN21_Urgent", "u32")
-        self._requests = processor.view("ETN21_Requests", "u8")
-        self._moved = processor.view("ETN21_Moved", "u32")
-        self._moves = processor.view("ETN21_Moves", "u8")
-        self._rings, self._rings_at = processor.beside, processor.beside_at
-        processor.view("ETN21_Rings", "u32")[0] = self._rings_at
-        processor.view("ETN21_Filler", "u16")[0] = KEEP if odd_filler is None else odd_filler
-        self._most = len(self._events) // EVENT.size
+        self._agreed = agreed(processor.contract)
+        self._posted = processor.view("ETN21_Posted")
+        self._behind = processor.view("ETN21_Behind")
+        self._events = processor.view("ETN21_Events")
+        self._requested = processor.view("ETN21_Requested")
+        self._urgent = processor.view("ETN21_Urgent")
+        self._requests = processor.view("ETN21_Requests")
+        self._moved = processor.view("ETN21_Moved")
+        self._moves = processor.view("ETN21_Moves")
+        self._rings = processor.view("ETN21_Rings")
+        processor.view("ETN21_Filler")[0] = KEEP if odd_filler is None else odd_filler
         self._later: list[Event] = []
         """Events for which there is no room now."""
-        self._ends = processor.view("ETN21_Ends", "u32")
+        self._ends = processor.view("ETN21_Ends")
         """Of what each socket has kept: the places behind the last bytes in their rings."""
         self._fresh: dict[int, int] = {}
         """How many bytes of the rows that are posted lie behind these, by socket."""
 
     @property
-    def waits(self) -> bool:
+    def has_events(self) -> bool:
         """True if there are events that the processor has not taken."""
         return self._posted[0] > 0
 
@@ -106,19 +183,20 @@ class Mail:
         self._behind[0] = 0
 
     def take_over(self, other: Mail) -> None:
-        """Go on where this one is; the tables and rings are those of a copy of its processor."""
+        """Go on where another one is, of whose processor this one's is a copy."""
         self._later, self._fresh = [*other._later], {**other._fresh}
 
     def post(self, events: Iterable[Event]) -> None:
-        """Give events to the processor; what does not fit waits for the refresh after, unknown channels are dropped."""
+        """Gives events to the program.  Those that do not fit wait for the refresh after, those of unknown channels are lost."""
         posted: int = self._posted[0]
         if not posted:  # what the program has not kept gives way to the next
             self._fresh.clear()
         if self._later:
             events, self._later = [*self._later, *events], []
             self._behind[0] = 0
+        agreed = self._agreed
         for event in events:
-            if posted == self._most:
+            if posted == agreed.most_events:
                 self._later.append(event)
                 self._behind[0] = 1
                 continue
@@ -129,70 +207,58 @@ class Mail:
                 place = self._keep(channel, event.data)
                 if place < 0:
                     continue
-            EVENT.pack_into(self._events, EVENT.size * posted, *_ROWS[type(event)](event), place)
+            pack, kind, values = agreed.events[type(event)]
+            pack(self._events, agreed.event_bytes * posted, kind, channel, *values(event, place))
             posted += 1
         self._posted[0] = posted
 
     def _keep(self, channel: int, data: bytes) -> int:
-        """Put bytes into the ring of a socket; the place behind them, or -1: they are lost, and are more than it would keep.
-
-        In the ring there may be a full buffer and, if it is not stored yet, what the last receive was handed."""
-        fresh, size = self._fresh.get(channel, 0), len(data)
-        if fresh + size > RING_BYTES - 2 * LARGEST:
+        """Puts bytes into the ring of a socket.  Returns the place behind them, or -1: there were more than the socket would
+        keep, and they are lost."""
+        fresh, size, ring_bytes = self._fresh.get(channel, 0), len(data), self._agreed.ring_bytes
+        if fresh + size > self._agreed.fresh_bytes:
             return -1
         self._fresh[channel] = fresh + size
         place = self._ends[channel - 1] + fresh
-        begin = RING_BYTES * (channel - 1) + (place & RING_BYTES - 1)
-        if (over := (place & RING_BYTES - 1) + size - RING_BYTES) <= 0:
+        begin = ring_bytes * (channel - 1) + (place & ring_bytes - 1)
+        if (over := (place & ring_bytes - 1) + size - ring_bytes) <= 0:
             self._rings[begin : begin + size] = data
         else:
-            ring = RING_BYTES * channel
+            ring = ring_bytes * channel
             self._rings[begin:ring] = data[: size - over]
-            self._rings[ring - RING_BYTES : ring - RING_BYTES + over] = data[size - over :]
+            self._rings[ring - ring_bytes : ring - ring_bytes + over] = data[size - over :]
         return place + size & COUNTER
 
     def collect(self, memory: AreaMemory) -> list[Request]:
-        """After a refresh: what the processor asks of the network."""
+        """After a refresh: what the program asks of the network.  Data to be sent are taken from `memory`, the PLC's."""
         if self._later:
             self.post(())
         requests: list[Request] = []
         if count := self._requested[0]:
             self._requested[0] = self._urgent[0] = 0
-            for row in REQUEST.iter_unpack(self._requests[: REQUEST.size * count]):
+            agreed = self._agreed
+            for row in agreed.requests(self._requests[: agreed.request_bytes * count]):
                 kind, channel, _, _, _, _, _, high, low, size = row
-                if kind == GRANT:
+                if kind == agreed.grant:
                     requests.append(Grant(channel, size))
-                elif kind == SEND:
-                    data = fetch(memory, high, low, size)
-                    if size <= TCP_PART:
+                elif kind == agreed.send:
+                    data, part = fetch(memory, high, low, size), agreed.part_bytes
+                    if size <= part:
                         requests.append(Send(channel, data))
                     else:
-                        requests += [Send(channel, data[at : at + TCP_PART]) for at in range(0, size, TCP_PART)]
+                        requests += [Send(channel, data[first : first + part]) for first in range(0, size, part)]
                 else:
-                    requests.append(_rare(kind, channel, row, memory))
+                    requests.append(agreed.rare[kind](dict(zip(REQUEST_FIELDS, row, strict=True)), memory))
         return requests
 
     def move(self, memory: AreaMemory) -> None:
-        """What was received goes to PLC memory, if that has not been done yet."""
+        """Stores what receives were handed in `memory`, the PLC's, if machine code has not done so yet."""
         if not self._moved[0]:
             return
-        for _, ring, place, size, filler, high, low in MOVE.iter_unpack(self._moves[: MOVE.size * self._moved[0]]):
-            first, begin = ring - self._rings_at, place & RING_BYTES - 1
-            data = bytes(self._rings[first + begin : first + min(begin + size, RING_BYTES)])
-            data += bytes(self._rings[first : first + size - len(data)])
+        agreed, rings = self._agreed, self._rings
+        for ring, place, size, filler, high, low in agreed.moves(self._moves[: agreed.move_bytes * self._moved[0]]):
+            first, begin = agreed.ring_bytes * (ring - 1), place & agreed.ring_bytes - 1
+            data = bytes(rings[first + begin : first + min(begin + size, agreed.ring_bytes)])
+            data += bytes(rings[first : first + size - len(data)])
             store(memory, high, low, data, None if filler == KEEP else filler)
         self._moved[0] = 0
-
-
-def _rare(kind: int, channel: int, row: tuple[int, ...], memory: AreaMemory) -> Request:
-    """What is not asked for in each exchange."""
-    if kind == CLOSE:
-        return Close(channel, bool(row[2]))
-    remote = Peer(at.host_of(row[4], row[5]), row[6])
-    if kind == SEND_TO:
-        return SendTo(channel, remote, fetch(memory, row[7], row[8], row[9]))
-    if kind == CONNECT:
-        return Connect(channel, remote, row[3], bool(row[2]))
-    if kind == LISTEN:
-        return Listen(channel, row[3], remote, bool(row[2]))
-    return Bind(channel, row[3])

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from functools import lru_cache
 
 SOCKETS = range(1, 9)
 AREAS = range(1, 9)
@@ -38,9 +37,6 @@ PARAMETERS_LENGTH = 10
 D_WORDS = 98
 """That the unit exchanges, from m on."""
 
-FIRST_AREA_CODE = 0x80
-"""Of the table of the areas' lengths."""
-
 # --- offsets in a parameter area, W421 6-7-4 p117 --------------------------------------------------------------------
 OPTION_AND_SOCKET, LOCAL_PORT, REMOTE_HOST, REMOTE_PORT, COUNT, DATA_ADDRESS, TIMEOUT, RESPONSE = 0, 1, 2, 4, 5, 6, 8, 9
 
@@ -56,7 +52,6 @@ class Switch(IntEnum):
     SEND = 3
     RECEIVE = 4
     CLOSE = 5
-
 
 
 class TcpState(IntEnum):
@@ -101,15 +96,3 @@ class Layout:
     def status(self, protocol: str, socket: int) -> int:
         """CIO address of a socket's status word."""
         return self.n + (TCP_STATUS if protocol == "TCP" else UDP_STATUS) + socket
-
-
-def host_of(high: int, low: int) -> str:
-    """Dotted address from its two words: C424, 2037 -> "196.36.32.55"."""
-    return f"{high >> 8}.{high & 0xFF}.{low >> 8}.{low & 0xFF}"
-
-
-@lru_cache(1024)
-def words_of(host: str) -> tuple[int, int]:
-    """The two words of a dotted address."""
-    a, b, c, d = (int(part) for part in host.split("."))
-    return a << 8 | b, c << 8 | d

@@ -12,12 +12,12 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import Any
 
-from fbvm.units.contract import AreaMemory, Exchanged, Moves
+from fbvm.base.areas import NEVER
+from fbvm.units.contract import AreaMemory, Exchanged, ExchangedWords, Moves
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.data import AREA_OF_CODE, lengths
 from fbvm.units.etn21.faults import Fault, Faults
 from fbvm.units.etn21.inside import Inside, power_on
-from fbvm.units.etn21.mail import RING_BYTES
 from fbvm.units.etn21.map import Layout
 from fbvm.units.etn21.names import descriptions, meanings
 from fbvm.units.etn21.words import Words
@@ -26,10 +26,9 @@ from fbvm.wire.link import Event, Request
 __all__ = ["TIME_WAIT_NS", "Etn21", "Fault"]
 
 TIME_WAIT_NS = 60_000_000_000  # W421 6-9-3 p156
-NEVER_NS = 100_000 * 86_400 * 10**9  # ETN21_NEVER of its program
 TIMINGS = ("exact", "real")
-MOVES = Moves("ETN21_Moved", "ETN21_Moves", RING_BYTES, (
-    "ETN21_Targets", {code - at.FIRST_AREA_CODE: area for code, (area, _) in AREA_OF_CODE.items()}))  # fmt: skip
+MOVES = Moves(count="ETN21_Moved", rows="ETN21_Moves", rings="ETN21_Rings", targets="ETN21_Targets",
+              areas={code: area for code, (area, _) in AREA_OF_CODE.items()})  # fmt: skip
 
 
 class Etn21:
@@ -67,7 +66,7 @@ class Etn21:
         self._mask = 1 << self.layout.bit
         """Its bit in words for all units."""
         self._service_status, self._error_status = at.LINK_UP, 0
-        self.news = False
+        self.changed_words = False
         self._processor: Inside | None = None
         """Switched on when there is something to do for it: most programs ask nothing of an ETN21."""
         if faults := list(faults):
@@ -75,7 +74,7 @@ class Etn21:
 
     @property
     def _inside(self) -> Inside:
-        """The processor, which begins now if it has not yet."""
+        """The processor, which is switched on now if it is not yet."""
         inside = self._processor
         if inside is None:
             made = self._made
@@ -94,7 +93,7 @@ class Etn21:
         if self._processor:
             twin._processor = self._processor.copy(self._made["odd_filler"])
         twin._service_status, twin._error_status = self._service_status, self._error_status
-        twin._words, twin.news = self._words, self.news
+        twin._words, twin.changed_words = self._words, self.changed_words
         return twin
 
     @property
@@ -109,7 +108,7 @@ class Etn21:
 
     @property
     def watched(self) -> tuple[tuple[str, int], ...]:
-        """Force-close switch, unit status and request switches, restart bit."""
+        """The groups of four words with the force-close switch, with unit status and request switches, with the restart bit."""
         n = self.layout.n
         return ("CIO", n), ("CIO", n + at.SERVICE_STATUS), ("CIO", n + at.SWITCHES), ("A", at.RESTART)
 
@@ -119,18 +118,20 @@ class Etn21:
         inside = self._processor
         if inside is None:
             return None
-        words = (("CIO", self.layout.n, "ETN21_N", at.CIO_WORDS), ("D", self.layout.m, "ETN21_M", at.D_WORDS),
-                 ("A", at.INITIALIZING, "ETN21_Initializing", 1), ("A", at.RESTART, "ETN21_Restart", 1))  # fmt: skip
-        left = "ETN21_Requested", "ETN21_Behind"
-        return Exchanged(inside.own, words, "ETN21_Posted", "ETN21_Urgent", left, "ETN21_Wake", MOVES)
+        words = (ExchangedWords(area="CIO", first=self.layout.n, variable="ETN21_N"),
+                 ExchangedWords(area="D", first=self.layout.m, variable="ETN21_M"),
+                 ExchangedWords(area="A", first=at.INITIALIZING, variable="ETN21_Initializing"),
+                 ExchangedWords(area="A", first=at.RESTART, variable="ETN21_Restart"))  # fmt: skip
+        return Exchanged(processor=inside.own, words=words, posted="ETN21_Posted", urgent="ETN21_Urgent",
+                         unfinished=("ETN21_Requested", "ETN21_Behind"), wake="ETN21_Wake", moves=MOVES)  # fmt: skip
 
     @property
     def wake_ns(self) -> int:
-        """When the unit has something to do by itself."""
+        """When the unit has something to do by itself, in ns of the PLC's time; 0 for the next refresh."""
         inside = self._processor
         if inside is None:
-            return NEVER_NS
-        return 0 if inside.mail.waits else int(inside.wake[0])
+            return NEVER
+        return 0 if inside.mail.has_events else int(inside.wake[0])
 
     @property
     def link_up(self) -> bool:
@@ -188,11 +189,11 @@ class Etn21:
             self._report(words)
             return []
         self._inside.reset()
-        self.news = self._inside.run(words, 0)
+        self.changed_words = self._inside.run(words, 0)
         return self.finish()
 
     def _look_at(self, memory: AreaMemory) -> Words:
-        """The words of the PLC that the unit is in now."""
+        """Views of the unit's words in the PLC that the unit is in now; the program learns how long that PLC's areas are."""
         words = self._words = Words(self.layout, memory)
         if self._processor:
             self._processor.know(lengths(memory))
@@ -206,12 +207,13 @@ class Etn21:
         return self.finish()
 
     def move(self, memory: AreaMemory) -> None:
-        """Store what receives were handed."""
+        """Stores the bytes that receives were handed in the CPU unit's words, as far as machine code has not done so."""
         if self._processor:
             self._processor.mail.move(memory)
 
     def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
-        """One I/O refresh but for what network and data have to do with it; False if there was nothing to do."""
+        """Posts events, copies the unit's words in, runs the program once, copies them out.  Returns False if none of this was
+        needed, because no switch, no event and no time asks for it."""
         words, inside = self._words, self._processor
         if words is None or words.memory is not memory:
             words = self._look_at(memory)
@@ -219,22 +221,22 @@ class Etn21:
             self._inside.mail.post(events)
         elif not self._asks(words):
             if inside is None:
-                self.news = self._report(words)
+                self.changed_words = self._report(words)
                 return False
             if words.switches[0] == inside.seen[0] and words.status[0] == inside.reported[0] and now_ns < self.wake_ns:
-                self.news = False
+                self.changed_words = False
                 return False
-        self.news = self._inside.run(words, now_ns)
+        self.changed_words = self._inside.run(words, now_ns)
         return True
 
     def _asks(self, words: Words) -> bool:
-        """Does the program want a force-close, or a restart, or anything of a processor that has nothing to do yet?"""
+        """True if the user's program wants a force-close or a restart, or turned a switch ON before the processor was on."""
         if words.n[0] & at.FORCE_CLOSE or words.restart[0] & self._mask:
             return True
         return self._processor is None and words.switches[0] != 0
 
     def _report(self, words: Words) -> bool:
-        """Show n+17 and n+18 as a processor does that has nothing to do; whether they have changed."""
+        """Shows n+17 and n+18 while the processor is not on.  Returns True if they have changed."""
         status = self._service_status, self._error_status
         if (words.n[at.SERVICE_STATUS], words.n[at.ERROR_STATUS]) == status:
             return False
@@ -246,7 +248,7 @@ class Etn21:
         self._inside.mail.post(events)
 
     def finish(self) -> list[Request]:
-        """What the program asked for since the last time, as far as it is the network's affair; the rest is done."""
+        """The requests that the unit's program has left for the network since the last call, in order."""
         if self._processor is None or self._words is None:
             return []
         return self._processor.mail.collect(self._words.memory)

@@ -7,14 +7,15 @@ from fbvm.units.etn21 import map as at
 
 
 def numbers(n: memoryview) -> tuple[memoryview, memoryview]:
-    """Of the words from n on: the request switches n+19..n+22 as one number, and n+17..n+20, which begin with what the unit
-    reports of itself."""
+    """Two views of 64 bits into `n`, the unit's CIO words: the request switches n+19..n+22, and n+17..n+20, which begin with
+    the unit's service status and error status."""
     switches, status = n[at.SWITCHES : at.SWITCHES + 4], n[at.SERVICE_STATUS : at.SERVICE_STATUS + 4]
     return switches.cast("B").cast("Q"), status.cast("B").cast("Q")
 
 
 class Words:
-    """What a unit with this layout exchanges with a memory."""
+    """Views of the words that a unit with this layout exchanges with a memory: `n` and `m` from n and from m on, `initializing`
+    and `restart` in A, `switches` and `status` as `numbers` has them."""
 
     __slots__ = ("initializing", "m", "memory", "n", "restart", "status", "switches")
 

@@ -1,12 +1,12 @@
-"""One slot of a mailbox port: follows the program's wish, moves bytes between the network and the words of the slot."""
+"""One line of a mailbox port: follows the program's command, moves bytes between the network and the words of the line."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable
 
-from fbvm.units.port import map as at
-from fbvm.units.port.map import State, Wish
+from fbvm.units.addresses import host_of, words_of
+from fbvm.units.port.words import Lines
 from fbvm.wire.link import (
     Broken,
     Close,
@@ -25,18 +25,21 @@ from fbvm.wire.link import (
     Sent,
 )
 
-_AT_WORK = (State.OPEN, State.ENDED)
-
 
 class Line:
-    """The connection of one slot; `words` are the slot's, and may be given anew at each call."""
+    """The connection of one line with the number `channel`.
 
-    def __init__(self, channel: int, number_of: Callable[[str], int]) -> None:
+    `words`, of each method, are the line's words in the PLC's memory; `number_of` gives the number that the unit has for a
+    POSIX errno name."""
+
+    def __init__(self, channel: int, lines: Lines, number_of: Callable[[str], int]) -> None:
         self.channel = channel
         self._number_of = number_of
+        self._words, self._commands, self._states = lines.words, lines.commands, lines.states
+        self._outgoing_bytes, self._incoming_bytes = lines.outgoing_bytes, lines.incoming_bytes
         self._in_use = False
         """The network knows the channel."""
-        self._closes = 0
+        self._unconfirmed_closes = 0
         """Closes that the network has not confirmed; what it tells until then is about the past."""
         self._is_sending = False
         self._granted = 0
@@ -44,20 +47,21 @@ class Line:
     @property
     def is_idle(self) -> bool:
         """True if nothing is open and nothing is awaited."""
-        return not self._in_use and not self._closes
+        return not self._in_use and not self._unconfirmed_closes
 
     def take(self, event: Event, words: memoryview) -> None:
-        """What the network tells."""
+        """Shows the program what the network tells."""
         if isinstance(event, Closed):
-            self._closes = max(0, self._closes - 1)
+            self._unconfirmed_closes = max(0, self._unconfirmed_closes - 1)
             return
-        if self._closes or not self._in_use:
+        if self._unconfirmed_closes or not self._in_use:
             return
+        at, states = self._words, self._states
         match event:
             case Opened(remote=remote):
-                words[at.STATE] = State.OPEN
-                words[at.PEER_IP], words[at.PEER_IP + 1] = _ip_words(remote.host)
-                words[at.PEER_PORT] = remote.port
+                words[at.state] = states.open
+                words[at.peer_ip], words[at.peer_ip + 1] = words_of(remote.host)
+                words[at.peer_port] = remote.port
             case Failed(service="open", error=error):
                 self._in_use = False
                 self._fail(error, words)
@@ -68,71 +72,76 @@ class Line:
             case Received(data=data):
                 self._store(data, words)
             case PeerClosed():
-                if words[at.STATE] == State.OPEN:
-                    words[at.STATE] = State.ENDED
+                if words[at.state] == states.open:
+                    words[at.state] = states.ended
 
     def exchange(self, words: memoryview, is_mine: bool) -> list[Request]:
-        """What the network has to do for the program's wish."""
-        wish = words[at.WISH] if is_mine else Wish.CLOSED
-        if wish in (Wish.CONNECT, Wish.LISTEN):
-            if self.is_idle and words[at.STATE] not in (*_AT_WORK, State.FAILED):
-                return [self._open(wish, words)]
-            return self._work(words) if words[at.STATE] in _AT_WORK else []
+        """What the network has to do for the program's command; a line that is not the unit's any more is closed."""
+        at, commands, states = self._words, self._commands, self._states
+        command = words[at.command] if is_mine else commands.close
+        if command == commands.connect or command == commands.listen:
+            state = words[at.state]
+            is_at_work = state == states.open or state == states.ended
+            if self.is_idle and not is_at_work and state != states.failed:
+                return [self._open(command, words)]
+            return self._work(words) if is_at_work else []
         if self._in_use:
-            words[at.STATE] = State.CLOSING
-            return self.close(wish == Wish.RESET)
-        if is_mine and not self._closes and words[at.STATE] != State.CLOSED:
-            words[at.STATE] = State.CLOSED
+            words[at.state] = states.closing
+            return self.close(command == commands.reset)
+        if is_mine and not self._unconfirmed_closes and words[at.state] != states.closed:
+            words[at.state] = states.closed
         return []
 
     def close(self, reset: bool) -> list[Request]:
-        """Give the connection up, whatever it does."""
+        """Gives the connection up, whatever it does."""
         self._is_sending = False
         self._granted = 0
         if not self._in_use:
             return []
         self._in_use = False
-        self._closes += 1
+        self._unconfirmed_closes += 1
         return [Close(self.channel, reset)]
 
-    def _open(self, wish: int, words: memoryview) -> Request:
-        remote = Peer(_dotted(words[at.REMOTE_IP], words[at.REMOTE_IP + 1]), words[at.REMOTE_PORT])
-        local_port, keep_alive = words[at.LOCAL_PORT], bool(words[at.OPTIONS] & at.KEEP_ALIVE)
-        words[at.STATE] = State.OPENING
-        words[at.ERROR] = words[at.RECEIVED] = 0
+    def _open(self, command: int, words: memoryview) -> Request:
+        at = self._words
+        remote = Peer(host_of(words[at.remote_ip], words[at.remote_ip + 1]), words[at.remote_port])
+        local_port, keep_alive = words[at.local_port], bool(words[at.keep_alive])
+        words[at.state] = self._states.opening
+        words[at.error] = words[at.received] = 0
         self._in_use = True
-        if wish == Wish.CONNECT:
+        if command == self._commands.connect:
             return Connect(self.channel, remote, local_port, keep_alive)
         return Listen(self.channel, local_port, remote, keep_alive)
 
     def _work(self, words: memoryview) -> list[Request]:
-        requests: list[Request] = []
-        size = min(words[at.SENDING], at.OUTGOING_BYTES)
+        at, requests = self._words, list[Request]()
+        size = min(words[at.sending], self._outgoing_bytes)
         if size and not self._is_sending:
             self._is_sending = True
-            words[at.SENDING] = 0
-            data = _swapped(words[at.OUTGOING : at.OUTGOING + (size + 1) // 2].tobytes())
+            words[at.sending] = 0
+            data = _swapped(words[at.outgoing : at.outgoing + (size + 1) // 2].tobytes())
             requests.append(Send(self.channel, data[:size]))
-        room = max(0, at.INCOMING_BYTES - words[at.RECEIVED])
-        if room != self._granted and words[at.STATE] == State.OPEN:
+        room = max(0, self._incoming_bytes - words[at.received])
+        if room != self._granted and words[at.state] == self._states.open:
             self._granted = room
             requests.append(Grant(self.channel, room))
         return requests
 
     def _store(self, data: bytes, words: memoryview) -> None:
-        """Add bytes behind those that wait; what has no room, because the program moved the mark, is lost."""
-        held = min(words[at.RECEIVED], at.INCOMING_BYTES)
-        data = data[: at.INCOMING_BYTES - held]
+        """Adds bytes behind those that wait; what has no room, because the program moved the mark, is lost."""
+        at = self._words
+        held = min(words[at.received], self._incoming_bytes)
+        data = data[: self._incoming_bytes - held]
         self._granted = max(0, self._granted - len(data))
-        first = at.INCOMING + held // 2
+        first = at.incoming + held // 2
         whole = bytes((words[first] >> 8,)) + data if held % 2 else data
         whole += bytes(len(whole) % 2)
         words[first : first + len(whole) // 2] = memoryview(_swapped(whole)).cast("H")
-        words[at.RECEIVED] = held + len(data)
+        words[at.received] = held + len(data)
 
     def _fail(self, error: str, words: memoryview) -> None:
-        words[at.STATE] = State.FAILED
-        words[at.ERROR] = self._number_of(error)
+        words[self._words.state] = self._states.failed
+        words[self._words.error] = self._number_of(error)
 
 
 def _swapped(data: bytes) -> bytes:
@@ -142,12 +151,3 @@ def _swapped(data: bytes) -> bytes:
     turned = bytearray(data)
     turned[::2], turned[1::2] = data[1::2], data[::2]
     return bytes(turned)
-
-
-def _dotted(high: int, low: int) -> str:
-    return ".".join(str(octet) for octet in (high >> 8, high & 255, low >> 8, low & 255))
-
-
-def _ip_words(host: str) -> tuple[int, int]:
-    octets = [int(part) for part in host.split(".")]
-    return octets[0] << 8 | octets[1], octets[2] << 8 | octets[3]

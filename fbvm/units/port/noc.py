@@ -1,192 +1,145 @@
-"""The Ethernet module of a Schneider PLC, as the MBP_MSTR library meets it: a mailbox with a head for the module and
-slots for its connections.
+"""The Ethernet module of a Schneider Quantum or M340, as the MBP_MSTR library meets it: a table.
 
-Moves bytes, counts what passes, restarts when it is asked to.  It knows neither Modbus nor operations of MBP_MSTR;
-HTTP and FTP are states of services that nobody serves.
-"""
+It counts what passes and restarts when it is asked to.  HTTP and FTP are states of services that nobody serves.  The layout of
+the mailbox is this project's own.  The statistics table, module types and board status are those of the Control Expert help
+(CONTROL parameter of MBP_MSTR for Modbus TCP), the errors those of the module's BSD stack (840 USE 115 00 pp. 25-40), of which
+only the numbers that all its generations share are used."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from typing import Any
+from dataclasses import KW_ONLY, dataclass, field
+from enum import IntEnum
 
-from fbvm.units.contract import AreaMemory
-from fbvm.units.port import noc_map as at
-from fbvm.units.port.port import Port, mailbox
-from fbvm.wire.link import Broken, Close, Connect, Event, Failed, Opened, PeerClosed, Received, Request, Send
+from fbvm.units.port.unit import MailboxUnit, Restart, Table, Traffic
 
-NEVER_NS = 1 << 63
 RESTART_NS = 5_000_000_000
 """How long a restart takes, unless somebody says another time: assumed."""
+RACK_SLOTS = range(17)
+BUILT_IN = 254
+"""What programs call the port that is built into the CPU; it comes behind the slots of the rack."""
+MODULE_TYPES = {
+    0: "NOE 2x1", 1: "ENT", 2: "M1E", 3: "NOE 771 00", 4: "ETY", 5: "CIP", 7: "140 CPU 651 x0", 8: "140 CRP 312 00",
+    10: "140 NOE 771 10", 11: "140 NOE 771 01", 12: "140 NOE 771 11", 14: "140 NOC 78x 00", 17: "M340 CPU",
+    18: "M340 NOE", 19: "BMX NOC 0401", 20: "TSX ETC 101", 21: "140 NOC 771 01",
+}  # fmt: skip
+ERRNO = {
+    "EINTR": 0x04, "EIO": 0x05, "ENXIO": 0x06, "EBADF": 0x09, "ENOMEM": 0x0C, "EACCES": 0x0D, "EEXIST": 0x11,
+    "EINVAL": 0x16, "EPIPE": 0x20, "EADDRINUSE": 0x30, "EADDRNOTAVAIL": 0x31, "ENETUNREACH": 0x33, "ENETRESET": 0x34,
+    "ECONNABORTED": 0x35, "ECONNRESET": 0x36, "ENOBUFS": 0x37, "EISCONN": 0x38, "ENOTCONN": 0x39, "ETIMEDOUT": 0x3C,
+    "ECONNREFUSED": 0x3D, "EHOSTUNREACH": 0x41,
+}  # fmt: skip
 
 
-class Noc:
+class Statistic(IntEnum):
+    """Words of the statistics table.  All between board status and IP are counters of 32 bits, the low word first."""
+
+    MAC = 0
+    BOARD = 3
+    RECEIVER_INTERRUPTS = 4
+    TRANSMITTER_INTERRUPTS = 6
+    TRANSMIT_TIMEOUTS = 8
+    DRIVER_RESTARTS = 16
+    TRANSMIT_BUFFER_ERRORS = 26
+    LOST_CARRIER = 32
+    IP = 36
+
+
+# bits of the board status, and where the type of the module stands in it
+RUNNING, CONFIGURED, DUPLEX, FAST, LINK = 1 << 0, 1 << 1, 1 << 2, 1 << 12, 1 << 15
+TYPE_SHIFT = 4
+# bits of the words that say which services there are
+FTP, HTTP = 1 << 0, 1 << 1
+
+
+def _statistic(word: int) -> str:
+    return f"Statistics[{word}]"
+
+
+def _status(noc: Noc) -> str:
+    return "restarting" if noc.is_restarting else "ready" if noc.configured else "unconfigured"
+
+
+def _board(noc: Noc) -> int:
+    running = RUNNING if noc.configured and not noc.is_restarting else 0
+    return (FAST | DUPLEX | noc.module_type << TYPE_SHIFT | (LINK if noc.link_up else 0)
+            | (CONFIGURED if noc.configured else 0) | running)  # fmt: skip
+
+
+def _services(noc: Noc) -> int:
+    return (FTP if noc.ftp else 0) | (HTTP if noc.http else 0)
+
+
+def _mac(noc: Noc) -> tuple[int, ...]:
+    octets = re.sub("[:-]", "", noc.mac)
+    return tuple(int(octets[first : first + 4], 16) for first in (0, 4, 8))
+
+
+def _received(noc: Noc, traffic: Traffic) -> int:
+    """Counts a refused connection, too, and one that was reset."""
+    if not traffic.errors:
+        return traffic.received
+    return traffic.received + traffic.errors.count("ECONNRESET") + traffic.errors.count("ECONNREFUSED")
+
+
+@dataclass(eq=False)
+class Noc(MailboxUnit):
     """A module in `rack_slot` (0 to 16, or 254 for the port of the CPU itself).
 
-    `module_type` is a number of `noc_map.MODULE_TYPES`; `http` and `ftp` say whether the services are configured.
+    `module_type` is a number of `MODULE_TYPES`; `http` and `ftp` say whether the services are configured.
     Raises ValueError for a wrong argument."""
 
-    def __init__(
-        self,
-        rack_slot: int = 7,
-        address: str = "192.168.250.22",
-        *,
-        mac: str = "00:00:54:00:12:34",
-        module_type: int = 14,
-        http: bool = True,
-        ftp: bool = True,
-        restart_ns: int = RESTART_NS,
-    ) -> None:
-        if module_type not in at.MODULE_TYPES:
-            raise ValueError(f"there is no module of type {module_type}")
-        if not re.fullmatch(r"[0-9A-Fa-f]{2}([:-][0-9A-Fa-f]{2}){5}", mac):
-            raise ValueError(f"{mac!r} is not six bytes in hexadecimal, parted by colons")
-        place = at.place_of(rack_slot)
-        self._rack_slot = rack_slot
-        self.name = f"NOC {rack_slot}"
-        self.address = address
-        self.link_up = True
-        """Whether the board status says that the cable is plugged; what the network does is the network's affair."""
-        self.configured = True
-        """Whether the module has its configuration."""
-        self._made = {"rack_slot": rack_slot, "address": address, "mac": mac, "module_type": module_type,
-                      "http": http, "ftp": ftp, "restart_ns": restart_ns}  # fmt: skip
-        self._head_at = place * at.HEAD_WORDS
-        octets = [int(part) for part in address.split(".")]
-        self._own_ip = (octets[0] << 8 | octets[1], octets[2] << 8 | octets[3])
-        self._mac = [int(part, 16) for part in re.split("[:-]", mac)]
-        self._services = (at.FTP if ftp else 0) | (at.HTTP if http else 0)
-        self._board = at.FAST | at.DUPLEX | module_type << at.TYPE_SHIFT
-        self._restart_ns = restart_ns
-        self._ready_ns: int | None = None
-        self._before = b""
-        """The head as the last refresh left it."""
-        self._seen: tuple[bytes, bool, bool] | None = None
-        """Mailbox and settings as the last refresh left them."""
-        self.wake_ns = NEVER_NS
-        self.news = False
-        self._port = Port(place + 1, at.PLACES * at.HEAD_WORDS, at.SLOTS, at.number_of)
+    rack_slot: int = 7
+    address: str = "192.168.250.22"
+    _: KW_ONLY
+    mac: str = "00:00:54:00:12:34"
+    module_type: int = 14
+    http: bool = True
+    ftp: bool = True
+    restart_ns: int = RESTART_NS
+    link_up: bool = field(default=True, init=False)
+    """Whether the board status says that the cable is plugged; what the network does is the network's affair."""
+    configured: bool = field(default=True, init=False)
+    """Whether the module has its configuration."""
 
-    watched = None
-    """Its mailbox is looked at in each refresh."""
-    exchanged = None
-    """It has no processor of its own."""
-
-    @property
-    def configuration(self) -> dict[str, Any]:
-        """The arguments with which `Noc` makes the same module."""
-        return dict(self._made)
-
-    @property
-    def settings(self) -> dict[str, Any]:
-        """What may be set on the module while it runs, as plain data."""
-        return {"link_up": self.link_up, "configured": self.configured}
-
-    @settings.setter
-    def settings(self, given: dict[str, Any]) -> None:
-        self.link_up, self.configured = bool(given["link_up"]), bool(given["configured"])
-
-    def reset(self, memory: AreaMemory) -> list[Request]:
-        """Power on: counters 0, services as configured, connections broken by RST."""
-        words = mailbox(memory, at.AREA)
-        requests = self._port.reset(words)
-        self._ready_ns, self._before, self._seen = None, b"", None
-        self.wake_ns = 0 if words else NEVER_NS
-        if words:
-            head = self._head(words)
-            head[:] = memoryview(bytes(2 * at.HEAD_WORDS)).cast("H")
-            self._show(head)
-        return requests
-
-    def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
-        """One I/O refresh: connections, counters, restart.  A PLC whose program has no mailbox leaves it idle."""
-        words = mailbox(memory, at.AREA)
-        if words is None:
-            return []
-        before = (words.tobytes(), self.link_up, self.configured)
-        if not events and before == self._seen and (self._ready_ns is None or now_ns < self._ready_ns):
-            self.wake_ns, self.news = self._next_ns(), False
-            return []
-        head = self._head(words)
-        if head[at.REQUEST] & at.RESTART:
-            head[at.REQUEST] &= ~at.RESTART
-            self._restart(head)
-            self._ready_ns = now_ns + self._restart_ns
-        elif self._ready_ns is not None and now_ns >= self._ready_ns:
-            self._ready_ns = None
-        self._show(head)
-        self._port.take(words, events)
-        ready = head[at.STATUS] == at.READY
-        requests = self._port.exchange(words) if ready else self._port.reset(words)
-        self._count(head, events, requests)
-        self._before = head.tobytes()
-        self._seen = (words.tobytes(), self.link_up, self.configured)
-        self.wake_ns, self.news = self._next_ns(), self._seen != before
-        return requests
-
-    def _next_ns(self) -> int:
-        """When something happens by itself."""
-        return NEVER_NS if self._ready_ns is None else self._ready_ns
-
-    def _restart(self, head: memoryview) -> None:
-        """Counters begin anew but for that of restarts (assumed), services are as configured."""
-        restarts = _counter(head, at.DRIVER_RESTARTS)
-        for place in at.COUNTERS:
-            _set_counter(head, place, 0)
-        _set_counter(head, at.DRIVER_RESTARTS, restarts + 1)
-        head[at.SERVICES] = self._services
-
-    def _head(self, words: memoryview) -> memoryview:
-        return words[self._head_at : self._head_at + at.HEAD_WORDS]
-
-    def _show(self, head: memoryview) -> None:
-        """What the head says of the module.  A mode change clears the mailbox, but not what the module knows."""
-        if head[at.STATUS] == at.ABSENT:
-            self._begin(head)
-        status = at.RESTARTING if self._ready_ns is not None else at.READY if self.configured else at.UNCONFIGURED
-        head[at.STATUS] = status
-        board = self._board | (at.LINK if self.link_up else 0)
-        board |= (at.CONFIGURED_BIT if self.configured else 0) | (at.RUNNING if status == at.READY else 0)
-        head[at.STATISTICS + at.BOARD] = board
-
-    def _begin(self, head: memoryview) -> None:
-        """Words that only a mode change or power on makes necessary."""
-        if self._before:
-            head[:] = memoryview(self._before).cast("H")
-            return
-        head[at.RACK_SLOT] = self._rack_slot
-        head[at.CONFIGURED] = head[at.SERVICES] = self._services
-        head[at.OWN_IP], head[at.OWN_IP + 1] = self._own_ip
-        table = head[at.STATISTICS :]
-        for number in range(3):
-            table[at.MAC + number] = self._mac[2 * number] << 8 | self._mac[2 * number + 1]
-        table[at.IP + 1], table[at.IP] = self._own_ip
-
-    def _count(self, head: memoryview, events: Sequence[Event], requests: Sequence[Request]) -> None:
-        """What came over the wire and what goes out, by the counters of the table."""
-        if not events and not requests:
-            return
-        received = sum(isinstance(event, Opened | Received | PeerClosed) for event in events)
-        sent = sum(isinstance(request, Connect | Send | Close) for request in requests)
-        errors = [event.error for event in events if isinstance(event, Failed | Broken)]
-        for place, more in (
-            (at.RECEIVER_INTERRUPTS, received + sum(error in ("ECONNRESET", "ECONNREFUSED") for error in errors)),
-            (at.TRANSMITTER_INTERRUPTS, sent),
-            (at.TRANSMIT_TIMEOUTS, errors.count("ETIMEDOUT")),
-            (at.TRANSMIT_BUFFER_ERRORS, errors.count("ENOBUFS")),
-            (at.LOST_CARRIER, 0 if self.link_up else sent),
-        ):
-            if more:
-                _set_counter(head, place, _counter(head, place) + more)
-
-
-
-def _counter(head: memoryview, place: int) -> int:
-    low, high = head[at.STATISTICS + place], head[at.STATISTICS + place + 1]
-    return low | high << 16
-
-
-def _set_counter(head: memoryview, place: int, value: int) -> None:
-    head[at.STATISTICS + place] = value & 0xFFFF
-    head[at.STATISTICS + place + 1] = value >> 16 & 0xFFFF
+    table = Table(
+        name="NOC {unit.rack_slot}",
+        area="NOC",
+        block="MBP_MSTR",
+        lines="MSTR_Lines",
+        number=lambda noc: 1 + (len(RACK_SLOTS) if noc.rack_slot == BUILT_IN else noc.rack_slot),
+        head="MSTR_Modules[{number}]",
+        begins={
+            "Rack_Slot": lambda noc: noc.rack_slot,
+            "Configured": _services,
+            "Services": _services,
+            "IP": lambda noc: noc.own_ip,
+            _statistic(Statistic.MAC): _mac,
+            _statistic(Statistic.IP): lambda noc: noc.own_ip[::-1],
+        },
+        shows={"Status": _status, _statistic(Statistic.BOARD): _board},
+        counts={
+            _statistic(Statistic.RECEIVER_INTERRUPTS): _received,
+            _statistic(Statistic.TRANSMITTER_INTERRUPTS): lambda noc, traffic: traffic.sent,
+            _statistic(Statistic.TRANSMIT_TIMEOUTS): lambda noc, traffic: traffic.errors.count("ETIMEDOUT"),
+            _statistic(Statistic.TRANSMIT_BUFFER_ERRORS): lambda noc, traffic: traffic.errors.count("ENOBUFS"),
+            _statistic(Statistic.LOST_CARRIER): lambda noc, traffic: 0 if noc.link_up else traffic.sent,
+        },
+        counters=[_statistic(word) for word in range(Statistic.RECEIVER_INTERRUPTS, Statistic.IP, 2)],
+        restart=Restart(
+            asked="Restart",
+            count=_statistic(Statistic.DRIVER_RESTARTS),
+            restores={"Services": _services},
+            lasts_ns=lambda noc: noc.restart_ns,
+        ),
+        serves=lambda noc: noc.configured and not noc.is_restarting,
+        errors=ERRNO,
+        other_error=ERRNO["EIO"],  # assumed
+        refusals=[
+            (lambda noc: noc.module_type not in MODULE_TYPES, "there is no module of type {unit.module_type}"),
+            (lambda noc: not re.fullmatch(r"[0-9A-Fa-f]{2}([:-][0-9A-Fa-f]{2}){5}", noc.mac),
+             "{unit.mac!r} is not six bytes in hexadecimal, parted by colons"),
+            (lambda noc: noc.rack_slot not in (*RACK_SLOTS, BUILT_IN),
+             f"a module is in slot 0 to {RACK_SLOTS[-1]} of the rack, or {BUILT_IN} within the CPU; not {{unit.rack_slot}}"),
+        ],
+    )  # fmt: skip

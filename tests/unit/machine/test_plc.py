@@ -321,7 +321,7 @@ class _Echo:
     """A unit that reports D200 of the refresh in D300 and what came from the network in D301."""
 
     name, address, wake_ns = "Echo 0", "192.168.250.2", 1 << 63
-    news = False
+    changed_words = False
     watched = exchanged = None
 
     def __init__(self) -> None:
@@ -383,7 +383,7 @@ def test_the_next_scan_is_worth_while_when_timer_task_or_unit_say_so(plc: Plc) -
     assert plc.due_ns == 7 * MS < far
     plc.memory.write(DUE, "i64", 5 * MS)
     assert plc.due_ns == 5 * MS
-    echo.news = True
+    echo.changed_words = True
     plc.scan()
     assert plc.due_ns == 0
 

@@ -20,7 +20,7 @@ from fbvm.code.image import Image
 from fbvm.engine.clock import Clock
 from fbvm.engine.native import engine as native
 from fbvm.machine.fast.paths import Alone, Way
-from fbvm.machine.fast.units_in_code import Accompanied
+from fbvm.machine.fast.units_in_code import WithUnits
 from fbvm.machine.plc import Mode
 
 if not native.available():
@@ -140,7 +140,7 @@ def test_scan_by_scan(program: tuple[Any, ...], delays_ns: tuple[int, ...], late
     rigs = four(image(*program), delays_ns, latency_ns)
     for _ in range(120):
         agree(rigs, Plc.scan)
-    assert isinstance(way(rigs[0]), Accompanied) and isinstance(way(rigs[1]), Alone)
+    assert isinstance(way(rigs[0]), WithUnits) and isinstance(way(rigs[1]), Alone)
     assert rigs[0].plc.read("D20001") > 2 and rigs[0].networks[0].log
     assert rigs[0].toys[0].refreshes < rigs[1].toys[0].refreshes
 
@@ -211,7 +211,7 @@ def test_scans_in_one_piece_and_others_take_turns() -> None:
             agree(rigs, lambda plc: setattr(plc, "mode", Mode.RUN))
         if number == 8:
             agree(rigs, lambda plc: plc.units.append(plc.units.pop(0)))
-    assert isinstance(way(rigs[0]), Accompanied)
+    assert isinstance(way(rigs[0]), WithUnits)
 
 
 @pytest.mark.slow
@@ -246,7 +246,7 @@ def test_a_processor_without_machine_code_is_run_from_outside(monkeypatch: pytes
         other.toys[0].connect()
     for scans in (1, 5, 300):
         agree([rig, other], lambda plc, scans=scans: plc.run(scans=scans))  # type: ignore[misc]
-    assert isinstance(way(other), Alone) and isinstance(way(rig), Accompanied)
+    assert isinstance(way(other), Alone) and isinstance(way(rig), WithUnits)
 
 
 # --- bursts -----------------------------------------------------------------------------------------------------------
@@ -295,7 +295,7 @@ def test_machine_code_that_reads_the_clock_comes_back_less_often() -> None:
     for is_told in (True, False):
         rig, points = Rig(image(2), (0,), virtual_time=False, is_told=is_told), list[int]()
         bursts(rig, 1, 16, 1000)
-        series = cast(Accompanied, way(rig))._series
+        series = cast(WithUnits, way(rig))._series
         call, scans, looks = series.call_burst, rig.plc.scans, rig.clock.looks
         series.call_burst = lambda at, call=call, points=points: points.append(call(at)) or points[-1]  # type: ignore[misc]
         bursts(rig, 40, 16, 1000)
@@ -315,7 +315,7 @@ def test_ctrl_c_when_machine_code_comes_back_loses_nothing() -> None:
     for stop in range(1, 12):
         rig, calls = Rig(image(2), (0,), virtual_time=False, is_told=False), iter(range(1, 1000))
         bursts(rig, 5, 16, 1000)
-        series = cast(Accompanied, way(rig))._series
+        series = cast(WithUnits, way(rig))._series
         call = series.call_burst
 
         def interrupted(at: int, call: Any = call, calls: Iterator[int] = calls, stop: int = stop) -> int:

@@ -94,6 +94,9 @@ class CommonUnitTests:
         max_examples=times(40), deadline=None, suppress_health_check=[HealthCheck.differing_executors, HealthCheck.too_slow]
     )
 
+    sizes = SIZES
+    """Words of the areas that there are; a unit with a mailbox of its own adds it."""
+
     # --- what a unit's tests say of it -------------------------------------------------------------------------------
 
     def new_unit(self) -> Unit:
@@ -209,11 +212,11 @@ class CommonUnitTests:
         assert unit.wake_ns > CYCLE_NS << 10
         self.ask(memory)
         told = answer(unit.refresh(memory, [], 2 * CYCLE_NS))
-        assert unit.news  # what it shows of the request
+        assert unit.changed_words  # what it shows of the request
         unit.refresh(memory, [], 3 * CYCLE_NS)
-        assert unit.wake_ns > 3 * CYCLE_NS and not unit.news
+        assert unit.wake_ns > 3 * CYCLE_NS and not unit.changed_words
         unit.refresh(memory, told, 4 * CYCLE_NS)
-        assert unit.news
+        assert unit.changed_words
 
     @pytest.mark.slow
     @inherited
@@ -225,7 +228,7 @@ class CommonUnitTests:
             self.ask(memory)
             before = memory.snapshot()
             unit.refresh(memory, told, now_ns)
-            assert unit.news or not any(memory.differences(before))
+            assert unit.changed_words or not any(memory.differences(before))
             if unit.wake_ns > now_ns:
                 before = memory.snapshot()
                 now_ns = min(unit.wake_ns - 1, now_ns + 10 * CYCLE_NS)
@@ -242,7 +245,7 @@ class CommonUnitTests:
         if is_asked:
             self.ask(memory)
         number = 1
-        while number == 1 or ((unit.news or unit.wake_ns == 0) and number < 20):
+        while number == 1 or ((unit.changed_words or unit.wake_ns == 0) and number < 20):
             unit.refresh(memory, [], number * CYCLE_NS)
             number += 1
         if unit.watched is None:

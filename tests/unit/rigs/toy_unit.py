@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from fbvm.processor.processor import OwnProcessor, processor
-from fbvm.units.contract import AreaMemory, Exchanged
+from fbvm.units.contract import AreaMemory, Exchanged, ExchangedWords
 from fbvm.wire.link import Event, Link, Received, Request, Send, Sent
 
 PROGRAM = """
@@ -61,12 +61,14 @@ class Toy:
         self.is_inside = is_inside
         self._bit, self._delay_ns = 1 << number, delay_ns
         self._cio, self._d = 1500 + 4 * number, 20_000 + 7 * number
-        self.words = (("CIO", self._cio, "Words", 4), ("D", self._d, "Table", 7), ("W", 4, "Shared", 4))
+        places = (("CIO", self._cio, "Words"), ("D", self._d, "Table"), ("W", 4, "Shared"))
+        self.words = tuple(ExchangedWords(area=area, first=first, variable=name) for area, first, name in places)
         self._begin()
 
     @property
     def exchanged(self) -> Exchanged | None:
-        return Exchanged(self.own, self.words, "Posted", "Requested", ("Requested",), "Wake") if self.is_inside else None
+        return Exchanged(processor=self.own, words=self.words, posted="Posted", urgent="Requested", unfinished=("Requested",),
+                         wake="Wake") if self.is_inside else None  # fmt: skip
 
     @property
     def watched(self) -> Sequence[tuple[str, int]]:
@@ -74,9 +76,9 @@ class Toy:
 
     def _begin(self) -> None:
         self.own: OwnProcessor = processor(PROGRAM)
-        self.own.view("Bit", "u16")[0], self.own.view("Delay", "i64")[0] = self._bit, self._delay_ns
+        self.own.view("Bit")[0], self.own.view("Delay")[0] = self._bit, self._delay_ns
         self.connect()
-        self.news, self.refreshes, self._has_run = False, 0, False
+        self.changed_words, self.refreshes, self._has_run = False, 0, False
 
     @property
     def wake_ns(self) -> int:
@@ -84,14 +86,14 @@ class Toy:
 
     def connect(self) -> None:
         """Use the processor that there is."""
-        self._posted, self._happened = self.own.view("Posted", "u32"), self.own.view("Happened", "u32")
-        self._wake, self._requested = self.own.view("Wake", "u64"), self.own.view("Requested", "u32")
-        self._asked, self._news = self.own.view("Asked", "u32"), self.own.view("News", "u8")
+        self._posted, self._happened = self.own.view("Posted"), self.own.view("Happened")
+        self._wake, self._requested = self.own.view("Wake"), self.own.view("Requested")
+        self._asked, self._news = self.own.view("Asked"), self.own.view("News")
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         self._begin()
-        for area, first, _, count in self.words[:2]:
-            memory.words(area)[first : first + count] = memoryview(bytes(2 * count)).cast("H")
+        for plc, own in self._views(memory)[:2]:
+            plc[:] = memoryview(bytes(2 * len(own))).cast("H")
         return []
 
     def post(self, events: Sequence[Event]) -> None:
@@ -109,11 +111,10 @@ class Toy:
     def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
         self.refreshes += 1
         self.post(events)
-        views = [(memory.words(area)[first : first + count], self.own.view(variable, "u16"))
-                 for area, first, variable, count in self.words]  # fmt: skip
+        views = self._views(memory)
         changed = any(plc != own for plc, own in views[::2])
         if not changed and not self._posted[0] and now_ns < self._wake[0] and self._has_run:
-            self.news = False
+            self.changed_words = False
             return False
         self._has_run = True
         for plc, own in views:
@@ -121,8 +122,13 @@ class Toy:
         self.own.run(now_ns)
         for plc, own in views:
             plc[:] = own
-        self.news = bool(self._news[0])
+        self.changed_words = bool(self._news[0])
         return True
+
+    def _views(self, memory: AreaMemory) -> list[tuple[memoryview, memoryview]]:
+        """The exchanged words, in the PLC's memory and in the processor's."""
+        views = [(words, self.own.view(words.variable)) for words in self.words]
+        return [(memory.words(words.area)[words.first : words.first + len(own)], own) for words, own in views]
 
     def finish(self) -> list[Request]:
         return [Send(1, bytes([value & 0xFF])) for value in self._asked[: self._requested[0]]]

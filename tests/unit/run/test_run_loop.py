@@ -87,7 +87,7 @@ class Idle:
     """A unit that does nothing."""
 
     name, address, wake_ns = "Idle 0", "192.168.250.9", 1 << 63
-    news = False
+    changed_words = False
     watched = exchanged = None
 
     def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:

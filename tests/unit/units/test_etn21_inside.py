@@ -9,7 +9,7 @@ import pytest
 from fbvm import Etn21, LoopNetwork, Peer, Plc, compile_text
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
-from fbvm.machine.fast.units_in_code import Accompanied
+from fbvm.machine.fast.units_in_code import WithUnits
 from fbvm.net.peers import Actions, Conversation, Say, Station
 
 SERVER = Peer("192.168.250.7", 7)
@@ -84,7 +84,7 @@ def test_received_bytes_are_where_they_belong(switch: int, area: str, odd_filler
         if scan % 10 == 0:
             assert bytes(inside.memory.words("D")) == bytes(python.memory.words("D"))
             assert bytes(inside.memory.words("W")) == bytes(python.memory.words("W"))
-    assert isinstance(inside._way(), Accompanied)
+    assert isinstance(inside._way(), WithUnits)
     assert inside.read("Main.Exchanges") == python.read("Main.Exchanges")
     assert int(str(inside.read("Main.Exchanges"))) > 150
     assert bytes(inside.memory.words("CIO")) == bytes(python.memory.words("CIO"))

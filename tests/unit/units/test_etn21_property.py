@@ -93,7 +93,7 @@ def test_the_unit_does_the_same_without_machine_code(
         asked = [turn(rig, program, told, force, cycle_ms) for rig in rigs]
         assert asked[0] == asked[1]
         assert rigs[0].memory.snapshot() == rigs[1].memory.snapshot()
-        assert (rigs[0].unit.wake_ns, rigs[0].unit.news) == (rigs[1].unit.wake_ns, rigs[1].unit.news)
+        assert (rigs[0].unit.wake_ns, rigs[0].unit.changed_words) == (rigs[1].unit.wake_ns, rigs[1].unit.changed_words)
 
 
 def turn(

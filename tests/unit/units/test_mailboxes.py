@@ -72,7 +72,7 @@ class Box:
 
     def __init__(self) -> None:
         self.wake_ns = 1 << 63
-        self.news = False
+        self.changed_words = False
         self.configuration: dict[str, Any] = {}
         self.settings: dict[str, Any] = {}
 
@@ -82,7 +82,7 @@ class Box:
         words[0] |= 8
         for slot in range(BOX.head_words, BOX.words, BOX.slot_words):
             words[slot + 1] = 100 + slot if words[slot] else 0
-        self.news = words.tobytes() != before
+        self.changed_words = words.tobytes() != before
         return []
 
     def reset(self, memory: AreaMemory) -> list[Request]:

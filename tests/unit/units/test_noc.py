@@ -5,21 +5,20 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Sequence
 
+import noc_words
 import pytest
 from common_unit_tests import CYCLE_NS, CommonUnitTests, FakeMemory
 from depth import times
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from noc_words import AREA, COMMAND, HEAD_WORDS, LINE, LINES, MODULES, OWN_IP, STATE
 from rows import each_of
 
 from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopLink, LoopNetwork
 from fbvm.net.peers import Fin, Reset, Say, ScriptedPeer
 from fbvm.units.contract import Unit
-from fbvm.units.port import map as port_map
-from fbvm.units.port import noc_map
-from fbvm.units.port.map import State, Wish
-from fbvm.units.port.noc import RESTART_NS, Noc
+from fbvm.units.port.noc import ERRNO, FTP, HTTP, RESTART_NS, Noc, Statistic
 from fbvm.wire.link import (
     Broken,
     Close,
@@ -38,32 +37,32 @@ from fbvm.wire.link import (
 
 OWN = Peer("192.168.250.22", 502)
 SERVER = Peer("192.168.250.2", 502)
-SLOTS_AT = noc_map.PLACES * noc_map.HEAD_WORDS
+SLOTS_AT = MODULES * HEAD_WORDS
 
 
 def slot(memory: FakeMemory, number: int = 0) -> memoryview:
-    start = SLOTS_AT + number * port_map.SLOT_WORDS
-    return memory.words("NOC")[start : start + port_map.SLOT_WORDS]
+    start = SLOTS_AT + number * LINES.size
+    return memory.words("NOC")[start : start + LINES.size]
 
 
-def wish(words: memoryview, what: Wish, remote: Peer = SERVER, local_port: int = 0, place: int = 7) -> None:
+def command(words: memoryview, what: int, remote: Peer = SERVER, local_port: int = 0, place: int = 7) -> None:
     octets = [int(part) for part in remote.host.split(".")]
-    words[port_map.MODULE] = place + 1
-    words[port_map.REMOTE_IP], words[port_map.REMOTE_IP + 1] = octets[0] << 8 | octets[1], octets[2] << 8 | octets[3]
-    words[port_map.REMOTE_PORT], words[port_map.LOCAL_PORT] = remote.port, local_port
-    words[port_map.WISH] = what
+    words[LINE.module] = place + 1
+    words[LINE.remote_ip], words[LINE.remote_ip + 1] = octets[0] << 8 | octets[1], octets[2] << 8 | octets[3]
+    words[LINE.remote_port], words[LINE.local_port] = remote.port, local_port
+    words[LINE.command] = what
 
 
 def say(words: memoryview, data: bytes) -> None:
     padded = data + b"\0"
     for number in range((len(data) + 1) // 2):
-        words[port_map.OUTGOING + number] = int.from_bytes(padded[2 * number : 2 * number + 2], "big")
-    words[port_map.SENDING] = len(data)
+        words[LINE.outgoing + number] = int.from_bytes(padded[2 * number : 2 * number + 2], "big")
+    words[LINE.sending] = len(data)
 
 
 def heard(words: memoryview) -> bytes:
-    size = words[port_map.RECEIVED]
-    data = b"".join(word.to_bytes(2, "big") for word in words[port_map.INCOMING : port_map.INCOMING + (size + 1) // 2])
+    size = words[LINE.received]
+    data = b"".join(word.to_bytes(2, "big") for word in words[LINE.incoming : LINE.incoming + (size + 1) // 2])
     return data[:size]
 
 
@@ -72,19 +71,19 @@ class TestNocIsAUnit(CommonUnitTests):
         return Noc()
 
     def may_write(self) -> set[tuple[str, int]]:
-        head = range(7 * noc_map.HEAD_WORDS, 8 * noc_map.HEAD_WORDS)
-        unit_words = (port_map.WISH, port_map.STATE, port_map.ERROR, port_map.PEER_IP, port_map.PEER_IP + 1,
-                      port_map.PEER_PORT, port_map.SENDING, port_map.RECEIVED)  # fmt: skip
+        head = range(7 * HEAD_WORDS, 8 * HEAD_WORDS)
+        unit_words = (LINE.command, LINE.state, LINE.error, LINE.peer_ip, LINE.peer_ip + 1,
+                      LINE.peer_port, LINE.sending, LINE.received)  # fmt: skip
         return {("NOC", word) for word in head} | {("NOC", SLOTS_AT + word) for word in unit_words}
 
     def data_words(self) -> set[tuple[str, int]]:
-        return {("NOC", SLOTS_AT + word) for word in range(port_map.INCOMING, port_map.SLOT_WORDS)}
+        return {("NOC", SLOTS_AT + word) for word in range(LINE.incoming, LINES.size)}
 
     def ask(self, memory: FakeMemory) -> None:
-        wish(slot(memory), Wish.CONNECT)
+        command(slot(memory), COMMAND.connect)
 
     def is_answered(self, memory: FakeMemory) -> bool:
-        return slot(memory)[port_map.STATE] == State.OPEN
+        return slot(memory)[LINE.state] == STATE.open
 
 
 class Rig:
@@ -106,10 +105,10 @@ class Rig:
             self.link.submit(self.requests, self.now_ns)
 
     def head(self, place: int = 7) -> memoryview:
-        return self.memory.words("NOC")[place * noc_map.HEAD_WORDS : (place + 1) * noc_map.HEAD_WORDS]
+        return self.memory.words("NOC")[place * HEAD_WORDS : (place + 1) * HEAD_WORDS]
 
     def table(self) -> list[int]:
-        return self.head()[noc_map.STATISTICS : noc_map.STATISTICS + noc_map.TABLE_WORDS].tolist()
+        return self.head()[noc_words.STATISTICS : noc_words.STATISTICS + noc_words.TABLE_WORDS].tolist()
 
     def counter(self, place: int) -> int:
         low, high = self.table()[place : place + 2]
@@ -121,8 +120,8 @@ class Rig:
 
 def test_the_library_declares_what_the_unit_brings() -> None:
     written = tomllib.loads((data_folder("fblib") / "schneider" / "mbp_mstr" / "library.toml").read_text())["mailbox"]
-    assert written == {"area": noc_map.AREA, "head": SLOTS_AT, "slots": noc_map.SLOTS, "slot": port_map.SLOT_WORDS}
-    assert len(FakeMemory().words("NOC")) == SLOTS_AT + noc_map.SLOTS * port_map.SLOT_WORDS
+    assert written == {"area": AREA, "head": SLOTS_AT, "slots": LINES.count, "slot": LINES.size}
+    assert len(FakeMemory().words("NOC")) == SLOTS_AT + LINES.count * LINES.size
 
 
 def test_the_table_of_the_sheet() -> None:
@@ -140,16 +139,16 @@ def test_the_board_status_follows_the_settings() -> None:
     rig.noc.settings = {"link_up": False, "configured": False}
     rig.step()
     assert rig.table()[3] == 0x1000 | 21 << 4 | 4
-    assert rig.head()[noc_map.STATUS] == noc_map.UNCONFIGURED
+    assert rig.head()[noc_words.STATUS] == noc_words.UNCONFIGURED
 
 
 @each_of(("rack_slot", "place"), [(0, 0), (7, 7), (16, 16), (254, 17)])
 def test_the_head_of_each_slot(rack_slot: int, place: int) -> None:
     rig = Rig(Noc(rack_slot, http=False))
     head = rig.head(place)
-    assert (head[noc_map.STATUS], head[noc_map.RACK_SLOT]) == (noc_map.READY, rack_slot)
-    assert head[noc_map.CONFIGURED] == head[noc_map.SERVICES] == noc_map.FTP
-    assert head[noc_map.OWN_IP : noc_map.OWN_IP + 2].tolist() == [0xC0A8, 0xFA16]
+    assert (head[noc_words.STATUS], head[noc_words.RACK_SLOT]) == (noc_words.READY, rack_slot)
+    assert head[noc_words.CONFIGURED] == head[noc_words.SERVICES] == FTP
+    assert head[OWN_IP : OWN_IP + 2].tolist() == [0xC0A8, 0xFA16]
     assert rig.noc.name == f"NOC {rack_slot}"
 
 
@@ -164,14 +163,14 @@ def test_wrong_arguments(wrong: dict[str, int | str]) -> None:
 
 def test_a_mode_change_clears_the_words_but_not_what_the_module_knows() -> None:
     rig = Rig()
-    rig.head()[noc_map.SERVICES] = 0
-    rig.head()[noc_map.STATISTICS + 4] = 9
+    rig.head()[noc_words.SERVICES] = 0
+    rig.head()[noc_words.STATISTICS + 4] = 9
     rig.step()
     rig.memory.words("NOC")[:] = memoryview(bytes(2 * 13664)).cast("H")
     rig.step()
-    assert (rig.head()[noc_map.SERVICES], rig.counter(4)) == (0, 9)
+    assert (rig.head()[noc_words.SERVICES], rig.counter(4)) == (0, 9)
     rig.noc.reset(rig.memory)
-    assert (rig.head()[noc_map.SERVICES], rig.counter(4)) == (noc_map.FTP | noc_map.HTTP, 0)
+    assert (rig.head()[noc_words.SERVICES], rig.counter(4)) == (FTP | HTTP, 0)
 
 
 def test_a_plc_without_a_mailbox_leaves_it_idle() -> None:
@@ -192,21 +191,21 @@ def test_connect_send_receive_close() -> None:
     peer = ScriptedPeer([Say(b"worlds")])
     rig.network.place(SERVER, peer)
     words = slot(rig.memory, 31)
-    wish(words, Wish.CONNECT)
+    command(words, COMMAND.connect)
     say(words, b"hello")
     states = []
     for _ in range(4):
         rig.step()
-        states.append(words[port_map.STATE])
-    assert states == [State.OPENING, State.OPEN, State.OPEN, State.OPEN]
+        states.append(words[LINE.state])
+    assert states == [STATE.opening, STATE.open, STATE.open, STATE.open]
     assert peer.received == [b"hello"]
-    assert (words[port_map.SENDING], heard(words)) == (0, b"worlds")
-    assert words[port_map.PEER_IP : port_map.PEER_PORT + 1].tolist() == [0xC0A8, 0xFA02, 502]
-    words[port_map.WISH] = Wish.CLOSED
+    assert (words[LINE.sending], heard(words)) == (0, b"worlds")
+    assert words[LINE.peer_ip : LINE.peer_port + 1].tolist() == [0xC0A8, 0xFA02, 502]
+    words[LINE.command] = COMMAND.close
     rig.step()
-    assert (rig.requests, words[port_map.STATE]) == ([Close(31)], State.CLOSING)
+    assert (rig.requests, words[LINE.state]) == ([Close(31)], STATE.closing)
     rig.step()
-    assert words[port_map.STATE] == State.CLOSED
+    assert words[LINE.state] == STATE.closed
     assert peer.log == ["fin"]
 
 
@@ -216,13 +215,13 @@ def test_what_the_program_leaves_stays_in_the_network() -> None:
     data = bytes(range(256)) * 4
     rig.network.place(SERVER, ScriptedPeer(greeting=[Say(data)]))
     words = slot(rig.memory)
-    wish(words, Wish.CONNECT)
+    command(words, COMMAND.connect)
     rig.step(5)
     assert heard(words) == data[:504]
-    words[port_map.RECEIVED] = 0
+    words[LINE.received] = 0
     rig.step(3)
     assert heard(words) == data[504:1008]
-    words[port_map.RECEIVED] = 3
+    words[LINE.received] = 3
     rig.step(3)
     assert heard(words) == data[504:507] + data[1008:]
 
@@ -231,30 +230,30 @@ def test_the_end_and_the_break_of_a_connection() -> None:
     rig = Rig()
     rig.network.place(SERVER, ScriptedPeer([Say(b"x"), Fin()], [Reset()]))
     words = slot(rig.memory)
-    wish(words, Wish.CONNECT)
+    command(words, COMMAND.connect)
     say(words, b"1")
     rig.step(5)
-    assert (words[port_map.STATE], heard(words)) == (State.ENDED, b"x")
+    assert (words[LINE.state], heard(words)) == (STATE.ended, b"x")
     say(words, b"2")
     rig.step(3)
-    assert (words[port_map.STATE], words[port_map.ERROR]) == (State.FAILED, 0x36)
+    assert (words[LINE.state], words[LINE.error]) == (STATE.failed, 0x36)
     rig.step(3)
-    assert words[port_map.STATE] == State.FAILED
-    words[port_map.WISH] = Wish.CLOSED
+    assert words[LINE.state] == STATE.failed
+    words[LINE.command] = COMMAND.close
     rig.step(2)
-    assert words[port_map.STATE] == State.CLOSED
+    assert words[LINE.state] == STATE.closed
 
 
 def test_an_open_that_fails_waits_for_the_program() -> None:
     rig = Rig()
     words = slot(rig.memory)
-    wish(words, Wish.CONNECT)
+    command(words, COMMAND.connect)
     rig.step(3)
-    assert (words[port_map.STATE], words[port_map.ERROR], rig.requests) == (State.FAILED, 0x3D, [])
-    words[port_map.WISH] = Wish.CLOSED
+    assert (words[LINE.state], words[LINE.error], rig.requests) == (STATE.failed, 0x3D, [])
+    words[LINE.command] = COMMAND.close
     rig.step()
-    assert (words[port_map.STATE], rig.requests) == (State.CLOSED, [])
-    words[port_map.WISH] = Wish.CONNECT
+    assert (words[LINE.state], rig.requests) == (STATE.closed, [])
+    words[LINE.command] = COMMAND.connect
     rig.step()
     assert rig.requests == [Connect(0, SERVER)]
 
@@ -263,16 +262,16 @@ def test_slots_listen_at_once_and_the_first_gets_the_first_caller() -> None:
     rig = Rig()
     first, second = slot(rig.memory, 3), slot(rig.memory, 5)
     for words in (first, second):
-        wish(words, Wish.LISTEN, Peer("0.0.0.0", 0), 502)
+        command(words, COMMAND.listen, Peer("0.0.0.0", 0), 502)
     rig.step()
     assert rig.requests == [Listen(3, 502), Listen(5, 502)]
     clients = [rig.network.attach(f"192.168.250.{number}") for number in (50, 51)]
     for client in clients:
         client.submit([Connect(1, OWN), Send(1, b"hi"), Grant(1, 100)], rig.now_ns)
         rig.step(3)
-    assert [words[port_map.STATE] for words in (first, second)] == [State.OPEN, State.OPEN]
-    assert [words[port_map.PEER_IP + 1] for words in (first, second)] == [0xFA32, 0xFA33]
-    first[port_map.WISH] = Wish.RESET
+    assert [words[LINE.state] for words in (first, second)] == [STATE.open, STATE.open]
+    assert [words[LINE.peer_ip + 1] for words in (first, second)] == [0xFA32, 0xFA33]
+    first[LINE.command] = COMMAND.reset
     rig.step(2)
     assert Broken(1, "ECONNRESET") in clients[0].events(rig.now_ns)
 
@@ -281,13 +280,13 @@ def test_a_slot_of_another_module_is_left_alone_and_closed_when_it_changes_hands
     rig = Rig()
     rig.network.place(SERVER, ScriptedPeer())
     words = slot(rig.memory)
-    wish(words, Wish.CONNECT, place=8)
+    command(words, COMMAND.connect, place=8)
     rig.step(3)
-    assert words[port_map.STATE] == State.CLOSED
-    words[port_map.MODULE] = 8
+    assert words[LINE.state] == STATE.closed
+    words[LINE.module] = 8
     rig.step(3)
-    assert words[port_map.STATE] == State.OPEN
-    words[port_map.MODULE] = 0
+    assert words[LINE.state] == STATE.open
+    words[LINE.module] = 0
     rig.step()
     assert rig.requests == [Close(0)]
 
@@ -295,21 +294,21 @@ def test_a_slot_of_another_module_is_left_alone_and_closed_when_it_changes_hands
 def test_keep_alive_is_an_option() -> None:
     rig = Rig()
     words = slot(rig.memory)
-    wish(words, Wish.CONNECT)
-    words[port_map.OPTIONS] = port_map.KEEP_ALIVE
+    command(words, COMMAND.connect)
+    words[LINE.keep_alive] = 1
     rig.step()
     assert rig.requests == [Connect(0, SERVER, 0, True)]
 
 
-@each_of("errno", [*noc_map.ERRNO, "EUNHEARDOF"])
+@each_of("errno", [*ERRNO, "EUNHEARDOF"])
 def test_errors_by_their_numbers(errno: str) -> None:
     noc, memory = Noc(), FakeMemory()
     noc.reset(memory)
-    wish(slot(memory), Wish.CONNECT)
+    command(slot(memory), COMMAND.connect)
     noc.refresh(memory, [], 1)
     noc.refresh(memory, [Failed(0, "open", errno)], 2)
-    assert slot(memory)[port_map.ERROR] == noc_map.ERRNO.get(errno, 5)
-    assert slot(memory)[port_map.STATE] == State.FAILED
+    assert slot(memory)[LINE.error] == ERRNO.get(errno, 5)
+    assert slot(memory)[LINE.state] == STATE.failed
 
 
 # --- counters and restart -----------------------------------------------------------------------------------------------
@@ -320,10 +319,10 @@ def counted(*events: Event, link_up: bool = True) -> list[int]:
     noc, memory = Noc(), FakeMemory()
     noc.reset(memory)
     noc.settings = {"link_up": link_up, "configured": True}
-    wish(slot(memory), Wish.CONNECT)
+    command(slot(memory), COMMAND.connect)
     noc.refresh(memory, [], 1)
     noc.refresh(memory, events, 2)
-    first = 7 * noc_map.HEAD_WORDS + noc_map.STATISTICS
+    first = 7 * HEAD_WORDS + noc_words.STATISTICS
     return memory.words("NOC")[first + 4 : first + 36].tolist()
 
 
@@ -349,8 +348,8 @@ def test_what_goes_out_without_a_cable_is_lost_carrier() -> None:
 def test_a_counter_goes_on_in_its_high_word_and_from_the_end_to_0() -> None:
     for before, after in (((0xFFFF, 0), [0, 1]), ((0xFFFF, 0xFFFF), [0, 0])):
         rig = Rig()
-        rig.head()[noc_map.STATISTICS + 6], rig.head()[noc_map.STATISTICS + 7] = before
-        wish(slot(rig.memory), Wish.CONNECT)
+        rig.head()[noc_words.STATISTICS + 6], rig.head()[noc_words.STATISTICS + 7] = before
+        command(slot(rig.memory), COMMAND.connect)
         rig.step()
         assert rig.table()[6:8] == after
 
@@ -360,41 +359,42 @@ def test_a_restart_breaks_connections_and_restores_the_configuration() -> None:
     peer = ScriptedPeer()
     rig.network.place(SERVER, peer)
     words = slot(rig.memory)
-    wish(words, Wish.CONNECT)
+    command(words, COMMAND.connect)
     rig.step(3)
-    rig.head()[noc_map.SERVICES] = 0
-    rig.head()[noc_map.REQUEST] = noc_map.RESTART
+    rig.head()[noc_words.SERVICES] = 0
+    rig.head()[noc_words.RESTART] = 1
     rig.step()
     assert rig.requests == [Close(0, reset=True)]
-    assert (rig.head()[noc_map.STATUS], rig.head()[noc_map.REQUEST]) == (noc_map.RESTARTING, 0)
-    assert (words[port_map.WISH], words[port_map.STATE]) == (Wish.CLOSED, State.CLOSED)
-    assert rig.head()[noc_map.SERVICES] == noc_map.FTP | noc_map.HTTP
-    assert (rig.counter(noc_map.DRIVER_RESTARTS), rig.counter(noc_map.RECEIVER_INTERRUPTS)) == (1, 0)
-    words[port_map.WISH] = Wish.CONNECT
+    assert (rig.head()[noc_words.STATUS], rig.head()[noc_words.RESTART]) == (noc_words.RESTARTING, 0)
+    assert (words[LINE.command], words[LINE.state]) == (COMMAND.close, STATE.closed)
+    assert rig.head()[noc_words.SERVICES] == FTP | HTTP
+    assert (rig.counter(Statistic.DRIVER_RESTARTS), rig.counter(Statistic.RECEIVER_INTERRUPTS)) == (1, 0)
+    words[LINE.command] = COMMAND.connect
     rig.step(4)
-    assert (rig.head()[noc_map.STATUS], words[port_map.STATE]) == (noc_map.RESTARTING, State.CLOSED)
-    words[port_map.WISH] = Wish.CONNECT
+    assert (rig.head()[noc_words.STATUS], words[LINE.state]) == (noc_words.RESTARTING, STATE.closed)
+    words[LINE.command] = COMMAND.connect
     rig.step()
-    assert rig.head()[noc_map.STATUS] == noc_map.READY
+    assert rig.head()[noc_words.STATUS] == noc_words.READY
     rig.step()
-    assert words[port_map.STATE] == State.OPEN
+    assert words[LINE.state] == STATE.open
     assert peer.log == ["ECONNRESET"]
     assert Noc().configuration["restart_ns"] == RESTART_NS
 
 
 @settings(max_examples=times(40), deadline=None)
-@given(st.lists(st.integers(0, 0xFFFF), min_size=16, max_size=16), st.lists(st.sampled_from(list(Wish)), max_size=8))
-def test_any_words_in_a_slot_are_survived(content: list[int], wishes: list[Wish]) -> None:
+@given(st.lists(st.integers(0, 0xFFFF), min_size=16, max_size=16),
+       st.lists(st.sampled_from([*vars(COMMAND).values()]), max_size=8))  # fmt: skip
+def test_any_words_in_a_slot_are_survived(content: list[int], commands: list[int]) -> None:
     rig = Rig()
     rig.network.place(SERVER, ScriptedPeer(greeting=[Say(bytes(2000))]))
     words = slot(rig.memory)
     for number, value in enumerate(content):
         words[number] = value
-    words[port_map.MODULE] = 8
+    words[LINE.module] = 8
     rig.step(2)
-    for wanted in wishes:
-        wish(words, wanted, Peer(SERVER.host, content[7]), content[8] % 65536)
-        words[port_map.RECEIVED] = content[9]
-        words[port_map.SENDING] = content[10]
+    for wanted in commands:
+        command(words, wanted, Peer(SERVER.host, content[7]), content[8] % 65536)
+        words[LINE.received] = content[9]
+        words[LINE.sending] = content[10]
         rig.step(2)
-        assert words[port_map.STATE] in list(State)
+        assert words[LINE.state] in vars(STATE).values()

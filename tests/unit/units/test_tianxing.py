@@ -9,15 +9,17 @@ from common_unit_tests import CommonUnitTests, FakeMemory
 
 from fbvm.base.data import data_folder
 from fbvm.units.contract import Unit
-from fbvm.units.port import map as port_map
-from fbvm.units.port import tianxing
-from fbvm.units.port.map import State, Wish
 from fbvm.units.port.tianxing import Tianxing
+from fbvm.units.port.words import mailbox
 from fbvm.wire.link import Connect, Failed, Peer
+
+BOX = mailbox(Tianxing.table.block, Tianxing.table.area, Tianxing.table.lines)
+LINES, LINE, COMMAND, STATE = BOX.lines, BOX.lines.words, BOX.lines.commands, BOX.lines.states
+HEAD_WORDS = BOX.head_words
 
 
 def slot(memory: FakeMemory) -> memoryview:
-    return memory.words("TXP")[tianxing.HEAD_WORDS : tianxing.HEAD_WORDS + port_map.SLOT_WORDS]
+    return memory.words("TXP")[HEAD_WORDS : HEAD_WORDS + LINES.size]
 
 
 class TestTianxingIsAUnit(CommonUnitTests):
@@ -25,26 +27,26 @@ class TestTianxingIsAUnit(CommonUnitTests):
         return Tianxing()
 
     def may_write(self) -> set[tuple[str, int]]:
-        unit_words = (port_map.WISH, port_map.STATE, port_map.ERROR, port_map.PEER_IP, port_map.PEER_IP + 1,
-                      port_map.PEER_PORT, port_map.SENDING, port_map.RECEIVED)  # fmt: skip
-        return {("TXP", word) for word in range(8)} | {("TXP", tianxing.HEAD_WORDS + word) for word in unit_words}
+        unit_words = (LINE.command, LINE.state, LINE.error, LINE.peer_ip, LINE.peer_ip + 1,
+                      LINE.peer_port, LINE.sending, LINE.received)  # fmt: skip
+        return {("TXP", word) for word in range(8)} | {("TXP", HEAD_WORDS + word) for word in unit_words}
 
     def data_words(self) -> set[tuple[str, int]]:
-        return {("TXP", tianxing.HEAD_WORDS + word) for word in range(port_map.INCOMING, port_map.SLOT_WORDS)}
+        return {("TXP", HEAD_WORDS + word) for word in range(LINE.incoming, LINES.size)}
 
     def ask(self, memory: FakeMemory) -> None:
         words = slot(memory)
-        words[port_map.MODULE] = tianxing.NUMBER
-        words[port_map.REMOTE_IP : port_map.REMOTE_PORT + 1] = memoryview(b"\xa8\xc0\x02\xfa\xf6\x01").cast("H")
-        words[port_map.WISH] = Wish.CONNECT
+        words[LINE.module] = Tianxing.table.number(None)
+        words[LINE.remote_ip : LINE.remote_port + 1] = memoryview(b"\xa8\xc0\x02\xfa\xf6\x01").cast("H")
+        words[LINE.command] = COMMAND.connect
 
     def is_answered(self, memory: FakeMemory) -> bool:
-        return slot(memory)[port_map.STATE] == State.OPEN
+        return slot(memory)[LINE.state] == STATE.open
 
 
 def test_the_library_declares_what_the_port_brings() -> None:
     written = tomllib.loads((data_folder("fblib") / "tianxing" / "mb_tcp_server" / "library.toml").read_text())["mailbox"]
-    assert written == {"area": "TXP", "head": tianxing.HEAD_WORDS, "slots": tianxing.SLOTS, "slot": port_map.SLOT_WORDS}
+    assert written == {"area": "TXP", "head": HEAD_WORDS, "slots": LINES.count, "slot": LINES.size}
 
 
 @pytest.mark.parametrize(("model", "connections"), [("T3", 8), ("T4", 32)])
@@ -65,7 +67,7 @@ def test_what_fails_has_one_number() -> None:
     TestTianxingIsAUnit().ask(memory)
     assert port.refresh(memory, [], 0) == [Connect(0, Peer("192.168.250.2", 502))]
     port.refresh(memory, [Failed(0, "open", "ECONNREFUSED")], 1)
-    assert (slot(memory)[port_map.STATE], slot(memory)[port_map.ERROR]) == (State.FAILED, 1)
+    assert (slot(memory)[LINE.state], slot(memory)[LINE.error]) == (STATE.failed, 1)
 
 
 def test_a_plc_without_a_mailbox_leaves_it_idle() -> None:

@@ -1,7 +1,7 @@
 """Text of the machine code of scans: what a scan does up to its refresh, several at known times, a burst upon a clock.
 
 It is made for a shape: which of the tasks have an interval, which words tell the program about time, what is watched,
-which companions there are.  It has no calls but those of the tasks, of companions and of the clock."""
+which units there are.  It has no calls but those of the tasks, of units and of the clock."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from string import Template
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
-from fbvm.engine.native.scans.units import Shape, Told
-from fbvm.engine.native.scans.units import text as companions_text
+from fbvm.engine.native.scans.slots import ROWS, addresses_of_slots
+from fbvm.engine.native.scans.units import Shape, refresh_text
 
 
 @dataclass(frozen=True)
@@ -29,19 +29,8 @@ class Clockwork:
 
 
 NOTHING = Clockwork()
-(MEMORY, CONTEXT, LEFT, FIRST, STEP, BUDGETED, SPEND, DONE, CHANGED, UNFINISHED, AGAIN, FAULTY, POINT,
- DEFERRED, KNOWN, ALONE, HEARD, TIMES, ENDS, CLOCK, NUMBER, ZERO, ROWS) = range(23)  # fmt: skip
-"""Parameters, 64 bits each, and then the rows of turns, of what is watched and of companions: the addresses of memory and
-context, how many scans, the time of the first one and by how far it goes on, statements that a scan may execute and all
-of them together, how many scans there were, whether something that is watched has changed or which companions ran, and
-what else these tell.
-
-Of a burst only: whether it begins with a refresh, whether FIRST is the time of its next scan, whether there shall be one
-refresh only, which become 0; whether somebody was heard for the last refresh, when it is over; where the time of the next
-scan goes and where there is no more room; the clock, as `Clock` describes it.  FIRST becomes the time of the last scan."""
-TOLD = Told(memory=MEMORY, ran=CHANGED, unfinished=UNFINISHED, again=AGAIN, faulty=FAULTY, point=POINT)
 ASKED = -1
-"""In place of a trap's point: companions have requests, or one of them has a trap of its own."""
+"""In place of a trap's point: units have requests, or one of them has a trap of its own."""
 OVER, SCANNED, ASKED_BEFORE, REFRESHED = 0, -2, -3, -4
 """What else a burst returns, which goes on unless it is OVER: ASKED or SCANNED after a scan; after the refresh before it
 ASKED_BEFORE or REFRESHED."""
@@ -52,12 +41,6 @@ WATCHED_ROW, WATCHED_BYTES = 2, 8
 MOST_CYCLE = 0xFFFF_FFFF
 """The longest cycle time that its words can say."""
 SECOND_NS = 1_000_000_000
-_PARAMETERS = {
-    "memory": MEMORY, "context": CONTEXT, "left": LEFT, "first": FIRST, "step": STEP, "budgeted": BUDGETED, "spend": SPEND,
-    "done": DONE, "changed": CHANGED, "again": AGAIN, "deferred": DEFERRED, "known": KNOWN, "alone": ALONE, "heard": HEARD,
-    "times": TIMES, "ends": ENDS, "clock": CLOCK, "number": NUMBER, "zero": ZERO,
-}  # fmt: skip
-"""The names that functions use."""
 _SCAN = f"""scan:
 %before = load i64, ptr %now_at
 store i64 %now, ptr %now_at
@@ -156,16 +139,16 @@ start:
 br i1 %late, label %refresh, label %ready
 refresh:
 store i64 0, ptr %deferred_at
-%early = call i32 @companions(ptr %p, i64 %first)
+%early = call i32 @refresh(ptr %p, i64 %first)
 %asks = icmp slt i32 %early, 0
 %back = or i1 %asks, %single
-br i1 %back, label %refreshed, label %unheard
+br i1 %back, label %refreshed, label %uncollected
 refreshed:
 store i64 1, ptr %known_at
 %before_scan = select i1 %asks, i32 {ASKED_BEFORE}, i32 {REFRESHED}
 br label %return
-unheard:
-store i64 0, ptr %heard_at
+uncollected:
+store i64 0, ptr %collected_at
 br label %ready
 ready:
 store i64 0, ptr %known_at
@@ -182,7 +165,7 @@ store i64 %now, ptr %first_at
 store i64 0, ptr %changed_at
 br label %scan
 {_SCAN}
-%ran = call i32 @companions(ptr %p, i64 %now)
+%ran = call i32 @refresh(ptr %p, i64 %now)
 %again = load i64, ptr %again_at
 %wanted = icmp ne i64 %again, 0
 %more = icmp ult i64 %at1, %ends
@@ -196,14 +179,14 @@ scanned:
 %after_scan = select i1 %urgent, i32 {ASKED}, i32 {SCANNED}
 br label %return
 follow:
-store i64 0, ptr %heard_at
+store i64 0, ptr %collected_at
 %next = call i64 @time(ptr %p)
 br label %begin
 return:
 %answer = phi i32 [ %before_scan, %refreshed ], [ %after_scan, %scanned ]
-%heard = load i64, ptr %heard_at
-%stays = select i1 %single, i64 %heard, i64 0
-store i64 %stays, ptr %heard_at
+%collected = load i64, ptr %collected_at
+%stays = select i1 %single, i64 %collected, i64 0
+store i64 %stays, ptr %collected_at
 ret i32 %answer
 over:
 ret i32 {OVER}
@@ -214,14 +197,14 @@ ret i32 %point
 
 
 def text(intervals: Sequence[bool], clockwork: Clockwork, watched: int, shapes: Sequence[Shape]) -> str:
-    """The functions @scans and, where there are companions, @burst: both take the address of the parameters, and return
+    """The functions @scans and, where there are units, @burst: both take the address of the parameters, and return
     a trap's point, ASKED, 0, or what else there is for a burst."""
     first = ROWS + ROW * len(intervals)
     parts = {"addresses": _lines(_addresses()), "rows": _lines(_rows(len(intervals))), "clockwork": _lines(_clockwork(clockwork)),
              "turns": _lines(_turns(intervals)),
              "points": ", ".join(f"[ %r{n}, %run{n} ]" for n in range(len(intervals)))}  # fmt: skip
     if shapes:
-        burst = companions_text(shapes, first, TOLD) + _BURST.substitute(parts)
+        burst = refresh_text(shapes, first) + _BURST.substitute(parts)
         return _SCANS.substitute(parts, watched=_REFRESHED, changed=_RAN, burst=burst)
     return _SCANS.substitute(parts, watched=_lines(_watched(first, watched)), changed=_CHANGED, burst="")
 
@@ -232,8 +215,7 @@ def _lines(lines: Iterable[str]) -> str:
 
 def _addresses() -> Iterator[str]:
     """Where the parameters are, and the words of the system page; some of them as they stay."""
-    for name, number in _PARAMETERS.items():
-        yield f"%{name}_at = getelementptr inbounds i8, ptr %p, i64 {8 * number}"
+    yield from addresses_of_slots()
     yield from ("%m = load ptr, ptr %memory_at", "%c = load ptr, ptr %context_at", "%amount = load i64, ptr %budgeted_at")
     for name, offset in {"now": NOW, "due": DUE, "budget": BUDGET, "count": SCANS}.items():
         yield f"%{name}_at = getelementptr inbounds i8, ptr %m, i64 {offset}"
@@ -287,7 +269,7 @@ def _watched(first: int, count: int) -> Iterator[str]:
 
 _CHANGED = """store i64 1, ptr %changed_at
 ret i32 0"""
-_REFRESHED = """%ran = call i32 @companions(ptr %p, i64 %now)
+_REFRESHED = """%ran = call i32 @refresh(ptr %p, i64 %now)
 %changed = icmp ne i32 %ran, 0"""
 _RAN = """%answer = ashr i32 %ran, 31
 ret i32 %answer"""

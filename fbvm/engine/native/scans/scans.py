@@ -18,27 +18,9 @@ from fbvm.engine.native.cache import Stored, name_of
 from fbvm.engine.native.compiler import Linked, compile_text
 from fbvm.engine.native.entries import Entry
 from fbvm.engine.native.scans import code as native_scan_code
-from fbvm.engine.native.scans.code import (  # fmt: skip
-    BUDGETED,
-    CHANGED,
-    CLOCK,
-    CONTEXT,
-    DONE,
-    ENDS,
-    FIRST,
-    LEFT,
-    MEMORY,
-    NUMBER,
-    ROW,
-    ROWS,
-    SPEND,
-    STEP,
-    WATCHED_BYTES,
-    WATCHED_ROW,
-    ZERO,
-    Clockwork,
-)
-from fbvm.engine.native.scans.units import Companion, Shape
+from fbvm.engine.native.scans.code import ROW, WATCHED_BYTES, WATCHED_ROW, Clockwork
+from fbvm.engine.native.scans.slots import ROWS, Slot
+from fbvm.engine.native.scans.units import Shape, UnitInCode
 
 
 @dataclass
@@ -51,6 +33,7 @@ class Turn:
 
 
 NO_LIMIT = 1 << 62
+FIRST, BUDGETED, CHANGED = Slot.FIRST, Slot.BUDGETED, Slot.CHANGED  # looked up once, not in each scan
 
 
 class Series:
@@ -58,13 +41,13 @@ class Series:
 
     In each scan there is a time, nothing is due, the budget is full, the clockwork is written; then the tasks that are
     due take their turns, and the number of scans grows.  `watched` are offsets of eight bytes each, by who watches them: a
-    scan after which they are not as `expect` saw them last is the last one.  In place of it there may be `companions`: then
+    scan after which they are not as `expect` saw them last is the last one.  In place of it there may be `units`: then
     each scan ends with a refresh, and the one in whose refresh one of them ran is the last one; in a burst, which its caller
     begins by `call_burst`, one that gives no reason for another scan, or in which they ask for something."""
 
     def __init__(self, memory: Memory, memory_at: int, context_at: int, tasks: Sequence[Entry], turns: Sequence[Turn],
                  clockwork: Clockwork, watched: Sequence[Sequence[int]] = (),
-                 companions: Sequence[Companion] = ()) -> None:  # fmt: skip
+                 units: Sequence[UnitInCode] = ()) -> None:  # fmt: skip
         rows: list[tuple[int, ...]] = [
             (tasks[turn.task].function_at, turn.interval_ns, turn.next_ns, 0) for turn in turns]  # fmt: skip
         offsets = [offset for group in watched for offset in group]
@@ -74,18 +57,18 @@ class Series:
         """These move on, or others of the same tasks."""
         self._timed = [(row, ROWS + ROW * row + 2) for row, turn in enumerate(turns) if turn.interval_ns]
         """Which turns have an interval, and where their next time is."""
-        given = {MEMORY: memory_at, CONTEXT: context_at, LEFT: 1, SPEND: NO_LIMIT}
+        given: dict[int, int] = {Slot.MEMORY: memory_at, Slot.CONTEXT: context_at, Slot.LEFT: 1, Slot.SPEND: NO_LIMIT}
         self.numbers = numbers = array("q", [given.get(number, 0) for number in range(ROWS)])
         """The parameters, for who calls `call` himself."""
         numbers.extend(number for row in rows for number in row)
         at = count(ROWS + ROW * len(turns) + 1, WATCHED_ROW)
         self._expected = [[(memory.u8[offset : offset + WATCHED_BYTES].cast("q"), next(at)) for offset in group]
                           for group in watched]  # fmt: skip
-        """What is watched, and where what is expected of it is, by who watches it: of each companion, if there are any."""
-        self.companions = companions
-        for companion in companions:
-            self._expected.append([(view, len(numbers) + at) for view, at in companion.expected(memory)])
-            numbers.extend(companion.row(memory_at))
+        """What is watched, and where what is expected of it is, by who watches it: of each unit, if there are any."""
+        self.units = units
+        for unit in units:
+            self._expected.append([(view, len(numbers) + at) for view, at in unit.expected(memory)])
+            numbers.extend(unit.parameters(memory_at))
         shape = tuple(turn.interval_ns > 0 for turn in turns), clockwork, len(offsets)
         self.numbers_at = numbers.buffer_info()[0]
         self.clock: Clock | None = None
@@ -94,12 +77,12 @@ class Series:
         self.times = array("q")
         """When those of the last one began."""
         self.times_at = 0
-        self.call, self.call_burst = _scans(*shape, tuple(companion.shape for companion in companions))
+        self.call, self.call_burst = _scans(*shape, tuple(unit.shape for unit in units))
         """Machine code of scans, and of a burst: they take the address of the parameters."""
 
     @property
     def changed(self) -> bool:
-        """True if after the last scan something that is watched was not as expected, or a companion ran."""
+        """True if after the last scan something that is watched was not as expected, or a unit ran."""
         return self.numbers[CHANGED] != 0
 
     def expect(self, number: int) -> None:
@@ -112,9 +95,9 @@ class Series:
         self.clock, self.most = clock, most
         self.times = array("q", bytes(8 * most))
         self.times_at = self.times.buffer_info()[0]
-        told = {ENDS: self.times_at + 8 * most, CLOCK: clock.function_at, NUMBER: clock.number, ZERO: clock.zero_ns}
-        for number, value in told.items():
-            self.numbers[number] = value
+        numbers = self.numbers
+        numbers[Slot.ENDS], numbers[Slot.CLOCK] = self.times_at + 8 * most, clock.function_at
+        numbers[Slot.NUMBER], numbers[Slot.ZERO] = clock.number, clock.zero_ns
 
     def load_turns(self) -> None:
         """Take over when the tasks run next."""
@@ -142,10 +125,10 @@ class Series:
 
         No other begins when all together have executed `spend` statements."""
         numbers = self.numbers
-        numbers[LEFT], numbers[STEP], numbers[SPEND] = n, step_ns, spend
+        numbers[Slot.LEFT], numbers[Slot.STEP], numbers[Slot.SPEND] = n, step_ns, spend
         point = self.once(now_ns, budget)
-        numbers[LEFT], numbers[SPEND] = 1, NO_LIMIT
-        return numbers[DONE], point
+        numbers[Slot.LEFT], numbers[Slot.SPEND] = 1, NO_LIMIT
+        return numbers[Slot.DONE], point
 
 
 Call = Callable[[int], int]
@@ -153,7 +136,7 @@ Call = Callable[[int], int]
 
 @cache
 def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int, shapes: tuple[Shape, ...]) -> tuple[Call, Call]:
-    """The functions for a shape: scans, and a burst, which is never called where there are no companions."""
+    """The functions for a shape: scans, and a burst, which is never called where there are no units."""
     text = native_scan_code.text(intervals, clockwork, watched, shapes)
     name = name_of("scans", text)
     stored = native_cache.read(name)

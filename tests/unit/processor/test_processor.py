@@ -40,38 +40,38 @@ def own(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> OwnP
 
 def test_it_runs_its_program_over_a_memory_of_its_own(own: OwnProcessor) -> None:
     unit: Processor = own
-    assert list(unit.view("Out", "u16")) == [7, 0, 0, 0] and unit.view("Wake", "i64")[0] == 12
-    unit.view("In", "u16")[1] = 0xFFFF
+    assert list(unit.view("Out")) == [7, 0, 0, 0] and unit.view("Wake")[0] == 12
+    unit.view("In")[1] = 0xFFFF
     for ms in range(4):
-        assert unit.view("Some", "u8")[0] == 0
+        assert unit.view("Some")[0] == 0
         unit.run(ms * 1_000_000)
-    assert unit.view("Out", "u16").tolist() == [0, 0x7FFF, 0, 0] and unit.view("Some", "u8")[0] == 1
-    assert unit.view("Runs", "u32")[0] == 4
-    assert unit.offset("Fifth") == AREAS["D"].offset + 10 and own.memory.words("D")[5] == 0x7FFF
+    assert unit.view("Out").tolist() == [0, 0x7FFF, 0, 0] and unit.view("Some")[0] == 1
+    assert unit.view("Runs")[0] == 4
+    assert unit.contract.offset("Fifth") == AREAS["D"].offset + 10 and own.memory.words("D")[5] == 0x7FFF
 
 
 def test_each_has_its_own_memory_and_a_copy_the_same_contents(own: OwnProcessor) -> None:
     own.run(5)
     for other in (own.copy(), deepcopy(own)):
-        assert bytes(other.memory.u8) == bytes(own.memory.u8) and other.image is own.image
+        assert bytes(other.memory.u8) == bytes(own.memory.u8) and other.contract is own.contract
         other.run(6)
-        assert (other.view("Runs", "u32")[0], own.view("Runs", "u32")[0]) == (2, 1)
-    assert processor(TEXT).view("Runs", "u32")[0] == 0
+        assert (other.view("Runs")[0], own.view("Runs")[0]) == (2, 1)
+    assert processor(TEXT).view("Runs")[0] == 0
 
 
 def test_a_trap_is_a_fault_of_ours(own: OwnProcessor) -> None:
-    own.view("Divisor", "i16")[0] = 0
+    own.view("Divisor")[0] = 0
     with pytest.raises(RuntimeError, match=r"R0101 unit\.st:9:\d+ in Own: 0 divided by 0"):
         own.run(0)
-    own.view("Divisor", "i16")[0] = 1
+    own.view("Divisor")[0] = 1
     own.run(0)
 
 
 def test_what_it_does_not_have(own: OwnProcessor) -> None:
     with pytest.raises(UnknownPlace):
-        own.view("Nothing", "u8")
+        own.view("Nothing")
     with pytest.raises(ValueError, match="bytes of its own"):
-        own.offset("OneBit")
+        own.contract.offset("OneBit")
 
 
 @pytest.mark.parametrize(("text", "said"), [
