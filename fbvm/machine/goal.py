@@ -3,25 +3,54 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import Generic, Protocol, TypeVar
 
 from fbvm.base.areas import NEVER
+from fbvm.engine.trap import Trap
+from fbvm.machine.breakpoints import Halt
 from fbvm.watch.conditions import Condition, parse_condition
+from fbvm.watch.paths import Place, Span
+from fbvm.watch.values import Value
 
-if TYPE_CHECKING:
-    from fbvm.machine.plc import Plc
+
+class Scanned(Protocol):
+    """What the end of a run depends on; a `Plc` has it."""
+
+    scans: int
+    cycle_ns: int
+    trap: Trap | None
+
+    @property
+    def elapsed_ns(self) -> int: ...
+
+    @property
+    def halted(self) -> Halt | None: ...
+
+    def find(self, text: str) -> Place | Span: ...
+
+    def read(self, where: str | Place | Span) -> Value: ...
 
 
-class Goal:
-    """The end of a run that begins now.  Raises ValueError if nothing would ever end it, or a bound makes no sense."""
+P = TypeVar("P", bound=Scanned)
+
+
+class Goal(Generic[P]):
+    """The end of a run of `plc` that begins now.
+
+    `scans` is how many more scans there may be, `for_ns` how much more time; `until` ends the run after the scan in which it
+    becomes true (a function of the PLC, or an expression such as `Main.done AND D200 > 5`); `max_ns` bounds the time of a
+    run with `until`.  The first bound that is reached ends the run.
+
+    Raises ValueError if none of `scans`, `for_ns` and `until` is given or a number is negative, UnknownPlace for a name in
+    `until` that the program does not have."""
 
     def __init__(
         self,
-        plc: Plc,
+        plc: P,
         *,
         scans: int | None = None,
         for_ns: int | None = None,
-        until: str | Callable[[Plc], bool] | None = None,
+        until: str | Callable[[P], bool] | None = None,
         max_ns: int | None = None,
     ) -> None:
         if scans is None and for_ns is None and until is None:
@@ -37,7 +66,7 @@ class Goal:
         self._started = plc.scans
         self._halted = plc.halted
 
-    def _condition(self, until: str | Callable[[Plc], bool] | None) -> Callable[[], bool] | None:
+    def _condition(self, until: str | Callable[[P], bool] | None) -> Callable[[], bool] | None:
         if until is None:
             return None
         if callable(until):
@@ -48,19 +77,20 @@ class Goal:
 
     @property
     def scans_left(self) -> int:
-        """How many scans come before the goal, whatever time they take; 1 for a condition."""
+        """How many scans may follow before `reached` has to be asked, however long they take; 1 with `until`."""
         return 1 if self._until else self._last_scan - self._plc.scans
 
     @property
     def cycles_left(self) -> int:
-        """How many scans of a cycle each come before the goal; 1 for a condition."""
+        """How many scans, each `cycle_ns` long, may follow before `reached` has to be asked; 1 with `until`."""
         plc = self._plc
         return min(self.scans_left, -((plc.elapsed_ns - self._end_ns) // plc.cycle_ns))
 
     def reached(self) -> str:
-        """"trap", "until", "scans", "time", "max" or "break" if that ended the run, else ""."""
+        """What ended the run: "break" (a breakpoint), "trap", "until", "scans", "time" (`for_ns`) or "max" (`max_ns`);
+        "" while the run goes on."""
         plc = self._plc
-        if (halted := plc.breakpoints.halted) and halted is not self._halted:
+        if (halted := plc.halted) and halted is not self._halted:
             return "break"
         if plc.trap:
             return "trap"
