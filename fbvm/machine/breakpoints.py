@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, cast
+from typing import Protocol, cast
 
+from fbvm.base.memory import Memory
 from fbvm.base.types import fold
 from fbvm.code.image import Image, Site
 from fbvm.code.shapes import statements
@@ -23,8 +24,18 @@ from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, show
 
-if TYPE_CHECKING:
-    from fbvm.machine.plc import Plc
+
+class Stoppable(Protocol):
+    """What breakpoints see of their PLC; a `Plc` has it."""
+
+    image: Image
+    memory: Memory
+    engine: Engine
+    scans: int
+
+    def find(self, text: str) -> Place | Span: ...
+
+    def read(self, where: str | Place | Span) -> Value: ...
 
 
 @dataclass(frozen=True)
@@ -69,7 +80,7 @@ class Halt:
 class Breakpoints:
     """The breakpoints of a PLC, in the order in which they were set."""
 
-    def __init__(self, plc: Plc) -> None:
+    def __init__(self, plc: Stoppable) -> None:
         self._plc = plc
         self._rows: dict[Breakpoint, Line | Watched] = {}
         self._stops = Stops(plc.memory, len(plc.image.sites))
@@ -190,35 +201,58 @@ class Breakpoints:
 
 
 def find_line(image: Image, where: str) -> tuple[str, frozenset[int]]:
-    """The line that `FILE:LINE` or the name of a POU means, and the sites of its statements.
+    """The line that `where` means, as `FILE:LINE`, and the numbers of the sites at which a breakpoint there stops.
 
-    Of several statements on one line the first one counts.  Raises ValueError."""
+    `where` is `FILE:LINE` (the next line with a statement, if that one has none; of the file's path its last parts are enough)
+    or the name of a POU (the line of its first statement).  Of several statements on one line the first one counts, in each
+    POU that has some there.  Raises ValueError, whose message names the files or POUs that there are."""
     file, colon, number = where.rpartition(":")
-    rows = _statements(image)
-    if not colon or not number.strip().isdecimal():
-        inside = {site: place for site, place in rows.items() if fold(place.pou) == fold(where.strip())}
-        if not inside:
-            pous = ", ".join(sorted({place.pou for place in rows.values() if place.pou}))
-            raise ValueError(f"{where!r} is neither FILE:LINE nor a POU with statements; POUs are {pous or 'none'}")
-        rows, line = inside, min(place.line for place in inside.values())
+    statements = _statements(image)
+    if colon and number.strip().isdecimal():
+        inside = _of_file(statements, file.strip())
+        line = _line_from(inside, int(number), where)
     else:
-        named = {place.file for place in rows.values() if f"/{place.file}".endswith(f"/{file.strip()}")
-                 or f"/{file.strip()}".endswith(f"/{place.file}")}  # fmt: skip
-        if not named:
-            files = ", ".join(sorted({place.file for place in rows.values()}))
-            raise ValueError(f"no statement is in {file!r}; files are {files or 'none'}")
-        rows = {site: place for site, place in rows.items() if place.file in named}
-        lines = [place.line for place in rows.values() if place.line >= int(number)]
-        if not lines:
-            last = max(place.line for place in rows.values())
-            raise ValueError(f"{where}: the last statement of {file} is on line {last}")
-        line = min(lines)
-    here = {site: place for site, place in rows.items() if place.line == line}
-    first = {(place.file, place.pou): min(other.column for other in here.values()
-                                          if (other.file, other.pou) == (place.file, place.pou))
-             for place in here.values()}  # fmt: skip
-    sites = [site for site, place in here.items() if place.column == first[place.file, place.pou]]
+        inside = _of_pou(statements, where.strip())
+        line = min(site.line for site in inside.values())
+    sites = _first_of_each_pou({number: site for number, site in inside.items() if site.line == line})
     return f"{image.sites[sites[0]].file}:{line}", frozenset(sites)
+
+
+def _of_pou(statements: dict[int, Site], name: str) -> dict[int, Site]:
+    """The statements of the POU of that name.  Raises ValueError if there are none."""
+    inside = {number: site for number, site in statements.items() if fold(site.pou) == fold(name)}
+    if not inside:
+        pous = ", ".join(sorted({site.pou for site in statements.values() if site.pou}))
+        raise ValueError(f"{name!r} is neither FILE:LINE nor a POU with statements; POUs are {pous or 'none'}")
+    return inside
+
+
+def _of_file(statements: dict[int, Site], path: str) -> dict[int, Site]:
+    """The statements of the files whose paths end as `path` does, or with which `path` ends.  Raises ValueError."""
+    inside = {number: site for number, site in statements.items()
+              if f"/{site.file}".endswith(f"/{path}") or f"/{path}".endswith(f"/{site.file}")}  # fmt: skip
+    if not inside:
+        files = ", ".join(sorted({site.file for site in statements.values()}))
+        raise ValueError(f"no statement is in {path!r}; files are {files or 'none'}")
+    return inside
+
+
+def _line_from(statements: dict[int, Site], line: int, where: str) -> int:
+    """The first line from `line` on that has a statement.  Raises ValueError behind the last one."""
+    lines = {site.line for site in statements.values()}
+    following = [other for other in lines if other >= line]
+    if not following:
+        raise ValueError(f"{where}: the last statement of {where.rpartition(':')[0]} is on line {max(lines)}")
+    return min(following)
+
+
+def _first_of_each_pou(statements: dict[int, Site]) -> list[int]:
+    """Of statements on one line the first one of each POU, by the numbers of their sites."""
+    columns: dict[tuple[str, str], int] = {}
+    for site in statements.values():
+        pou = site.file, site.pou
+        columns[pou] = min(site.column, columns.get(pou, site.column))
+    return [number for number, site in statements.items() if site.column == columns[site.file, site.pou]]
 
 
 def _statements(image: Image) -> dict[int, Site]:

@@ -90,31 +90,49 @@ class Regions:
         return [f", !alias.scope !{at + 2 * group}, !noalias !{at + 2 * group + 1}" for group in groups], lines
 
     def _groups(self) -> list[int]:
-        """The number of each access's group: one for each run of computed places, then the constant ones apart from
-        them all by base; a constant place among computed ones belongs to those."""
-        runs: list[list[Access]] = []
-        for access in self.accesses:
-            if access[3]:
-                meeting = [run for run in runs if any(self._meet(access, other) for other in run)]
-                runs = [run for run in runs if run not in meeting] + [[access, *(a for run in meeting for a in run)]]
-        if len(runs) > MOST:
-            runs = [[access for run in runs for access in run]]
-        changed = True
-        while changed:  # a constant place that meets two runs makes them one
-            changed = False
-            for access in self.accesses:
-                meeting = [run for run in runs if any(self._meet(access, other) for other in run)]
-                if len(meeting) > 1:
-                    runs = [run for run in runs if run not in meeting] + [[a for run in meeting for a in run]]
-                    changed = True
+        """For each access the number of its group; accesses of two groups that are told apart never touch the same byte.
+
+        There is a group for each run of computed accesses that may meet one another, with the constant accesses that may meet
+        one of them; then one for all other constant accesses that count from the start of memory, and one for those that count
+        from the instance."""
+        runs = self._runs_of_computed()
         self._members: list[list[Access]] = [list(run) for run in runs] + [[], []]
         groups = []
         for access in self.accesses:
-            group = next((place for place, run in enumerate(runs) if any(self._meet(access, other) for other in run)),
-                         len(runs) + access[0])
+            number = self._number_of_run(runs, access)
+            group = len(runs) + access[0] if number is None else number
             self._members[group].append(access)
             groups.append(group)
         return groups
+
+    def _runs_of_computed(self) -> list[list[Access]]:
+        """Computed accesses, and of those that may meet one another one list; no constant access meets two of the lists."""
+        runs: list[list[Access]] = []
+        for access in self.accesses:
+            if access[3]:
+                runs = self._joined(runs, access, [access])
+        if len(runs) > MOST:
+            runs = [[access for run in runs for access in run]]
+        count = -1
+        while count != len(runs):  # a list that has grown may meet more
+            count = len(runs)
+            for access in self.accesses:
+                runs = self._joined(runs, access, [])
+        return runs
+
+    def _joined(self, runs: list[list[Access]], access: Access, more: list[Access]) -> list[list[Access]]:
+        """`runs`, of which those that an access may meet, and `more`, are one."""
+        meeting = [run for run in runs if self._meets(access, run)]
+        if not more and len(meeting) < 2:
+            return runs
+        return [run for run in runs if run not in meeting] + [[*more, *(other for run in meeting for other in run)]]
+
+    def _number_of_run(self, runs: list[list[Access]], access: Access) -> int | None:
+        """Which of the runs an access may meet; None if it meets none."""
+        return next((number for number, run in enumerate(runs) if self._meets(access, run)), None)
+
+    def _meets(self, access: Access, run: list[Access]) -> bool:
+        return any(self._meet(access, other) for other in run)
 
     def _apart(self, groups: list[int], a: int, b: int) -> bool:
         return not any(self._meet(one, other) for one in self._members[a] for other in self._members[b])

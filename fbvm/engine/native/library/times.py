@@ -68,8 +68,48 @@ def unit_at(at: int, n: int) -> int:
     return unit
 
 
+def number_length(at: int, n: int) -> int:
+    """Characters of the number that a part of a duration begins with, such as 3.5 of 3.5s; 0 if there is none.
+
+    In front of the number there may be one `_`."""
+    skip = peek(at) == ord("_")
+    whole = run_of_digits(at + skip, n - skip)
+    if whole == 0:
+        return 0
+    end = skip + whole
+    if end < n and peek(at + end) == ord("."):
+        behind = run_of_digits(at + end + 1, n - end - 1)
+        if behind == 0:
+            return 0
+        end += 1 + behind
+    return end
+
+
+def subtract_part(out: int, at: int, n: int, size: int, total: int) -> int:
+    """Writes `total` less the number of n characters times `size` nanoseconds to `out`; OUTSIDE if 64 bits cannot hold it."""
+    skip = peek(at) == ord("_")
+    whole = run_of_digits(at + skip, n - skip)
+    status = read_decimal(out, at + skip, whole)
+    count = peek_all(out)
+    if status == GOOD and count == SIGN and size == 1 and total == 0:
+        total = SIGN
+    elif status != GOOD or count < 0 or count > MOST // size or count * size - 1 > total + MOST:
+        status = OUTSIDE
+    else:
+        total -= count * size
+    behind = n - skip - whole - 1
+    if behind > 0:
+        if read_fraction(out, at + skip + whole + 1, behind, size) != GOOD or peek_all(out) - 1 > total + MOST:
+            status = OUTSIDE
+        total -= peek_all(out)
+    poke_all(out, total)
+    return status
+
+
 def read_duration(out: int, at: int, n: int) -> int:
-    """1d2h3.5s or -5us300ns; the total is kept below 0, where there is room for one more."""
+    """The nanoseconds of 1d2h3.5s or -5us300ns.  Units fall from part to part, and only the last part may have a fraction.
+
+    The total is kept negative until the end: below 0 there is room for one nanosecond more."""
     negative = 0
     if n > 0 and (peek(at) == ord("-") or peek(at) == ord("+")):
         negative = peek(at) == ord("-")
@@ -81,34 +121,16 @@ def read_duration(out: int, at: int, n: int) -> int:
     outside = 0
     last = -1
     while n > 0:
-        skip = peek(at) == ord("_")
-        whole = run_of_digits(at + skip, n - skip)
-        end = skip + whole
-        behind = 0
-        if end < n and peek(at + end) == ord("."):
-            behind = run_of_digits(at + end + 1, n - end - 1)
-            if behind == 0:
-                return MALFORMED
-            end += 1 + behind
-        unit = unit_at(at + end, n - end)
-        if whole == 0 or unit == 7:
+        length = number_length(at, n)
+        unit = unit_at(at + length, n - length)
+        end = length + 1 + (unit > 3)
+        if length == 0 or unit == 7 or unit <= last or end > LONGEST:
             return MALFORMED
-        size = unit_ns(unit)
-        end += 1 + (unit > 3)
-        if end > LONGEST or unit <= last or (behind != 0 and end != n):
+        if end != n and place_of(ord("."), at, length) != length:
             return MALFORMED
-        counted = read_decimal(out, at + skip, whole)
-        count = peek_all(out)
-        if counted == GOOD and count == SIGN and size == 1 and total == 0:
-            total = SIGN
-        elif counted != GOOD or count < 0 or count > MOST // size or count * size - 1 > total + MOST:
+        if subtract_part(out, at, length, unit_ns(unit), total) != GOOD:
             outside = 1
-        else:
-            total -= count * size
-        if behind != 0:
-            if read_fraction(out, at + skip + whole + 1, behind, size) != GOOD or peek_all(out) - 1 > total + MOST:
-                outside = 1
-            total -= peek_all(out)
+        total = peek_all(out)
         last = unit
         at += end
         n -= end
