@@ -15,8 +15,8 @@ from fbvm.base.memory import Memory
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
-from fbvm.engine.native.scans.code import Clockwork
-from fbvm.engine.native.scans.scans import Turn
+from fbvm.engine.native.scans.code import ClockWordTable
+from fbvm.engine.native.scans.scans import ScheduledTask
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.python.runtime import NO_SITE, Observation
 from fbvm.engine.stops import STOPPED, State, Stops
@@ -73,18 +73,18 @@ class Guarded:
             return trap
         return self._observe(task_index)
 
-    def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork, *,
+    def run_many(self, tasks: Sequence[ScheduledTask], n: int, step_ns: int, clock_words: ClockWordTable, *,
                  spend: int) -> tuple[int, Trap | None]:  # fmt: skip
         """What `NativeEngine.run_many` does, up to the scan that would stop; its caller does that one alone."""
         if self._native is None:
             return 0, None
-        seen, times = self._keep(), [turn.next_ns for turn in turns]
-        done, trap = self._native.run_many(turns, n, step_ns, clockwork, spend=spend)
+        seen, times = self._keep(), [task.next_ns for task in tasks]
+        done, trap = self._native.run_many(tasks, n, step_ns, clock_words, spend=spend)
         if not self._undone(trap, seen):
             return done, trap
-        for turn, next_ns in zip(turns, times, strict=True):
-            turn.next_ns = next_ns
-        return self._native.run_many(turns, done - 1, step_ns, clockwork, spend=spend)
+        for task, next_ns in zip(tasks, times, strict=True):
+            task.next_ns = next_ns
+        return self._native.run_many(tasks, done - 1, step_ns, clock_words, spend=spend)
 
     def _keep(self) -> State:
         """Keep the memory as it is, and what was seen of it last."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fbvm.base.areas import AREAS
 from fbvm.base.memory import Memory
-from fbvm.engine.native.scans.code import MOST_CYCLE, Clockwork
+from fbvm.engine.native.scans.code import MOST_CYCLE, ClockWordTable
 
 FIRST_CYCLE = (200, 11)
 """A200.11: ON in the first cycle after a change to RUN."""
@@ -35,7 +35,7 @@ SLOT_NS = 10_000_000
 """Within such a slot of time no clock pulse and no free counter changes."""
 
 
-class Flags:
+class ClockWords:
     """These words and bits of one memory."""
 
     def __init__(self, memory: Memory) -> None:
@@ -86,12 +86,12 @@ class Flags:
         return bool(self._a[word] >> bit & 1)
 
 
-def _clockwork() -> Clockwork:
-    """What `Flags.update` writes in a scan that is not the first, as data for machine code."""
+def _clock_words() -> ClockWordTable:
+    """What `ClockWords.update` writes in a scan that is not the first, as data for machine code."""
     a = AREAS["A"].offset
     word, bit = FIRST_CYCLE
     assert FIRST_TASK_CYCLE[0] == word
-    return Clockwork(
+    return ClockWordTable(
         cleared=((a + 2 * word, 0xFFFF & ~(1 << bit | 1 << FIRST_TASK_CYCLE[1])),),
         cycle_time=(a + 2 * CYCLE_TIME, a + 2 * MAX_CYCLE_TIME, TENTH_MS_NS),
         counters=tuple((a + 2 * at, unit_ns) for at, unit_ns in FREE_COUNTERS),
@@ -106,4 +106,4 @@ def _masks(byte: int) -> tuple[int, Periods]:
 
 
 _ROWS = [(AREAS["CF"].offset + byte, *_masks(byte)) for byte in sorted({number // 8 for number in PERIODS_NS})]
-CLOCKWORK = _clockwork()
+CLOCK_WORDS = _clock_words()

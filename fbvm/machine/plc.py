@@ -16,17 +16,17 @@ from fbvm.engine.clock import Clock
 from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
 from fbvm.machine.breakpoints import Breakpoints, Halt
-from fbvm.machine.clock_words import CLOCKWORK, Flags
-from fbvm.machine.fast.paths import Express, Way
+from fbvm.machine.clock_words import CLOCK_WORDS, ClockWords
+from fbvm.machine.fast.paths import FastPath, FastPaths
 from fbvm.machine.goal import Goal
-from fbvm.machine.refresh import Attached, Exchange
+from fbvm.machine.refresh import Attached, IORefresh
 from fbvm.machine.scan_times import Lateness, ScanTimes
 from fbvm.machine.state import RUN
 from fbvm.machine.state import Mode as Mode
 from fbvm.machine.state import Phase as Phase
 from fbvm.machine.state import State as State
 from fbvm.machine.state import Stopped as Stopped
-from fbvm.machine.tasks import Schedule, hurried
+from fbvm.machine.tasks import TaskSchedule, too_short_intervals
 from fbvm.net.journal import Journal
 from fbvm.units.contract import Unit
 from fbvm.watch import places
@@ -65,7 +65,7 @@ class Plc:
         self._choice = engine
         self.engine: Engine = engine_for(image, self.memory, engine, observed)
         self._system = self.memory.views["i64"]
-        self._flags = Flags(self.memory)
+        self._clock_words = ClockWords(self.memory)
         self.units: list[Attached] = []
         self.watchers: list[Callable[[Plc], None]] = []
         """Called at the end of each scan, after its I/O refresh: recorders, watches."""
@@ -74,7 +74,7 @@ class Plc:
         self.now_ns = 0
         """Time of the last scan; `elapsed_ns` is where the next one begins in virtual time."""
         self.scans = 0
-        self.warnings = tuple(hurried(image.tasks, cycle_ns))
+        self.warnings = tuple(too_short_intervals(image.tasks, cycle_ns))
         """What the program asks and this PLC does not do, for people: tasks that want to be quicker than the cycle."""
         self.scan_times = ScanTimes(cycle_ns)
         """How long scans took, where somebody with a clock measured it (`fbvm.run`)."""
@@ -88,9 +88,9 @@ class Plc:
         self._past: deque[State] = deque(maxlen=0)
         self._due: deque[int] = deque()
         self.breakpoints = Breakpoints(self)
-        self._schedule = Schedule(image.tasks, lambda path: self.read(path) is True)
-        self._exchange = Exchange(self.units, self.memory)
-        self._express = Express(self._exchange, self._schedule)
+        self._schedule = TaskSchedule(image.tasks, lambda path: self.read(path) is True)
+        self._io = IORefresh(self.units, self.memory)
+        self._fast_paths = FastPaths(self._io, self._schedule)
         self._write_initial()
         self._journal = journal
         if journal:
@@ -108,9 +108,9 @@ class Plc:
             raise Stopped(self.trap)
         if not self.breakpoints.halted:
             now_ns = self._time(now_ns)
-            if way := self._way():
+            if path := self._fast_path():
                 self.now_ns = now_ns
-                self.trap = way.once(now_ns, self.budget)
+                self.trap = path.once(now_ns, self.budget)
                 self.scans += 1
                 self._tell()
                 return self.trap
@@ -126,12 +126,12 @@ class Plc:
         self._end()
         return self.trap
 
-    def _way(self) -> Way | None:
+    def _fast_path(self) -> FastPath | None:
         """How machine code does the next scan in one piece.  It cannot if somebody has a part in it."""
         machine = self.engine.machine
         if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
             return None
-        return None if self.breakpoints.armed else self._express.way(machine)
+        return None if self.breakpoints.armed else self._fast_paths.path(machine)
 
     def _begin(self, now_ns: int) -> None:
         """A scan up to its program."""
@@ -148,7 +148,7 @@ class Plc:
     def _end(self) -> None:
         """A scan from the end of its program on."""
         if not self.trap:
-            self._express.refresh(self.now_ns, self._journal)
+            self._fast_paths.refresh(self.now_ns, self._journal)
             if self.phases:
                 self._over(Phase.REFRESH)
         self.scans += 1
@@ -185,7 +185,7 @@ class Plc:
         self.now_ns = now_ns
         system = self._system
         system[NOW // 8], system[DUE // 8], system[BUDGET // 8] = now_ns, NEVER, self.budget
-        self._flags.update(now_ns, cycle_time_ns, self._first and self._mode is RUN)
+        self._clock_words.update(now_ns, cycle_time_ns, self._first and self._mode is RUN)
 
     def _over(self, phase: Phase) -> None:
         for told in self.phases:
@@ -197,7 +197,7 @@ class Plc:
         some_are_new = bool(fresh)
         while due:
             if some_are_new:
-                self._flags.begin_task(due[0] in fresh)
+                self._clock_words.begin_task(due[0] in fresh)
             trap = breakpoints.run(due[0], self.engine) if breakpoints.armed else self.engine.run(due[0])
             if breakpoints.halted:
                 return None
@@ -217,7 +217,7 @@ class Plc:
     def due_ns(self) -> int:
         """When the next scan is worth while, if no network tells anything before: at once if a unit changed words for the
         program, else when a timer of the program, a task's interval or a unit changes something by itself."""
-        return min(self._exchange.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
+        return min(self._io.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
 
     def run(
         self,
@@ -245,8 +245,8 @@ class Plc:
             return False
         if self.breakpoints.armed:
             done, self.trap = self._many_guarded(most)
-        elif all(attached.network.virtual_time for attached in self.units) and (way := self._way()):
-            done, self.trap = way.many(most, self.now_ns, self.cycle_ns, self.budget, STEP_BUDGET)
+        elif all(attached.network.virtual_time for attached in self.units) and (path := self._fast_path()):
+            done, self.trap = path.many(most, self.now_ns, self.cycle_ns, self.budget, STEP_BUDGET)
         else:
             return False
         self.scans += done
@@ -257,10 +257,10 @@ class Plc:
         """Scans in the time that `clock` tells, which was `now_ns` before, one upon the other for as long as units have news
         for the program; when they began.  None if somebody has to be told between them, or has a part in one: use `scan`."""
         times: list[int] = []
-        if self.watchers or self._past.maxlen or self.trap or not (way := self._way()):
+        if self.watchers or self._past.maxlen or self.trap or not (path := self._fast_path()):
             return times
         try:
-            self.trap = way.burst(times, most, now_ns, clock, self.budget)
+            self.trap = path.burst(times, most, now_ns, clock, self.budget)
         finally:  # Ctrl-C may come between two of them
             if times:
                 self.scans += len(times)
@@ -269,13 +269,13 @@ class Plc:
 
     def _many_guarded(self, most: int) -> tuple[int, Trap | None]:
         """How many scans there were before one that stops at a breakpoint."""
-        turns = self._schedule.turns()
+        tasks = self._schedule.by_time()
         outside = self.units or self.phases or self._forces or self._journal
-        if outside or not turns or self._first or self._mode is not RUN or self.halted:
+        if outside or not tasks or self._first or self._mode is not RUN or self.halted:
             return 0, None
         self._system[BUDGET // 8] = self.budget
         guarded = self.breakpoints.guarding(self.engine)
-        return guarded.run_many(turns, most, self.cycle_ns, CLOCKWORK, spend=STEP_BUDGET)
+        return guarded.run_many(tasks, most, self.cycle_ns, CLOCK_WORDS, spend=STEP_BUDGET)
 
     # --- values -------------------------------------------------------------------------------------------------------
 
@@ -350,7 +350,7 @@ class Plc:
     def mode(self, mode: Mode) -> None:
         with self._acting("mode", mode.value):
             if mode is RUN and self._mode is not RUN:
-                held = ("CIO", "W", "TF", "T") if self._flags.io_memory_held else ()
+                held = ("CIO", "W", "TF", "T") if self._clock_words.io_memory_held else ()
                 self._restart(self._kept(held))
             self._mode = mode
 
@@ -382,7 +382,7 @@ class Plc:
         self._schedule.reset()
         self._leave()
         self._first = True
-        self._express.forget()
+        self._fast_paths.forget()
         self.trap = None
 
     def _kept(self, held: Sequence[str]) -> list[tuple[int, bytes]]:
@@ -419,7 +419,7 @@ class Plc:
         self.now_ns, self.scans, self.trap = state.now_ns, state.scans, state.trap
         self._mode, self._first, self._forces = state.mode, state.first, dict(state.forces)
         self._schedule.restore(state.schedule)
-        self._express.forget()
+        self._fast_paths.forget()
         self._leave()
 
     def _leave(self) -> None:

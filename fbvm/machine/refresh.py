@@ -26,12 +26,12 @@ class Attached:
         return self.unit if isinstance(self.unit, ProcessorUnit) else None
 
 
-class Exchange:
+class IORefresh:
     """I/O refreshes of the units of one PLC; some may be left out, and are counted."""
 
     def __init__(self, units: Sequence[Attached], memory: Memory) -> None:
         self.units, self.memory = units, memory
-        self.passed = 0
+        self.skipped = 0
         """How many refreshes were left out since the last one."""
         self.changed_words = False
         """The units changed words in the last refresh, and no scan has come upon it."""
@@ -40,8 +40,8 @@ class Exchange:
         """Each unit exchanges its words once and stores what it received; then the networks take what the units ask for.
 
         `seen` is told the number of each unit whose words have been exchanged.  True if nobody has anything left to do."""
-        if self.passed:
-            self.pass_by()
+        if self.skipped:
+            self.report_skipped()
         memory, changed_words = self.memory, False
         asked: list[list[Request] | None] = []
         """What each unit asks for; None if its program is to be asked."""
@@ -69,11 +69,11 @@ class Exchange:
         self.changed_words = changed_words
         return self.is_idle(now_ns)
 
-    def pass_by(self) -> None:
+    def report_skipped(self) -> None:
         """Tell the links of refreshes that were left out."""
         for attached in self.units:
-            attached.link.pass_by(self.passed)
-        self.passed = 0
+            attached.link.pass_by(self.skipped)
+        self.skipped = 0
 
     def is_idle(self, now_ns: int) -> bool:
         """True if a refresh changes nothing unless what the units watch has changed, as far as they say what that is."""

@@ -7,7 +7,7 @@ from enum import Enum
 
 from fbvm.base.memory import Snapshot
 from fbvm.engine.trap import Trap
-from fbvm.machine.tasks import ScheduleState
+from fbvm.machine.tasks import TaskScheduleState
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value
 
@@ -37,7 +37,7 @@ class State:
     memory: Snapshot
     now_ns: int
     scans: int
-    schedule: ScheduleState
+    schedule: TaskScheduleState
     forces: dict[Place, Value]
     mode: Mode
     first: bool

@@ -12,34 +12,36 @@ from dataclasses import dataclass, field
 
 from fbvm.base.areas import NEVER
 from fbvm.code.image import TaskRow
-from fbvm.engine.native.scans.scans import Turn
+from fbvm.engine.native.scans.scans import ScheduledTask
 from fbvm.watch.values import show_time
 
 UNPLANNED = -1
-"""Time of a task that has not been planned yet."""
-ScheduleState = tuple[dict[int, int], dict[int, bool], frozenset[int]]
+"""In place of the time of a task that has not been planned yet."""
+TaskScheduleState = tuple[dict[int, int], dict[int, bool], frozenset[int]]
+"""Next times by task, the last level of SINGLE by task, tasks that have not been executed."""
 
 
 @dataclass
-class Schedule:
-    """When each task runs next.  `single` tells whether the BOOL of a path is TRUE."""
+class TaskSchedule:
+    """When each task runs next.  `tasks` are those of the image; `single` tells whether the BOOL of a path is TRUE."""
 
     tasks: tuple[TaskRow, ...]
     single: Callable[[str], bool]
     _levels: dict[int, bool] = field(default_factory=dict)
+    """Of tasks with SINGLE what the BOOL was in the last scan."""
     fresh: set[int] = field(default_factory=set)
     """Tasks that have not been executed since the start."""
 
     def __post_init__(self) -> None:
         self.fresh.update(range(len(self.tasks)))
         self._order = sorted(range(len(self.tasks)), key=lambda number: self.tasks[number].priority)
-        self._turns = [Turn(number, self.tasks[number].interval_ns, UNPLANNED) for number in self._order]
-        self._timed = {turn.task: turn for turn in self._turns if turn.interval_ns}
-        self._by_time = not any(task.single for task in self.tasks)
-        self._always = self._by_time and not self._timed
+        self._entries = [ScheduledTask(number, self.tasks[number].interval_ns, UNPLANNED) for number in self._order]
+        self._timed = {entry.task: entry for entry in self._entries if entry.interval_ns}
+        self._only_time = not any(task.single for task in self.tasks)
+        self._always = self._only_time and not self._timed
 
     def due(self, now_ns: int) -> list[int]:
-        """Numbers of the tasks that run in the scan at `now_ns`, by priority."""
+        """Numbers of the tasks that run in the scan at `now_ns`, by priority.  Plans the next time of those with an interval."""
         if self._always:
             return self._order
         return [number for number in self._order if self._is_due(number, now_ns)]
@@ -48,7 +50,7 @@ class Schedule:
         """The earliest time after `now_ns` at which an interval has passed; NEVER if no task has one."""
         if not self._timed:
             return NEVER
-        return min((turn.next_ns for turn in self._timed.values() if turn.next_ns > now_ns), default=NEVER)
+        return min((entry.next_ns for entry in self._timed.values() if entry.next_ns > now_ns), default=NEVER)
 
     def _is_due(self, number: int, now_ns: int) -> bool:
         task = self.tasks[number]
@@ -57,40 +59,42 @@ class Schedule:
         self._levels[number] = level
         if not task.interval_ns:
             return edge or not task.single
-        turn = self._timed[number]
-        if turn.next_ns == UNPLANNED:
-            turn.next_ns = now_ns
-        if now_ns < turn.next_ns:
+        entry = self._timed[number]
+        if entry.next_ns == UNPLANNED:
+            entry.next_ns = now_ns
+        if now_ns < entry.next_ns:
             return edge
-        missed = (now_ns - turn.next_ns) // task.interval_ns
-        turn.next_ns += (missed + 1) * task.interval_ns
+        missed = (now_ns - entry.next_ns) // task.interval_ns
+        entry.next_ns += (missed + 1) * task.interval_ns
         return edge or not level
 
-    def turns(self) -> list[Turn] | None:
-        """The tasks in their order, always the same list, whose times move on; None if not only time says when they run."""
-        return self._turns if self._by_time and not self.fresh else None
+    def by_time(self) -> list[ScheduledTask] | None:
+        """The tasks in their order if time alone says when each runs, and each has run once; else None.
+
+        It is the same list each time, and its entries are those of this schedule: whoever runs the tasks keeps `next_ns` right."""
+        return self._entries if self._only_time and not self.fresh else None
 
     def reset(self) -> None:
         """As at power-on."""
-        for turn in self._turns:
-            turn.next_ns = UNPLANNED
+        for entry in self._entries:
+            entry.next_ns = UNPLANNED
         self._levels.clear()
         self.fresh.update(range(len(self.tasks)))
 
-    def state(self) -> ScheduleState:
+    def state(self) -> TaskScheduleState:
         """What a snapshot keeps."""
-        planned = {turn.task: turn.next_ns for turn in self._timed.values() if turn.next_ns != UNPLANNED}
+        planned = {entry.task: entry.next_ns for entry in self._timed.values() if entry.next_ns != UNPLANNED}
         return planned, dict(self._levels), frozenset(self.fresh)
 
-    def restore(self, state: ScheduleState) -> None:
+    def restore(self, state: TaskScheduleState) -> None:
         """Back to a state that `state` gave."""
-        for turn in self._timed.values():
-            turn.next_ns = state[0].get(turn.task, UNPLANNED)
+        for entry in self._timed.values():
+            entry.next_ns = state[0].get(entry.task, UNPLANNED)
         self._levels, self.fresh = dict(state[1]), set(state[2])
 
 
-def hurried(tasks: tuple[TaskRow, ...], cycle_ns: int) -> Iterator[str]:
-    """What to say of tasks with an INTERVAL that is shorter than the cycle."""
+def too_short_intervals(tasks: tuple[TaskRow, ...], cycle_ns: int) -> Iterator[str]:
+    """A warning for each task whose INTERVAL is shorter than the cycle, so that it runs less often than it asks for."""
     for task in tasks:
         if 0 < task.interval_ns < cycle_ns:
             wanted, cycle = show_time(task.interval_ns)[2:], show_time(cycle_ns)[2:]

@@ -36,7 +36,7 @@ from fbvm.code.image import Image  # noqa: E402
 from fbvm.engine.native.emit import statements as native_statements  # noqa: E402
 from fbvm.engine.native.emit.writer import Writer  # noqa: E402
 from fbvm.engine.native.engine import NativeEngine  # noqa: E402
-from fbvm.engine.native.scans.scans import Turn  # noqa: E402
+from fbvm.engine.native.scans.scans import ScheduledTask  # noqa: E402
 from fbvm.engine.python.engine import PythonEngine  # noqa: E402
 from fbvm.engine.stops import Stops  # noqa: E402
 from fbvm.machine.plc import Plc  # noqa: E402
@@ -101,7 +101,7 @@ def natively(image: Image, level: int, step_ns: int) -> Callable[[int], object]:
 
     def scans(n: int) -> None:
         engine.memory.write(BUDGET, "i64", 1 << 60)
-        assert engine.run_many([Turn(0)], n, step_ns) == (n, None)
+        assert engine.run_many([ScheduledTask(0)], n, step_ns) == (n, None)
 
     return scans
 
@@ -113,7 +113,7 @@ def with_stops(image: Image, step_ns: int) -> Callable[[int], object]:
 
     def scans(n: int) -> None:
         memory.write(BUDGET, "i64", 1 << 60)
-        assert engine.run_many([Turn(0)], n, step_ns) == (n, None)
+        assert engine.run_many([ScheduledTask(0)], n, step_ns) == (n, None)
 
     return scans
 

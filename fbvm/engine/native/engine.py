@@ -17,9 +17,9 @@ from fbvm.engine.native.code import Code, code_of
 from fbvm.engine.native.context import Context
 from fbvm.engine.native.emit.writer import Unsupported
 from fbvm.engine.native.entries import Entry, entry
-from fbvm.engine.native.scans.code import NOTHING, Clockwork
-from fbvm.engine.native.scans.scans import NO_LIMIT, Series, Turn
-from fbvm.engine.native.scans.units import UnitExchange, UnitInCode
+from fbvm.engine.native.scans.code import NO_CLOCK_WORDS, ClockWordTable
+from fbvm.engine.native.scans.scans import NO_LIMIT, NativeScans, ScheduledTask
+from fbvm.engine.native.scans.units import UnitInCode
 from fbvm.engine.stops import PAUSE, STOPPED, Stops
 from fbvm.engine.trap import Trap, trap
 
@@ -48,7 +48,7 @@ class NativeEngine:
         self._memory_at = ctypes.addressof(self._place)
         self._entries = [self._entry(number) for number in range(len(image.tasks))]
         self._calls = [entry.call for entry in self._entries]
-        self._series: dict[tuple[tuple[tuple[int, int], ...], Clockwork], Series] = {}
+        self._scans: dict[tuple[tuple[tuple[int, int], ...], ClockWordTable], NativeScans] = {}
 
     def _entry(self, task: int) -> Entry:
         bound = entry()
@@ -77,29 +77,31 @@ class NativeEngine:
         point = self._calls[task_index]()
         return self.trap_at(point) if point else None
 
-    def series(self, turns: Sequence[Turn], clockwork: Clockwork = NOTHING, watched: Sequence[Sequence[int]] = (),
-               units: Sequence[UnitInCode] = ()) -> Series:  # fmt: skip
-        """Scans with the tasks in this order, which write the clockwork and end when what is watched changes or the
-        program of a unit runs."""
-        return Series(self.memory, self._memory_at, self._context.at, self._entries, turns, clockwork, watched, units)
+    def scans(self, tasks: Sequence[ScheduledTask], clock_words: ClockWordTable = NO_CLOCK_WORDS,
+              watched: Sequence[Sequence[int]] = (), units: Sequence[UnitInCode] = ()) -> NativeScans:  # fmt: skip
+        """Machine code of whole scans, with the tasks in this order; see `NativeScans` for `watched` and `units`."""
+        return NativeScans(self.memory, self._memory_at, self._context.at, self._entries, tasks, clock_words, watched, units)
 
     def unit_in_code(self, exchange: UnitExchange) -> UnitInCode:
         """This program, its first task, as that of a unit which exchanges this with a PLC."""
         return UnitInCode(self._entries[0].function_at, self._memory_at, self._context.at, self.trap_at, exchange)
 
-    def run_many(self, turns: Sequence[Turn], n: int, step_ns: int, clockwork: Clockwork = NOTHING, *,
+    def run_many(self, tasks: Sequence[ScheduledTask], n: int, step_ns: int, clock_words: ClockWordTable = NO_CLOCK_WORDS, *,
                  spend: int = NO_LIMIT) -> tuple[int, Trap | None]:  # fmt: skip
-        """Up to n scans of a `Series`, each a step later than the one before, with the budget that there is now; how many
-        there were, and the trap of the last."""
-        if not turns or n <= 0:
+        """Up to n scans of a PLC without units, each `step_ns` later than the one before, with the time and the step budget that
+        stand in the system page now.
+
+        No further scan begins when all together have executed `spend` statements.  Returns how many scans there were, and the
+        trap that ended the last one."""
+        if not tasks or n <= 0:
             return 0, None
-        shape = tuple((turn.task, turn.interval_ns) for turn in turns), clockwork
-        series = self._series.get(shape)
-        if series is None:
-            series = self._series[shape] = self.series(turns, clockwork)
-        series.turns = turns
+        shape = tuple((task.task, task.interval_ns) for task in tasks), clock_words
+        scans = self._scans.get(shape)
+        if scans is None:
+            scans = self._scans[shape] = self.scans(tasks, clock_words)
+        scans.tasks = tasks
         system = self.memory.views["i64"]
-        done, point = series.run(n, system[NOW // 8] + step_ns, step_ns, system[BUDGET // 8], spend)
+        done, point = scans.run(n, system[NOW // 8] + step_ns, step_ns, system[BUDGET // 8], spend)
         return done, self.trap_at(point) if point else None
 
     def trap_at(self, number: int) -> Trap:

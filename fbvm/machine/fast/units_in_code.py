@@ -11,12 +11,11 @@ from fbvm.base.memory import STRUCTS
 from fbvm.engine.clock import Clock
 from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.native.scans.code import ASKED, ASKED_BEFORE, OVER, SCANNED
-from fbvm.engine.native.scans.scans import Turn
-from fbvm.engine.native.scans.slots import Slot
-from fbvm.engine.native.scans.units import CHANGED_WORDS, FieldAt, MovesAt, MoveShape, UnitExchange, UnitInCode
+from fbvm.engine.native.scans.scans import ScheduledTask
+from fbvm.engine.native.scans.units import CHANGED_WORDS, UnitInCode
 from fbvm.engine.trap import Trap
-from fbvm.machine.clock_words import CLOCKWORK
-from fbvm.machine.refresh import Exchange
+from fbvm.machine.clock_words import CLOCK_WORDS
+from fbvm.machine.refresh import IORefresh
 from fbvm.net.journal import Journal
 from fbvm.units.contract import MOVE_FIELDS, Moves, Processor, ProcessorUnit, Unit
 
@@ -26,162 +25,166 @@ COLLECTED, CHANGED, UNFINISHED = Slot.COLLECTED, Slot.CHANGED, Slot.UNFINISHED
 """Slots of every burst, looked up once."""
 
 
-def can_run_in_code(exchange: Exchange) -> bool:
+def can_run_in_code(io: IORefresh) -> bool:
     """True if there are units, and each has a processor at work that runs as machine code."""
-    for attached in exchange.units:
+    for attached in io.units:
         exchanged = attached.unit.exchanged
         if exchanged is None or attached.unit.watched is None or exchanged.processor.machine is None:
             return False
-    return bool(exchange.units)
+    return bool(io.units)
 
 
-def units_in_code(exchange: Exchange) -> list[UnitInCode]:
+def units_in_code(io: IORefresh) -> list[UnitInCode]:
     """The units as machine code runs them; none if one of them cannot be."""
-    return [_unit_in_code(attached.unit, exchange) for attached in exchange.units] if can_run_in_code(exchange) else []
+    return [_unit_in_code(attached.unit, io) for attached in io.units] if can_run_in_code(io) else []
 
 
-def _unit_in_code(unit: Unit, exchange: Exchange) -> UnitInCode:
-    exchanged, watched = unit.exchanged, unit.watched
-    assert exchanged and watched is not None
-    own = exchanged.processor.contract
-    machine: NativeEngine = exchanged.processor.machine
-    return machine.unit_in_code(UnitExchange(
-        copies=tuple((exchange.offset(words.area, words.first), own.offset(words.variable), own.size(words.variable))
-                     for words in exchanged.words),
-        watched=tuple(exchange.offset(area, word) for area, word in watched),
-        posted=own.offset(exchanged.posted),
-        urgent=own.offset(exchanged.urgent),
-        unfinished=tuple(map(own.offset, exchanged.unfinished)),
-        wake=own.offset(exchanged.wake),
-        moves=_moves(exchanged.processor, exchanged.moves, exchange) if exchanged.moves else None,
-    ))  # fmt: skip
+def _unit_in_code(unit: Unit, io: IORefresh) -> UnitInCode:
+    exchanged, groups = unit.exchanged, unit.watched
+    assert exchanged and groups is not None
+    own = exchanged.processor
+    machine: NativeEngine = own.machine
+    copies = [(io.offset(area, word), own.offset(variable), 2 * count) for area, word, variable, count in exchanged.words]
+    watched = [io.offset(area, word) for area, word in groups]
+    posted, requested, wake = map(own.offset, (exchanged.posted, exchanged.requested, exchanged.wake))
+    left = [own.offset(variable) for variable in exchanged.left]
+    return machine.unit_in_code(copies, watched, posted, requested, left, wake, _moves(exchanged, io))
 
 
-def _moves(processor: Processor, moves: Moves, exchange: Exchange) -> MovesAt:
-    """Where a program says what is to be moved.  The program learns where the areas are that it wants to know of."""
-    own = processor.contract
-    targets, (first_target, _, _) = processor.view(moves.targets), own.array(moves.targets)
-    for subscript, area in moves.areas.items():
-        if area in exchange.memory.areas:
-            targets[subscript - first_target] = exchange.offset(area, 0)
-    row = own.record(moves.rows)
-    first_ring, _, ring_bytes = own.array(moves.rings)
-    fields = {name: FieldAt(row[name].offset, 8 * STRUCTS[row[name].machine].size) for name in MOVE_FIELDS}
-    shape = MoveShape(row_bytes=row.size, first_ring=first_ring, ring_bytes=ring_bytes, **fields)
-    return MovesAt(count=own.offset(moves.count), rows=own.offset(moves.rows), rings=own.offset(moves.rings), shape=shape)
+def _moves(exchanged: Exchanged, io: IORefresh) -> tuple[int, int, int]:
+    """Where a processor says what is to be moved; it learns where the areas are."""
+    moves, own = exchanged.moves, exchanged.processor
+    if moves is None:
+        return 0, 0, 0
+    variable, areas = moves.targets
+    targets = own.view(variable, "u32")
+    for index, area in areas.items():
+        if area in io.memory.areas:
+            targets[index] = io.offset(area, 0)
+    return own.offset(moves.count), own.offset(moves.rows), moves.ring_bytes
 
 
 class WithUnits:
-    """Machine code of whole scans, with their I/O refreshes.  One in which no unit has anything to do is left out."""
+    """The fast path of a PLC all of whose units run inside machine code: a scan with its I/O refresh is one call.
 
-    def __init__(self, exchange: Exchange, machine: NativeEngine, turns: list[Turn], found: Sequence[UnitInCode]) -> None:
-        self._exchange, self._machine = exchange, machine
-        self._series = machine.series(turns, CLOCKWORK, units=found)
-        self._numbers, self._numbers_at = self._series.numbers, self._series.numbers_at
-        self._is_timed = any(turn.interval_ns for turn in turns)
+    A refresh in which no unit has anything to do is left out.  Python collects the events of networks before a scan and submits
+    the requests that the units' programs have left behind."""
+
+    is_outdated = False
+    """Always False: a path that has its units in machine code is never replaced."""
+
+    def __init__(self, io: IORefresh, machine: NativeEngine, tasks: list[ScheduledTask], units: Sequence[UnitInCode]) -> None:
+        self._io, self._machine = io, machine
+        self._scans = machine.scans(tasks, CLOCK_WORDS, units=units)
+        self._parameters, self._parameters_at = self._scans.parameters, self._scans.parameters_at
+        self._has_intervals = any(task.interval_ns for task in tasks)
         self._rows = [(1 << number, cast(ProcessorUnit, attached.unit), attached.link)
-                      for number, attached in enumerate(exchange.units)]  # fmt: skip
-        self._counts = any(attached.network.virtual_time for attached in exchange.units)
-        """There are links that want to know of each refresh."""
-        self.is_outdated = False
-        """It stays as it is."""
+                      for number, attached in enumerate(io.units)]  # fmt: skip
+        """Of each unit the bit by which machine code names it, the unit, and its link."""
+        self._counts_refreshes = any(attached.network.virtual_time for attached in io.units)
+        """True if there are links that want to know of each refresh, so that machine code comes back after each scan."""
         self.is_open = False
-        """What the units watch is expected to be as their last refresh left it."""
+        """True if machine code knows the words that the units watch as their last refresh left them."""
 
     def refresh(self, now_ns: int, journal: Journal | None = None) -> None:
-        """An I/O refresh of a scan that goes another way."""
-        self._exchange.refresh(now_ns, journal, self._series.expect)
+        """An I/O refresh in Python, at the end of a scan that took no fast path."""
+        self._io.refresh(now_ns, journal, self._scans.expect)
         self.is_open = True
 
     def once(self, now_ns: int, budget: int) -> Trap | None:
-        """One scan."""
-        self._numbers[COLLECTED] = has_events = self._has_events()
-        if has_events:
+        """One scan at `now_ns` in which the program may execute `budget` statements.  Returns the trap that ended it."""
+        pending = self._has_pending_events()
+        self._parameters.events_collected = pending
+        if pending:
             self._collect_events(now_ns)
-        point = self._series.once(now_ns, budget)
+        point = self._scans.once(now_ns, budget)
         if point > 0:
             return self._machine.trap_at(point)
-        self._count()
+        self._count_refresh()
         self._end(now_ns)
         return None
 
     def burst(self, times: list[int], most: int, now_ns: int, clock: Clock, budget: int) -> Trap | None:
-        """Scans each at the time that the clock tells, one upon the other for as long as units have news for the program;
-        `times` takes when they began.
+        """Runs up to `most` scans back to back while units have changed words.
 
-        A refresh that was left out takes place now if there is something for it: waiting comes before the refresh, as in
-        a PLC with a fixed cycle time (W394)."""
-        series, numbers, exchange = self._series, self._numbers, self._exchange
-        if clock is not series.clock or most != series.most:
-            series.follow(clock, most)
-        is_stepped, has_events, point = self._counts or not clock.function_at, self._has_events(), SCANNED
-        numbers[BUDGETED], numbers[TIMES] = budget, series.times_at
-        if self._is_timed:
-            series.load_turns()
-        if exchange.passed:
-            exchange.passed -= 1
-            numbers[DEFERRED] = 1
+        Reads `clock` before each, whose time was `now_ns` at the call, and appends the time to `times`.  Returns the trap that
+        ended the burst, if any.
+
+        A refresh that was left out before takes place now if a unit has something to do: a PLC with a fixed cycle time waits
+        before the refresh and not behind it (W394)."""
+        scans, parameters, io = self._scans, self._parameters, self._io
+        if clock is not scans.clock or most != scans.most:
+            scans.set_clock(clock, most)
+        is_stepped, pending, point = self._counts_refreshes or not clock.function_at, self._has_pending_events(), SCANNED
+        parameters.budget, parameters.times = budget, scans.times_at
+        if self._has_intervals:
+            scans.load_times()
+        if io.skipped:
+            io.skipped -= 1
+            parameters.refresh_first = 1
         try:
             while True:
                 if is_stepped and point >= SCANNED:
-                    now_ns = numbers[FIRST] = clock.now()
-                    numbers[KNOWN] = 1
-                if has_events:
-                    has_events = self._collect_events(now_ns)
-                    numbers[COLLECTED] = 1
-                if has_events or is_stepped:
-                    numbers[ALONE] = 1
-                point = series.call_burst(self._numbers_at)
+                    now_ns = parameters.time_ns = clock.now()
+                    parameters.is_time_known = 1
+                if pending:
+                    pending = self._collect_events(now_ns)
+                    parameters.events_collected = 1
+                if pending or is_stepped:
+                    parameters.is_single = 1
+                point = scans.call_burst(self._parameters_at)
                 if point == OVER:
-                    self._count()
+                    self._count_refresh()
                     break
                 if point > 0:
                     return self._machine.trap_at(point)
                 if is_stepped:
-                    self._count()
-                now_ns = numbers[FIRST]
+                    self._count_refresh()
+                now_ns = parameters.time_ns
                 if point in (ASKED, ASKED_BEFORE):
-                    has_events = self._finish(now_ns) or has_events
+                    pending = self._submit_requests(now_ns) or pending
         finally:  # Ctrl-C may come between two calls
-            if self._is_timed:
-                series.store_turns()
-            if done := (numbers[TIMES] - series.times_at) // 8:
-                times += series.times[:done]
-                self._end(numbers[FIRST])
+            if self._has_intervals:
+                scans.store_times()
+            if done := (parameters.times - scans.times_at) // 8:
+                times += scans.times[:done]
+                self._end(parameters.time_ns)
             else:
-                exchange.passed += numbers[DEFERRED]
-                numbers[DEFERRED] = numbers[KNOWN] = 0
+                io.skipped += parameters.refresh_first
+                parameters.refresh_first = parameters.is_time_known = 0
         return None
 
     def many(self, most: int, now_ns: int, step_ns: int, budget: int, spend: int) -> tuple[int, Trap | None]:
-        """Scans that follow the one at `now_ns`, each a step later, until a unit has something to do; how many there were.
+        """Up to `most` scans after the one at `now_ns`, each `step_ns` later than the one before and of `budget` statements at
+        most, until the program of a unit has run.
 
-        No other begins when all together have executed `spend` statements."""
-        series, exchange = self._series, self._exchange
-        if self._has_events():
+        No further scan begins when all together have executed `spend` statements.  Returns how many scans there were, and the
+        trap that ended the last one."""
+        scans, io = self._scans, self._io
+        if self._has_pending_events():
             return 0, None
-        done, point = series.run(most, now_ns + step_ns, step_ns, budget, spend)
-        exchange.passed += done - 1
+        done, point = scans.run(most, now_ns + step_ns, step_ns, budget, spend)
+        io.skipped += done - 1
         if point > 0:
             return done, self._machine.trap_at(point)
-        self._count()
+        self._count_refresh()
         self._end(now_ns + done * step_ns)
         return done, None
 
-    def _has_events(self) -> bool:
-        """True if a link has something to tell."""
+    def _has_pending_events(self) -> bool:
+        """True if a link has events for its unit."""
         for _, _, link in self._rows:  # noqa: SIM110 - a generator would cost as much as the rest of it
             if not link.is_quiet:
                 return True
         return False
 
     def _collect_events(self, now_ns: int) -> bool:
-        """Fetch what links have to tell, for the next refresh; whether they have more before they are asked for anything."""
-        if self._exchange.passed:
-            self._exchange.pass_by()
-        if self._numbers[UNFINISHED]:
-            self._finish(now_ns)
-        has_events = False
+        """Collects pending network events for the next I/O refresh.  Returns True if a link has more already."""
+        if self._io.skipped:
+            self._io.report_skipped()
+        if self._parameters.unfinished:
+            self._submit_requests(now_ns)
+        more = False
         for _, unit, link in self._rows:
             if link.is_quiet:
                 link.pass_by(1)
@@ -190,40 +193,42 @@ class WithUnits:
             if events:
                 unit.post(events)
             if not link.is_quiet:
-                has_events = True
-        return has_events
+                more = True
+        return more
 
-    def _count(self) -> None:
-        """A refresh is over; links that were heard for it know of it, and others are told if it was not left out."""
-        numbers = self._numbers
-        if numbers[COLLECTED]:
-            numbers[COLLECTED] = 0
+    def _count_refresh(self) -> None:
+        """Called after each I/O refresh of machine code: adds it to those of which the links have not been told.
+
+        Not if events were collected for this refresh, which has told the links.  Tells them at once if a unit's program ran."""
+        parameters = self._parameters
+        if parameters.events_collected:
+            parameters.events_collected = 0
             return
-        exchange = self._exchange
-        exchange.passed += 1
-        if numbers[CHANGED]:
-            exchange.pass_by()
+        io = self._io
+        io.skipped += 1
+        if parameters.changed:
+            io.report_skipped()
 
     def _end(self, now_ns: int) -> None:
-        """The last of some scans is over."""
-        numbers = self._numbers
-        if numbers[UNFINISHED]:
-            self._finish(now_ns)
-        self._exchange.changed_words = numbers[Slot.AGAIN] & CHANGED_WORDS != 0
+        """Called after the last scan of a call: submits requests that are still unsent and updates `io.changed_words`."""
+        parameters = self._parameters
+        if parameters.unfinished:
+            self._submit_requests(now_ns)
+        self._io.changed_words = parameters.again & CHANGED_WORDS != 0
 
-    def _finish(self, now_ns: int) -> bool:
-        """Have done what the processors ask for that ran; whether that made links have something to tell.
+    def _submit_requests(self, now_ns: int) -> bool:
+        """Submits what the units' programs have asked of their networks.  Returns True if links have events because of that.
 
-        Raises RuntimeError if the program of one has trapped, which is a fault of ours."""
-        numbers, submitted = self._numbers, False
-        if numbers[Slot.FAULTY]:
-            number = numbers[Slot.FAULTY].bit_length() - 1
-            raise RuntimeError(str(self._series.units[number].trap_at(numbers[Slot.POINT])))
-        ran, numbers[UNFINISHED] = numbers[UNFINISHED], 0
+        Raises RuntimeError if the program of a unit has trapped, which is a mistake of this package."""
+        parameters, submitted = self._parameters, False
+        if parameters.faulty:
+            number = parameters.faulty.bit_length() - 1
+            raise RuntimeError(str(self._scans.units[number].trap_at(parameters.point)))
+        unfinished, parameters.unfinished = parameters.unfinished, 0
         for bit, unit, link in self._rows:
-            if ran & bit:
+            if unfinished & bit:
                 requests = unit.finish()
                 if requests:
                     link.submit(requests, now_ns)
                     submitted = True
-        return submitted and self._has_events()
+        return submitted and self._has_pending_events()

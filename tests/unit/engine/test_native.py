@@ -31,7 +31,7 @@ from fbvm.engine.native import compiler as native_compiler
 from fbvm.engine.native import entries
 from fbvm.engine.native.emit import conversions
 from fbvm.engine.native.module import BodyWriter, translate
-from fbvm.engine.native.scans.scans import Turn
+from fbvm.engine.native.scans.scans import ScheduledTask
 from fbvm.engine.native.worker import worker
 
 ONE = const("i16", 1)
@@ -107,7 +107,7 @@ def test_a_memory_stays_while_an_engine_runs_over_it() -> None:
 
 def test_many_scans_advance_time_and_count() -> None:
     e = engine((*COUNT, ("due", ("add", "i64", ("now", "i64"), const("i64", 5))), ("charge", 7, 1)), budget=10)
-    assert e.run_many([Turn(0)], 1000, 1_000_000) == (1000, None)
+    assert e.run_many([ScheduledTask(0)], 1000, 1_000_000) == (1000, None)
     assert slot(e) == 1000
     read = e.memory.read
     assert (read(NOW, "i64"), read(SCANS, "i64")) == (1_005_000_000, 1000)
@@ -117,7 +117,7 @@ def test_many_scans_advance_time_and_count() -> None:
 def test_many_scans_end_with_a_trap() -> None:
     left = ("sub", "i16", const("i16", 5), load("i16", 0))
     e = engine((*COUNT, store("i16", 2, ("div", "i16", ONE, left, 4))))
-    done, trap = e.run_many([Turn(0)], 1000, 1000)
+    done, trap = e.run_many([ScheduledTask(0)], 1000, 1000)
     assert done == 5 and trap is not None
     assert (trap.code, trap.values) == ("R0101", (1, 0))
     assert e.memory.read(SCANS, "i64") == 5
@@ -125,7 +125,7 @@ def test_many_scans_end_with_a_trap() -> None:
 
 def test_many_scans_of_nothing() -> None:
     e = engine(COUNT)
-    assert e.run_many([Turn(0)], 0, 1000) == (0, None)
+    assert e.run_many([ScheduledTask(0)], 0, 1000) == (0, None)
     assert slot(e) == 0 and e.memory.read(DUE, "i64") == NEVER
 
 

@@ -14,7 +14,7 @@ from rows import first_quick
 from fbvm import Etn21, LoopNetwork, ModbusPeer, Peer, Plc, compile_text
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
-from fbvm.engine.native.scans.scans import Series
+from fbvm.engine.native.scans.scans import NativeScans
 from fbvm.machine.plc import Mode
 from fbvm.net.loop import LoopLink
 from fbvm.run import TimedWrite, loop
@@ -126,13 +126,13 @@ def test_a_long_run_comes_back_now_and_then(monkeypatch: pytest.MonkeyPatch) -> 
     plc = Plc(IMAGE, engine="native")
     plc.run(scans=100)
     counts = []
-    run_many = Series.run
+    run_many = NativeScans.run
 
-    def counted(self: Series, *operands: Any, **named: Any) -> Any:
+    def counted(self: NativeScans, *operands: Any, **named: Any) -> Any:
         counts.append(plc.scans)
         return run_many(self, *operands, **named)
 
-    monkeypatch.setattr(Series, "run", counted)
+    monkeypatch.setattr(NativeScans, "run", counted)
     assert plc.run(scans=2000) == "scans"
     assert len(counts) > 4 and all(later - earlier < 500 for earlier, later in pairwise(counts))
 
@@ -146,7 +146,7 @@ def test_who_wants_every_scan_gets_it(monkeypatch: pytest.MonkeyPatch, disturb: 
     plc = Plc(IMAGE, engine="native")
     plc.run(scans=10)
     disturb(plc)
-    monkeypatch.setattr(Series, "run", lambda *_: pytest.fail("not scan by scan"))
+    monkeypatch.setattr(NativeScans, "run", lambda *_: pytest.fail("not scan by scan"))
     assert plc.run(scans=10) == "scans" and plc.scans == 20
 
 

@@ -19,7 +19,7 @@ from fbvm.base.areas import NOW
 from fbvm.code.image import Image
 from fbvm.engine.clock import Clock
 from fbvm.engine.native import engine as native
-from fbvm.machine.fast.paths import Alone, Way
+from fbvm.machine.fast.paths import FastPath, ProgramAlone
 from fbvm.machine.fast.units_in_code import WithUnits
 from fbvm.machine.plc import Mode
 
@@ -115,16 +115,16 @@ def four(code: Image, *operands: Any) -> list[Rig]:
             Rig(code, *operands, engine="python")]  # fmt: skip
 
 
-def way(rig: Rig) -> Way | None:
-    return rig.plc._way()
+def way(rig: Rig) -> FastPath | None:
+    return rig.plc._fast_path()
 
 
 def agree(rigs: list[Rig], do: Callable[[Plc], object]) -> None:
     for rig in rigs:
         do(rig.plc)
         for attached in rig.plc.units:  # what was left out is told at the latest by the next refresh
-            attached.link.pass_by(rig.plc._exchange.passed)
-        rig.plc._exchange.passed = 0
+            attached.link.pass_by(rig.plc._io.skipped)
+        rig.plc._io.skipped = 0
     for rig in rigs[1:]:
         assert rig.state == rigs[0].state
 
@@ -140,7 +140,7 @@ def test_scan_by_scan(program: tuple[Any, ...], delays_ns: tuple[int, ...], late
     rigs = four(image(*program), delays_ns, latency_ns)
     for _ in range(120):
         agree(rigs, Plc.scan)
-    assert isinstance(way(rigs[0]), WithUnits) and isinstance(way(rigs[1]), Alone)
+    assert isinstance(way(rigs[0]), WithUnits) and isinstance(way(rigs[1]), ProgramAlone)
     assert rigs[0].plc.read("D20001") > 2 and rigs[0].networks[0].log
     assert rigs[0].toys[0].refreshes < rigs[1].toys[0].refreshes
 
@@ -235,7 +235,7 @@ def test_units_of_different_kinds_are_refreshed_from_outside() -> None:
     rig = Rig(image(), (0,))
     rig.plc.attach(Toy(1, is_inside=False), Echoing())
     rig.plc.run(scans=5)
-    assert isinstance(way(rig), Alone)
+    assert isinstance(way(rig), ProgramAlone)
 
 
 def test_a_processor_without_machine_code_is_run_from_outside(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -246,7 +246,7 @@ def test_a_processor_without_machine_code_is_run_from_outside(monkeypatch: pytes
         other.toys[0].connect()
     for scans in (1, 5, 300):
         agree([rig, other], lambda plc, scans=scans: plc.run(scans=scans))  # type: ignore[misc]
-    assert isinstance(way(other), Alone) and isinstance(way(rig), WithUnits)
+    assert isinstance(way(other), ProgramAlone) and isinstance(way(rig), WithUnits)
 
 
 # --- bursts -----------------------------------------------------------------------------------------------------------
@@ -295,7 +295,7 @@ def test_machine_code_that_reads_the_clock_comes_back_less_often() -> None:
     for is_told in (True, False):
         rig, points = Rig(image(2), (0,), virtual_time=False, is_told=is_told), list[int]()
         bursts(rig, 1, 16, 1000)
-        series = cast(WithUnits, way(rig))._series
+        series = cast(WithUnits, way(rig))._scans
         call, scans, looks = series.call_burst, rig.plc.scans, rig.clock.looks
         series.call_burst = lambda at, call=call, points=points: points.append(call(at)) or points[-1]  # type: ignore[misc]
         bursts(rig, 40, 16, 1000)
@@ -315,7 +315,7 @@ def test_ctrl_c_when_machine_code_comes_back_loses_nothing() -> None:
     for stop in range(1, 12):
         rig, calls = Rig(image(2), (0,), virtual_time=False, is_told=False), iter(range(1, 1000))
         bursts(rig, 5, 16, 1000)
-        series = cast(WithUnits, way(rig))._series
+        series = cast(WithUnits, way(rig))._scans
         call = series.call_burst
 
         def interrupted(at: int, call: Any = call, calls: Iterator[int] = calls, stop: int = stop) -> int:

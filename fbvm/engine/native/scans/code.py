@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from string import Template
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
-from fbvm.engine.native.scans.slots import ROWS, addresses_of_slots
-from fbvm.engine.native.scans.units import Shape, refresh_text
+from fbvm.engine.native.scans.parameters import COUNT, INDEX
+from fbvm.engine.native.scans.units import Shape, Told, refresh_text
 
 
 @dataclass(frozen=True)
-class Clockwork:
+class ClockWordTable:
     """What a scan writes at its start from its time alone; offsets in bytes of the buffer."""
 
     cleared: tuple[tuple[int, int], ...] = ()
@@ -28,45 +28,60 @@ class Clockwork:
     """Bytes, the bits of them that stay, and the others: mask, period, and from when in it they are ON."""
 
 
-NOTHING = Clockwork()
+NO_CLOCK_WORDS = ClockWordTable()
+UNIT_PARAMETERS = Told(memory=INDEX["memory"], ran=INDEX["changed"], unfinished=INDEX["unfinished"], again=INDEX["again"],
+                       faulty=INDEX["faulty"], point=INDEX["point"])  # fmt: skip
+"""Those parameters that the code of units uses."""
+OVER = 0
+"""What `@scans` and `@burst` return when all is done: nothing has to be seen to, no program has trapped.  Above 0 they
+return the point of a trap."""
 ASKED = -1
-"""In place of a trap's point: units have requests, or one of them has a trap of its own."""
-OVER, SCANNED, ASKED_BEFORE, REFRESHED = 0, -2, -3, -4
-"""What else a burst returns, which goes on unless it is OVER: ASKED or SCANNED after a scan; after the refresh before it
-ASKED_BEFORE or REFRESHED."""
-ROW = 4
-"""Numbers of a turn: where the address of its function lies, interval, next time, whether it is due."""
-WATCHED_ROW, WATCHED_BYTES = 2, 8
-"""Numbers of what is watched: its offset in the memory, and the eight bytes that are expected there."""
+"""After a scan: units have requests for their networks, or the program of a unit has trapped.  A burst goes on by another
+call."""
+SCANNED = -2
+"""`@burst` after a scan that was not the last, because `is_single` was set.  It goes on by another call."""
+ASKED_BEFORE = -3
+"""`@burst`, as ASKED, but before its first scan: after the refresh that had been left out."""
+REFRESHED = -4
+"""`@burst`, as SCANNED, but before its first scan: after the refresh that had been left out."""
+TASK_ROW = 4
+"""Numbers of 64 bits in the row of a task: where the address of its function lies, interval in ns, time in ns from which on
+it is due, whether it is due in this scan."""
+NEXT_NS = 2
+"""Which of them is the time from which on the task is due."""
+WATCHED_ROW = 2
+"""Numbers of 64 bits in the row of watched words: their offset in the memory, and the eight bytes that are expected there."""
+WATCHED_BYTES = 8
+"""How many bytes one row watches."""
 MOST_CYCLE = 0xFFFF_FFFF
 """The longest cycle time that its words can say."""
 SECOND_NS = 1_000_000_000
 _SCAN = f"""scan:
-%before = load i64, ptr %now_at
-store i64 %now, ptr %now_at
-store i64 {NEVER}, ptr %due_at
-store i64 %amount, ptr %budget_at
-$clockwork
-$turns
+%before = load i64, ptr %now_word
+store i64 %now, ptr %now_word
+store i64 {NEVER}, ptr %due_word
+store i64 %amount, ptr %left_word
+$clock_words
+$tasks
 br label %good
 good:
-%s = load i64, ptr %count_at
+%s = load i64, ptr %scans_word
 %s1 = add i64 %s, 1
-store i64 %s1, ptr %count_at"""
+store i64 %s1, ptr %scans_word"""
 _TRAP = """trap:
 %point = phi i32 $points
-%s2 = load i64, ptr %count_at
+%s2 = load i64, ptr %scans_word
 %s3 = add i64 %s2, 1
-store i64 %s3, ptr %count_at"""
+store i64 %s3, ptr %scans_word"""
 _SCANS = Template(f"""
 define i32 @scans(ptr %p) {{
 entry:
 $addresses
 $rows
 store i64 0, ptr %changed_at
-%n = load i64, ptr %left_at
-%first = load i64, ptr %first_at
-%step = load i64, ptr %step_at
+%n = load i64, ptr %most_scans_at
+%first = load i64, ptr %time_ns_at
+%step = load i64, ptr %step_ns_at
 %spend = load i64, ptr %spend_at
 br label %test
 test:
@@ -78,7 +93,7 @@ test:
 %go = and i1 %more, %rest
 br i1 %go, label %scan, label %end
 {_SCAN}
-%left = load i64, ptr %budget_at
+%left = load i64, ptr %left_word
 %used = sub i64 %amount, %left
 %spent1 = add i64 %spent, %used
 %i1 = add i64 %i, 1
@@ -101,18 +116,18 @@ declare i32 @llvm.umax.i32(i32, i32)
 declare i64 @llvm.umin.i64(i64, i64)
 """)
 _BURST = Template(f"""
-define internal i64 @time(ptr %p) {{
+define internal i64 @clock_time(ptr %p) {{
 $addresses
 %spec = alloca [2 x i64]
 %part_at = getelementptr inbounds i8, ptr %spec, i64 8
-%clock = load ptr, ptr %clock_at
-%number = load i32, ptr %number_at
+%clock = load ptr, ptr %clock_function_at
+%number = load i32, ptr %clock_number_at
 %told = call i32 %clock(i32 signext %number, ptr %spec)
 %whole = load i64, ptr %spec
 %part = load i64, ptr %part_at
 %ns = mul i64 %whole, {SECOND_NS}
 %time = add i64 %ns, %part
-%zero = load i64, ptr %zero_at
+%zero = load i64, ptr %clock_zero_ns_at
 %less = sub i64 %time, %zero
 ret i64 %less
 }}
@@ -120,38 +135,38 @@ define i32 @burst(ptr %p) {{
 entry:
 $addresses
 $rows
-%alone = load i64, ptr %alone_at
+%alone = load i64, ptr %is_single_at
 %single = icmp ne i64 %alone, 0
-store i64 0, ptr %alone_at
-%ends = load i64, ptr %ends_at
-%given = load i64, ptr %first_at
-%known = load i64, ptr %known_at
+store i64 0, ptr %is_single_at
+%ends = load i64, ptr %times_end_at
+%given = load i64, ptr %time_ns_at
+%known = load i64, ptr %is_time_known_at
 %is_known = icmp ne i64 %known, 0
 br i1 %is_known, label %start, label %look
 look:
-%looked = call i64 @time(ptr %p)
-store i64 %looked, ptr %first_at
+%looked = call i64 @clock_time(ptr %p)
+store i64 %looked, ptr %time_ns_at
 br label %start
 start:
 %first = phi i64 [ %given, %entry ], [ %looked, %look ]
-%deferred = load i64, ptr %deferred_at
+%deferred = load i64, ptr %refresh_first_at
 %late = icmp ne i64 %deferred, 0
 br i1 %late, label %refresh, label %ready
 refresh:
-store i64 0, ptr %deferred_at
+store i64 0, ptr %refresh_first_at
 %early = call i32 @refresh(ptr %p, i64 %first)
 %asks = icmp slt i32 %early, 0
 %back = or i1 %asks, %single
 br i1 %back, label %refreshed, label %uncollected
 refreshed:
-store i64 1, ptr %known_at
+store i64 1, ptr %is_time_known_at
 %before_scan = select i1 %asks, i32 {ASKED_BEFORE}, i32 {REFRESHED}
 br label %return
-uncollected:
-store i64 0, ptr %collected_at
+unheard:
+store i64 0, ptr %events_collected_at
 br label %ready
 ready:
-store i64 0, ptr %known_at
+store i64 0, ptr %is_time_known_at
 %at0 = load i64, ptr %times_at
 br label %begin
 begin:
@@ -161,7 +176,7 @@ begin:
 store i64 %now, ptr %time_at
 %at1 = add i64 %at, 8
 store i64 %at1, ptr %times_at
-store i64 %now, ptr %first_at
+store i64 %now, ptr %time_ns_at
 store i64 0, ptr %changed_at
 br label %scan
 {_SCAN}
@@ -179,14 +194,14 @@ scanned:
 %after_scan = select i1 %urgent, i32 {ASKED}, i32 {SCANNED}
 br label %return
 follow:
-store i64 0, ptr %collected_at
-%next = call i64 @time(ptr %p)
+store i64 0, ptr %events_collected_at
+%next = call i64 @clock_time(ptr %p)
 br label %begin
 return:
 %answer = phi i32 [ %before_scan, %refreshed ], [ %after_scan, %scanned ]
-%collected = load i64, ptr %collected_at
-%stays = select i1 %single, i64 %collected, i64 0
-store i64 %stays, ptr %collected_at
+%heard = load i64, ptr %events_collected_at
+%stays = select i1 %single, i64 %heard, i64 0
+store i64 %stays, ptr %events_collected_at
 ret i32 %answer
 over:
 ret i32 {OVER}
@@ -196,15 +211,15 @@ ret i32 %point
 """)
 
 
-def text(intervals: Sequence[bool], clockwork: Clockwork, watched: int, shapes: Sequence[Shape]) -> str:
+def text(intervals: Sequence[bool], clock_words: ClockWordTable, watched: int, shapes: Sequence[Shape]) -> str:
     """The functions @scans and, where there are units, @burst: both take the address of the parameters, and return
     a trap's point, ASKED, 0, or what else there is for a burst."""
-    first = ROWS + ROW * len(intervals)
-    parts = {"addresses": _lines(_addresses()), "rows": _lines(_rows(len(intervals))), "clockwork": _lines(_clockwork(clockwork)),
-             "turns": _lines(_turns(intervals)),
+    first = COUNT + TASK_ROW * len(intervals)
+    parts = {"addresses": _lines(_addresses()), "rows": _lines(_rows(len(intervals))),
+             "clock_words": _lines(_clock_words(clock_words)), "tasks": _lines(_tasks(intervals)),
              "points": ", ".join(f"[ %r{n}, %run{n} ]" for n in range(len(intervals)))}  # fmt: skip
     if shapes:
-        burst = refresh_text(shapes, first) + _BURST.substitute(parts)
+        burst = refresh_text(shapes, first, UNIT_PARAMETERS) + _BURST.substitute(parts)
         return _SCANS.substitute(parts, watched=_REFRESHED, changed=_RAN, burst=burst)
     return _SCANS.substitute(parts, watched=_lines(_watched(first, watched)), changed=_CHANGED, burst="")
 
@@ -215,13 +230,14 @@ def _lines(lines: Iterable[str]) -> str:
 
 def _addresses() -> Iterator[str]:
     """Where the parameters are, and the words of the system page; some of them as they stay."""
-    yield from addresses_of_slots()
-    yield from ("%m = load ptr, ptr %memory_at", "%c = load ptr, ptr %context_at", "%amount = load i64, ptr %budgeted_at")
-    for name, offset in {"now": NOW, "due": DUE, "budget": BUDGET, "count": SCANS}.items():
-        yield f"%{name}_at = getelementptr inbounds i8, ptr %m, i64 {offset}"
+    for name, index in INDEX.items():
+        yield f"%{name}_at = getelementptr inbounds i8, ptr %p, i64 {8 * index}"
+    yield from ("%m = load ptr, ptr %memory_at", "%c = load ptr, ptr %context_at", "%amount = load i64, ptr %budget_at")
+    for name, offset in {"now": NOW, "due": DUE, "left": BUDGET, "scans": SCANS}.items():
+        yield f"%{name}_word = getelementptr inbounds i8, ptr %m, i64 {offset}"
 
 
-def _clockwork(row: Clockwork) -> Iterator[str]:
+def _clock_words(row: ClockWordTable) -> Iterator[str]:
     """What it writes, as instructions."""
     for n, (offset, stay) in enumerate(row.cleared):
         yield from (f"%ka{n} = getelementptr inbounds i8, ptr %m, i64 {offset}", f"%kb{n} = load i16, ptr %ka{n}",
@@ -248,9 +264,9 @@ def _clockwork(row: Clockwork) -> Iterator[str]:
 
 
 def _rows(count: int) -> Iterator[str]:
-    """The functions of the turns, and where their times are."""
+    """The addresses of the tasks' functions, and where their rows are."""
     for n in range(count):
-        for letter, number in zip("finw", range(ROWS + ROW * n, ROWS + ROW * n + ROW), strict=True):
+        for letter, number in zip("finw", range(COUNT + TASK_ROW * n, COUNT + TASK_ROW * (n + 1)), strict=True):
             yield f"%{letter}a{n} = getelementptr inbounds i8, ptr %p, i64 {8 * number}"
         yield from (f"%fs{n} = load ptr, ptr %fa{n}", f"%f{n} = load ptr, ptr %fs{n}")
 
@@ -275,7 +291,7 @@ _RAN = """%answer = ashr i32 %ran, 31
 ret i32 %answer"""
 
 
-def _turns(intervals: Sequence[bool]) -> Iterator[str]:
+def _tasks(intervals: Sequence[bool]) -> Iterator[str]:
     """Which are due is found before the first one runs."""
     for n in (n for n, has in enumerate(intervals) if has):
         yield from (f"%x{n} = load i64, ptr %na{n}", f"%y{n} = icmp sge i64 %now, %x{n}", f"%z{n} = zext i1 %y{n} to i64",

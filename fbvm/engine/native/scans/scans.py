@@ -1,6 +1,6 @@
-"""Scans inside machine code: what a scan does up to its refresh, for as long as nobody outside has to be told.
+"""Scans inside machine code: what a scan does up to its refresh, one or several, without coming back in between.
 
-What their functions are made of is in `scans.code`."""
+What their functions are made of is in `scans.code`, what they are told and tell in `scans.parameters`."""
 
 from __future__ import annotations
 
@@ -18,126 +18,143 @@ from fbvm.engine.native.cache import Stored, name_of
 from fbvm.engine.native.compiler import Linked, compile_text
 from fbvm.engine.native.entries import Entry
 from fbvm.engine.native.scans import code as native_scan_code
-from fbvm.engine.native.scans.code import ROW, WATCHED_BYTES, WATCHED_ROW, Clockwork
-from fbvm.engine.native.scans.slots import ROWS, Slot
+from fbvm.engine.native.scans.code import NEXT_NS, TASK_ROW, WATCHED_BYTES, WATCHED_ROW, ClockWordTable
+from fbvm.engine.native.scans.parameters import COUNT, Parameters
 from fbvm.engine.native.scans.units import Shape, UnitInCode
 
 
 @dataclass
-class Turn:
-    """A task in its turn: its number, its interval or 0, and when it runs next if it has one."""
+class ScheduledTask:
+    """A task's entry in the order of a scan."""
 
     task: int
+    """Its number in the image."""
     interval_ns: int = 0
+    """0 for a task that runs in every scan."""
     next_ns: int = 0
+    """From which time on it is due, if it has an interval."""
 
 
 NO_LIMIT = 1 << 62
-FIRST, BUDGETED, CHANGED = Slot.FIRST, Slot.BUDGETED, Slot.CHANGED  # looked up once, not in each scan
+"""As many statements as nobody spends."""
 
 
-class Series:
-    """Scans of one PLC: its memory and context by their addresses, its tasks by their entries, in the order of `turns`.
+class NativeScans:
+    """Machine code of the scans of one PLC, for its tasks in the order of `tasks`.
 
-    In each scan there is a time, nothing is due, the budget is full, the clockwork is written; then the tasks that are
-    due take their turns, and the number of scans grows.  `watched` are offsets of eight bytes each, by who watches them: a
-    scan after which they are not as `expect` saw them last is the last one.  In place of it there may be `units`: then
-    each scan ends with a refresh, and the one in whose refresh one of them ran is the last one; in a burst, which its caller
-    begins by `call_burst`, one that gives no reason for another scan, or in which they ask for something."""
+    `memory_at` and `context_at` are the addresses of the memory and of the context, `entries` the entry points of the image's
+    tasks.  A scan writes its time, the step budget and the clock words, runs the tasks that are due and counts itself.
 
-    def __init__(self, memory: Memory, memory_at: int, context_at: int, tasks: Sequence[Entry], turns: Sequence[Turn],
-                 clockwork: Clockwork, watched: Sequence[Sequence[int]] = (),
+    `watched` has a list for each unit: the offsets of eight bytes each that the unit looks at in the PLC's memory.  A scan after
+    which these bytes are not what they were at the last `expect` is the last one of a `run`.  With `units` instead, each scan
+    ends with the I/O refresh of these, and a scan in whose refresh the program of a unit has run is the last one of a `run`.
+    A burst, which the caller starts by `call_burst`, ends with a scan whose refresh gives no reason for another scan, and comes
+    back before its end when units ask something of their networks."""
+
+    def __init__(self, memory: Memory, memory_at: int, context_at: int, entries: Sequence[Entry],
+                 tasks: Sequence[ScheduledTask], clock_words: ClockWordTable, watched: Sequence[Sequence[int]] = (),
                  units: Sequence[UnitInCode] = ()) -> None:  # fmt: skip
-        rows: list[tuple[int, ...]] = [
-            (tasks[turn.task].function_at, turn.interval_ns, turn.next_ns, 0) for turn in turns]  # fmt: skip
+        self._entries = entries  # which stay while machine code calls them
+        self.tasks = tasks
+        """Their times move on; the caller may put others of the same tasks in their place."""
+        self.units = units
+        self._timed = [(row, COUNT + TASK_ROW * row + NEXT_NS) for row, task in enumerate(tasks) if task.interval_ns]
+        """Which tasks have an interval, and where among the numbers their next time is."""
         offsets = [offset for group in watched for offset in group]
-        rows += [(offset, 0) for offset in offsets]
-        self._tasks = tasks  # which stay while machine code calls them
-        self.turns = turns
-        """These move on, or others of the same tasks."""
-        self._timed = [(row, ROWS + ROW * row + 2) for row, turn in enumerate(turns) if turn.interval_ns]
-        """Which turns have an interval, and where their next time is."""
-        given: dict[int, int] = {Slot.MEMORY: memory_at, Slot.CONTEXT: context_at, Slot.LEFT: 1, Slot.SPEND: NO_LIMIT}
-        self.numbers = numbers = array("q", [given.get(number, 0) for number in range(ROWS)])
-        """The parameters, for who calls `call` himself."""
-        numbers.extend(number for row in rows for number in row)
-        at = count(ROWS + ROW * len(turns) + 1, WATCHED_ROW)
+        numbers = array("q", bytes(8 * COUNT))
+        for task in tasks:
+            numbers.extend((entries[task.task].function_at, task.interval_ns, task.next_ns, 0))
+        at = count(len(numbers) + 1, WATCHED_ROW)
         self._expected = [[(memory.u8[offset : offset + WATCHED_BYTES].cast("q"), next(at)) for offset in group]
                           for group in watched]  # fmt: skip
-        """What is watched, and where what is expected of it is, by who watches it: of each unit, if there are any."""
-        self.units = units
+        """For each unit the bytes that it watches, and where among the numbers the expected ones are."""
+        for offset in offsets:
+            numbers.extend((offset, 0))
         for unit in units:
             self._expected.append([(view, len(numbers) + at) for view, at in unit.expected(memory)])
-            numbers.extend(unit.parameters(memory_at))
-        shape = tuple(turn.interval_ns > 0 for turn in turns), clockwork, len(offsets)
-        self.numbers_at = numbers.buffer_info()[0]
+            numbers.extend(unit.row(memory_at))
+        self._numbers = numbers
+        """The parameters, and the rows behind them."""
+        self.parameters = Parameters.from_buffer(numbers)
+        parameters = self.parameters
+        parameters.memory, parameters.context = memory_at, context_at
+        parameters.most_scans, parameters.spend = 1, NO_LIMIT
+        self.parameters_at = numbers.buffer_info()[0]
+        """Their address, which `call` and `call_burst` take."""
         self.clock: Clock | None = None
         self.most = 0
         """Of how many scans a burst is at most."""
         self.times = array("q")
-        """When those of the last one began."""
+        """The times of the last burst's scans."""
         self.times_at = 0
-        self.call, self.call_burst = _scans(*shape, tuple(unit.shape for unit in units))
-        """Machine code of scans, and of a burst: they take the address of the parameters."""
+        self.call, self.call_burst = _functions(tuple(task.interval_ns > 0 for task in tasks), clock_words, len(offsets),
+                                                tuple(unit.shape for unit in units))  # fmt: skip
+        """Machine code of scans, and of a burst, which there is only with `units`."""
 
     @property
     def changed(self) -> bool:
-        """True if after the last scan something that is watched was not as expected, or a unit ran."""
-        return self.numbers[CHANGED] != 0
+        """True if after the last scan watched bytes were not as expected, or the program of a unit has run."""
+        return self.parameters.changed != 0
 
-    def expect(self, number: int) -> None:
-        """From now on what this one watches shall be as it is."""
-        for view, at in self._expected[number]:
-            self.numbers[at] = view[0]
+    def expect(self, unit: int) -> None:
+        """From now on the bytes that a unit (by its number) watches are expected to stay as they are."""
+        for view, at in self._expected[unit]:
+            self._numbers[at] = view[0]
 
-    def follow(self, clock: Clock, most: int) -> None:
-        """Bursts are of no more scans than so many from now on, at the time of this clock."""
+    def set_clock(self, clock: Clock, most: int) -> None:
+        """From now on bursts have at most so many scans, at the times that this clock tells."""
         self.clock, self.most = clock, most
         self.times = array("q", bytes(8 * most))
         self.times_at = self.times.buffer_info()[0]
-        numbers = self.numbers
-        numbers[Slot.ENDS], numbers[Slot.CLOCK] = self.times_at + 8 * most, clock.function_at
-        numbers[Slot.NUMBER], numbers[Slot.ZERO] = clock.number, clock.zero_ns
+        parameters = self.parameters
+        parameters.times_end = self.times_at + 8 * most
+        parameters.clock_function, parameters.clock_number = clock.function_at, clock.number
+        parameters.clock_zero_ns = clock.zero_ns
 
-    def load_turns(self) -> None:
-        """Take over when the tasks run next."""
+    def load_times(self) -> None:
+        """Tells machine code when the tasks with an interval are due."""
         for row, at in self._timed:
-            self.numbers[at] = self.turns[row].next_ns
+            self._numbers[at] = self.tasks[row].next_ns
 
-    def store_turns(self) -> None:
-        """Give back when the tasks run next."""
+    def store_times(self) -> None:
+        """Takes over from machine code when the tasks with an interval are due."""
         for row, at in self._timed:
-            self.turns[row].next_ns = self.numbers[at]
+            self.tasks[row].next_ns = self._numbers[at]
 
     def once(self, now_ns: int, budget: int) -> int:
-        """One scan; the point of its trap, 0, or ASKED."""
-        numbers = self.numbers
-        numbers[FIRST], numbers[BUDGETED] = now_ns, budget
+        """One scan at `now_ns` that may execute `budget` statements.
+
+        Returns the point of the trap that ended it (`NativeEngine.trap_at`), OVER, or ASKED."""
+        parameters = self.parameters
+        parameters.time_ns, parameters.budget = now_ns, budget
         if not self._timed:
-            return self.call(self.numbers_at)
-        self.load_turns()
-        point = self.call(self.numbers_at)
-        self.store_turns()
+            return self.call(self.parameters_at)
+        self.load_times()
+        point = self.call(self.parameters_at)
+        self.store_times()
         return point
 
     def run(self, n: int, now_ns: int, step_ns: int, budget: int, spend: int) -> tuple[int, int]:
-        """Up to n scans, a step of time between them; how many there were, and what `once` says of the last.
+        """Up to n scans, the first at `now_ns`, each `step_ns` later than the one before, of `budget` statements at most.
 
-        No other begins when all together have executed `spend` statements."""
-        numbers = self.numbers
-        numbers[Slot.LEFT], numbers[Slot.STEP], numbers[Slot.SPEND] = n, step_ns, spend
+        No further scan begins when all together have executed `spend` statements.  Returns how many scans there were, and
+        what `once` returns for the last one."""
+        parameters = self.parameters
+        parameters.most_scans, parameters.step_ns, parameters.spend = n, step_ns, spend
         point = self.once(now_ns, budget)
-        numbers[Slot.LEFT], numbers[Slot.SPEND] = 1, NO_LIMIT
-        return numbers[Slot.DONE], point
+        parameters.most_scans, parameters.spend = 1, NO_LIMIT
+        return parameters.done, point
 
 
 Call = Callable[[int], int]
+"""A function of machine code: takes the address of the parameters, returns a point or one of the answers of `scans.code`."""
 
 
 @cache
-def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int, shapes: tuple[Shape, ...]) -> tuple[Call, Call]:
-    """The functions for a shape: scans, and a burst, which is never called where there are no units."""
-    text = native_scan_code.text(intervals, clockwork, watched, shapes)
+def _functions(intervals: tuple[bool, ...], clock_words: ClockWordTable, watched: int,
+               shapes: tuple[Shape, ...]) -> tuple[Call, Call]:  # fmt: skip
+    """The functions @scans and @burst for a shape; where there are no units, @scans twice."""
+    text = native_scan_code.text(intervals, clock_words, watched, shapes)
     name = name_of("scans", text)
     stored = native_cache.read(name)
     if stored is None:
@@ -151,4 +168,4 @@ def _scans(intervals: tuple[bool, ...], clockwork: Clockwork, watched: int, shap
 
 
 _LOADED: list[Linked] = []
-"""What functions that were given out lie in."""
+"""The objects that stay in memory because their functions were given out."""
