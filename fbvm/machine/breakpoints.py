@@ -13,10 +13,10 @@ from fbvm.base.memory import Memory
 from fbvm.base.types import fold
 from fbvm.code.image import Image, Site
 from fbvm.code.shapes import statements
-from fbvm.engine.guarded import STATEMENTS, Guarded
+from fbvm.engine.choice.stoppable import STATEMENTS, Guarded
+from fbvm.engine.choice.tiers import Engine, choice_of, substitutes_of
 from fbvm.engine.python.runtime import NO_SITE
 from fbvm.engine.stops import Line, Stops, Test, Watched
-from fbvm.engine.tiers import Engine, choice_of, substitutes_of
 from fbvm.engine.trap import Trap
 from fbvm.watch.changes import changed
 from fbvm.watch.conditions import Condition, parse_condition

@@ -12,21 +12,21 @@ from contextlib import AbstractContextManager, nullcontext
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
 from fbvm.base.memory import Memory, Snapshot
 from fbvm.code.image import Image
+from fbvm.engine.choice.tiers import Engine, engine_for
 from fbvm.engine.clock import Clock
-from fbvm.engine.tiers import Engine, engine_for
 from fbvm.engine.trap import Trap
 from fbvm.machine.breakpoints import Breakpoints, Halt
-from fbvm.machine.clock_words import CLOCK_WORDS, ClockWords
 from fbvm.machine.fast.paths import FastPath, FastPaths
 from fbvm.machine.goal import Goal
-from fbvm.machine.refresh import Attached, IORefresh
+from fbvm.machine.scan.clock_words import CLOCK_WORDS, ClockWords
+from fbvm.machine.scan.refresh import Attached, IORefresh
+from fbvm.machine.scan.tasks import TaskSchedule, too_short_intervals
 from fbvm.machine.scan_times import Lateness, ScanTimes
 from fbvm.machine.state import RUN
 from fbvm.machine.state import Mode as Mode
 from fbvm.machine.state import Phase as Phase
 from fbvm.machine.state import State as State
 from fbvm.machine.state import Stopped as Stopped
-from fbvm.machine.tasks import TaskSchedule, too_short_intervals
 from fbvm.net.journal import Journal
 from fbvm.units.contract import Unit
 from fbvm.watch import places

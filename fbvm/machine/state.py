@@ -7,7 +7,7 @@ from enum import Enum
 
 from fbvm.base.memory import Snapshot
 from fbvm.engine.trap import Trap
-from fbvm.machine.tasks import TaskScheduleState
+from fbvm.machine.scan.tasks import TaskScheduleState
 from fbvm.watch.paths import Place
 from fbvm.watch.values import Value
 

@@ -27,7 +27,7 @@ from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.dialects import DIALECTS
-from fbvm.engine.tiers import CHOICES
+from fbvm.engine.choice.tiers import CHOICES
 from fbvm.net.faults import FOREVER, KINDS, NO_FAULT, Fault
 from fbvm.run.project_reader import (
     Key,

@@ -8,7 +8,7 @@ import click
 
 from fbvm.cli.shared.sources import compile_or_exit, source_arguments
 from fbvm.code.listing import listing
-from fbvm.engine.native.module import translate
+from fbvm.engine.native.emit.module import translate
 
 
 @click.command("list")

@@ -23,7 +23,7 @@ from fbvm.cli.shared.run_result import RunProgress, RunResult
 from fbvm.cli.shared.sources import compile_or_exit, source_options
 from fbvm.cli.shared.traces import statement_lines, write_page, write_trace
 from fbvm.code.image import Image
-from fbvm.engine.tiers import CHOICES
+from fbvm.engine.choice.tiers import CHOICES
 from fbvm.machine.plc import Plc
 from fbvm.net.journal import Journal
 from fbvm.net.loop import LoopNetwork

@@ -7,14 +7,14 @@ from functools import cache, cached_property
 from weakref import WeakKeyDictionary, WeakValueDictionary
 
 from fbvm.code.image import Image
-from fbvm.engine.native import cache as native_cache
-from fbvm.engine.native.cache import Stored, name_of
-from fbvm.engine.native.compiler import Linked, compile_text
-from fbvm.engine.native.context import Point
-from fbvm.engine.native.entries import Entry
+from fbvm.engine.native.emit.context import Point
+from fbvm.engine.native.emit.module import Translation, translate
 from fbvm.engine.native.library.library import module_text, parts_of, routines_of
-from fbvm.engine.native.module import Translation, translate
-from fbvm.engine.native.worker import worker
+from fbvm.engine.native.llvm import cache as native_cache
+from fbvm.engine.native.llvm.cache import Stored, name_of
+from fbvm.engine.native.llvm.compiler import Linked, compile_text
+from fbvm.engine.native.llvm.entry_points import Entry
+from fbvm.engine.native.llvm.worker import worker
 
 QUICK, FAST = 0, 2
 """Levels of optimisation."""

@@ -12,11 +12,11 @@ from weakref import finalize
 from fbvm.base.areas import BUDGET, NOW
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
-from fbvm.engine.native import compiler as native_compiler
 from fbvm.engine.native.code import Code, code_of
-from fbvm.engine.native.context import Context
+from fbvm.engine.native.emit.context import Context
 from fbvm.engine.native.emit.writer import Unsupported
-from fbvm.engine.native.entries import Entry, entry
+from fbvm.engine.native.llvm import compiler as native_compiler
+from fbvm.engine.native.llvm.entry_points import Entry, entry
 from fbvm.engine.native.scans.code import NO_CLOCK_WORDS, ClockWordTable
 from fbvm.engine.native.scans.scans import NO_LIMIT, NativeScans, ScheduledTask
 from fbvm.engine.native.scans.units import UnitInCode

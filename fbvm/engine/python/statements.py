@@ -6,7 +6,6 @@ and blocks nested deeper than Python allows become functions inside the body; wh
 from __future__ import annotations
 
 import re
-from bisect import bisect_right
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +13,7 @@ from fbvm.base.areas import BUDGET, DUE
 from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.image import Body, Image
 from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
+from fbvm.engine.case_tables import case_table
 from fbvm.engine.python.expressions import ROWS, flag_operands, view
 from fbvm.engine.python.runtime import NO_SITE
 from fbvm.engine.python.writer import Expressions, bare, plus
@@ -255,19 +255,6 @@ def _case(w: BodyWriter, machine: str, a: Node, rows: tuple[tuple[Any, Block], .
         w.suite(lambda: choose(middle, last))
 
     choose(0, len(rows))
-
-
-def case_table(rows: list[tuple[tuple[int, int], ...]]) -> tuple[list[int], list[int]]:
-    """Labels as (starts, numbers): a value belongs to row `numbers[bisect_right(starts, value)]`, the first that fits.
-
-    A value of no row has the number of rows."""
-    edges = sorted({edge for labels in rows for low, high in labels for edge in (low, high + 1)})
-    numbers = [len(rows)] * (len(edges) + 1)
-    for number in range(len(rows) - 1, -1, -1):
-        for low, high in rows[number]:
-            first, last = bisect_right(edges, low), bisect_right(edges, high)
-            numbers[first:last + 1] = [number] * (last + 1 - first)
-    return edges, numbers
 
 
 def _loop(w: BodyWriter, head: Block, body: Block, tail: Block) -> None:

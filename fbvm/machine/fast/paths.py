@@ -10,10 +10,10 @@ from fbvm.engine.clock import Clock
 from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.native.scans.scans import ScheduledTask
 from fbvm.engine.trap import Trap
-from fbvm.machine.clock_words import CLOCK_WORDS
 from fbvm.machine.fast.units_in_code import WithUnits, can_run_in_code, units_in_code
-from fbvm.machine.refresh import Attached, IORefresh
-from fbvm.machine.tasks import TaskSchedule
+from fbvm.machine.scan.clock_words import CLOCK_WORDS
+from fbvm.machine.scan.refresh import Attached, IORefresh
+from fbvm.machine.scan.tasks import TaskSchedule
 from fbvm.net.journal import Journal
 
 

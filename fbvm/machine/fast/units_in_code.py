@@ -14,8 +14,8 @@ from fbvm.engine.native.scans.code import ASKED, ASKED_BEFORE, OVER, SCANNED
 from fbvm.engine.native.scans.scans import ScheduledTask
 from fbvm.engine.native.scans.units import CHANGED_WORDS, UnitInCode
 from fbvm.engine.trap import Trap
-from fbvm.machine.clock_words import CLOCK_WORDS
-from fbvm.machine.refresh import IORefresh
+from fbvm.machine.scan.clock_words import CLOCK_WORDS
+from fbvm.machine.scan.refresh import IORefresh
 from fbvm.net.journal import Journal
 from fbvm.units.contract import MOVE_FIELDS, Moves, Processor, ProcessorUnit, Unit
 

@@ -14,9 +14,9 @@ from typing import NamedTuple, TypeAlias
 from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Image
 from fbvm.code.operations import detail_size
+from fbvm.engine.choice.tiers import substitutes_of
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.python.runtime import NO_SITE, Observation
-from fbvm.engine.tiers import substitutes_of
 from fbvm.engine.trap import Trap
 from fbvm.wire.tap import TapEvent
 

@@ -13,7 +13,7 @@ from functools import partial
 from typing import Protocol
 
 from fbvm.base.memory import Snapshot
-from fbvm.engine.tiers import python_of
+from fbvm.engine.choice.tiers import python_of
 from fbvm.machine.plc import Phase, Plc, State
 from fbvm.record.trace.events import Event, ObservedEngine
 

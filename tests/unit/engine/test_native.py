@@ -27,12 +27,12 @@ if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
 from fbvm.base import cache
-from fbvm.engine.native import compiler as native_compiler
-from fbvm.engine.native import entries
 from fbvm.engine.native.emit import conversions
-from fbvm.engine.native.module import BodyWriter, translate
+from fbvm.engine.native.emit.module import BodyWriter, translate
+from fbvm.engine.native.llvm import compiler as native_compiler
+from fbvm.engine.native.llvm import entry_points as entries
+from fbvm.engine.native.llvm.worker import worker
 from fbvm.engine.native.scans.scans import ScheduledTask
-from fbvm.engine.native.worker import worker
 
 ONE = const("i16", 1)
 COUNT = (store("i16", 0, ("add", "i16", load("i16", 0), ONE)),)

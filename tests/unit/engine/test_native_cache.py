@@ -16,11 +16,11 @@ if not native.available():
 
 from fbvm.base import cache
 from fbvm.code.compiler import compile_text
-from fbvm.engine.native import cache as native_cache
 from fbvm.engine.native import code as native_code
-from fbvm.engine.native.cache import Stored
 from fbvm.engine.native.code import Code
-from fbvm.engine.native.compiler import Linked
+from fbvm.engine.native.llvm import cache as native_cache
+from fbvm.engine.native.llvm.cache import Stored
+from fbvm.engine.native.llvm.compiler import Linked
 
 STORED = Stored({"points": [["R0101", 3, [["i64", None]]]], "context": 512}, b"object" * 100)
 NAME = "a" * 64

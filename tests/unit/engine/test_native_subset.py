@@ -15,9 +15,9 @@ from fbvm.engine.native.library import routines
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
 
-from fbvm.engine.native.compiler import Linked, compile_text
 from fbvm.engine.native.library.library import PARTS, parts_of, routines_of
 from fbvm.engine.native.library.subset import Routine
+from fbvm.engine.native.llvm.compiler import Linked, compile_text
 
 
 def compiled(source: str, **names: Any) -> Any:

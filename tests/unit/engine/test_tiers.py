@@ -7,11 +7,11 @@ import pytest
 from fbvm.base.memory import Memory
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
-from fbvm.engine import tiers
+from fbvm.engine.choice import tiers
+from fbvm.engine.choice.tiers import Tiers, engine_for
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
 from fbvm.engine.python.engine import PythonEngine
-from fbvm.engine.tiers import Tiers, engine_for
 from fbvm.machine.plc import Plc
 
 TEXT = """

@@ -8,7 +8,7 @@ import pytest
 
 from fbvm import Plc, compile_text
 from fbvm.code.image import Image
-from fbvm.engine import tiers
+from fbvm.engine.choice import tiers
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
 from fbvm.machine.breakpoints import Halt
@@ -228,7 +228,7 @@ def test_memory_is_that_of_a_run_that_nobody_stopped(plc: Plc) -> None:
 
 @pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
 def test_a_run_with_breakpoints_becomes_machine_code_when_that_pays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fbvm.engine.guarded.PAYS", 100)
+    monkeypatch.setattr("fbvm.engine.choice.stoppable.PAYS", 100)
     program = image()
     plc = Plc(program)
     assert isinstance(plc.engine, tiers.Tiers)
@@ -325,7 +325,7 @@ def test_a_restart_leaves_the_scan_that_stands(plc: Plc) -> None:
 
 
 def test_a_block_in_python_stands_in_with_breakpoints_too() -> None:
-    from fbvm.engine.tiers import python_of
+    from fbvm.engine.choice.tiers import python_of
 
     plc = Plc(image())
     number = next(n for n, body in enumerate(plc.image.bodies) if body.name == "Adder")

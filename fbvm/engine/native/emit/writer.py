@@ -17,10 +17,9 @@ from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import single
 from fbvm.code.image import Image
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT, Address, Block, Node
-from fbvm.engine.native.calls import Range
-from fbvm.engine.native.context import FIELDS, INSTANCE, SCRATCH, Point, Shown
-from fbvm.engine.native.guard import is_seen_later
-from fbvm.engine.native.regions import SYSTEM, Regions
+from fbvm.engine.native.emit.alias_scopes import SYSTEM, Regions
+from fbvm.engine.native.emit.call_graph import Range
+from fbvm.engine.native.emit.context import FIELDS, INSTANCE, SCRATCH, Point, Shown
 from fbvm.engine.ranges import is_float, span
 from fbvm.engine.trap import NO_INSTANCE
 
@@ -31,6 +30,10 @@ ENDED = -(1 << 63)
 TRAPPED = -(1 << 62)
 RARE = "!prof !0"
 """What marks a branch whose first way is hardly ever taken."""
+
+
+STOPPABLE = ("statement", "rung", "write")
+"""The kinds of observations at which a run can stop."""
 
 
 def ir(machine: str) -> str:
@@ -61,6 +64,12 @@ def literal(machine: str, value: Any) -> str:
         return NAN_BITS[machine]
     number = single(value) if machine == "f32" else float(value)
     return f"0x{struct.unpack('<Q', struct.pack('<d', number))[0]:016X}"
+
+
+def _is_seen_later(node: Node, following: Node | None) -> bool:
+    """True for the observation of a write behind which nothing happens up to the next one: that one sees the write as well."""
+    return (following is not None and node[:2] == ("observe", "write")
+            and following[0] == "observe" and following[1] in STOPPABLE)  # fmt: skip
 
 
 class Text(NamedTuple):
@@ -179,7 +188,7 @@ class Writer:
         for position, node in enumerate(block, 1):
             if self.dead:
                 return
-            if node[0] == "observe" and (not stops or is_seen_later(node, block[position] if position < len(block) else None)):
+            if node[0] == "observe" and (not stops or _is_seen_later(node, block[position] if position < len(block) else None)):
                 continue
             self.next_scratch = SCRATCH
             self.statements[node[0]](self, *node[1:])

@@ -8,7 +8,6 @@ from __future__ import annotations
 import struct
 
 from fbvm.base.types import SHORT_NAMES
-from fbvm.engine.native.context import DIGITS, FIELDS
 from fbvm.engine.native.library.routines import INFINITE
 from fbvm.engine.native.library.subset import data, float_bits, peek, peek_all, poke, poke_all, text_float
 from fbvm.syntax.st.literals import LONGEST, REALS
@@ -29,8 +28,8 @@ LINT, REAL, LREAL, TIME = KINDS["LINT"], KINDS["REAL"], KINDS["LREAL"], KINDS["T
 DATE, TOD, DT, STRING = KINDS["DATE"], KINDS["TIME_OF_DAY"], KINDS["DATE_AND_TIME"], KINDS["STRING"]
 CANONICAL_NAN, SIGN = 0x7FF8000000000000, -(1 << 63)
 REAL_LIMIT = struct.unpack("<q", struct.pack("<d", REALS["REAL"]))[0]
-CLEANED = DIGITS - FIELDS["result"]
-"""How far behind the result the bytes lie in which a number's text is cleaned."""
+CLEANED = 32
+"""How many bytes behind `out` the text of a number is written without its `_`; the caller has LONGEST + 1 bytes there."""
 TENTH = ((1 << 64) - 1) // 10
 
 

@@ -13,10 +13,10 @@ from itertools import count
 
 from fbvm.base.memory import Memory
 from fbvm.engine.clock import Clock
-from fbvm.engine.native import cache as native_cache
-from fbvm.engine.native.cache import Stored, name_of
-from fbvm.engine.native.compiler import Linked, compile_text
-from fbvm.engine.native.entries import Entry
+from fbvm.engine.native.llvm import cache as native_cache
+from fbvm.engine.native.llvm.cache import Stored, name_of
+from fbvm.engine.native.llvm.compiler import Linked, compile_text
+from fbvm.engine.native.llvm.entry_points import Entry
 from fbvm.engine.native.scans import code as native_scan_code
 from fbvm.engine.native.scans.code import NEXT_NS, TASK_ROW, WATCHED_BYTES, WATCHED_ROW, ClockWordTable
 from fbvm.engine.native.scans.parameters import COUNT, Parameters

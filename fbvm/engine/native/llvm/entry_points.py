@@ -9,9 +9,9 @@ import ctypes
 from collections.abc import Callable
 from functools import cache
 
-from fbvm.engine.native import cache as native_cache
-from fbvm.engine.native.cache import Stored, name_of
-from fbvm.engine.native.compiler import Linked, compile_text
+from fbvm.engine.native.llvm import cache as native_cache
+from fbvm.engine.native.llvm.cache import Stored, name_of
+from fbvm.engine.native.llvm.compiler import Linked, compile_text
 
 BLOCK = 32
 """Entries that are loaded together."""

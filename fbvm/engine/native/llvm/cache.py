@@ -9,7 +9,7 @@ from typing import Any
 from fbvm.base import cache
 from fbvm.base.cache import Cache
 from fbvm.base.data import PACKAGE
-from fbvm.engine.native.compiler import host
+from fbvm.engine.native.llvm.compiler import host
 
 FILES = Cache("native", b"fbvm object 1\n", 256 << 20)
 

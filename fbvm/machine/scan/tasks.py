@@ -71,7 +71,7 @@ class TaskSchedule:
     def by_time(self) -> list[ScheduledTask] | None:
         """The tasks in their order if time alone says when each runs, and each has run once; else None.
 
-        It is the same list each time, and its entries are those of this schedule: whoever runs the tasks keeps `next_ns` right."""
+        It is the same list each time, with the entries of this schedule: whoever runs the tasks keeps their `next_ns` right."""
         return self._entries if self._only_time and not self.fresh else None
 
     def reset(self) -> None:

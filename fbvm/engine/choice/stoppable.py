@@ -13,6 +13,7 @@ from typing import NamedTuple
 from fbvm.base.areas import BUDGET
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
+from fbvm.engine.choice.tiers import PAYS
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
 from fbvm.engine.native.scans.code import ClockWordTable
@@ -20,7 +21,6 @@ from fbvm.engine.native.scans.scans import ScheduledTask
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.python.runtime import NO_SITE, Observation
 from fbvm.engine.stops import STOPPED, State, Stops
-from fbvm.engine.tiers import PAYS
 from fbvm.engine.trap import Trap
 
 STATEMENTS = ("statement", "rung")

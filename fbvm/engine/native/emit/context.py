@@ -12,13 +12,14 @@ from typing import Any
 
 from fbvm.base.arithmetic import NAN
 from fbvm.base.memory import STRUCTS
+from fbvm.engine.native.library.reading import CLEANED
 
 FIELDS = {"size": 0, "values": 8, "result": 32, "f32": 40, "f64": 48, "stops": 56}
 """Where its 64-bit fields lie: size of the memory, up to three values of a trap, a second result of a routine or the
 instance of a trap, the canonical NaN of each float type (out of LLVM's sight, which holds one NaN for as good as another),
 the table of `stops`."""
-DIGITS = 64
-"""Where a number's text is cleaned before it is read."""
+DIGITS = FIELDS["result"] + CLEANED
+"""Where routines of the library write the text of a number before they read the number."""
 SCRATCH = 512
 """Where the scratch bytes of texts begin; statements use them in turn."""
 

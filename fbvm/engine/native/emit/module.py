@@ -11,18 +11,18 @@ from fbvm.base.areas import BUDGET
 from fbvm.code.image import Image
 from fbvm.engine.bases import fixed_bases
 from fbvm.engine.depths import however_deep
-from fbvm.engine.native.calls import call_graph, heights, instance_places
-from fbvm.engine.native.compiler import MATH
-from fbvm.engine.native.context import Point
 from fbvm.engine.native.emit import texts as native_texts
+from fbvm.engine.native.emit.alias_scopes import METADATA, Regions, resolved
+from fbvm.engine.native.emit.call_graph import call_graph, heights, instance_places
+from fbvm.engine.native.emit.context import Point
 from fbvm.engine.native.emit.conversions import ONE_STEP
 from fbvm.engine.native.emit.expressions import VALUES
+from fbvm.engine.native.emit.object_bounds import objects
 from fbvm.engine.native.emit.statements import EMITTERS
+from fbvm.engine.native.emit.stop_checks import GUARD, at_end
 from fbvm.engine.native.emit.writer import RARE, TRAPPED, Module, Writer
-from fbvm.engine.native.guard import GUARD, at_end
 from fbvm.engine.native.library.library import declaration, definitions
-from fbvm.engine.native.objects import objects
-from fbvm.engine.native.regions import METADATA, Regions, resolved
+from fbvm.engine.native.llvm.compiler import MATH
 from fbvm.engine.stops import STOPPED
 
 SMALL, LARGE = 40, 600

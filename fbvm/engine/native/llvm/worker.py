@@ -20,7 +20,7 @@ _SIZE_BYTES = 8
 
 def serve(jobs: IO[bytes], answers: IO[bytes]) -> None:
     """Compile one module after the other until nobody asks any more; an answer of no bytes tells that it failed."""
-    from fbvm.engine.native.compiler import compile_text
+    from fbvm.engine.native.llvm.compiler import compile_text
 
     while len(head := jobs.read(_SIZE_BYTES)) == _SIZE_BYTES:
         text = jobs.read(int.from_bytes(head, "little")).decode()
@@ -76,7 +76,7 @@ class Worker:
         process = self._process  # which `stop` may take away meanwhile
         if process is None or process.poll() is not None or self._owner != os.getpid():
             program = (f"import sys; sys.path[:] = {sys.path!r}\n"
-                       "from fbvm.engine.native.worker import serve\nserve(sys.stdin.buffer, sys.stdout.buffer)")
+                       "from fbvm.engine.native.llvm.worker import serve\nserve(sys.stdin.buffer, sys.stdout.buffer)")
             process = self._process = subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE,
                                                        stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
             self._owner = os.getpid()

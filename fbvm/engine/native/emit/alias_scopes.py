@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from fbvm.base.areas import PAGE_BYTES
 from fbvm.code.operations import Address
-from fbvm.engine.native.calls import Range, reached
+from fbvm.engine.native.emit.call_graph import Range, reached
 
 Access = tuple[bool, int, int, bool]
 """Whether it counts from the instance, first byte, first byte behind, whether its place is computed."""

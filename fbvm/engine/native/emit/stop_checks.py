@@ -4,14 +4,9 @@ Code with stops is a build of its own, made when somebody wants some."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from fbvm.code.operations import Node
-from fbvm.engine.native.context import FIELDS
+from fbvm.engine.native.emit.context import FIELDS
+from fbvm.engine.native.emit.writer import STOPPABLE, Writer
 from fbvm.engine.stops import ASK, AT_STATEMENT, COUNT, ROW_BYTES, ROWS, STOPPED, TABLE, WATCHING
-
-if TYPE_CHECKING:
-    from fbvm.engine.native.emit.writer import Writer
 
 GUARD = f"""
 define internal i64 @guard(ptr %m, ptr %c, i64 %site, i64 %statement) #5 {{
@@ -66,18 +61,9 @@ attributes #6 = {{ nounwind willreturn memory(read, inaccessiblemem: readwrite) 
 assert AT_STATEMENT == 1, "a statement is told from a write by this bit"
 
 
-_KINDS = ("statement", "rung", "write")
-"""The observations at which a run can stop."""
-
-
-def is_seen_later(node: Node, following: Node | None) -> bool:
-    """True for a write behind which nothing happens up to the next look: that finds it as well."""
-    return following is not None and node[:2] == ("observe", "write") and following[0] == "observe" and following[1] in _KINDS
-
-
 def observe(w: Writer, kind: str, site: int) -> None:
     """End the run here if somebody wants it to."""
-    if kind not in _KINDS:
+    if kind not in STOPPABLE:
         return
     statement = kind != "write"
     stops = w.new(f"load ptr, ptr {w.field('stops')}, !invariant.load !1")

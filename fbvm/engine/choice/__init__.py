@@ -1,0 +1,1 @@
+"""Which engine runs an image, and how a run is stopped inside a scan."""
