@@ -19,7 +19,7 @@ from fbvm.engine.native.llvm import compiler as native_compiler
 from fbvm.engine.native.llvm.entry_points import Entry, entry
 from fbvm.engine.native.scans.code import NO_CLOCK_WORDS, ClockWordTable
 from fbvm.engine.native.scans.scans import NO_LIMIT, NativeScans, ScheduledTask
-from fbvm.engine.native.scans.units import UnitInCode
+from fbvm.engine.native.scans.units import UnitExchange, UnitInCode
 from fbvm.engine.stops import PAUSE, STOPPED, Stops
 from fbvm.engine.trap import Trap, trap
 

@@ -12,17 +12,12 @@ from fbvm.engine.clock import Clock
 from fbvm.engine.native.engine import NativeEngine
 from fbvm.engine.native.scans.code import ASKED, ASKED_BEFORE, OVER, SCANNED
 from fbvm.engine.native.scans.scans import ScheduledTask
-from fbvm.engine.native.scans.units import CHANGED_WORDS, UnitInCode
+from fbvm.engine.native.scans.units import CHANGED_WORDS, FieldAt, MovesAt, MoveShape, UnitExchange, UnitInCode
 from fbvm.engine.trap import Trap
 from fbvm.machine.scan.clock_words import CLOCK_WORDS
 from fbvm.machine.scan.refresh import IORefresh
 from fbvm.net.journal import Journal
 from fbvm.units.contract import MOVE_FIELDS, Moves, Processor, ProcessorUnit, Unit
-
-BUDGETED, TIMES, DEFERRED, FIRST, KNOWN, ALONE = (
-    Slot.BUDGETED, Slot.TIMES, Slot.DEFERRED, Slot.FIRST, Slot.KNOWN, Slot.ALONE)  # fmt: skip
-COLLECTED, CHANGED, UNFINISHED = Slot.COLLECTED, Slot.CHANGED, Slot.UNFINISHED
-"""Slots of every burst, looked up once."""
 
 
 def can_run_in_code(io: IORefresh) -> bool:
@@ -40,28 +35,34 @@ def units_in_code(io: IORefresh) -> list[UnitInCode]:
 
 
 def _unit_in_code(unit: Unit, io: IORefresh) -> UnitInCode:
-    exchanged, groups = unit.exchanged, unit.watched
-    assert exchanged and groups is not None
-    own = exchanged.processor
-    machine: NativeEngine = own.machine
-    copies = [(io.offset(area, word), own.offset(variable), 2 * count) for area, word, variable, count in exchanged.words]
-    watched = [io.offset(area, word) for area, word in groups]
-    posted, requested, wake = map(own.offset, (exchanged.posted, exchanged.requested, exchanged.wake))
-    left = [own.offset(variable) for variable in exchanged.left]
-    return machine.unit_in_code(copies, watched, posted, requested, left, wake, _moves(exchanged, io))
+    exchanged, watched = unit.exchanged, unit.watched
+    assert exchanged and watched is not None
+    own = exchanged.processor.contract
+    machine: NativeEngine = exchanged.processor.machine
+    return machine.unit_in_code(UnitExchange(
+        copies=tuple((io.offset(words.area, words.first), own.offset(words.variable), own.size(words.variable))
+                     for words in exchanged.words),
+        watched=tuple(io.offset(area, word) for area, word in watched),
+        posted=own.offset(exchanged.posted),
+        urgent=own.offset(exchanged.urgent),
+        unfinished=tuple(map(own.offset, exchanged.unfinished)),
+        wake=own.offset(exchanged.wake),
+        moves=_moves(exchanged.processor, exchanged.moves, io) if exchanged.moves else None,
+    ))  # fmt: skip
 
 
-def _moves(exchanged: Exchanged, io: IORefresh) -> tuple[int, int, int]:
-    """Where a processor says what is to be moved; it learns where the areas are."""
-    moves, own = exchanged.moves, exchanged.processor
-    if moves is None:
-        return 0, 0, 0
-    variable, areas = moves.targets
-    targets = own.view(variable, "u32")
-    for index, area in areas.items():
+def _moves(processor: Processor, moves: Moves, io: IORefresh) -> MovesAt:
+    """Where a program says what is to be moved.  The program learns where the areas are that it wants to know of."""
+    own = processor.contract
+    targets, (first_target, _, _) = processor.view(moves.targets), own.array(moves.targets)
+    for subscript, area in moves.areas.items():
         if area in io.memory.areas:
-            targets[index] = io.offset(area, 0)
-    return own.offset(moves.count), own.offset(moves.rows), moves.ring_bytes
+            targets[subscript - first_target] = io.offset(area, 0)
+    row = own.record(moves.rows)
+    first_ring, _, ring_bytes = own.array(moves.rings)
+    fields = {name: FieldAt(row[name].offset, 8 * STRUCTS[row[name].machine].size) for name in MOVE_FIELDS}
+    shape = MoveShape(row_bytes=row.size, first_ring=first_ring, ring_bytes=ring_bytes, **fields)
+    return MovesAt(count=own.offset(moves.count), rows=own.offset(moves.rows), rings=own.offset(moves.rings), shape=shape)
 
 
 class WithUnits:
@@ -116,7 +117,7 @@ class WithUnits:
         if clock is not scans.clock or most != scans.most:
             scans.set_clock(clock, most)
         is_stepped, pending, point = self._counts_refreshes or not clock.function_at, self._has_pending_events(), SCANNED
-        parameters.budget, parameters.times = budget, scans.times_at
+        parameters.scan_budget, parameters.times = budget, scans.times_at
         if self._has_intervals:
             scans.load_times()
         if io.skipped:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from string import Template
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
-from fbvm.engine.native.scans.parameters import COUNT, INDEX
-from fbvm.engine.native.scans.units import Shape, Told, refresh_text
+from fbvm.engine.native.scans.parameters import COUNT, addresses
+from fbvm.engine.native.scans.units import Shape, refresh_text
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,6 @@ class ClockWordTable:
 
 
 NO_CLOCK_WORDS = ClockWordTable()
-UNIT_PARAMETERS = Told(memory=INDEX["memory"], ran=INDEX["changed"], unfinished=INDEX["unfinished"], again=INDEX["again"],
-                       faulty=INDEX["faulty"], point=INDEX["point"])  # fmt: skip
-"""Those parameters that the code of units uses."""
 OVER = 0
 """What `@scans` and `@burst` return when all is done: nothing has to be seen to, no program has trapped.  Above 0 they
 return the point of a trap."""
@@ -162,7 +159,7 @@ refreshed:
 store i64 1, ptr %is_time_known_at
 %before_scan = select i1 %asks, i32 {ASKED_BEFORE}, i32 {REFRESHED}
 br label %return
-unheard:
+uncollected:
 store i64 0, ptr %events_collected_at
 br label %ready
 ready:
@@ -199,8 +196,8 @@ store i64 0, ptr %events_collected_at
 br label %begin
 return:
 %answer = phi i32 [ %before_scan, %refreshed ], [ %after_scan, %scanned ]
-%heard = load i64, ptr %events_collected_at
-%stays = select i1 %single, i64 %heard, i64 0
+%collected = load i64, ptr %events_collected_at
+%stays = select i1 %single, i64 %collected, i64 0
 store i64 %stays, ptr %events_collected_at
 ret i32 %answer
 over:
@@ -219,7 +216,7 @@ def text(intervals: Sequence[bool], clock_words: ClockWordTable, watched: int, s
              "clock_words": _lines(_clock_words(clock_words)), "tasks": _lines(_tasks(intervals)),
              "points": ", ".join(f"[ %r{n}, %run{n} ]" for n in range(len(intervals)))}  # fmt: skip
     if shapes:
-        burst = refresh_text(shapes, first, UNIT_PARAMETERS) + _BURST.substitute(parts)
+        burst = refresh_text(shapes, first) + _BURST.substitute(parts)
         return _SCANS.substitute(parts, watched=_REFRESHED, changed=_RAN, burst=burst)
     return _SCANS.substitute(parts, watched=_lines(_watched(first, watched)), changed=_CHANGED, burst="")
 
@@ -230,9 +227,8 @@ def _lines(lines: Iterable[str]) -> str:
 
 def _addresses() -> Iterator[str]:
     """Where the parameters are, and the words of the system page; some of them as they stay."""
-    for name, index in INDEX.items():
-        yield f"%{name}_at = getelementptr inbounds i8, ptr %p, i64 {8 * index}"
-    yield from ("%m = load ptr, ptr %memory_at", "%c = load ptr, ptr %context_at", "%amount = load i64, ptr %budget_at")
+    yield from addresses()
+    yield from ("%m = load ptr, ptr %memory_at", "%c = load ptr, ptr %context_at", "%amount = load i64, ptr %scan_budget_at")
     for name, offset in {"now": NOW, "due": DUE, "left": BUDGET, "scans": SCANS}.items():
         yield f"%{name}_word = getelementptr inbounds i8, ptr %m, i64 {offset}"
 

@@ -6,6 +6,7 @@ fast as an item whose index is an IntEnum.  Behind the structure follow the rows
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Iterator
 
 
 class Parameters(ctypes.Structure):
@@ -21,7 +22,7 @@ class Parameters(ctypes.Structure):
     """Time of the first scan; after a burst, time of its last scan."""
     step_ns: int
     """`@scans`: how much later than the one before each scan is."""
-    budget: int
+    scan_budget: int
     """How many statements one scan may execute."""
     spend: int
     """`@scans`: no further scan begins when all together have executed so many statements."""
@@ -60,9 +61,12 @@ class Parameters(ctypes.Structure):
     _fields_ = tuple((name, ctypes.c_int64) for name in __annotations__)
 
 
-NAMES: tuple[str, ...] = tuple(name for name, *_ in Parameters._fields_)
-"""The fields in their order."""
-INDEX = {name: index for index, name in enumerate(NAMES)}
-"""Of each field: how many numbers of 64 bits lie before it."""
-COUNT = len(NAMES)
+COUNT = len(Parameters._fields_)
 """How many numbers of 64 bits lie before the first row."""
+
+
+def addresses() -> Iterator[str]:
+    """Instructions of LLVM by which a function whose argument %p is the address of the parameters names where each of them is:
+    `%budget_at` is where `budget` is."""
+    for number, (name, *_) in enumerate(Parameters._fields_):
+        yield f"%{name}_at = getelementptr inbounds i8, ptr %p, i64 {8 * number}"

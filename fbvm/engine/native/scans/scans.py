@@ -72,7 +72,7 @@ class NativeScans:
             numbers.extend((offset, 0))
         for unit in units:
             self._expected.append([(view, len(numbers) + at) for view, at in unit.expected(memory)])
-            numbers.extend(unit.row(memory_at))
+            numbers.extend(unit.parameters(memory_at))
         self._numbers = numbers
         """The parameters, and the rows behind them."""
         self.parameters = Parameters.from_buffer(numbers)
@@ -126,7 +126,7 @@ class NativeScans:
 
         Returns the point of the trap that ended it (`NativeEngine.trap_at`), OVER, or ASKED."""
         parameters = self.parameters
-        parameters.time_ns, parameters.budget = now_ns, budget
+        parameters.time_ns, parameters.scan_budget = now_ns, budget
         if not self._timed:
             return self.call(self.parameters_at)
         self.load_times()

@@ -13,7 +13,7 @@ from string import Template
 
 from fbvm.base.areas import BUDGET, DUE, NEVER, NOW
 from fbvm.base.memory import Memory
-from fbvm.engine.native.scans.slots import addresses_of_slots
+from fbvm.engine.native.scans.parameters import addresses
 from fbvm.engine.trap import Trap
 
 STATEMENTS = 2_000_000
@@ -265,7 +265,7 @@ quiet:
 """Blocks of bytes go into the PLC's memory, the high byte of a word first."""
 _REFRESH = Template("""
 define internal i32 @refresh(ptr %p, i64 %now) {
-$slots
+$parameters
 store i64 0, ptr %changed_at
 store i64 0, ptr %again_at
 $calls
@@ -288,7 +288,7 @@ def refresh_text(shapes: Sequence[Shape], first: int) -> str:
                   f"%a{number} = call i32 @unit{kinds.index(shape)}(ptr %p, ptr %w{number}, i64 %now, i64 {1 << number})",
                   f"%any{number + 1} = or i32 %any{number}, %a{number}"]  # fmt: skip
         first += shape.size
-    return "".join(functions) + _REFRESH.substitute(slots=_lines(addresses_of_slots()), calls=_lines(calls), count=len(shapes))
+    return "".join(functions) + _REFRESH.substitute(parameters=_lines(addresses()), calls=_lines(calls), count=len(shapes))
 
 
 def _unit_text(number: int, shape: Shape) -> str:
@@ -317,7 +317,7 @@ def _loaded(name: str, number: int, kind: str = "ptr") -> Iterator[str]:
 
 def _fields() -> Iterator[str]:
     """The names that a unit's function uses: slots of all scans, and of the unit."""
-    yield from addresses_of_slots()
+    yield from addresses()
     short = {UnitSlot.MEMORY: "m", UnitSlot.CONTEXT: "c"}
     for slot in UnitSlot:
         yield from _loaded(short.get(slot, f"{slot.name.lower()}_at"), slot)
