@@ -9,8 +9,8 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 
-from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, PAGE_BYTES, SCANS
-from fbvm.base.memory import Memory, Snapshot
+from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SCANS
+from fbvm.base.memory import Memory
 from fbvm.code.image import Image
 from fbvm.engine.choice.tiers import Engine, engine_for
 from fbvm.engine.clock import Clock
@@ -20,6 +20,7 @@ from fbvm.machine.fast.paths import FastPath, FastPaths
 from fbvm.machine.goal import Goal
 from fbvm.machine.scan.clock_words import CLOCK_WORDS, ClockWords
 from fbvm.machine.scan.refresh import Attached, IORefresh
+from fbvm.machine.scan.start import Kept, retained, start, write
 from fbvm.machine.scan.tasks import TaskSchedule, too_short_intervals
 from fbvm.machine.scan_times import Lateness, ScanTimes
 from fbvm.machine.state import RUN
@@ -91,7 +92,7 @@ class Plc:
         self._schedule = TaskSchedule(image.tasks, lambda path: self.read(path) is True)
         self._io = IORefresh(self.units, self.memory)
         self._fast_paths = FastPaths(self._io, self._schedule)
-        self._write_initial()
+        write(self.memory, image.initial)
         self._journal = journal
         if journal:
             journal.begin(image.fingerprint, cycle_ns, budget, self.memory)
@@ -335,6 +336,8 @@ class Plc:
         if any(other.unit.name == unit.name for other in self.units):
             raise ValueError(f"{unit.name} is on the backplane already")
         attached = Attached(unit, network.attach(unit.address), network)
+        if attached.own:
+            attached.own.run_on(self._choice)
         with self._acting("unit", self._journal.unit(unit) if self._journal else None):
             self.units.append(attached)
             attached.link.submit(unit.reset(self.memory), self.now_ns)
@@ -351,13 +354,13 @@ class Plc:
         with self._acting("mode", mode.value):
             if mode is RUN and self._mode is not RUN:
                 held = ("CIO", "W", "TF", "T") if self._clock_words.io_memory_held else ()
-                self._restart(self._kept(held))
+                self._restart(retained(self.memory, self.image, held))
             self._mode = mode
 
     def warm_start(self) -> None:
         """Power off and on: retained variables and areas keep their values, everything else begins anew."""
         with self._acting("start", "warm"):
-            self._power_on(self._kept(()))
+            self._power_on(retained(self.memory, self.image))
 
     def cold_start(self) -> None:
         """As new: all memory at its initial values."""
@@ -368,33 +371,19 @@ class Plc:
         """Lets the journal know of something that is done between scans."""
         return self._journal.acting(what, value) if self._journal else nullcontext()
 
-    def _power_on(self, kept: list[tuple[int, bytes]]) -> None:
+    def _power_on(self, kept: Kept) -> None:
         self._restart(kept)
         self._mode = RUN
         for attached in self.units:
             attached.link.submit(attached.unit.reset(self.memory), self.now_ns)
 
-    def _restart(self, kept: list[tuple[int, bytes]]) -> None:
-        self.memory.restore(Snapshot((None,) * (self.memory.size // PAGE_BYTES)))
-        self._write_initial()
-        for offset, data in kept:
-            self.memory.u8[offset : offset + len(data)] = data
+    def _restart(self, kept: Kept) -> None:
+        start(self.memory, self.image, kept)
         self._schedule.reset()
         self._leave()
         self._first = True
         self._fast_paths.forget()
         self.trap = None
-
-    def _kept(self, held: Sequence[str]) -> list[tuple[int, bytes]]:
-        """What a restart keeps: retained areas and variables, and the areas named."""
-        areas = [area for area in self.memory.areas.values() if area.retained or area.name in held]
-        extents = [(area.offset, area.size_bytes) for area in areas]
-        extents += [(row.offset, row.size) for row in self.image.retained]
-        return [(offset, bytes(self.memory.u8[offset : offset + size])) for offset, size in extents]
-
-    def _write_initial(self) -> None:
-        for offset, data in self.image.initial:
-            self.memory.u8[offset : offset + len(data)] = data
 
     def snapshot(self) -> State:
         """The state of the PLC itself at this moment; pages that did not change are shared, not copied.
@@ -429,8 +418,12 @@ class Plc:
 
     def fork(self) -> Plc:
         """A second PLC in the same state, without units, watchers and connections, whether or not this one has them."""
+        return self._twin(self.snapshot())
+
+    def _twin(self, state: State) -> Plc:
+        """A second PLC with the same program, in a state of this one."""
         twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self._choice)
-        twin.restore(self.snapshot())
+        twin.restore(state)
         return twin
 
     def remember(self, scans: int) -> None:
@@ -443,8 +436,6 @@ class Plc:
         Raises ValueError if `remember` did not keep that scan."""
         for state in reversed(self._past):
             if state.scans == scan + 1:
-                twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self._choice)
-                twin.restore(state)
-                return twin
+                return self._twin(state)
         held = f"scans {self._past[0].scans - 1} to {self._past[-1].scans - 1} are" if self._past else "none is"
         raise ValueError(f"scan {scan} is not remembered; {held}: see Plc.remember")

@@ -27,11 +27,12 @@ TASK = 0
 """The number of the program's only task."""
 
 
-def processor(text: str) -> OwnProcessor:
+def processor(text: str, engine: str = "auto") -> OwnProcessor:
     """A processor with the program `text` (ST), before its first execution; a text is compiled once.
 
+    `engine` is that of a PLC: "python" runs the program in Python, any other one as machine code if this host can make it.
     Raises ValueError for a text that does not compile, or that has not exactly one PROGRAM."""
-    return _first(text).another()
+    return _first(text, engine).another()
 
 
 @cache
@@ -44,9 +45,9 @@ def contract(text: str, libraries: tuple[Path, ...] = ()) -> Contract:
 
 
 @cache
-def _first(text: str) -> OwnProcessor:
-    """The first processor of a program: it is kept, and with it the machine code for all others."""
-    return OwnProcessor(contract(text))
+def _first(text: str, engine: str) -> OwnProcessor:
+    """The first processor of a program on an engine: it is kept, and with it the code for all others."""
+    return OwnProcessor(contract(text), engine)
 
 
 def _compiled(text: str, libraries: tuple[Path, ...]) -> Image:
@@ -63,18 +64,25 @@ def _compiled(text: str, libraries: tuple[Path, ...]) -> Image:
 
 
 class OwnProcessor:
-    """A `fbvm.units.contract.Processor`: runs its program as machine code if this host can make any, else in Python."""
+    """A `fbvm.units.contract.Processor`: runs its program as machine code if this host can make any, else in Python.
 
-    def __init__(self, contract: Contract) -> None:
+    With `engine` "python" it runs in Python anyway."""
+
+    def __init__(self, contract: Contract, engine: str = "auto") -> None:
         image = contract.image
         self.contract = contract
         self.memory = Memory(image.layout.size, image.layout.areas)
         for offset, data in image.initial:
             self.memory.u8[offset : offset + len(data)] = data
-        self.machine = NativeEngine(image, self.memory) if native.available() else None
+        self._system = self.memory.views["i64"]
+        self._take(engine)
+
+    def _take(self, engine: str) -> None:
+        image = self.contract.image
+        self.engine = engine
+        self.machine = NativeEngine(image, self.memory) if engine != "python" and native.available() else None
         """What runs the program as machine code; None if Python does."""
         self._engine = self.machine or PythonEngine(image, self.memory)
-        self._system = self.memory.views["i64"]
 
     def view(self, variable: str) -> memoryview:
         """All values of a variable, writable, in the form that the program declares: an `ARRAY[0..3] OF WORD` as four numbers
@@ -97,7 +105,12 @@ class OwnProcessor:
 
     def another(self) -> OwnProcessor:
         """Another processor with the same program and a memory of its own, before its first execution."""
-        return OwnProcessor(self.contract)
+        return OwnProcessor(self.contract, self.engine)
+
+    def run_on(self, engine: str) -> None:
+        """Goes on with the program on this engine, in the same memory."""
+        if engine != self.engine:
+            self._take(engine)
 
     def copy(self) -> OwnProcessor:
         """Another processor with the same program, and a memory of its own with the same contents."""

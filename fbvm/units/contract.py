@@ -147,6 +147,10 @@ class ProcessorUnit(Unit, Protocol):
 
     The machine may copy the words and run the program itself, between `post` and `finish`."""
 
+    def run_on(self, engine: str) -> None:
+        """From now on the program of the unit runs on the engine of this name, that of its PLC; "python" never runs machine
+        code."""
+
     def exchange(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> bool:
         """The first part of `refresh`: posts the events, copies the words in, runs the program, copies them out.  Returns False
         if none of this was needed; else `finish` comes when the other units have exchanged their words."""

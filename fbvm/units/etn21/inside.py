@@ -12,11 +12,13 @@ from fbvm.units.etn21.words import Words, numbers
 PROGRAM = "PROGRAM Unit ETN21_Refresh(); END_PROGRAM"
 
 
-def power_on(layout: at.Layout, address: str, *, real: bool, seed: int, time_wait_ns: int, odd_filler: int | None) -> Inside:
+def power_on(layout: at.Layout, address: str, *, real: bool, seed: int, time_wait_ns: int, odd_filler: int | None,
+             engine: str) -> Inside:  # fmt: skip
     """A processor with an ETN21's program that knows how its unit is made, before its first run.
 
-    `real` turns delays and words out of step on, drawn from `seed`; `time_wait_ns` is how long a local port stays taken."""
-    own = processor(PROGRAM)
+    `real` turns delays and words out of step on, drawn from `seed`; `time_wait_ns` is how long a local port stays taken;
+    `engine` is that of `processor`."""
+    own = processor(PROGRAM, engine)
     own.view("ETN21_Unit_Bit")[0] = 1 << layout.bit
     ip = own.view("ETN21_IP")
     ip[0], ip[1] = words_of(address)

@@ -67,6 +67,7 @@ class Etn21:
         """Its bit in words for all units."""
         self._service_status, self._error_status = at.LINK_UP, 0
         self.changed_words = False
+        self._engine = "auto"
         self._processor: Inside | None = None
         """Switched on when there is something to do for it: most programs ask nothing of an ETN21."""
         if faults := list(faults):
@@ -80,7 +81,7 @@ class Etn21:
             made = self._made
             inside = self._processor = power_on(
                 self.layout, self.address, real=made["timing"] == "real", seed=made["seed"],
-                time_wait_ns=made["time_wait_ns"], odd_filler=made["odd_filler"])  # fmt: skip
+                time_wait_ns=made["time_wait_ns"], odd_filler=made["odd_filler"], engine=self._engine)  # fmt: skip
             inside.report(self._service_status, self._error_status)
             inside.begin()
             if self._words:
@@ -90,6 +91,7 @@ class Etn21:
     def __deepcopy__(self, known: dict[int, Any]) -> Etn21:
         """Another unit in the same state, which shares the PLC's memory."""
         twin = Etn21(**self._made)
+        twin._engine = self._engine
         if self._processor:
             twin._processor = self._processor.copy(self._made["odd_filler"])
         twin._service_status, twin._error_status = self._service_status, self._error_status
@@ -242,6 +244,12 @@ class Etn21:
             return False
         words.n[at.SERVICE_STATUS], words.n[at.ERROR_STATUS] = status
         return True
+
+    def run_on(self, engine: str) -> None:
+        """From now on the unit's program runs on this engine."""
+        self._engine = engine
+        if self._processor:
+            self._processor.own.run_on(engine)
 
     def post(self, events: Iterable[Event]) -> None:
         """Events of the network for the next run of the program."""

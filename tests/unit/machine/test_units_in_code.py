@@ -14,14 +14,16 @@ from hypothesis import strategies as st
 from rows import first_quick
 from toy_unit import Echoing, Toy
 
-from fbvm import Plc, compile_text
+from fbvm import Etn21, LoopNetwork, Plc, compile_text
 from fbvm.base.areas import NOW
 from fbvm.code.image import Image
 from fbvm.engine.clock import Clock
 from fbvm.engine.native import engine as native
+from fbvm.engine.native.engine import NativeEngine
 from fbvm.machine.fast.paths import FastPath, ProgramAlone
 from fbvm.machine.fast.units_in_code import WithUnits
 from fbvm.machine.plc import Mode
+from fbvm.units.etn21.faults import Fault
 
 if not native.available():
     pytest.skip("llvmlite is not installed", allow_module_level=True)
@@ -247,6 +249,25 @@ def test_a_processor_without_machine_code_is_run_from_outside(monkeypatch: pytes
     for scans in (1, 5, 300):
         agree([rig, other], lambda plc, scans=scans: plc.run(scans=scans))  # type: ignore[misc]
     assert isinstance(way(other), ProgramAlone) and isinstance(way(rig), WithUnits)
+
+
+def test_with_the_python_engine_no_program_of_a_unit_is_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(NativeEngine, "run", lambda self, task: pytest.fail("machine code"))
+    rig, etn21 = Rig(image(), (0, MS), engine="python"), Etn21(0, "192.168.250.20")
+    rig.plc.attach(etn21, LoopNetwork())
+    rig.plc.write("CIO1519.0", True)  # an open, which switches the processor of the unit on
+    rig.plc.run(scans=50)
+    assert etn21.exchanged and etn21.exchanged.processor.machine is None
+    assert [toy.own.machine for toy in rig.toys] == [None, None] and rig.plc.read("D20001") > 2  # type: ignore[operator]
+
+
+def test_a_unit_that_is_attached_goes_over_to_the_engine_of_its_plc() -> None:
+    etn21 = Etn21(0, "192.168.250.20", faults=[Fault(0x2211)])
+    assert etn21.exchanged and etn21.exchanged.processor.machine is not None
+    Plc(image(), MS, engine="python").attach(etn21, LoopNetwork())
+    assert etn21.exchanged.processor.machine is None
+    Plc(image(), MS, engine="native").attach(etn21, LoopNetwork())
+    assert etn21.exchanged.processor.machine is not None
 
 
 # --- bursts -----------------------------------------------------------------------------------------------------------

@@ -63,6 +63,7 @@ class Toy:
         self._cio, self._d = 1500 + 4 * number, 20_000 + 7 * number
         places = (("CIO", self._cio, "Words"), ("D", self._d, "Table"), ("W", 4, "Shared"))
         self.words = tuple(ExchangedWords(area=area, first=first, variable=name) for area, first, name in places)
+        self._engine = "auto"
         self._begin()
 
     @property
@@ -75,7 +76,7 @@ class Toy:
         return ("CIO", self._cio), ("W", 4)
 
     def _begin(self) -> None:
-        self.own: OwnProcessor = processor(PROGRAM)
+        self.own: OwnProcessor = processor(PROGRAM, self._engine)
         self.own.view("Bit")[0], self.own.view("Delay")[0] = self._bit, self._delay_ns
         self.connect()
         self.changed_words, self.refreshes, self._has_run = False, 0, False
@@ -95,6 +96,10 @@ class Toy:
         for plc, own in self._views(memory)[:2]:
             plc[:] = memoryview(bytes(2 * len(own))).cast("H")
         return []
+
+    def run_on(self, engine: str) -> None:
+        self._engine = engine
+        self.own.run_on(engine)
 
     def post(self, events: Sequence[Event]) -> None:
         for event in events:
