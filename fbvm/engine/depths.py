@@ -12,7 +12,7 @@ from fbvm.code.operations import Block
 _T = TypeVar("_T")
 
 
-def however_deep(image: Image, frames_a_level: int, work: Callable[[], _T]) -> _T:
+def with_recursion_room(image: Image, frames_a_level: int, work: Callable[[], _T]) -> _T:
     """What `work` yields, which goes through the code of an image with at most so many frames for a level of tuples.
 
     Hardly any code is too deep for the host's limit, and to look how deep it is takes a third of the time of translating

@@ -29,12 +29,12 @@ def may_trap(item: Any) -> bool:
     return any(may_trap(part) for part in item)
 
 
-def number(node: Node) -> int | None:
+def constant_integer(node: Node) -> int | None:
     """The value of an integer that is a constant, also one that was converted; else None."""
     if node[0] == "const" and not is_float(node[1]):
         return int(node[2])
     if node[0] == "convert" and not is_float(node[1]) and not is_float(node[2]):
-        value = number(node[3])
+        value = constant_integer(node[3])
         return None if value is None else wrap(value, node[1])
     return None
 
@@ -42,29 +42,29 @@ def number(node: Node) -> int | None:
 def _traps_itself(node: Node) -> bool:
     name = node[0]
     if name in ("div", "mod"):
-        return not is_float(node[1]) and not number(node[3])
+        return not is_float(node[1]) and not constant_integer(node[3])
     if name in ("shl", "shr", "rol", "ror"):
-        count = number(node[3])
+        count = constant_integer(node[3])
         return count is None or count < 0
     if name == "load_flag":
         return False  # by its address
     return bool(EXPRESSIONS[name].traps)
 
 
-def reach(node: Node) -> Range:
+def unwrapped_range(node: Node) -> Range:
     """Least and greatest number that an integer operation can yield before it wraps."""
-    row = _REACH.get(node[0])
+    row = _UNWRAPPED.get(node[0])
     return row(node) if row and node[1] in INTEGERS else limits(node[1])
 
 
-def fits(node: Node) -> bool:
+def never_wraps(node: Node) -> bool:
     """True if an integer operation never has to wrap."""
-    return _within(reach(node), limits(node[1]))
+    return _within(unwrapped_range(node), limits(node[1]))
 
 
-def span(node: Node) -> Range:
+def value_range(node: Node) -> Range:
     """Least and greatest value of an integer expression."""
-    whole, range_ = limits(node[1]), reach(node)
+    whole, range_ = limits(node[1]), unwrapped_range(node)
     return range_ if _within(range_, whole) else whole
 
 
@@ -73,80 +73,80 @@ def _within(inner: Range, outer: Range) -> bool:
 
 
 def _sum(node: Node) -> Range:
-    (low, high), (least, greatest) = span(node[2]), span(node[3])
+    (low, high), (least, greatest) = value_range(node[2]), value_range(node[3])
     return low + least, high + greatest
 
 
 def _difference(node: Node) -> Range:
-    (low, high), (least, greatest) = span(node[2]), span(node[3])
+    (low, high), (least, greatest) = value_range(node[2]), value_range(node[3])
     return low - greatest, high - least
 
 
 def _product(node: Node) -> Range:
-    left, right = span(node[2]), span(node[3])
+    left, right = value_range(node[2]), value_range(node[3])
     corners = [a * b for a in left for b in right]
     return min(corners), max(corners)
 
 
 def _quotient(node: Node) -> Range:
-    divisor = number(node[3])
+    divisor = constant_integer(node[3])
     if divisor is not None and divisor > 0:
-        low, high = span(node[2])
+        low, high = value_range(node[2])
         return quotient(low, divisor), quotient(high, divisor)
     low, high = limits(node[1])
     return low, high + (low < 0)
 
 
 def _remainder(node: Node) -> Range:
-    low, high = span(node[2])
-    if divisor := number(node[3]):
+    low, high = value_range(node[2])
+    if divisor := constant_integer(node[3]):
         most = abs(divisor) - 1
         return (max(low, -most) if low < 0 else 0), (min(high, most) if high > 0 else 0)
     return min(low, 0), max(high, 0)
 
 
 def _negative(node: Node) -> Range:
-    low, high = span(node[2])
+    low, high = value_range(node[2])
     return -high, -low
 
 
 def _union(*nodes: Node) -> Range:
-    ranges = [span(node) for node in nodes]
+    ranges = [value_range(node) for node in nodes]
     return min(low for low, _ in ranges), max(high for _, high in ranges)
 
 
 def _bitwise(node: Node) -> Range:
-    high = max(span(node[2])[1], span(node[3])[1])
+    high = max(value_range(node[2])[1], value_range(node[3])[1])
     return 0, (1 << high.bit_length()) - 1
 
 
 def _shifted(node: Node) -> Range:
-    low, high = span(node[2])
-    count = number(node[3])
+    low, high = value_range(node[2])
+    count = constant_integer(node[3])
     return (0, high >> min(count, 64)) if low >= 0 and count is not None and count >= 0 else limits(node[1])
 
 
 def _converted(node: Node) -> Range:
-    return limits(node[1]) if is_float(node[2]) else span(node[3])
+    return limits(node[1]) if is_float(node[2]) else value_range(node[3])
 
 
 def _checked(node: Node) -> Range:
-    low, high = span(node[2])
+    low, high = value_range(node[2])
     return max(low, node[3]), min(high, node[4])
 
 
 def _floored(node: Node) -> Range:
-    (low, high), divisor = span(node[2]), number(node[3])
+    (low, high), divisor = value_range(node[2]), constant_integer(node[3])
     return (low // divisor, high // divisor) if divisor else limits(node[1])
 
 
 _LENGTH = (0, (1 << 31) - 1)
 
-_REACH: dict[str, Callable[[Node], Range]] = {
+_UNWRAPPED: dict[str, Callable[[Node], Range]] = {
     "const": lambda node: (node[2], node[2]),
     "add": _sum, "sub": _difference, "mul": _product, "div": _quotient, "mod": _remainder, "neg": _negative,
-    "abs": lambda node: (0, max(map(abs, span(node[2])))),
-    "and": lambda node: (0, min(span(node[2])[1], span(node[3])[1])),
+    "abs": lambda node: (0, max(map(abs, value_range(node[2])))),
+    "and": lambda node: (0, min(value_range(node[2])[1], value_range(node[3])[1])),
     "or": _bitwise, "xor": _bitwise, "shr": _shifted, "convert": _converted, "check": _checked,
     "select": lambda node: _union(node[3], node[4]), "mux": lambda node: _union(*node[3]),
     "min": lambda node: _union(node[2], node[3]), "max": lambda node: _union(node[2], node[3]),

@@ -33,14 +33,14 @@ _CHUNK = STRUCTS["u64"]
 
 
 @dataclass(eq=False)
-class Line:
+class LineStop:
     """Stops at statements, by the numbers of their sites; with a test only where it is TRUE."""
 
     sites: frozenset[int]
     test: Test | None = None
 
 
-class Watched:
+class Watchpoint:
     """Stops where bytes have changed: runs of (offset, size), or one byte of which only the bits of `mask` count.
 
     With a test it stops only if that is TRUE at a change; with `edge`, if it was not at the change before.  `value` and
@@ -85,13 +85,13 @@ class Watched:
         self.last, self._held, self.value = state
 
 
-class Stops:
+class StopTable:
     """The table of one memory, for an image with so many sites.  `at` is its address in the host."""
 
     def __init__(self, memory: Memory, sites: int) -> None:
         self._memory = memory
-        self._watched: list[Watched] = []
-        self._lines: dict[int, list[Line]] = {}
+        self._watched: list[Watchpoint] = []
+        self._lines: dict[int, list[LineStop]] = {}
         self._buffer = (ctypes.c_uint8 * (TABLE + sites + 1))()
         self.at = ctypes.addressof(self._buffer)
         self._head = (ctypes.c_int64 * 3).from_buffer(self._buffer)
@@ -100,7 +100,7 @@ class Stops:
         self._rows = (ctypes.c_uint8 * 1)()
         self._asked = _ASK(self._ask)  # stays while machine code may ask
         self._head[0] = ctypes.cast(self._asked, ctypes.c_void_p).value or 0
-        self.reasons: tuple[Line | Watched, ...] = ()
+        self.reasons: tuple[LineStop | Watchpoint, ...] = ()
         """What stopped the run."""
         self.failure: BaseException | None = None
         """What a test raised while machine code ran."""
@@ -110,16 +110,16 @@ class Stops:
         """True if anything could stop a run."""
         return bool(self._lines or self._watched)
 
-    def put(self, rows: Iterable[Line | Watched]) -> None:
+    def put(self, rows: Iterable[LineStop | Watchpoint]) -> None:
         """These stop runs from now on, and no others."""
         rows = list(rows)
         for row in rows:
-            if isinstance(row, Watched) and row not in self._watched:
+            if isinstance(row, Watchpoint) and row not in self._watched:
                 row.begin(self._memory)
-        self._watched = [row for row in rows if isinstance(row, Watched)]
+        self._watched = [row for row in rows if isinstance(row, Watchpoint)]
         ctypes.memset(self.table, WATCHING if self._watched else 0, len(self.table))
         self._lines = {}
-        for line in (row for row in rows if isinstance(row, Line)):
+        for line in (row for row in rows if isinstance(row, LineStop)):
             for site in line.sites:
                 self._lines.setdefault(site, []).append(line)
                 self.table[site] |= AT_STATEMENT
@@ -128,7 +128,7 @@ class Stops:
 
     def hit(self, site: int, statement: bool) -> bool:
         """True if the run stops at this observation; the site of an end is -1."""
-        found: list[Line | Watched] = []
+        found: list[LineStop | Watchpoint] = []
         changed = False
         for row in self._watched:
             now = row.seen(self._memory)

@@ -13,10 +13,10 @@ from fbvm.base.memory import Memory
 from fbvm.base.types import fold
 from fbvm.code.image import Image, Site
 from fbvm.code.shapes import statements
-from fbvm.engine.choice.stoppable import STATEMENTS, Guarded
+from fbvm.engine.choice.stoppable import STATEMENTS, StoppableEngine
 from fbvm.engine.choice.tiers import Engine, choice_of, substitutes_of
 from fbvm.engine.python.runtime import NO_SITE
-from fbvm.engine.stops import Line, Stops, Test, Watched
+from fbvm.engine.stops import LineStop, StopTable, Test, Watchpoint
 from fbvm.engine.trap import Trap
 from fbvm.watch.changes import changed
 from fbvm.watch.conditions import Condition, parse_condition
@@ -82,9 +82,9 @@ class Breakpoints:
 
     def __init__(self, plc: Stoppable) -> None:
         self._plc = plc
-        self._rows: dict[Breakpoint, Line | Watched] = {}
-        self._stops = Stops(plc.memory, len(plc.image.sites))
-        self._guarded: Guarded | None = None
+        self._rows: dict[Breakpoint, LineStop | Watchpoint] = {}
+        self._stops = StopTable(plc.memory, len(plc.image.sites))
+        self._stoppable: StoppableEngine | None = None
         self._stands_in: tuple[object, object] = None, None
         self.halted: Halt | None = None
         """Where the scan stands, if one does."""
@@ -107,7 +107,7 @@ class Breakpoints:
         statement of a POU by its name.  Raises ValueError for what is not there."""
         found, sites = find_line(self._plc.image, where)
         condition = self._condition(when)
-        return self._put(Breakpoint("line", found, when), Line(sites, self._test(condition)))
+        return self._put(Breakpoint("line", found, when), LineStop(sites, self._test(condition)))
 
     def change(self, where: str, when: str = "") -> Breakpoint:
         """Stops behind the statement that changed a variable, an address or a range, as `Plc.find` takes them.
@@ -116,7 +116,7 @@ class Breakpoints:
         found = self._plc.find(where)
         condition = self._condition(when)
         extents, mask = _extents(found)
-        row = Watched(extents, mask, test=self._test(condition), read=lambda: self._plc.read(found))
+        row = Watchpoint(extents, mask, test=self._test(condition), read=lambda: self._plc.read(found))
         return self._put(Breakpoint("change", where, when), row)
 
     def condition(self, when: str) -> Breakpoint:
@@ -124,7 +124,7 @@ class Breakpoints:
         condition = self._condition(when)
         assert condition is not None
         extents: list[tuple[int, int]] = [run for place in condition.places for run in _extents(place)[0]]
-        return self._put(Breakpoint("condition", when), Watched(extents, test=self._test(condition), edge=True))
+        return self._put(Breakpoint("condition", when), Watchpoint(extents, test=self._test(condition), edge=True))
 
     def remove(self, breakpoint: Breakpoint) -> None:
         """Takes one away.  Raises KeyError if it is not set."""
@@ -136,7 +136,7 @@ class Breakpoints:
         self._rows.clear()
         self._stops.put(())
 
-    def _put(self, breakpoint: Breakpoint, row: Line | Watched) -> Breakpoint:
+    def _put(self, breakpoint: Breakpoint, row: LineStop | Watchpoint) -> Breakpoint:
         choice_of(self._plc.engine)
         self._rows[breakpoint] = row
         self._stops.put(self._rows.values())
@@ -152,42 +152,42 @@ class Breakpoints:
 
     def run(self, task_index: int, engine: Engine) -> Trap | None:
         """Executes a task in place of an engine, or goes on with it, up to its end, a trap or a stop."""
-        if self.halted and self._guarded:
+        if self.halted and self._stoppable:
             self.halted = None
-            guarded = self._guarded
-            trap = guarded.go_on()
+            stoppable = self._stoppable
+            trap = stoppable.go_on()
         else:
-            guarded = self.guarding(engine)
-            trap = guarded.run(task_index)
-        if guarded.seen:
-            self.halted = self._halt(guarded, guarded.seen.site)
+            stoppable = self.stoppable(engine)
+            trap = stoppable.run(task_index)
+        if stoppable.seen:
+            self.halted = self._halt(stoppable, stoppable.seen.site)
         return trap
 
-    def guarding(self, engine: Engine) -> Guarded:
+    def stoppable(self, engine: Engine) -> StoppableEngine:
         """What runs in place of an engine."""
         substitutes = substitutes_of(engine)
-        if self._guarded is None or self._stands_in != (engine, substitutes):
+        if self._stoppable is None or self._stands_in != (engine, substitutes):
             plc = self._plc
-            self._guarded = Guarded(plc.image, plc.memory, self._stops, choice_of(engine), substitutes)
+            self._stoppable = StoppableEngine(plc.image, plc.memory, self._stops, choice_of(engine), substitutes)
             self._stands_in = engine, dict(substitutes)
-        return self._guarded
+        return self._stoppable
 
     def leave(self) -> None:
         """The scan that stands will not go on."""
         self.halted = None
 
-    def _halt(self, guarded: Guarded, site: int) -> Halt:
+    def _halt(self, stoppable: StoppableEngine, site: int) -> Halt:
         image = self._plc.image
         frames, at = [], site
-        for call in reversed(guarded.calls):
+        for call in reversed(stoppable.calls):
             frames.append(Frame(image.bodies[call.body].name, call.base, None if at == NO_SITE else image.sites[at]))
             at = call.site
         rows = [(said, row) for said, row in self._rows.items() if row in self._stops.reasons]
         reasons = [self._reason(said, row) for said, row in rows]
         return Halt(self._plc.scans, frames[0].site, tuple(reasons), tuple(said for said, _ in rows), tuple(frames))
 
-    def _reason(self, said: Breakpoint, row: Line | Watched) -> str:
-        if isinstance(row, Watched) and said.kind == "change":
+    def _reason(self, said: Breakpoint, row: LineStop | Watchpoint) -> str:
+        if isinstance(row, Watchpoint) and said.kind == "change":
             whole = self._plc.find(said.where)
             found, before, after = changed(whole, cast(Value, row.before), cast(Value, row.value))
             name = said.where if found is whole else found.name

@@ -245,7 +245,7 @@ class Plc:
         if self.watchers or self._past.maxlen:
             return False
         if self.breakpoints.armed:
-            done, self.trap = self._many_guarded(most)
+            done, self.trap = self._many_stoppable(most)
         elif all(attached.network.virtual_time for attached in self.units) and (path := self._fast_path()):
             done, self.trap = path.many(most, self.now_ns, self.cycle_ns, self.budget, STEP_BUDGET)
         else:
@@ -268,15 +268,15 @@ class Plc:
                 self.now_ns = times[-1]
         return times
 
-    def _many_guarded(self, most: int) -> tuple[int, Trap | None]:
+    def _many_stoppable(self, most: int) -> tuple[int, Trap | None]:
         """How many scans there were before one that stops at a breakpoint."""
         tasks = self._schedule.by_time()
         outside = self.units or self.phases or self._forces or self._journal
         if outside or not tasks or self._first or self._mode is not RUN or self.halted:
             return 0, None
         self._system[BUDGET // 8] = self.budget
-        guarded = self.breakpoints.guarding(self.engine)
-        return guarded.run_many(tasks, most, self.cycle_ns, CLOCK_WORDS, spend=STEP_BUDGET)
+        stoppable = self.breakpoints.stoppable(self.engine)
+        return stoppable.run_many(tasks, most, self.cycle_ns, CLOCK_WORDS, spend=STEP_BUDGET)
 
     # --- values -------------------------------------------------------------------------------------------------------
 

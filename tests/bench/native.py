@@ -38,7 +38,7 @@ from fbvm.engine.native.emit.writer import Writer  # noqa: E402
 from fbvm.engine.native.engine import NativeEngine  # noqa: E402
 from fbvm.engine.native.scans.scans import ScheduledTask  # noqa: E402
 from fbvm.engine.python.engine import PythonEngine  # noqa: E402
-from fbvm.engine.stops import Stops  # noqa: E402
+from fbvm.engine.stops import StopTable  # noqa: E402
 from fbvm.machine.plc import Plc  # noqa: E402
 
 BENCH = Path(__file__).resolve().parent
@@ -109,7 +109,7 @@ def natively(image: Image, level: int, step_ns: int) -> Callable[[int], object]:
 def with_stops(image: Image, step_ns: int) -> Callable[[int], object]:
     """The build that looks into the table of breakpoints, of which there is none."""
     memory = power_on(image)
-    engine = NativeEngine(image, memory, 2, Stops(memory, len(image.sites)))
+    engine = NativeEngine(image, memory, 2, StopTable(memory, len(image.sites)))
 
     def scans(n: int) -> None:
         memory.write(BUDGET, "i64", 1 << 60)

@@ -62,7 +62,7 @@ def _guarded(image: Image) -> Plc:
     """A build that could be stopped, by nothing that happens."""
     plc = Plc(image, budget=budget(image), engine="python")  # whose guard asks for no machine code of its own
     plc.breakpoints.change("D31999")
-    guarded = plc.breakpoints.guarding(plc.engine)
+    guarded = plc.breakpoints.stoppable(plc.engine)
     guarded._native = NativeEngine(image, plc.memory, 0, plc.breakpoints._stops)
     return plc
 

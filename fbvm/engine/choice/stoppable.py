@@ -13,14 +13,14 @@ from typing import NamedTuple
 from fbvm.base.areas import BUDGET
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
-from fbvm.engine.choice.tiers import PAYS
+from fbvm.engine.choice.tiers import STATEMENTS_TO_PAY
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
 from fbvm.engine.native.scans.code import ClockWordTable
 from fbvm.engine.native.scans.scans import ScheduledTask
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.python.runtime import NO_SITE, Observation
-from fbvm.engine.stops import STOPPED, State, Stops
+from fbvm.engine.stops import STOPPED, State, StopTable
 from fbvm.engine.trap import Trap
 
 STATEMENTS = ("statement", "rung")
@@ -34,12 +34,12 @@ class Call(NamedTuple):
     site: int
 
 
-class Guarded:
+class StoppableEngine:
     """An engine whose runs stop where `stops` say.  `seen` is the observation at which one stands, None if none does.
 
     `choice` is "auto", "python" or "native" as for `tiers.engine_for`."""
 
-    def __init__(self, image: Image, memory: Memory, stops: Stops, choice: str,
+    def __init__(self, image: Image, memory: Memory, stops: StopTable, choice: str,
                  substitutes: Mapping[int, Callable[[int], None]]) -> None:  # fmt: skip
         self._image, self._memory, self._stops = image, memory, stops
         self._python = PythonEngine(image, memory, observed=True)
@@ -107,7 +107,7 @@ class Guarded:
         self._steps, self.calls = self._python.observe(task_index), []
         trap = self.go_on()
         self._executed += before - int(self._memory.read(BUDGET, "i64"))
-        if self._code and self._executed >= PAYS:
+        if self._code and self._executed >= STATEMENTS_TO_PAY:
             self._code.request()
         return trap
 

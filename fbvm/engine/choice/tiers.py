@@ -20,9 +20,9 @@ from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.trap import Trap
 
 CHOICES = ("auto", "python", "native")
-PAYS = 300_000
+STATEMENTS_TO_PAY = 300_000
 """Statements after which machine code is asked for: about a tenth of a second in Python."""
-LARGE = 1000
+LARGE_PROGRAM = 1000
 """Places in the source of a program that takes about as long to be made into Python as into quick machine code, whose scans
 take a hundredth of the time, and which is kept on disk for the next start."""
 
@@ -52,12 +52,12 @@ def engine_for(image: Image, memory: Memory, choice: str = "auto", observed: boo
         return NativeEngine(image, memory)
     if choice == "python" or observed or not native.available():
         return PythonEngine(image, memory, observed=observed)
-    return Tiers(image, memory)
+    return TieredEngine(image, memory)
 
 
 def choice_of(engine: object) -> str:
     """The choice by which `engine_for` makes such an engine.  Raises ValueError for what it does not make."""
-    for choice, kind in (("auto", Tiers), ("python", PythonEngine), ("native", NativeEngine)):
+    for choice, kind in (("auto", TieredEngine), ("python", PythonEngine), ("native", NativeEngine)):
         if isinstance(engine, kind):
             return choice
     raise ValueError("somebody looks into every scan already: a run with breakpoints is another one")
@@ -65,21 +65,21 @@ def choice_of(engine: object) -> str:
 
 def substitutes_of(engine: object) -> Mapping[int, Callable[[int], None]]:
     """What stands in place of bodies, by their numbers."""
-    return engine.substitutes if isinstance(engine, PythonEngine | Tiers) else {}
+    return engine.substitutes if isinstance(engine, PythonEngine | TieredEngine) else {}
 
 
 def python_of(engine: object) -> PythonEngine:
     """The Python engine of a run, which stays in Python from now on if it gets substitutes.
 
     Raises ValueError for a run that is all machine code."""
-    if isinstance(engine, Tiers):
+    if isinstance(engine, TieredEngine):
         return engine.python
     if not isinstance(engine, PythonEngine):
         raise ValueError("Python in place of a block needs the Python engine")
     return engine
 
 
-class Tiers:
+class TieredEngine:
     """Python first, machine code later; a large program begins with machine code that is soon there."""
 
     def __init__(self, image: Image, memory: Memory) -> None:
@@ -90,7 +90,7 @@ class Tiers:
         self._done = 0
         self._asked = False
         self._fast: NativeEngine | None = None
-        self._engine: Engine = NativeEngine(image, memory, level=0) if len(image.sites) >= LARGE else self.python
+        self._engine: Engine = NativeEngine(image, memory, level=0) if len(image.sites) >= LARGE_PROGRAM else self.python
 
     @property
     def python(self) -> PythonEngine:
@@ -125,7 +125,7 @@ class Tiers:
         before = self._budget[BUDGET // 8]
         trap = self._engine.run(task_index)
         self._done += before - self._budget[BUDGET // 8]
-        if self._done >= PAYS and not self._asked:
+        if self._done >= STATEMENTS_TO_PAY and not self._asked:
             self._asked = True
             self._code.request()
         return trap

@@ -13,7 +13,7 @@ from fbvm.engine.native.library.library import module_text, parts_of, routines_o
 from fbvm.engine.native.llvm import cache as native_cache
 from fbvm.engine.native.llvm.cache import Stored, name_of
 from fbvm.engine.native.llvm.compiler import Linked, compile_text
-from fbvm.engine.native.llvm.entry_points import Entry
+from fbvm.engine.native.llvm.entry_points import EntryPoint
 from fbvm.engine.native.llvm.worker import worker
 
 QUICK, FAST = 0, 2
@@ -35,7 +35,7 @@ class Code:
         self._linked: dict[int, Linked] = {}
         self._waiting = False
         self._lock = threading.Lock()
-        self._followers: WeakKeyDictionary[Entry, int] = WeakKeyDictionary()
+        self._followers: WeakKeyDictionary[EntryPoint, int] = WeakKeyDictionary()
 
     @cached_property
     def translation(self) -> Translation:
@@ -80,7 +80,7 @@ class Code:
         self._load(FAST, stored)
         with self._lock:
             for entry, task in self._followers.items():
-                entry.point_to(self.address(task, None))
+                entry.set_target(self.address(task, None))
 
     def _name(self, level: int) -> str:
         return name_of(f"image {level}{' with stops' * self.stops}", self.image.fingerprint)
@@ -115,12 +115,12 @@ class Code:
         """Where the entry of a task is."""
         return self._linked[self.level_of(level)].address(f"task{task}")
 
-    def follow(self, entry: Entry, task: int, level: int | None) -> None:
+    def follow(self, entry: EntryPoint, task: int, level: int | None) -> None:
         """Point an entry to the code of a task; for level None also to better code when there is."""
         with self._lock:
             if level is None:
                 self._followers[entry] = task
-            entry.point_to(self.address(task, level))
+            entry.set_target(self.address(task, level))
 
 
 def _facts(made: Translation) -> dict[str, object]:

@@ -16,11 +16,11 @@ from fbvm.engine.native.code import Code, code_of
 from fbvm.engine.native.emit.context import Context
 from fbvm.engine.native.emit.writer import Unsupported
 from fbvm.engine.native.llvm import compiler as native_compiler
-from fbvm.engine.native.llvm.entry_points import Entry, entry
+from fbvm.engine.native.llvm.entry_points import EntryPoint, entry
 from fbvm.engine.native.scans.code import NO_CLOCK_WORDS, ClockWordTable
 from fbvm.engine.native.scans.scans import NO_LIMIT, NativeScans, ScheduledTask
 from fbvm.engine.native.scans.units import UnitExchange, UnitInCode
-from fbvm.engine.stops import PAUSE, STOPPED, Stops
+from fbvm.engine.stops import PAUSE, STOPPED, StopTable
 from fbvm.engine.trap import Trap, trap
 
 __all__ = ["NativeEngine", "Unsupported", "available"]
@@ -35,7 +35,7 @@ class NativeEngine:
     is then what was stored before it.  With `stops` a run also ends where these say, with the Trap PAUSE.  Raises
     ImportError where llvmlite is missing (see `available`), Unsupported for code that the compiler never makes."""
 
-    def __init__(self, image: Image, memory: Memory, level: int | None = None, stops: Stops | None = None) -> None:
+    def __init__(self, image: Image, memory: Memory, level: int | None = None, stops: StopTable | None = None) -> None:
         if memory.size < image.layout.size:
             raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")
         self.image, self.memory, self.level = image, memory, level
@@ -50,11 +50,11 @@ class NativeEngine:
         self._calls = [entry.call for entry in self._entries]
         self._scans: dict[tuple[tuple[tuple[int, int], ...], ClockWordTable], NativeScans] = {}
 
-    def _entry(self, task: int) -> Entry:
+    def _entry(self, task: int) -> EntryPoint:
         bound = entry()
         bound.bind(self._memory_at, self._context.at)
         self._code.follow(bound, task, self.level)
-        finalize(self, bound.give_back)
+        finalize(self, bound.release)
         return bound
 
     @property

@@ -19,7 +19,7 @@ from weakref import finalize
 from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Body, Image, ProgramRun
 from fbvm.engine.bases import fixed_bases
-from fbvm.engine.depths import however_deep
+from fbvm.engine.depths import with_recursion_room
 from fbvm.engine.python.runtime import NO_SITE, Observation, environment
 from fbvm.engine.python.statements import BodyWriter, function_name
 from fbvm.engine.trap import NO_INSTANCE, Stop, Trap, trap
@@ -57,7 +57,7 @@ def translate(image: Image, observed: bool = False, anywhere: bool = False) -> P
     if known is not None:
         return known
     name = f"<fbvm {'observed' if observed else 'plain'} {next(_NUMBERS)}>"
-    program = however_deep(image, FRAMES_A_LEVEL, partial(_written, image, observed, anywhere, name))
+    program = with_recursion_room(image, FRAMES_A_LEVEL, partial(_written, image, observed, anywhere, name))
     source = program.source
     linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
     _programs[key] = program

@@ -11,7 +11,7 @@ from fbvm.base.areas import NOW
 from fbvm.base.arithmetic import width
 from fbvm.code.operations import BUFFER_OBJECT, INTEGERS, OBJECT_SHIFT, OFFSET_SHIFT, SIZES, TEXT_UNITS, Address, Node
 from fbvm.engine.python.writer import Expressions, Rows, bare
-from fbvm.engine.ranges import fits, is_float, mask, may_trap, number, span
+from fbvm.engine.ranges import constant_integer, is_float, mask, may_trap, never_wraps, value_range
 
 SIGNS = {"add": "+", "sub": "-", "mul": "*", "and": "&", "or": "|", "xor": "^",
          "eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">="}
@@ -28,18 +28,18 @@ def _brought(name: str) -> Callable[..., str]:
     def emit(e: Expressions, machine: str, *operands: Any) -> str:
         node = (name, machine, *operands)
         text = _LOOSE[name](e, node)
-        return text if machine == "f64" or (machine in INTEGERS and fits(node)) else e.bring(text, machine)
+        return text if machine == "f64" or (machine in INTEGERS and never_wraps(node)) else e.bring(text, machine)
 
     return emit
 
 
 def _binary(e: Expressions, node: Node) -> str:
-    read = e.value if is_float(node[1]) or fits(node) else e.loose
+    read = e.value if is_float(node[1]) or never_wraps(node) else e.loose
     return f"({read(node[2])} {SIGNS[node[0]]} {read(node[3])})"
 
 
 def _negative(e: Expressions, node: Node) -> str:
-    read = e.value if is_float(node[1]) or fits(node) else e.loose
+    read = e.value if is_float(node[1]) or never_wraps(node) else e.loose
     return f"(-{read(node[2])})"
 
 
@@ -49,12 +49,12 @@ def _loose_convert(e: Expressions, node: Node) -> str:
         return e.value(a) if is_float(source) else f"float({bare(e.value(a))})"
     if source == "b":
         return f"(1 if {e.condition(a)} else 0)"
-    return e.loose(a) if width(machine) <= width(source) and not fits(node) else e.value(a)
+    return e.loose(a) if width(machine) <= width(source) and not never_wraps(node) else e.value(a)
 
 
 def _convert(e: Expressions, machine: str, source: str, a: Node) -> str:
     if machine == "f32" and not is_float(source):
-        low, high = span(a)
+        low, high = value_range(a)
         exact = low >= -(1 << 24) and high <= 1 << 24
         return f"{'float' if exact else 'single_of_integer'}({bare(e.value(a))})"
     if (is_float(source) and machine == "f64") or machine == source:
@@ -73,23 +73,23 @@ def _divide(e: Expressions, machine: str, a: Node, b: Node, site: int) -> str:
     node = ("div", machine, a, b, site)
     if is_float(machine):
         return _brought("div")(e, machine, a, b, site)
-    divisor = number(b)
+    divisor = constant_integer(b)
     if divisor is not None and divisor > 0:
         return _toward_zero("//", e, a, divisor)
     text = f"quotient({bare(e.value(a))}, {bare(e.value(b))}, {site})"
-    return text if fits(node) or divisor not in (None, -1) else e.bring(text, machine)
+    return text if never_wraps(node) or divisor not in (None, -1) else e.bring(text, machine)
 
 
 def _toward_zero(sign: str, e: Expressions, a: Node, b: int) -> str:
     """Quotient or remainder by a positive constant; Python's go toward minus infinity."""
-    if span(a)[0] >= 0:
+    if value_range(a)[0] >= 0:
         return f"({e.value(a)} {sign} {b})"
     first, v = e.once(e.value(a))
     return f"({v} {sign} {b} if {first} >= 0 else -(-{v} {sign} {b}))"
 
 
 def _remainder(e: Expressions, machine: str, a: Node, b: Node, site: int) -> str:
-    divisor = number(b)
+    divisor = constant_integer(b)
     if divisor is not None and divisor > 0:
         return _toward_zero("%", e, a, divisor)
     return f"remainder({bare(e.value(a))}, {bare(e.value(b))}, {site})"
@@ -134,11 +134,11 @@ def _compare(name: str) -> Callable[..., str]:
 
 def _shift(name: str) -> Callable[..., str]:
     def emit(e: Expressions, machine: str, a: Node, n: Node, site: int) -> str:
-        count = number(n)
+        count = constant_integer(n)
         if count is not None and 0 <= count < width(machine):
             if name == "shift_left":
                 return e.bring(f"({e.loose(a)} << {count})", machine)
-            if name == "shift_right" and (count == 0 or span(a)[0] >= 0):
+            if name == "shift_right" and (count == 0 or value_range(a)[0] >= 0):
                 return f"({e.value(a)} >> {count})" if count else e.value(a)
         return f"{name}({bare(e.value(a))}, {bare(e.value(n))}, {machine!r}, {site})"
 
@@ -189,7 +189,7 @@ def _extreme(sign: str, function: str) -> Callable[..., str]:
 
 
 def _check(e: Expressions, machine: str, a: Node, low: int, high: int, code: str, site: int) -> str:
-    least, greatest = span(a)
+    least, greatest = value_range(a)
     if low <= least and greatest <= high:
         return e.value(a)
     first, v = e.once(e.value(a))

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from fbvm.base.arithmetic import limits, width
 from fbvm.code.operations import INTEGERS, SIZES, Address, Node
-from fbvm.engine.ranges import fits, is_float, mask
+from fbvm.engine.ranges import is_float, mask, never_wraps
 
 DEEPEST = 24
 """Levels of nodes in one Python expression: at most four parentheses each, where Python takes 200 in all."""
@@ -142,7 +142,7 @@ class Expressions:
                 return machine, self.value(node)
             first, v = self.once(self.loose(node))
             return machine, f"{v} if {first} == {v} else NAN"
-        if machine in INTEGERS and node[0] in ARITHMETIC and not fits(node):
+        if machine in INTEGERS and node[0] in ARITHMETIC and not never_wraps(node):
             return f"u{width(machine)}", f"{self.loose(node)} & {mask(machine)}"
         return machine, bare(self.value(node))
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from hand_image import const, image, store
 
-from fbvm.engine.depths import height, however_deep
+from fbvm.engine.depths import height, with_recursion_room
 
 
 def nested(depth: int) -> Any:
@@ -29,7 +29,7 @@ def test_what_meets_the_limit_is_done_again(depth: int, times: int) -> None:
         tried.append(sys.getrecursionlimit())
         return below(nested(depth))
 
-    assert however_deep(image((store("i16", 0, nested(depth)),)), 1, work) == depth
+    assert with_recursion_room(image((store("i16", 0, nested(depth)),)), 1, work) == depth
     assert (len(tried), sys.getrecursionlimit()) == (times, before)
 
 

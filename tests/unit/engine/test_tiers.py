@@ -8,7 +8,7 @@ from fbvm.base.memory import Memory
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.engine.choice import tiers
-from fbvm.engine.choice.tiers import Tiers, engine_for
+from fbvm.engine.choice.tiers import TieredEngine, engine_for
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
 from fbvm.engine.python.engine import PythonEngine
@@ -34,10 +34,10 @@ def image() -> Image:
 
 @needs_native
 def test_a_run_changes_to_machine_code_and_its_memory_does_not_tell(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tiers, "PAYS", 500)
+    monkeypatch.setattr(tiers, "STATEMENTS_TO_PAY", 500)
     code = image()
     auto, python = Plc(code), Plc(code, engine="python")
-    assert isinstance(auto.engine, Tiers)
+    assert isinstance(auto.engine, TieredEngine)
     changed = 0
     for number in range(60):
         if number == 20:
@@ -52,12 +52,12 @@ def test_a_run_changes_to_machine_code_and_its_memory_does_not_tell(monkeypatch:
 
 @needs_native
 def test_python_in_place_of_a_block_brings_a_run_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tiers, "PAYS", 1)
+    monkeypatch.setattr(tiers, "STATEMENTS_TO_PAY", 1)
     code = image()
     kept = code_of(code)
     kept.prepare(2)
     plc = Plc(code)
-    assert isinstance(plc.engine, Tiers)
+    assert isinstance(plc.engine, TieredEngine)
     for _ in range(3):
         plc.scan()
     assert plc.engine.native
@@ -89,8 +89,8 @@ def test_without_llvmlite_auto_is_python_and_native_says_what_is_missing(monkeyp
 
 @needs_native
 def test_a_large_program_begins_as_machine_code_and_makes_python_when_it_is_needed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tiers, "LARGE", 1)
-    monkeypatch.setattr(tiers, "PAYS", 500)
+    monkeypatch.setattr(tiers, "LARGE_PROGRAM", 1)
+    monkeypatch.setattr(tiers, "STATEMENTS_TO_PAY", 500)
     made: list[Image] = []
     code = image()
     kept = code_of(code)
@@ -103,7 +103,7 @@ def test_a_large_program_begins_as_machine_code_and_makes_python_when_it_is_need
             super().__init__(image, memory)
 
     monkeypatch.setattr(tiers, "PythonEngine", Counted)
-    assert isinstance(auto.engine, Tiers)
+    assert isinstance(auto.engine, TieredEngine)
     assert not auto.engine.native
     for _ in range(30):
         auto.scan()

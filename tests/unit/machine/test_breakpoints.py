@@ -228,16 +228,16 @@ def test_memory_is_that_of_a_run_that_nobody_stopped(plc: Plc) -> None:
 
 @pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")
 def test_a_run_with_breakpoints_becomes_machine_code_when_that_pays(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fbvm.engine.choice.stoppable.PAYS", 100)
+    monkeypatch.setattr("fbvm.engine.choice.stoppable.STATEMENTS_TO_PAY", 100)
     program = image()
     plc = Plc(program)
-    assert isinstance(plc.engine, tiers.Tiers)
+    assert isinstance(plc.engine, tiers.TieredEngine)
     plc.breakpoints.change("D100", when="D100 = 60")
     code = code_of(program, stops=True)
     monkeypatch.setattr(code, "request", lambda: code.prepare(2))
     assert plc.run(scans=50) == "break"
     assert plc.halted and plc.halted.scan == 9
-    assert plc.breakpoints._guarded and plc.breakpoints._guarded.native
+    assert plc.breakpoints._stoppable and plc.breakpoints._stoppable.native
 
 
 @pytest.mark.skipif(not native.available(), reason="llvmlite is not installed")

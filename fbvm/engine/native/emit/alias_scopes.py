@@ -35,7 +35,7 @@ _MARK = re.compile(r" ;(\d+)$", re.MULTILINE)
 
 
 @dataclass
-class Regions:
+class AliasScopes:
     """The accesses of one body.  `instances` is where its instances begin, in bytes of the buffer, `base` where the only one
     does, if that is known; `next` is the number of its next mark, which go on from body to body."""
 
@@ -148,7 +148,7 @@ class Regions:
         return access[1] + self.instances[0], access[2] + self.instances[1] - 1
 
 
-def resolved(text: str, bodies: Iterable[Regions]) -> str:
+def resolved(text: str, bodies: Iterable[AliasScopes]) -> str:
     """A module with what the marks of its bodies stand for, in their order."""
     marks: list[str] = []
     metadata: list[str] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fbvm.code.image import Image
 from fbvm.code.operations import Address
 from fbvm.code.shapes import statements
-from fbvm.engine.ranges import span
+from fbvm.engine.ranges import value_range
 
 Range = tuple[int, int]
 """First byte, and first byte behind."""
@@ -71,6 +71,6 @@ def reached(address: Address, count: int) -> Range:
     _, low, terms = address
     high = low + count
     for stride, term in terms:
-        edges = [stride * edge for edge in span(term)]
+        edges = [stride * edge for edge in value_range(term)]
         low, high = low + min(edges), high + max(edges)
     return low, high

@@ -10,9 +10,9 @@ from types import MappingProxyType
 from fbvm.base.areas import BUDGET
 from fbvm.code.image import Image
 from fbvm.engine.bases import fixed_bases
-from fbvm.engine.depths import however_deep
+from fbvm.engine.depths import with_recursion_room
 from fbvm.engine.native.emit import texts as native_texts
-from fbvm.engine.native.emit.alias_scopes import METADATA, Regions, resolved
+from fbvm.engine.native.emit.alias_scopes import METADATA, AliasScopes, resolved
 from fbvm.engine.native.emit.call_graph import call_graph, heights, instance_places
 from fbvm.engine.native.emit.context import Point
 from fbvm.engine.native.emit.conversions import ONE_STEP
@@ -65,7 +65,7 @@ class Translation:
 
     quick: str
     """Its text as quick code is made of it, which does not say what accesses cannot meet."""
-    regions: tuple[Regions, ...]
+    regions: tuple[AliasScopes, ...]
     points: tuple[Point, ...]
     kept_bytes: int
     """Bytes of the context in front of its fields."""
@@ -92,7 +92,7 @@ def translate(image: Image, stops: bool = False) -> Translation:
     """The module of an image, whose runs can be stopped at observations or not.
 
     Raises Unsupported for code that the compiler never makes."""
-    return however_deep(image, FRAMES_A_LEVEL, partial(_translated, image, stops))
+    return with_recursion_room(image, FRAMES_A_LEVEL, partial(_translated, image, stops))
 
 
 def _translated(image: Image, stops: bool) -> Translation:

@@ -17,10 +17,10 @@ from fbvm.base.areas import BUDGET
 from fbvm.base.arithmetic import single
 from fbvm.code.image import Image
 from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_MASK, OFFSET_SHIFT, Address, Block, Node
-from fbvm.engine.native.emit.alias_scopes import SYSTEM, Regions
+from fbvm.engine.native.emit.alias_scopes import SYSTEM, AliasScopes
 from fbvm.engine.native.emit.call_graph import Range
 from fbvm.engine.native.emit.context import FIELDS, INSTANCE, SCRATCH, Point, Shown
-from fbvm.engine.ranges import is_float, span
+from fbvm.engine.ranges import is_float, value_range
 from fbvm.engine.trap import NO_INSTANCE
 
 NAN_BITS = {"f32": "0x7FF8000000000000", "f64": "0x7FF8000000000000"}
@@ -99,7 +99,7 @@ class Module:
     """Whether its runs can be stopped at observations."""
     kept_bytes: int = 0
     scratch_end: int = SCRATCH
-    regions: list[Regions] = field(default_factory=list)
+    regions: list[AliasScopes] = field(default_factory=list)
     """The accesses of each body that has been written."""
 
     def point(self, code: str, site: int, shown: tuple[Shown, ...]) -> int:
@@ -127,7 +127,7 @@ class Writer:
     def __init__(self, module: Module, number: int) -> None:
         self.module, self.body = module, module.image.bodies[number]
         self.base = module.bases.get(number)
-        self.regions = Regions(module.instances[number], self.base, module.regions[-1].next if module.regions else 0)
+        self.regions = AliasScopes(module.instances[number], self.base, module.regions[-1].next if module.regions else 0)
         module.regions.append(self.regions)
         self.lines: list[str] = []
         self.cold: list[str] = []
@@ -370,7 +370,7 @@ class Writer:
         """The offset of what lies behind a reference, which is checked (R0110)."""
         (_, pointer, site), offset, terms = address
         reference = self.value(pointer)
-        form = "i128" if any(abs(stride * edge) >> 56 for stride, term in terms for edge in span(term)) else "i64"
+        form = "i128" if any(abs(stride * edge) >> 56 for stride, term in terms for edge in value_range(term)) else "i64"
         delta = str(offset)
         for stride, term in terms:
             number = self.value(term)

@@ -27,7 +27,7 @@ ret i32 %p
 }}"""
 
 
-class Entry:
+class EntryPoint:
     """One entry: `call` is the function.  It has to be bound before it is called."""
 
     def __init__(self, block: _Block, number: int) -> None:
@@ -39,7 +39,7 @@ class Entry:
         """Say over which memory and context the entry works."""
         self._slot[1], self._slot[2] = memory, context
 
-    def point_to(self, function: int) -> None:
+    def set_target(self, function: int) -> None:
         """Say what the entry calls from now on; another thread may say so."""
         self._slot[0] = function
 
@@ -48,7 +48,7 @@ class Entry:
         """Where the address of what it calls lies, at any time."""
         return self._block.slots + SLOT_BYTES * self._number
 
-    def give_back(self) -> None:
+    def release(self) -> None:
         """Somebody else may have the slot; `call` must not be used any more."""
         self._block.free.append(self._number)
         _open.append(self._block)
@@ -81,10 +81,10 @@ def _compiled() -> bytes:
     return stored.compiled
 
 
-def entry() -> Entry:
+def entry() -> EntryPoint:
     """An entry that nobody else has."""
     while _open and not _open[-1].free:
         _open.pop()
     if not _open:
         _open.append(_Block())
-    return Entry(_open[-1], _open[-1].free.pop())
+    return EntryPoint(_open[-1], _open[-1].free.pop())

@@ -16,7 +16,7 @@ from fbvm.engine.clock import Clock
 from fbvm.engine.native.llvm import cache as native_cache
 from fbvm.engine.native.llvm.cache import Stored, name_of
 from fbvm.engine.native.llvm.compiler import Linked, compile_text
-from fbvm.engine.native.llvm.entry_points import Entry
+from fbvm.engine.native.llvm.entry_points import EntryPoint
 from fbvm.engine.native.scans import code as native_scan_code
 from fbvm.engine.native.scans.code import NEXT_NS, TASK_ROW, WATCHED_BYTES, WATCHED_ROW, ClockWordTable
 from fbvm.engine.native.scans.parameters import COUNT, Parameters
@@ -51,7 +51,7 @@ class NativeScans:
     A burst, which the caller starts by `call_burst`, ends with a scan whose refresh gives no reason for another scan, and comes
     back before its end when units ask something of their networks."""
 
-    def __init__(self, memory: Memory, memory_at: int, context_at: int, entries: Sequence[Entry],
+    def __init__(self, memory: Memory, memory_at: int, context_at: int, entries: Sequence[EntryPoint],
                  tasks: Sequence[ScheduledTask], clock_words: ClockWordTable, watched: Sequence[Sequence[int]] = (),
                  units: Sequence[UnitInCode] = ()) -> None:  # fmt: skip
         self._entries = entries  # which stay while machine code calls them
