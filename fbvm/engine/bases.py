@@ -1,4 +1,4 @@
-"""Which bodies run for one instance only: their places are then known before they run."""
+"""Finds the bodies that run for one instance only, whose variables then have constant addresses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from fbvm.code.shapes import statements
 
 
 def fixed_bases(image: Image) -> dict[int, int]:
-    """The base of each body that is always executed with the same one, by the body's number."""
+    """Where the instance begins, in bytes of the memory, of each body that runs for one instance only, by the body's number."""
     callers: dict[int, list[tuple[int, Node]]] = {number: [] for number in range(len(image.bodies))}
     for number, body in enumerate(image.bodies):
         for node in statements(body.code):
@@ -32,7 +32,7 @@ def fixed_bases(image: Image) -> dict[int, int]:
 
 
 def _base(caller: int | None, call: Node) -> int | None:
-    """The base that one call gives, where it is a constant."""
+    """Where the instance of one call begins, if that is a constant; `caller` is where the caller's own begins, if known."""
     base, offset, terms = call[2] or ("abs", 0, ())
     if terms or isinstance(base, tuple) or (base == "self" and caller is None):
         return None

@@ -6,9 +6,18 @@ from bisect import bisect_right
 
 
 def case_table(rows: list[tuple[tuple[int, int], ...]]) -> tuple[list[int], list[int]]:
-    """Labels as (starts, numbers): a value belongs to row `numbers[bisect_right(starts, value)]`, the first that fits.
+    """The labels of a CASE as two lists `(starts, numbers)` for a search by halves.
 
-    A value of no row has the number of rows."""
+    `rows` are the ranges (low, high) of each branch, in the order of the branches.  A value belongs to the branch
+    `numbers[bisect_right(starts, value)]`; of several branches that fit, the first counts.  A value that fits none has
+    `len(rows)`, the number of the ELSE.
+
+    >>> starts, numbers = case_table([((1, 3),), ((7, 7), (9, 12))])
+    >>> starts, numbers
+    ([1, 4, 7, 8, 9, 13], [2, 0, 2, 1, 2, 1, 2])
+    >>> numbers[bisect_right(starts, 10)]
+    1
+    """
     edges = sorted({edge for labels in rows for low, high in labels for edge in (low, high + 1)})
     numbers = [len(rows)] * (len(edges) + 1)
     for number in range(len(rows) - 1, -1, -1):

@@ -1,4 +1,4 @@
-"""Work on code that may be nested deeper than the host recurses."""
+"""Recursion over code that may be nested deeper than Python's recursion limit."""
 
 from __future__ import annotations
 
@@ -13,10 +13,11 @@ _T = TypeVar("_T")
 
 
 def with_recursion_room(image: Image, frames_a_level: int, work: Callable[[], _T]) -> _T:
-    """What `work` yields, which goes through the code of an image with at most so many frames for a level of tuples.
+    """Returns what `work()` returns; if that met Python's recursion limit, calls it once more with a higher limit.
 
-    Hardly any code is too deep for the host's limit, and to look how deep it is takes a third of the time of translating
-    it.  So the work, which has to begin anew whenever it is called, is done again with room if it met the limit."""
+    `work` recurses over the code of `image`, with at most `frames_a_level` Python frames for each level of nested tuples, and
+    begins anew at each call.  The limit is raised only after it was met, because hardly any code is too deep and finding
+    out how deep code is takes a third of the time of translating it."""
     try:
         return work()
     except RecursionError:
@@ -29,7 +30,7 @@ def with_recursion_room(image: Image, frames_a_level: int, work: Callable[[], _T
 
 
 def height(code: Block) -> int:
-    """Levels of tuples in each other."""
+    """How many levels of tuples are nested in each other at most."""
     height, level = 0, [code]
     while level:
         height += 1

@@ -1,6 +1,6 @@
-"""What is known of an expression before it runs: the range of an integer, and whether it can trap.
+"""Value ranges of integer expressions, and whether an expression can trap.
 
-With it a back end leaves out wraps that change nothing, and orders nothing that cannot be told apart."""
+A back end leaves out wraps that a range shows to be needless, and evaluates in any order what cannot trap."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ def is_float(machine: str) -> bool:
 
 
 def may_trap(item: Any) -> bool:
-    """True if evaluating an operand (expression, address, tuple of them) could end the run."""
+    """True if evaluating an operand could end the run.  `item` is an operand of an operation: an expression, an address, a
+    tuple of these, or a constant."""
     if not isinstance(item, tuple) or not item:
         return False
     if is_address(item):
@@ -30,7 +31,11 @@ def may_trap(item: Any) -> bool:
 
 
 def constant_integer(node: Node) -> int | None:
-    """The value of an integer that is a constant, also one that was converted; else None."""
+    """The value of an integer expression that is a constant or a conversion of one; else None.
+
+    >>> constant_integer(("convert", "u8", "i16", ("const", "i16", -1)))
+    255
+    """
     if node[0] == "const" and not is_float(node[1]):
         return int(node[2])
     if node[0] == "convert" and not is_float(node[1]) and not is_float(node[2]):
@@ -52,18 +57,22 @@ def _traps_itself(node: Node) -> bool:
 
 
 def unwrapped_range(node: Node) -> Range:
-    """Least and greatest number that an integer operation can yield before it wraps."""
+    """The least and greatest number that an integer operation can yield before the number is wrapped into its type."""
     row = _UNWRAPPED.get(node[0])
     return row(node) if row and node[1] in INTEGERS else limits(node[1])
 
 
 def never_wraps(node: Node) -> bool:
-    """True if an integer operation never has to wrap."""
+    """True if the number that an integer operation yields always fits its type."""
     return _within(unwrapped_range(node), limits(node[1]))
 
 
 def value_range(node: Node) -> Range:
-    """Least and greatest value of an integer expression."""
+    """The least and greatest value of an integer expression.
+
+    >>> value_range(("add", "i32", ("convert", "i32", "u8", ("load", "u8", ("abs", 0, ()))), ("const", "i32", 1)))
+    (1, 256)
+    """
     whole, range_ = limits(node[1]), unwrapped_range(node)
     return range_ if _within(range_, whole) else whole
 

@@ -1,8 +1,8 @@
-"""Where the runs of one PLC stop: a table in memory that both engines look up at every observation.
+"""The table of a PLC's breakpoints and watchpoints, which both engines look up at every observation.
 
-Runs stop at a statement (or rung) that is about to be executed, behind a write, or at the end of a program.  Lines are
-looked up by the number of their site; watched bytes are compared with what they were when somebody looked last.  What
-machine code finds is asked about here (`hit`), so that both engines stop alike."""
+A run stops before a statement (or rung), behind a write, or at the end of a program.  A line is found by the number of its
+site; a watchpoint compares bytes with what they were at the last look.  When machine code finds a site with an entry, it
+calls `hit` here, so that both engines stop at the same observations."""
 
 from __future__ import annotations
 
@@ -17,16 +17,25 @@ from fbvm.engine.trap import Trap
 
 Test = Callable[[], bool]
 Seen = tuple[tuple[int, ...], bool, object]
-"""What was seen of watched bytes last: their bits, whether the test held, their value."""
+"""Of a watchpoint at the last look: the watched bits, whether its test held, its value."""
 State = list[Seen]
-AT_STATEMENT, WATCHING = 1, 2
-"""Bits of a byte of the table: a run stops at this statement; watched bytes are compared at this site."""
-ASK, COUNT, ROWS, TABLE = 0, 8, 16, 24
-"""Where machine code finds what it asks, how many rows of watched bytes there are, where they are, and the table."""
+"""That of all watchpoints, in their order."""
+AT_STATEMENT = 1
+"""Bit in the table's byte of a site: a run stops before this statement."""
+WATCHING = 2
+"""Bit in the table's byte of a site: watched bytes are compared at this site."""
+ASK = 0
+"""Offset in the buffer of the address of the function that machine code calls."""
+COUNT = 8
+"""Offset of the number of rows of watched bytes."""
+ROWS = 16
+"""Offset of the address of these rows."""
+TABLE = 24
+"""Offset of the table: a byte for each site, and one for the ends of programs."""
 ROW_BYTES = 24
-"""A row: the offset of eight bytes, the bits of them that count, what they were; 64 bits each."""
+"""A row of watched bytes: the offset of eight bytes, the bits of them that count, what they were; 64 bits each."""
 STOPPED = "stop"
-"""The code of a run's end that somebody wanted."""
+"""The code of the trap with which machine code ends a run at a breakpoint or watchpoint."""
 PAUSE = Trap(STOPPED, Site("", "", 0, 0), (), "stopped where somebody wants to look")
 _ASK = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)
 _CHUNK = STRUCTS["u64"]
@@ -41,10 +50,11 @@ class LineStop:
 
 
 class Watchpoint:
-    """Stops where bytes have changed: runs of (offset, size), or one byte of which only the bits of `mask` count.
+    """Stops a run where bytes have changed.
 
-    With a test it stops only if that is TRUE at a change; with `edge`, if it was not at the change before.  `value` and
-    `before` are what `read` yielded at the last change and at the one before."""
+    `extents` are (offset, size) in bytes of the memory; with a `mask`, the one byte there of which only these bits count.
+    With a `test` it stops only at a change at which the test holds; with `edge`, only if the test did not hold at the change
+    before.  `value` and `before` are what `read` returned at the last change and at the one before."""
 
     def __init__(self, extents: Iterable[tuple[int, int]], mask: int = 0, *, test: Test | None = None,
                  edge: bool = False, read: Callable[[], object] = lambda: None) -> None:  # fmt: skip
@@ -57,7 +67,7 @@ class Watchpoint:
         self._held = test is not None and test()
 
     def begin(self, memory: Memory) -> None:
-        """Take what is there now for unchanged."""
+        """From now on a change is a difference from what the bytes are now."""
         self.chunks.clear()
         for start, size in self._extents:
             for at in range(start, start + size, 8):
@@ -67,18 +77,18 @@ class Watchpoint:
         self.last = self.seen(memory)
 
     def seen(self, memory: Memory) -> tuple[int, ...]:
-        """The watched bits as they are."""
+        """The watched bits, eight bytes each."""
         return tuple([_CHUNK.unpack_from(memory.map, offset)[0] & bits for offset, bits in self.chunks])
 
     def changed(self, now: tuple[int, ...]) -> bool:
-        """Take in a change; True if a run stops at it."""
+        """Called when the bits are not those of the last look but `now`.  Returns True if a run stops at this change."""
         self.last, self.before, self.value = now, self.value, self._read()
         held, self._held = self._held, self._test is None or self._test()
         return self._held and not (self._edge and held)
 
     @property
     def state(self) -> Seen:
-        """What `back` brings back."""
+        """What `back` needs to undo later looks."""
         return self.last, self._held, self.value
 
     def back(self, state: Seen) -> None:
@@ -86,7 +96,9 @@ class Watchpoint:
 
 
 class StopTable:
-    """The table of one memory, for an image with so many sites.  `at` is its address in the host."""
+    """The breakpoints and watchpoints of one PLC: of its memory, and of an image with so many sites.
+
+    `at` is the address of the buffer that machine code reads."""
 
     def __init__(self, memory: Memory, sites: int) -> None:
         self._memory = memory
@@ -111,7 +123,7 @@ class StopTable:
         return bool(self._lines or self._watched)
 
     def put(self, rows: Iterable[LineStop | Watchpoint]) -> None:
-        """These stop runs from now on, and no others."""
+        """Replaces all rows: these stop runs from now on, and no others."""
         rows = list(rows)
         for row in rows:
             if isinstance(row, Watchpoint) and row not in self._watched:
@@ -127,7 +139,10 @@ class StopTable:
         self._write_rows()
 
     def hit(self, site: int, statement: bool) -> bool:
-        """True if the run stops at this observation; the site of an end is -1."""
+        """Looks at one observation.  Returns True if the run stops there; `reasons` then says why.
+
+        `site` is its number, -1 for the end of a program; `statement` is True before a statement or rung, False behind a
+        write.  Raises what a test raises."""
         found: list[LineStop | Watchpoint] = []
         changed = False
         for row in self._watched:
@@ -144,18 +159,18 @@ class StopTable:
 
     @property
     def state(self) -> State:
-        """What was seen last, for `back`."""
+        """What was seen at the last look, for `back`."""
         return [row.state for row in self._watched]
 
     def back(self, state: State) -> None:
-        """Nothing has been seen since then."""
+        """Undoes all looks since `state` was taken, because the memory goes back as well."""
         for row, was in zip(self._watched, state, strict=True):
             row.back(was)
         self.reasons = ()
         self._write_rows()
 
     def _ask(self, memory: int | None, what: int) -> int:
-        """Machine code asks: the site doubled, and 1 more for a statement.  Its answer ends the run if it is not 0."""
+        """Called by machine code: `what` is twice the site, and 1 more before a statement.  Not 0 ends the run."""
         try:
             return self.hit(what >> 1, bool(what & 1))
         except BaseException as error:  # it cannot pass through machine code

@@ -1,4 +1,4 @@
-"""What ends a run early: the trap that an engine returns, and its words."""
+"""Traps: what an engine returns when a program was stopped, and the wording of their messages."""
 
 from __future__ import annotations
 
@@ -15,21 +15,26 @@ NO_INSTANCE = -1
 
 @dataclass(frozen=True)
 class Trap:
-    """A program was stopped: `code` (R01..), where, the values that caused it, and a message of one line.
-
-    `instance` is where the instance begins whose body was executed, NO_INSTANCE in a function."""
+    """A program was stopped."""
 
     code: str
+    """R0101 and so on, as `fbvm explain` explains them."""
     site: Site
+    """The place in the source."""
     values: tuple[Any, ...]
+    """The values that caused it, such as index, lower and upper bound."""
     message: str
+    """All of this in one line."""
     instance: int = NO_INSTANCE
+    """Byte of the memory at which the instance begins whose body was executed; NO_INSTANCE in a function."""
 
     def __str__(self) -> str:
         return self.message
 
     def told(self, path: Callable[[int], str]) -> str:
-        """The message, and in which instance if the body has several; `path` names what begins at a byte."""
+        """The message, with the name of the instance if that is not the name of its POU.
+
+        `path` gives the name of what begins at a byte of the memory."""
         instance = path(self.instance) if self.instance != NO_INSTANCE else ""
         return f"{self} (in {instance})" if instance not in ("", self.site.pou) else str(self)
 
@@ -57,7 +62,9 @@ _CONVERSION = {1: "{0} has no such form", 2: "{0!r} does not fit {1}", 3: "{0} o
 
 
 def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), instance: int = NO_INSTANCE) -> Trap:
-    """The trap of that code at a site's number; a row without values says the title of its code."""
+    """The trap `code` at the site with number `site` of the image.
+
+    Its message says the values; without values it says the title of the code.  `instance` is that of `Trap`."""
     place = image.sites[site]
     values = tuple(int(value) if isinstance(value, bool) else value for value in values)
     if code == "R0105" and values:

@@ -1,7 +1,7 @@
 """Breakpoints of one PLC: at a line, at a change of a variable or an address, where a condition holds.
 
 A scan that meets one stands still there, with the memory as it is at that moment; the next `Plc.scan` or `Plc.run` goes
-on.  Runs keep their speed: machine code looks into a table, and only the scan that stops is done again in Python."""
+on.  Runs keep the speed of machine code, which looks into a table; only the scan that stops is done again in Python."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Stoppable(Protocol):
 
 @dataclass(frozen=True)
 class Breakpoint:
-    """What may stop a scan: a line of a source, a change of a place, or a condition; `when` is a further condition."""
+    """What stops a scan: a line of a source, a change of a variable or address, or a condition; `when` is a further condition."""
 
     kind: str
     """"line", "change" or "condition"."""
@@ -53,24 +53,30 @@ class Breakpoint:
 
 @dataclass(frozen=True)
 class Frame:
-    """A body in execution: name of the POU, byte where its instance begins, the statement that it is at."""
+    """A body in execution."""
 
     pou: str
+    """Name of its POU."""
     base: int
+    """Byte of the memory at which its instance begins."""
     site: Site | None
+    """The statement that it is at; None at its end."""
 
 
 @dataclass(frozen=True, eq=False)
 class Halt:
-    """A scan that stands still: in which scan, before or in which statement, why, and who called whom.
-
-    `site` is None at the end of a program; in `frames` the innermost body comes first."""
+    """A scan that stands still at a breakpoint."""
 
     scan: int
+    """Its number."""
     site: Site | None
+    """The statement before or in which it stands; None at the end of a program."""
     reasons: tuple[str, ...]
+    """Why, one line for each of the breakpoints."""
     breakpoints: tuple[Breakpoint, ...]
+    """Those that stopped it."""
     frames: tuple[Frame, ...]
+    """The bodies in execution, the innermost first."""
 
     def __str__(self) -> str:
         place = str(self.site) if self.site else f"end of {self.frames[-1].pou}"
@@ -103,16 +109,19 @@ class Breakpoints:
     # --- setting ------------------------------------------------------------------------------------------------------
 
     def line(self, where: str, when: str = "") -> Breakpoint:
-        """Stops before the statement of a line: `pump.st:12`; the next one if that line has none; or the first
-        statement of a POU by its name.  Raises ValueError for what is not there."""
+        """Stops before a statement.
+
+        `where` is `pump.st:12` (the next statement if that line has none) or the name of a POU (its first statement); `when` is
+        a condition as `Plc.run` takes it.  Raises ValueError if there is no such line or POU, or if the PLC is observed."""
         found, sites = find_line(self._plc.image, where)
         condition = self._condition(when)
         return self._put(Breakpoint("line", found, when), LineStop(sites, self._test(condition)))
 
     def change(self, where: str, when: str = "") -> Breakpoint:
-        """Stops behind the statement that changed a variable, an address or a range, as `Plc.find` takes them.
+        """Stops behind the statement that changed a variable, an address or a range of addresses (as `Plc.find` takes them).
 
-        What changed between scans is found at the first statement of the next."""
+        A change between two scans is found at the first statement of the second.  Raises UnknownPlace, ValueError for what
+        lies behind a reference or if the PLC is observed."""
         found = self._plc.find(where)
         condition = self._condition(when)
         extents, mask = _extents(found)
@@ -120,19 +129,19 @@ class Breakpoints:
         return self._put(Breakpoint("change", where, when), row)
 
     def condition(self, when: str) -> Breakpoint:
-        """Stops as soon as a condition becomes TRUE: `n > 5 AND D100 = 0`."""
+        """Stops behind the statement that makes a condition TRUE: `n > 5 AND D100 = 0`.  Raises ValueError as `change` does."""
         condition = self._condition(when)
         assert condition is not None
         extents: list[tuple[int, int]] = [run for place in condition.places for run in _extents(place)[0]]
         return self._put(Breakpoint("condition", when), Watchpoint(extents, test=self._test(condition), edge=True))
 
     def remove(self, breakpoint: Breakpoint) -> None:
-        """Takes one away.  Raises KeyError if it is not set."""
+        """Removes a breakpoint.  Raises KeyError if it is not set."""
         del self._rows[breakpoint]
         self._stops.put(self._rows.values())
 
     def clear(self) -> None:
-        """Takes all away."""
+        """Removes all breakpoints; a scan that stands goes on all the same with the next `Plc.scan`."""
         self._rows.clear()
         self._stops.put(())
 
@@ -151,7 +160,7 @@ class Breakpoints:
     # --- running, for the PLC -----------------------------------------------------------------------------------------
 
     def run(self, task_index: int, engine: Engine) -> Trap | None:
-        """Executes a task in place of an engine, or goes on with it, up to its end, a trap or a stop."""
+        """Executes a task as `engine` would, or goes on with a task that stands, up to its end, a trap or a stop (`halted`)."""
         if self.halted and self._stoppable:
             self.halted = None
             stoppable = self._stoppable
@@ -164,7 +173,7 @@ class Breakpoints:
         return trap
 
     def stoppable(self, engine: Engine) -> StoppableEngine:
-        """What runs in place of an engine."""
+        """The engine with breakpoints that runs in place of `engine`."""
         substitutes = substitutes_of(engine)
         if self._stoppable is None or self._stands_in != (engine, substitutes):
             plc = self._plc
@@ -173,7 +182,7 @@ class Breakpoints:
         return self._stoppable
 
     def leave(self) -> None:
-        """The scan that stands will not go on."""
+        """Gives up the scan that stands."""
         self.halted = None
 
     def _halt(self, stoppable: StoppableEngine, site: int) -> Halt:
@@ -256,13 +265,13 @@ def _first_of_each_pou(statements: dict[int, Site]) -> list[int]:
 
 
 def _statements(image: Image) -> dict[int, Site]:
-    """The sites at which a statement is observed."""
+    """The places of all statements, by the numbers of their sites."""
     return {node[2]: image.sites[node[2]] for body in image.bodies for node in statements(body.code)
             if node[0] == "observe" and node[1] in STATEMENTS}  # fmt: skip
 
 
 def _extents(found: Place | Span) -> tuple[list[tuple[int, int]], int]:
-    """The bytes of what is watched, and of a bit its mask."""
+    """The (offset, size) of what is watched, and the mask if that is a bit.  Raises ValueError behind a reference."""
     places = found.places if isinstance(found, Span) else (found,)
     for place in places:
         if place.hops:

@@ -1,7 +1,7 @@
-"""The PLC: an image and its memory, the units on its backplane and the network they talk through, one scan at a time.
+"""The PLC: a compiled program and its memory, the units on its backplane and their networks, one scan at a time.
 
-`plc.scan()` is the scan cycle as W394 draws it.  A PLC is told the time and never waits; what waits is in `run`.
-"""
+`Plc.scan` is the scan cycle of W394.  A PLC is told the time and never waits; `fbvm.run` waits.  Scans on the fast paths of
+`machine/fast` leave the same memory (docs/explanation/fast-paths.md)."""
 
 from __future__ import annotations
 
@@ -23,11 +23,7 @@ from fbvm.machine.scan.refresh import Attached, IORefresh
 from fbvm.machine.scan.start import Kept, retained, start, write
 from fbvm.machine.scan.tasks import TaskSchedule, too_short_intervals
 from fbvm.machine.scan_times import Lateness, ScanTimes
-from fbvm.machine.state import RUN
-from fbvm.machine.state import Mode as Mode
-from fbvm.machine.state import Phase as Phase
-from fbvm.machine.state import State as State
-from fbvm.machine.state import Stopped as Stopped
+from fbvm.machine.state import RUN, Mode, Phase, State, Stopped, state_after
 from fbvm.net.journal import Journal
 from fbvm.units.contract import Unit
 from fbvm.watch import places
@@ -35,6 +31,7 @@ from fbvm.watch.paths import Place, Span, find, find_place
 from fbvm.watch.values import Value
 from fbvm.wire.link import Network
 
+__all__ = ["STEP_BUDGET", "Mode", "Phase", "Plc", "State", "Stopped"]
 STEP_BUDGET = 2_000_000
 """Statements that one scan may execute before the watchdog ends it."""
 
@@ -42,10 +39,21 @@ STEP_BUDGET = 2_000_000
 class Plc:
     """One PLC with a compiled program, in RUN mode at time 0, before its first scan.
 
-    `cycle_ns` is how far a scan advances virtual time; `budget` the statements a scan may execute; `observed` runs the
-    build that reports each statement; `engine` is "auto" (Python first, machine code when that pays), "python" or
-    "native"; `journal` is told every input.  Raises nothing that a program, a file or a peer could cause: look at
-    `trap`."""
+    `cycle_ns` is how far a scan advances virtual time; `budget` how many statements a scan may execute; `observed` runs the
+    build that reports each statement; `engine` is "auto" (Python first, machine code when that pays), "python" (no machine
+    code, neither for the program nor for units) or "native"; `journal` is told every input.
+
+    A mistake of the program raises nothing: see `trap`.  Raises ValueError for a cycle that takes no time, an unknown engine,
+    or "native" where llvmlite is missing.
+
+    >>> from fbvm import compile_text
+    >>> image = compile_text("PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM").image
+    >>> plc = Plc(image, cycle_ns=10_000_000)
+    >>> plc.run(until="Main.n = 3")
+    'until'
+    >>> plc.scans, plc.elapsed_ns, plc.read("Main.n")
+    (3, 30000000, 3)
+    """
 
     def __init__(
         self,
@@ -128,14 +136,14 @@ class Plc:
         return self.trap
 
     def _fast_path(self) -> FastPath | None:
-        """How machine code does the next scan in one piece.  It cannot if somebody has a part in it."""
+        """The fast path of the next scan; None if the scan has to be a plain one because somebody has a part in it."""
         machine = self.engine.machine
         if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
             return None
         return None if self.breakpoints.armed else self._fast_paths.path(machine)
 
     def _begin(self, now_ns: int) -> None:
-        """A scan up to its program."""
+        """The part of a plain scan before its program: time, forces, tasks that are due."""
         if self._journal:
             self._journal.before(self.scans, now_ns, self.budget, self.forces)
         self._oversee(now_ns)
@@ -147,7 +155,7 @@ class Plc:
             self._due.extend(self._schedule.due(now_ns))
 
     def _end(self) -> None:
-        """A scan from the end of its program on."""
+        """The part of a plain scan behind its program: the I/O refresh, and counting the scan."""
         if not self.trap:
             self._fast_paths.refresh(self.now_ns, self._journal)
             if self.phases:
@@ -159,7 +167,7 @@ class Plc:
         self._tell()
 
     def _tell(self) -> None:
-        """Keep and tell what the scan has left."""
+        """Called at the end of each scan: keeps its state for `at`, calls the watchers."""
         if self._past.maxlen:
             self._past.append(self.snapshot())
         for watcher in self.watchers:
@@ -171,7 +179,7 @@ class Plc:
         return self.breakpoints.halted
 
     def _time(self, now_ns: int | None) -> int:
-        """When the scan is, told or virtual."""
+        """The time of the next scan: `now_ns`, or virtual time if that is None."""
         if now_ns is None:
             if not all(attached.network.virtual_time for attached in self.units):
                 raise ValueError("real connections need real time: run this PLC with fbvm.run, or say scan(now_ns)")
@@ -181,7 +189,7 @@ class Plc:
         return now_ns
 
     def _oversee(self, now_ns: int) -> None:
-        """Time, first-cycle flag, clock pulses, cycle time of the cycle before, step budget."""
+        """Overseeing (W394): writes time, step budget, first-cycle flag, clock pulses and the cycle time of the cycle before."""
         cycle_time_ns = 0 if self._first else now_ns - self.now_ns
         self.now_ns = now_ns
         system = self._system
@@ -216,8 +224,10 @@ class Plc:
 
     @property
     def due_ns(self) -> int:
-        """When the next scan is worth while, if no network tells anything before: at once if a unit changed words for the
-        program, else when a timer of the program, a task's interval or a unit changes something by itself."""
+        """The earliest time at which another scan can change anything, if no network has events before.
+
+        0 if a unit changed words that the program has not seen; else when a timer of the program ends, an interval of a task
+        has passed, or a unit changes something by itself."""
         return min(self._io.wake_ns(self._system[DUE // 8]), self._schedule.next_ns(self.now_ns))
 
     def run(
@@ -240,8 +250,9 @@ class Plc:
         return reason
 
     def scan_many(self, most: int) -> bool:
-        """Several scans in virtual time inside machine code, if nobody has to be told between them and the units have
-        nothing to do; False if there was none."""
+        """Up to `most` scans in virtual time without coming back from machine code, while no unit has anything to do.
+
+        Returns False if there was none: if somebody has to be told between scans, use `scan`."""
         if self.watchers or self._past.maxlen:
             return False
         if self.breakpoints.armed:
@@ -255,8 +266,10 @@ class Plc:
         return done > 0
 
     def scan_at_once(self, most: int, now_ns: int, clock: Clock) -> list[int]:
-        """Scans in the time that `clock` tells, which was `now_ns` before, one upon the other for as long as units have news
-        for the program; when they began.  None if somebody has to be told between them, or has a part in one: use `scan`."""
+        """Up to `most` scans back to back while units change words for the program (a burst).
+
+        `clock` is read before each scan; `now_ns` is what it told last.  Returns the times of the scans.  Returns [] without a
+        scan if somebody has a part in them or has to be told between them: use `scan`."""
         times: list[int] = []
         if self.watchers or self._past.maxlen or self.trap or not (path := self._fast_path()):
             return times
@@ -269,7 +282,7 @@ class Plc:
         return times
 
     def _many_stoppable(self, most: int) -> tuple[int, Trap | None]:
-        """How many scans there were before one that stops at a breakpoint."""
+        """Up to `most` scans inside machine code, before one that would stop; how many, and the trap of the last."""
         tasks = self._schedule.by_time()
         outside = self.units or self.phases or self._forces or self._journal
         if outside or not tasks or self._first or self._mode is not RUN or self.halted:
@@ -412,7 +425,7 @@ class Plc:
         self._leave()
 
     def _leave(self) -> None:
-        """A scan that stands at a breakpoint does not go on."""
+        """Gives up a scan that stands at a breakpoint."""
         self.breakpoints.leave()
         self._due.clear()
 
@@ -434,8 +447,4 @@ class Plc:
         """A second PLC as this one was at the end of a scan, without units: to be read, or run again with other inputs.
 
         Raises ValueError if `remember` did not keep that scan."""
-        for state in reversed(self._past):
-            if state.scans == scan + 1:
-                return self._twin(state)
-        held = f"scans {self._past[0].scans - 1} to {self._past[-1].scans - 1} are" if self._past else "none is"
-        raise ValueError(f"scan {scan} is not remembered; {held}: see Plc.remember")
+        return self._twin(state_after(scan, self._past))

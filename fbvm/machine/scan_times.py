@@ -1,4 +1,4 @@
-"""How long scans took and how late they began, by the host's clock: whether anything made a PLC wait."""
+"""Statistics of how long scans took and how late they began, by the host's clock."""
 
 from __future__ import annotations
 
@@ -8,13 +8,25 @@ from operator import sub
 from fbvm.base.areas import NEVER
 
 SIZES_NS: tuple[int, ...] = (*range(32), *(digits << zeros for zeros in range(1, 60) for digits in range(16, 32)))
-"""Where each size begins: a time is sorted in by its five highest bits, so a share is true to 3 %."""
+"""Lower bounds of the bins of the histogram, in ns: a time is sorted in by its five highest bits, so a percentile is true to
+3 %."""
 RECENT = 1024
-"""Scans of bursts that wait to be sorted in together, which takes a fifth of the time."""
+"""So many scans of bursts wait to be sorted into the histogram together, which takes a fifth of the time."""
 
 
 class Times:
-    """Many times, one a scan, of which only the longest and how many there were of each size are kept."""
+    """A histogram of times in ns, one a scan, and the longest of them.
+
+    `limit_ns` is what `beyond` counts.
+
+    >>> times = Times(limit_ns=1000)
+    >>> for scan, time_ns in enumerate((500, 700, 900, 4000)):
+    ...     times.note(scan, time_ns)
+    >>> times.count, times.beyond, times.longest_ns, times.longest_scan, times.mean_ns
+    (4, 1, 4000, 3, 1525)
+    >>> times.within_ns(0.75)
+    927
+    """
 
     def __init__(self, limit_ns: int = NEVER) -> None:
         self._limit_ns = limit_ns
@@ -57,7 +69,7 @@ class Times:
         return self._total_ns // self._count if self.count else 0
 
     def note(self, scan: int, time_ns: int, times: int = 1) -> None:
-        """Take one in, or so many that nobody measured one by one, from this scan on."""
+        """Adds the time of a scan; or of `times` scans from this one on, which took `time_ns` each on average."""
         self._settle()
         self._count += times
         self._total_ns += time_ns * times
@@ -69,14 +81,14 @@ class Times:
         self._sorted[size] = self._sorted.get(size, 0) + times
 
     def note_burst(self, scan: int, began_ns: list[int], together_ns: int) -> None:
-        """Take in those of scans one upon the other, from this one on: when they began, and what they took together."""
+        """Adds the times of a burst that began with scan number `scan`: when each scan began, and what all took together."""
         if scan != self._recent_scan + len(self._recent_ns) or len(self._recent_ns) >= RECENT:
             self._settle()
             self._recent_scan = scan
         self._recent_ns += map(sub, [*began_ns[1:], began_ns[0] + together_ns], began_ns)
 
     def _settle(self) -> None:
-        """Sort in what waits for it."""
+        """Sorts the scans of bursts that wait into the histogram."""
         recent_ns = self._recent_ns
         if not recent_ns:
             return
@@ -97,7 +109,7 @@ class Times:
         recent_ns.clear()
 
     def within_ns(self, share: float) -> int:
-        """The time that this share of all (0.99: 99 of 100) did not exceed, to 3 %."""
+        """The time in ns that this share of all scans (0.99: 99 of 100) did not exceed, to 3 %."""
         missing = share * self.count
         for size, times in sorted(self._sorted.items()):
             missing -= times
@@ -106,7 +118,7 @@ class Times:
         return self._longest_ns
 
     def add(self, other: Times) -> None:
-        """Take in all of another PLC's; the number of the longest scan is one of that PLC."""
+        """Adds all of another PLC's times; the number of the longest scan may then be one of that PLC."""
         if other.longest_ns > self.longest_ns:
             self._longest_ns, self._longest_scan = other._longest_ns, other._longest_scan
         self._count += other._count

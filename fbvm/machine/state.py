@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -23,7 +24,7 @@ RUN = Mode.RUN
 
 
 class Phase(Enum):
-    """What a scan consists of, for those who look inside: each is told when it is over."""
+    """The phases of a scan; `Plc.phases` are called when one is over."""
 
     INPUTS = "inputs"
     PROGRAM = "program"
@@ -32,7 +33,7 @@ class Phase(Enum):
 
 @dataclass(frozen=True)
 class State:
-    """All that `Plc.snapshot` keeps: memory, time, schedule, forces, mode and trap.  Not units and connections."""
+    """What `Plc.snapshot` keeps: memory, time, tasks, forces, mode and trap; neither units nor connections."""
 
     memory: Snapshot
     now_ns: int
@@ -42,6 +43,15 @@ class State:
     mode: Mode
     first: bool
     trap: Trap | None
+
+
+def state_after(scan: int, states: Sequence[State]) -> State:
+    """The state at the end of a scan.  Raises ValueError if `states`, the oldest first, do not have it."""
+    for state in reversed(states):
+        if state.scans == scan + 1:
+            return state
+    held = f"scans {states[0].scans - 1} to {states[-1].scans - 1} are" if states else "none is"
+    raise ValueError(f"scan {scan} is not remembered; {held}: see Plc.remember")
 
 
 class Stopped(RuntimeError):

@@ -1,8 +1,7 @@
-"""Runs that can stop inside a scan: at a line, at a change of watched bytes, where a condition holds.
+"""Runs that stop inside a scan: before a line, at a change of watched bytes, where a condition becomes TRUE.
 
-As machine code runs it looks into the table of `stops`.  What it finds there ends the scan early: memory goes back to
-where the scan began, and the observed Python build does the scan again up to that very observation.  There it stands
-until somebody lets it go on."""
+Machine code looks into the table of `stops`.  A hit ends its run: the memory goes back to what it was at the start, and the
+observed Python build does the run again up to the same observation.  There it stands until `go_on`."""
 
 from __future__ import annotations
 
@@ -27,17 +26,21 @@ STATEMENTS = ("statement", "rung")
 
 
 class Call(NamedTuple):
-    """A body in execution: its number, where its instance begins, the site of the statement that called it."""
+    """A body in execution."""
 
     body: int
+    """Its number."""
     base: int
+    """Byte of the memory at which its instance begins."""
     site: int
+    """Number of the site of the statement that called it; NO_SITE for a program."""
 
 
 class StoppableEngine:
-    """An engine whose runs stop where `stops` say.  `seen` is the observation at which one stands, None if none does.
+    """An engine whose runs stop where `stops` says.  `seen` is the observation at which a run stands, None if none does.
 
-    `choice` is "auto", "python" or "native" as for `tiers.engine_for`."""
+    `choice` is that of `tiers.engine_for`; `substitutes` are Python functions in place of bodies, by their numbers, with
+    which everything runs in Python."""
 
     def __init__(self, image: Image, memory: Memory, stops: StopTable, choice: str,
                  substitutes: Mapping[int, Callable[[int], None]]) -> None:  # fmt: skip
@@ -62,7 +65,9 @@ class StoppableEngine:
         return self._native is not None
 
     def run(self, task_index: int) -> Trap | None:
-        """Execute the programs of a task up to their end, a trap or a stop."""
+        """Executes the programs of a task up to their end, a trap, or a stop, after which `seen` is set.
+
+        Returns the trap that ended them, if any.  Raises what the test of a breakpoint raises."""
         if self._native is None and self._code and self._code.ready:
             self._native = native.NativeEngine(self._image, self._memory, 2, self._stops)
         if self._native is None:
@@ -75,7 +80,7 @@ class StoppableEngine:
 
     def run_many(self, tasks: Sequence[ScheduledTask], n: int, step_ns: int, clock_words: ClockWordTable, *,
                  spend: int) -> tuple[int, Trap | None]:  # fmt: skip
-        """What `NativeEngine.run_many` does, up to the scan that would stop; its caller does that one alone."""
+        """Does `NativeEngine.run_many` up to the scan before the one that would stop; the caller does that one by `run`."""
         if self._native is None:
             return 0, None
         seen, times = self._keep(), [task.next_ns for task in tasks]
@@ -87,12 +92,14 @@ class StoppableEngine:
         return self._native.run_many(tasks, done - 1, step_ns, clock_words, spend=spend)
 
     def _keep(self) -> State:
-        """Keep the memory as it is, and what was seen of it last."""
+        """Keeps a copy of the memory.  Returns what watchpoints saw at their last look."""
         ctypes.memmove(self._kept, self._place, len(self._kept))
         return self._stops.state
 
     def _undone(self, trap: Trap | None, seen: State) -> bool:
-        """If a run stopped: bring back what was kept.  Raises what a test has raised."""
+        """If machine code stopped at a breakpoint: brings back memory and watchpoints, and returns True.
+
+        Raises what a test has raised."""
         if trap is None or trap.code != STOPPED:
             return False
         failure, self._stops.failure = self._stops.failure, None
@@ -103,6 +110,7 @@ class StoppableEngine:
         return True
 
     def _observe(self, task_index: int) -> Trap | None:
+        """Does what `run` does on the observed Python build."""
         before = int(self._memory.read(BUDGET, "i64"))
         self._steps, self.calls = self._python.observe(task_index), []
         trap = self.go_on()
@@ -112,7 +120,7 @@ class StoppableEngine:
         return trap
 
     def go_on(self) -> Trap | None:
-        """From where the run stands to its end, a trap or the next stop."""
+        """Goes on from where the run stands, up to its end, a trap or the next stop.  Returns the trap, if any."""
         assert self._steps is not None
         self.seen = None
         while True:
@@ -127,7 +135,7 @@ class StoppableEngine:
                 return None
 
     def _hit(self, seen: Observation) -> bool:
-        """Follow calls; True if the run stops here."""
+        """Keeps `calls` up to date.  Returns True if the run stops at this observation."""
         kind, site, detail = seen
         if kind == "call":
             body, base = detail

@@ -1,8 +1,8 @@
-"""Which engine runs an image: Python at once, machine code when it pays and is there.
+"""Chooses the engine of an image: Python at once, machine code when that pays and is ready.
 
-A run begins in Python, which needs no compiling.  When a program has executed enough statements for machine code to be
-worth while, it is compiled beside the run, and a later scan begins with it; nobody notices, because all state is in the
-memory.  What is looked into statement by statement stays in Python.
+A run begins in Python, which needs no compiling.  After enough statements the program is compiled in a helper process, and
+a later scan runs as machine code.  The results are the same, because all state is in the memory.  A run that is observed
+statement by statement stays in Python.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ CHOICES = ("auto", "python", "native")
 STATEMENTS_TO_PAY = 300_000
 """Statements after which machine code is asked for: about a tenth of a second in Python."""
 LARGE_PROGRAM = 1000
-"""Places in the source of a program that takes about as long to be made into Python as into quick machine code, whose scans
-take a hundredth of the time, and which is kept on disk for the next start."""
+"""Sites of a program that begins as quick machine code: to make that takes about as long as to make Python, its scans take a
+hundredth of the time, and it is kept on disk for the next start."""
 
 
 class Engine(Protocol):
@@ -32,14 +32,19 @@ class Engine(Protocol):
 
     @property
     def machine(self) -> NativeEngine | None:
-        """The machine code that it runs now, if it does."""
+        """The machine code that runs now; None if none does."""
 
     def run(self, task_index: int) -> Trap | None:
-        """Executes the programs of one task once; time and budget are in the memory's system page."""
+        """Executes the programs of one task once.  Returns the trap that ended them, if any.
+
+        The caller has written time and step budget into the memory's system page."""
 
 
 def engine_for(image: Image, memory: Memory, choice: str = "auto", observed: bool = False) -> Engine:
-    """The engine of that name; "auto" begins in Python and goes on as machine code.
+    """A new engine for an image and its memory.
+
+    `choice` is "python", "native" (machine code at once) or "auto" (Python, and machine code when that pays); `observed` asks for
+    the build that reports each statement, which only Python has.
 
     Raises ValueError for another name, or for "native" where llvmlite is missing or observations are wanted."""
     if choice not in CHOICES:
@@ -64,14 +69,14 @@ def choice_of(engine: object) -> str:
 
 
 def substitutes_of(engine: object) -> Mapping[int, Callable[[int], None]]:
-    """What stands in place of bodies, by their numbers."""
+    """The Python functions that run in place of bodies (`PythonEngine.substitute`), by the numbers of the bodies."""
     return engine.substitutes if isinstance(engine, PythonEngine | TieredEngine) else {}
 
 
 def python_of(engine: object) -> PythonEngine:
-    """The Python engine of a run, which stays in Python from now on if it gets substitutes.
+    """The Python engine inside an engine.  As soon as it has substitutes, the run stays in Python.
 
-    Raises ValueError for a run that is all machine code."""
+    Raises ValueError for an engine that is machine code only."""
     if isinstance(engine, TieredEngine):
         return engine.python
     if not isinstance(engine, PythonEngine):
@@ -80,7 +85,7 @@ def python_of(engine: object) -> PythonEngine:
 
 
 class TieredEngine:
-    """Python first, machine code later; a large program begins with machine code that is soon there."""
+    """An engine that begins in Python and goes over to fast machine code; a large program begins as quick machine code."""
 
     def __init__(self, image: Image, memory: Memory) -> None:
         self._image, self._memory = image, memory
@@ -94,14 +99,14 @@ class TieredEngine:
 
     @property
     def python(self) -> PythonEngine:
-        """The engine that takes Python in place of blocks, made when it is needed."""
+        """The Python engine, made when first needed: a large program may never need it."""
         if self._python is None:
             self._python = PythonEngine(self._image, self._memory)
         return self._python
 
     @property
     def substitutes(self) -> Mapping[int, Callable[[int], None]]:
-        """What stands in place of bodies; a run that has any stays in Python."""
+        """The Python functions that run in place of bodies; with any the run stays in Python."""
         return self._python.substitutes if self._python else {}
 
     @property
@@ -115,7 +120,7 @@ class TieredEngine:
         return self._fast is not None
 
     def run(self, task_index: int) -> Trap | None:
-        """Execute the programs of a task once, in whatever tier the run is."""
+        """Executes the programs of one task once, on the engine of the present tier."""
         if self.substitutes:
             self._engine, self._fast = self.python, None
         if self._fast:
@@ -131,6 +136,6 @@ class TieredEngine:
         return trap
 
     def _change(self) -> None:
-        """Go over to machine code if it is there."""
+        """Goes over to fast machine code if that is ready."""
         if self._code.ready and not self.substitutes:
             self._engine = self._fast = NativeEngine(self._image, self._memory, level=2)

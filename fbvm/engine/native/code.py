@@ -17,15 +17,15 @@ from fbvm.engine.native.llvm.entry_points import EntryPoint
 from fbvm.engine.native.llvm.worker import worker
 
 QUICK, FAST = 0, 2
-"""Levels of optimisation."""
+"""Levels of optimisation: without passes over the module, and with all."""
 _LOADING = threading.RLock()
-"""Held by who loads code: the library must not come twice, once for those who run and once for those who come later."""
+"""Held while code is loaded, by the main thread or the worker's: the library must not be loaded twice."""
 
 
 class Code:
-    """The code of one image at each level that somebody wanted.
+    """The machine code of one image, at each level that was asked for; with `stops`, the build that can be stopped.
 
-    `points` and the sizes of the context are known once there is code."""
+    `points` (at which a run can end) and the sizes of the context are known as soon as one level is loaded."""
 
     def __init__(self, image: Image, stops: bool = False) -> None:
         self.image, self.stops = image, stops
@@ -43,7 +43,7 @@ class Code:
         return translate(self.image, self.stops)
 
     def prepare(self, level: int | None) -> None:
-        """Have code of a level; of None, any, and the fast one later."""
+        """Loads code of a level, from disk or by compiling it now.  With None: quick code, and fast code when that is ready."""
         if level is not None:
             if level not in self._linked:
                 self._load(level, self._known(level) or self._made(level))
@@ -59,11 +59,11 @@ class Code:
 
     @property
     def ready(self) -> bool:
-        """True if there is fast code."""
+        """True if fast code is loaded."""
         return FAST in self._linked
 
     def request(self) -> None:
-        """Have fast code as soon as it can be had without waiting for it."""
+        """Loads fast code if it is on disk, else has the helper process compile it; does not wait."""
         if self.ready or self._waiting:
             return
         known = self._known(FAST)
@@ -74,7 +74,7 @@ class Code:
         worker.compile(lambda: self.translation.text, self._improve)
 
     def _improve(self, compiled: bytes) -> None:
-        """Take fast code while quick code runs: all that follows is pointed to it.  The worker's thread does it."""
+        """Called in the worker's thread with the object of fast code: loads it, and points the entry points that follow to it."""
         stored = Stored(_facts(self.translation), compiled)
         native_cache.write(self._name(FAST), stored)
         self._load(FAST, stored)
@@ -95,7 +95,7 @@ class Code:
         return stored
 
     def _load(self, level: int, stored: Stored) -> None:
-        """Take code into use.  What came first stays: somebody may be running it, and what it calls in the library."""
+        """Loads an object.  One that is loaded already stays: a run may be inside it or inside the library that it calls."""
         with _LOADING:
             if level in self._linked:
                 return
@@ -108,15 +108,15 @@ class Code:
             self._linked[level] = linked
 
     def level_of(self, level: int | None) -> int:
-        """The level of the code that runs for those who want `level`."""
+        """The level of the code that an engine of `level` runs; with None the best one that is loaded."""
         return level if level is not None else max(self._linked)
 
     def address(self, task: int, level: int | None) -> int:
-        """Where the entry of a task is."""
+        """The address of the function of a task."""
         return self._linked[self.level_of(level)].address(f"task{task}")
 
     def follow(self, entry: EntryPoint, task: int, level: int | None) -> None:
-        """Point an entry to the code of a task; for level None also to better code when there is."""
+        """Points an entry point to the function of a task; with level None, to that of fast code as well when it is loaded."""
         with self._lock:
             if level is None:
                 self._followers[entry] = task
@@ -131,7 +131,7 @@ _codes: WeakValueDictionary[tuple[int, bool], Code] = WeakValueDictionary()
 
 
 def code_of(image: Image, stops: bool = False) -> Code:
-    """The code of an image, with `stops` or without; the same object as long as somebody has it."""
+    """The code of an image, with `stops` or without; the same object as long as an engine holds it."""
     code = _codes.get((id(image), stops))
     if code is None:
         code = _codes[id(image), stops] = Code(image, stops)
@@ -142,13 +142,13 @@ def code_of(image: Image, stops: bool = False) -> Code:
 
 
 def _addresses(parts: list[int]) -> dict[str, int]:
-    """Where the routines of some parts of the library are, each with those before it."""
+    """Loads parts of the library.  Returns the addresses of their routines, and of those of the parts before, by name."""
     return _part(max(parts))[1] if parts else {}
 
 
 @cache
 def _part(number: int) -> tuple[Linked, dict[str, int]]:
-    """A part in memory, and the addresses of its routines and of those before."""
+    """Loads one part of the library.  Returns the part, and the addresses of its routines and of those of the parts before."""
     before = _part(number - 1)[1] if number else {}
     name = name_of(f"library {number}")
     stored = native_cache.read(name)

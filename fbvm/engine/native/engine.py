@@ -1,7 +1,7 @@
-"""The native engine: an Image becomes machine code over the same flat memory, with the same traps and step budget.
+"""The native engine: runs an Image as machine code over the same flat memory, with the same traps and step budget.
 
-It has the surface of the Python engine and its results to the bit; it has no observations.  It decides nothing: every
-meaning is in the table of operations."""
+It has the methods of the Python engine and its results to the bit, but no observations.  It decides no meaning: that is in
+the table of operations (`fbvm.code.operations`)."""
 
 from __future__ import annotations
 
@@ -30,10 +30,13 @@ available = native_compiler.available
 class NativeEngine:
     """Runs an image over a memory.
 
-    The caller sets time and budget in the system page before a run.  `level` 0 is code that is soon there, 2 is code
-    that is fast, None begins with the one and goes on with the other.  A program's mistakes come back as a Trap; memory
-    is then what was stored before it.  With `stops` a run also ends where these say, with the Trap PAUSE.  Raises
-    ImportError where llvmlite is missing (see `available`), Unsupported for code that the compiler never makes."""
+    The caller writes time and step budget into the system page before a run.  `level` 0 is quick code, which is compiled soon,
+    2 is fast code; None begins with quick code and goes over to fast code when that is ready.  A program's mistake comes
+    back as a Trap; the memory then has what was stored before it.  With `stops` a run also ends, with the Trap PAUSE, where
+    the table says.
+
+    Raises ValueError for a memory that is too small, ImportError where llvmlite is missing (see `available`), Unsupported
+    for code that the compiler never makes."""
 
     def __init__(self, image: Image, memory: Memory, level: int | None = None, stops: StopTable | None = None) -> None:
         if memory.size < image.layout.size:
@@ -59,21 +62,21 @@ class NativeEngine:
 
     @property
     def source(self) -> str:
-        """The module of LLVM's language, before optimisation."""
+        """The module in LLVM's language, before optimisation."""
         return self._code.translation.text
 
     @property
     def optimised(self) -> bool:
-        """True if the fast code is running."""
+        """True if runs execute the fast code."""
         return self._code.level_of(self.level) == 2
 
     @property
     def machine(self) -> NativeEngine:
-        """What runs as machine code: all of it."""
+        """The machine code that runs now: this engine."""
         return self
 
     def run(self, task_index: int) -> Trap | None:
-        """Execute the programs of a task in their order, until the end or a trap."""
+        """Executes the programs of a task in their order.  Returns the trap that ended them, if any."""
         point = self._calls[task_index]()
         return self.trap_at(point) if point else None
 
@@ -83,7 +86,7 @@ class NativeEngine:
         return NativeScans(self.memory, self._memory_at, self._context.at, self._entries, tasks, clock_words, watched, units)
 
     def unit_in_code(self, exchange: UnitExchange) -> UnitInCode:
-        """This program, its first task, as that of a unit which exchanges this with a PLC."""
+        """The first task of this image as the program of a unit, to be run inside the scans of a PLC (`scans`)."""
         return UnitInCode(self._entries[0].function_at, self._memory_at, self._context.at, self.trap_at, exchange)
 
     def run_many(self, tasks: Sequence[ScheduledTask], n: int, step_ns: int, clock_words: ClockWordTable = NO_CLOCK_WORDS, *,
@@ -105,7 +108,7 @@ class NativeEngine:
         return done, self.trap_at(point) if point else None
 
     def trap_at(self, number: int) -> Trap:
-        """What the point says, with the values that the context holds."""
+        """The trap for a point that machine code has returned, with the values that it left in the context."""
         code, site, shown = self._code.points[number - 1]
         if code == STOPPED:
             return PAUSE

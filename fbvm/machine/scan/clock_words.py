@@ -1,8 +1,7 @@
-"""The words and bits in which a CPU unit tells the program about time: first cycle, clock pulses, cycle times.
+"""The words and bits in which a CPU unit tells its program about time: first cycle, clock pulses, cycle times.
 
-Written at the start of a scan from the scan's time alone, so that a program and a chart see the same.
-From W393/W394 (auxiliary area and condition flags), [K] where not noted.
-"""
+They are written at the start of a scan from the scan's time alone, so that a program and a chart see the same.  Addresses and
+units are from W393 and W394 (auxiliary area, condition flags); what is assumed says so."""
 
 from __future__ import annotations
 
@@ -30,13 +29,13 @@ IOM_HOLD = (500, 12)
 """A500.12: CIO, W and timers keep their contents over a change of mode."""
 
 Periods = list[tuple[int, int, int]]
-"""Bit of its byte, period and half of it."""
+"""Clock pulses of one byte: the bit as a mask, its period in ns, and half of that."""
 SLOT_NS = 10_000_000
-"""Within such a slot of time no clock pulse and no free counter changes."""
+"""Within so many nanoseconds, from a multiple of them on, no clock pulse and no free counter changes."""
 
 
 class ClockWords:
-    """These words and bits of one memory."""
+    """Writes these words and bits of one memory."""
 
     def __init__(self, memory: Memory) -> None:
         self._a = memory.words("A")
@@ -46,7 +45,9 @@ class ClockWords:
         self._pulses: list[tuple[int, int, int]] = []
 
     def update(self, now_ns: int, cycle_time_ns: int, first: bool) -> None:
-        """Write all of them for the scan at `now_ns`; `cycle_time_ns` is the length of the cycle before, 0 at first."""
+        """Writes all of them for the scan at `now_ns`.
+
+        `cycle_time_ns` is the length of the cycle before, 0 if there was none; `first` is True for the first scan in RUN."""
         a, on = self._a, self._bytes
         word, bit = FIRST_CYCLE
         a[word] = a[word] & ~(1 << bit | 1 << FIRST_TASK_CYCLE[1]) | first << bit
@@ -63,7 +64,7 @@ class ClockWords:
             on[at] = on[at] & keep | pulses
 
     def _enter(self, now_ns: int) -> None:
-        """Work out what holds all through the slot of this moment."""
+        """Works out what counters and pulses are in the whole slot of 10 ms to which `now_ns` belongs."""
         self._slot = now_ns // SLOT_NS
         self._counters = [(at, now_ns // step_ns & 0xFFFF) for at, step_ns in FREE_COUNTERS]
         self._pulses = []
@@ -75,7 +76,7 @@ class ClockWords:
             self._pulses.append((at, keep, pulses))
 
     def begin_task(self, first: bool) -> None:
-        """Tell the program that a task begins, and whether for the first time."""
+        """Writes A200.15 at the start of a task: ON if the task is executed for the first time."""
         word, bit = FIRST_TASK_CYCLE
         self._a[word] = self._a[word] & ~(1 << bit) | first << bit
 
@@ -100,7 +101,7 @@ def _clock_words() -> ClockWordTable:
 
 
 def _masks(byte: int) -> tuple[int, Periods]:
-    """Which bits of a byte of CF are not clock pulses, and when the others are ON."""
+    """For a byte of CF the mask of the bits that are no clock pulses, and the clock pulses."""
     here = {1 << number % 8: period_ns for number, period_ns in PERIODS_NS.items() if number // 8 == byte}
     return 0xFF & ~sum(here), [(bit, period_ns, period_ns // 2) for bit, period_ns in here.items()]
 

@@ -14,7 +14,7 @@ from fbvm.wire.link import Link, Network, Request
 
 @dataclass(frozen=True)
 class Attached:
-    """A unit on the backplane and its place on a network."""
+    """A unit on the backplane, its link, and the network of the link."""
 
     unit: Unit
     link: Link
@@ -22,29 +22,31 @@ class Attached:
 
     @cached_property
     def own(self) -> ProcessorUnit | None:
-        """The unit, if a processor of its own does what a refresh does, or will when there is something to do."""
+        """The unit, if it has a processor of its own, switched on or not; None for any other."""
         return self.unit if isinstance(self.unit, ProcessorUnit) else None
 
 
 class IORefresh:
-    """I/O refreshes of the units of one PLC; some may be left out, and are counted."""
+    """The I/O refresh of the units of one PLC.  Fast paths leave refreshes out that would change nothing, and count them here."""
 
     def __init__(self, units: Sequence[Attached], memory: Memory) -> None:
         self.units, self.memory = units, memory
         self.skipped = 0
-        """How many refreshes were left out since the last one."""
+        """How many refreshes were left out of which the links have not been told."""
         self.changed_words = False
-        """The units changed words in the last refresh, and no scan has come upon it."""
+        """True if the units changed words in the last refresh: the program should see them soon."""
 
     def refresh(self, now_ns: int, journal: Journal | None = None, seen: Callable[[int], None] | None = None) -> bool:
-        """Each unit exchanges its words once and stores what it received; then the networks take what the units ask for.
+        """One refresh at `now_ns`: each unit exchanges its words and stores what it received; then the networks take the requests
+        of all units.
 
-        `seen` is told the number of each unit whose words have been exchanged.  True if nobody has anything left to do."""
+        `journal` is told the events; `seen` is called with the number of each unit whose words have been exchanged.  Returns
+        True if no unit has anything left to do (`is_idle`)."""
         if self.skipped:
             self.report_skipped()
         memory, changed_words = self.memory, False
         asked: list[list[Request] | None] = []
-        """What each unit asks for; None if its program is to be asked."""
+        """The requests of each unit; None if its program ran and `finish` has them."""
         for number, attached in enumerate(self.units):
             unit, link = attached.unit, attached.link
             events = link.events(now_ns)
@@ -70,35 +72,35 @@ class IORefresh:
         return self.is_idle(now_ns)
 
     def report_skipped(self) -> None:
-        """Tell the links of refreshes that were left out."""
+        """Tells the links of the refreshes that were left out."""
         for attached in self.units:
             attached.link.pass_by(self.skipped)
         self.skipped = 0
 
     def is_idle(self, now_ns: int) -> bool:
-        """True if a refresh changes nothing unless what the units watch has changed, as far as they say what that is."""
+        """True if a refresh at `now_ns` would change nothing as long as the words that the units watch stay as they are."""
         for attached in self.units:  # noqa: SIM110 - a generator would cost as much as the rest of it
             if attached.unit.wake_ns <= now_ns or not attached.link.is_quiet:
                 return False
         return True
 
     def wake_ns(self, latest_ns: int) -> int:
-        """When the units want another scan: at once if the program has not seen yet what they changed."""
+        """When the units want another scan: 0 if the program has not seen words that they changed, else as `unit_ns`."""
         return 0 if self.changed_words else self.unit_ns(latest_ns)
 
     def unit_ns(self, latest_ns: int) -> int:
-        """When a unit changes something by itself, `latest_ns` if none does before."""
+        """When the first unit changes something by itself; `latest_ns` if none does before."""
         for attached in self.units:
             if (unit_ns := attached.unit.wake_ns) < latest_ns:
                 latest_ns = unit_ns
         return latest_ns
 
     def offset(self, area: str, word: int) -> int:
-        """Where a word of an area lies in the memory."""
+        """The offset of a word of an area, in bytes of the memory."""
         return self.memory.areas[area].offset + 2 * word
 
     @property
     def watched(self) -> list[list[int]] | None:
-        """Offsets of what each unit looks at in each refresh; None if one does not say so."""
+        """For each unit the offsets of the eight bytes each that it watches; None if a unit does not say what it watches."""
         groups = [attached.unit.watched for attached in self.units]
         return None if None in groups else [[self.offset(*place) for place in group or ()] for group in groups]

@@ -1,7 +1,8 @@
-"""Which accesses of a body cannot meet: told to LLVM, which then keeps values in registers across stores elsewhere.
+"""Alias scopes: metadata by which LLVM knows that two accesses of a body never touch the same byte.
 
-LLVM sees by itself that two constant places of one base differ.  Told are the ranges that computed subscripts reach, that
-an instance lies apart from the areas, and that no variable lies among the words of the system page."""
+LLVM then keeps a value in a register across a store elsewhere.  That two constant addresses of one base differ LLVM sees by
+itself.  The metadata says which range a computed subscript can reach, that an instance lies apart from the areas, and that
+no variable lies among the words of the system page.  See the LLVM Language Reference on `noalias` and `alias.scope`."""
 
 from __future__ import annotations
 
@@ -14,11 +15,12 @@ from fbvm.code.operations import Address
 from fbvm.engine.native.emit.call_graph import Range, reached
 
 Access = tuple[bool, int, int, bool]
-"""Whether it counts from the instance, first byte, first byte behind, whether its place is computed."""
+"""Whether its address counts from the instance (else from the start of memory), first byte, the byte behind the last, whether
+the address is computed from a subscript."""
 MOST = 16
-"""Ranges of computed subscripts that are told apart in one body."""
+"""How many ranges of computed subscripts are told apart in one body."""
 SYSTEM = ", !alias.scope !2, !noalias !3"
-"""What marks accesses to words of the system page."""
+"""The metadata of accesses to words of the system page."""
 METADATA = """\
 !0 = !{!"branch_weights", i32 1, i32 4000}
 !1 = !{}
@@ -29,15 +31,17 @@ METADATA = """\
 !6 = distinct !{!6, !"memory"}
 """
 FIRST_NUMBER = 7
-"""Of metadata that bodies add."""
+"""The first number of the metadata that bodies add."""
 _MARK = re.compile(r" ;(\d+)$", re.MULTILINE)
-"""At the end of the line of an access: a comment as long as nobody resolves it."""
+"""A mark at the end of the line of an access: a comment to LLVM, until `resolved` puts metadata in its place."""
 
 
 @dataclass
 class AliasScopes:
-    """The accesses of one body.  `instances` is where its instances begin, in bytes of the buffer, `base` where the only one
-    does, if that is known; `next` is the number of its next mark, which go on from body to body."""
+    """The accesses of one body.
+
+    `instances` is the range of bytes of the memory in which its instances begin; `base` is where its only instance begins, None
+    if there are several; `next` is the number of the next mark (numbers go on from body to body)."""
 
     instances: Range
     base: int | None
@@ -46,17 +50,17 @@ class AliasScopes:
     accesses: dict[Access, int] = field(default_factory=dict)
 
     def is_apart(self, address: Address, count: int) -> bool:
-        """Whether an access cannot meet the words of the system page."""
+        """True if an access cannot touch the words of the system page."""
         return self._access(address, count) is not None
 
     def mark(self, address: Address, count: int) -> str:
-        """A mark for an access."""
+        """Notes an access of `count` bytes.  Returns the mark for the end of its line."""
         self.marked.append((address, count))
         self.next += 1
         return f" ;{self.next - 1}"
 
     def _access(self, address: Address, count: int) -> Access | None:
-        """What an access reaches; None if that could be words of the system page."""
+        """What an access can touch; None if that could be words of the system page."""
         low, high = reached(address, count)
         from_instance = address[0] == "self"
         if from_instance and self.base is not None:
@@ -66,14 +70,14 @@ class AliasScopes:
         return from_instance, low, high, bool(address[2])
 
     def told(self, number: int) -> tuple[list[str], list[str]]:
-        """What each mark stands for, and definitions whose numbers begin with `number`."""
+        """The metadata that each mark stands for, and the definitions of metadata, whose numbers begin with `number`."""
         found = [self._access(*marked) for marked in self.marked]
         places = [None if access is None else self.accesses.setdefault(access, len(self.accesses)) for access in found]
         marks, lines = self._marks(number)
         return ["" if place is None else marks[place] for place in places], lines
 
     def _marks(self, number: int) -> tuple[list[str], list[str]]:
-        """What is told of each access."""
+        """The metadata of each access, and the definitions, whose numbers begin with `number`."""
         groups = self._groups()
         count = max(groups, default=-1) + 1
         if count < 2:
@@ -149,7 +153,7 @@ class AliasScopes:
 
 
 def resolved(text: str, bodies: Iterable[AliasScopes]) -> str:
-    """A module with what the marks of its bodies stand for, in their order."""
+    """The text of a module with metadata in place of the marks of its bodies, which come in their order."""
     marks: list[str] = []
     metadata: list[str] = []
     for regions in bodies:

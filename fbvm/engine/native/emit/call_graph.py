@@ -1,4 +1,4 @@
-"""Who calls whom in an image: which bodies are executed at all, how many calls are inside one another, for which instances."""
+"""The call graph of an image: which bodies are executed at all, how deep calls are nested, where instances may begin."""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from fbvm.code.shapes import statements
 from fbvm.engine.ranges import value_range
 
 Range = tuple[int, int]
-"""First byte, and first byte behind."""
+"""First byte, and the byte behind the last."""
 ANYWHERE: Range = (-(1 << 62), 1 << 62)
 Calls = dict[int, list[tuple[int, Address | None]]]
-"""For each body that is executed, those after it that call it come last: its calls and their instances' addresses."""
+"""For each body that is executed: the bodies that it calls, with the addresses of their instances.  A body comes behind those
+that it calls."""
 
 
 def call_graph(image: Image) -> Calls:
-    """The calls of every body that a task reaches; a body stands behind all that it calls."""
+    """The calls of every body that a task reaches."""
     graph: Calls = {}
     waiting = [run.body for task in image.tasks for run in task.programs]
     known: Calls = {}
@@ -33,7 +34,7 @@ def call_graph(image: Image) -> Calls:
 
 
 def heights(graph: Calls) -> dict[int, int]:
-    """For each body how many calls are at most inside one another below it."""
+    """For each body how many calls are nested below it at most; 0 if it calls none."""
     found: dict[int, int] = {}
     for number, called in graph.items():
         found[number] = max((found[other] + 1 for other, _ in called), default=0)
@@ -41,7 +42,7 @@ def heights(graph: Calls) -> dict[int, int]:
 
 
 def instance_places(image: Image, graph: Calls) -> dict[int, Range]:
-    """For each body the bytes of the buffer among which its instances begin."""
+    """For each body the range of bytes of the memory in which its instances begin."""
     places: dict[int, Range] = {}
     for task in image.tasks:
         for run in task.programs:
@@ -67,7 +68,9 @@ def _called_at(address: Address | None, caller: Range) -> Range:
 
 
 def reached(address: Address, count: int) -> Range:
-    """The bytes that an address without reference can reach, counted as it counts."""
+    """The range of bytes that an access of `count` bytes can touch, counted from the address's own base (memory or instance).
+
+    The address has no reference in it."""
     _, low, terms = address
     high = low + count
     for stride, term in terms:

@@ -1,7 +1,7 @@
-"""The context: the bytes beside a PLC's memory in which native code keeps what is no part of its state.
+"""The context: bytes beside a PLC's memory in which machine code keeps what is no part of the PLC's state.
 
-From where code looks at it, its fields come first and then scratch bytes for the texts of one statement; in front of them
-lie the texts of temporaries.  Nothing in it is kept between scans."""
+Machine code has the address of its fields.  Behind them lie scratch bytes for the texts of one statement, in front of them the
+texts of temporaries.  Nothing in the context outlives a scan."""
 
 from __future__ import annotations
 
@@ -15,24 +15,27 @@ from fbvm.base.memory import STRUCTS
 from fbvm.engine.native.library.reading import CLEANED
 
 FIELDS = {"size": 0, "values": 8, "result": 32, "f32": 40, "f64": 48, "stops": 56}
-"""Where its 64-bit fields lie: size of the memory, up to three values of a trap, a second result of a routine or the
-instance of a trap, the canonical NaN of each float type (out of LLVM's sight, which holds one NaN for as good as another),
-the table of `stops`."""
+"""Offsets of its 64-bit fields: size of the memory; up to three values of a trap; a second result of a routine, or the instance
+of a trap; the canonical NaN of each float type (here LLVM does not see it, which takes one NaN for as good as another); the
+address of the table of `stops`."""
 DIGITS = FIELDS["result"] + CLEANED
 """Where routines of the library write the text of a number before they read the number."""
 SCRATCH = 512
-"""Where the scratch bytes of texts begin; statements use them in turn."""
+"""Where the scratch bytes of texts begin; each statement uses them from the start."""
 
 Shown = tuple[str, Any]
-"""How a trap tells one value: (machine type, None) or ("text", None) as found in the context, ("const", value); and, last
-of all, whose code it was: (INSTANCE, offset), or None if that is found in the context."""
+"""One value of a trap: (machine type, None) or ("text", None) if it is in the context, else ("const", value).  The last entry is
+the instance whose body was executed: (INSTANCE, offset), with None if it is in the context."""
 INSTANCE = "instance"
 Point = tuple[str, int, tuple[Shown, ...]]
-"""A point at which a run can end: code, site, values."""
+"""A point at which a run can end early: code of the trap, number of the site, values."""
 
 
 class Context:
-    """The context of one PLC: `at` is the address of its fields in the host, `read` looks at what a trap left there."""
+    """The context of one PLC.  `at` is the address of its fields.
+
+    `kept_bytes` lie in front of the fields, `context_bytes` from the fields on; `memory_bytes` is the size of the PLC's memory,
+    `stops_at` the address of the stop table, if the code has stops."""
 
     def __init__(self, kept_bytes: int, context_bytes: int, memory_bytes: int, stops_at: int = 0) -> None:
         self._content = bytearray(kept_bytes + context_bytes)
@@ -48,7 +51,7 @@ class Context:
         struct.pack_into(form, self._content, self._start + FIELDS[field], value)
 
     def values(self, shown: Iterable[Shown]) -> Iterator[Any]:
-        """The values of a trap: a float as LREAL, an integer of 64 bits with its sign or without, bytes of a text."""
+        """The values of a trap in their order: a float, an integer, or the bytes of a text."""
         at = self._start + FIELDS["values"]
         for kind, constant in shown:
             if kind == INSTANCE:
@@ -64,7 +67,7 @@ class Context:
                 at += 8
 
     def instance(self, shown: tuple[Shown, ...]) -> int:
-        """Where the instance begins whose body a trap has ended."""
+        """The byte of the memory at which the instance begins whose body a trap has ended."""
         given: int | None = dict(shown).get(INSTANCE)
         at = self._start + FIELDS["result"]
         return int(STRUCTS["i64"].unpack_from(self._content, at)[0]) if given is None else given

@@ -1,4 +1,4 @@
-"""An Image as one module of LLVM's language: its bodies, one entry a task, constants, what they declare."""
+"""Translates an Image into one module of LLVM's language: bodies, a function for each task, constants, declarations."""
 
 from __future__ import annotations
 
@@ -26,14 +26,13 @@ from fbvm.engine.native.llvm.compiler import MATH
 from fbvm.engine.stops import STOPPED
 
 SMALL, LARGE = 40, 600
-"""Lines of LLVM up to which a body that calls no other is always copied to where it is called, and from which on a body
-never is."""
+"""Lines of LLVM: up to SMALL a body that calls no other is always inlined, from LARGE on a body never is."""
 ALIGN = 64
-"""Bytes at which functions begin: at others the same code takes a sixth more now and then."""
+"""Functions begin at multiples of so many bytes: elsewhere the same code takes a sixth longer now and then."""
 DEEP = 8
-"""Calls inside one another that may become one function."""
+"""How many nested calls may be inlined into one function."""
 FRAMES_A_LEVEL = 12
-"""Python frames that writing takes at most for a level of nested code."""
+"""Python frames that translating takes at most for each level of nested code."""
 _FUNCTIONS = """\
 declare void @llvm.memmove.p0.p0.i64(ptr, ptr, i64, i1)
 declare void @llvm.memcpy.p0.p0.i64(ptr, ptr, i64, i1)
@@ -61,27 +60,29 @@ attributes #5 = { nounwind willreturn memory(read) }
 
 @dataclass(frozen=True)
 class Translation:
-    """An image as LLVM: its text, the points at which a run can end, the sizes of the context, what it calls."""
+    """An image as a module of LLVM, and what the engine has to know of it."""
 
     quick: str
-    """Its text as quick code is made of it, which does not say what accesses cannot meet."""
+    """The text of which quick code is made: alias scopes are comments in it."""
     regions: tuple[AliasScopes, ...]
+    """The alias scopes of its bodies."""
     points: tuple[Point, ...]
+    """The points at which a run can end early; point n is `points[n - 1]`."""
     kept_bytes: int
     """Bytes of the context in front of its fields."""
     context_bytes: int
     """Bytes of the context from its fields on."""
     routines: tuple[str, ...]
-    """Names of what it calls of the library."""
+    """Names of the library's routines that it calls."""
 
     @cached_property
     def text(self) -> str:
-        """Its text as fast code is made of it."""
+        """The text of which fast code is made: with alias scopes."""
         return resolved(self.quick, self.regions)
 
 
 class BodyWriter(Writer):
-    """A Writer that knows all rows."""
+    """A Writer with the rows of all operations."""
 
     values: Mapping[str, Callable[..., str]] = MappingProxyType({**VALUES, **native_texts.VALUES})
     texts = native_texts.TEXTS
@@ -89,7 +90,7 @@ class BodyWriter(Writer):
 
 
 def translate(image: Image, stops: bool = False) -> Translation:
-    """The module of an image, whose runs can be stopped at observations or not.
+    """Translates an image; with `stops`, so that its runs can be stopped at observations.
 
     Raises Unsupported for code that the compiler never makes."""
     return with_recursion_room(image, FRAMES_A_LEVEL, partial(_translated, image, stops))
@@ -110,7 +111,7 @@ def _translated(image: Image, stops: bool) -> Translation:
 
 @cache
 def _declarations() -> tuple[str, ...]:
-    """Functions that modules call: LLVM's own, and those of C's math.h."""
+    """Declarations of functions that modules call: LLVM's intrinsics, and those of C's math.h."""
     lines = [_FUNCTIONS]
     lines += [f"declare {kind} @llvm.{name}.{kind}({kind}, {kind})"
               for name in ("umin", "umax", "smin", "smax") for kind in _WIDTHS]

@@ -1,4 +1,4 @@
-"""The objects of an image in native code: its extents as a constant, and the function that looks into them and into leases."""
+"""Bounds checks of references: the extents of an image's objects as a constant, and the function that compares with them."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ ret i1 false
 
 
 def objects(table: Objects) -> str:
-    """The definitions that code of an image with these objects calls."""
+    """The definitions of `@extents` and `@inside`, which the code of an image with these objects calls."""
     rows = ", ".join(f"[2 x i32] [i32 {start}, i32 {end}]" for start, end in table.extents)
     count = len(table.extents)
     extents = f"@extents = internal constant [{count} x [2 x i32]] {f'[{rows}]' if rows else 'zeroinitializer'}"

@@ -1,6 +1,6 @@
-"""Stops in native code: at each observation a byte of the table is looked up (see `stops`), and that is all as a rule.
+"""Breakpoints in machine code: at each observation one byte of the stop table is looked up (see `fbvm.engine.stops`).
 
-Code with stops is a build of its own, made when somebody wants some."""
+Code with these checks is a build of its own, made for the first breakpoint of a program."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ assert AT_STATEMENT == 1, "a statement is told from a write by this bit"
 
 
 def observe(w: Writer, kind: str, site: int) -> None:
-    """End the run here if somebody wants it to."""
+    """Writes the check at an observation: the run ends here if the table says so."""
     if kind not in STOPPABLE:
         return
     statement = kind != "write"
@@ -82,6 +82,6 @@ def observe(w: Writer, kind: str, site: int) -> None:
 
 
 def at_end(number: int, sites: int, point: int) -> list[str]:
-    """The lines behind a program of a task: watched bytes are compared once more."""
+    """The lines behind program number `number` of a task: watched bytes are compared once more; `point` is that of a stop."""
     return [f"%s{number} = call i64 @guard(ptr %m, ptr %c, i64 {sites}, i64 0) #5", f"%n{number} = icmp ne i64 %s{number}, 0",
             f"br i1 %n{number}, label %y{number}, label %h{number}", f"y{number}:", f"ret i32 {point}", f"h{number}:"]

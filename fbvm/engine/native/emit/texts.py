@@ -1,7 +1,7 @@
-"""Text operations as instructions of LLVM: a text is the place of its characters, their number and their width.
+"""Text operations as instructions of LLVM.  A text is a pointer to its characters, their number and their width.
 
-What only looks at a part of a text copies nothing; what makes a new one writes it to scratch bytes of the context, whose
-size is known before because every text has a greatest length."""
+An operation that yields a part of a text copies nothing.  One that makes a new text writes it to scratch bytes of the context,
+whose size is known at compile time because every text has a greatest length."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LONGEST_NUMBER = 48
 
 
 def capacity(w: Writer, node: Node) -> int:
-    """Characters that a text has at most."""
+    """How many characters the value of a text expression has at most."""
     name, operands = node[0], node[2:]
     if name == "const":
         return len(operands[0])
@@ -45,7 +45,7 @@ def capacity(w: Writer, node: Node) -> int:
 
 
 def kept(w: Writer) -> dict[int, tuple[int, int]]:
-    """For each text temporary of the body where it is kept in the context, and how many characters it has at most."""
+    """For each text temporary of the body its offset in the context, and how many characters it has at most."""
     if w.capacities is not None:
         return w.capacities
     lets = list(_text_lets(w.body.code))

@@ -1,9 +1,9 @@
-"""What the rows of native code write with: names, blocks, addresses, traps and constants of one body in LLVM's language.
+"""Writes the LLVM text of one body: names, blocks, addresses, traps and constants, for the rows of operations.
 
-A body is a function `i64 (ptr %m, ptr %c, i64 %self, i64 %left)`: the flat memory, the context (see `native.context`), the
-place of its instance, the step budget.  It returns what is left of the budget; or, far below 0, the point at which the
-run has to end, whose values are in the context.  The budget is stored whenever it changes, but not read back, which would
-make each charge wait for the one before."""
+A body becomes a function `i64 (ptr %m, ptr %c, i64 %self, i64 %left)`, whose arguments are the flat memory, the context (see
+`emit.context`), the byte at which its instance begins, and the step budget that is left.  The function returns the budget
+that is left then; or, far below 0, the point at which the run ends early, whose values are in the context.  The budget is
+stored in memory whenever it changes but not read from there, which would make each charge wait for the one before."""
 
 from __future__ import annotations
 
@@ -26,10 +26,11 @@ from fbvm.engine.trap import NO_INSTANCE
 NAN_BITS = {"f32": "0x7FF8000000000000", "f64": "0x7FF8000000000000"}
 """The canonical NaN as LLVM writes it; a float's digits are those of the double of that value."""
 ENDED = -(1 << 63)
-"""What a body returns for point 0; below `TRAPPED` there are points, above it budgets."""
+"""A body that ends at point n returns ENDED + n."""
 TRAPPED = -(1 << 62)
+"""A number below is a point, one above a budget."""
 RARE = "!prof !0"
-"""What marks a branch whose first way is hardly ever taken."""
+"""The metadata of a branch whose first target is hardly ever taken."""
 
 
 STOPPABLE = ("statement", "rung", "write")
@@ -37,7 +38,7 @@ STOPPABLE = ("statement", "rung", "write")
 
 
 def ir(machine: str) -> str:
-    """LLVM's name of a machine type as it is worked on."""
+    """LLVM's type for values of a machine type."""
     return _IR[machine]
 
 
@@ -46,7 +47,7 @@ _IR = {"b": "i1", "f32": "float", "f64": "double", "ref": "i64",
 
 
 def stored(machine: str) -> str:
-    """LLVM's name of a machine type as it lies in memory."""
+    """LLVM's type for a machine type in memory, where a BOOL takes a byte."""
     return "i8" if machine == "b" else ir(machine)
 
 
@@ -55,7 +56,7 @@ def signed(machine: str) -> bool:
 
 
 def literal(machine: str, value: Any) -> str:
-    """A constant of a machine type."""
+    """LLVM's text of a constant of a machine type."""
     if machine == "b":
         return "true" if value else "false"
     if not is_float(machine):
@@ -73,7 +74,7 @@ def _is_seen_later(node: Node, following: Node | None) -> bool:
 
 
 class Text(NamedTuple):
-    """A string as code has it: where its characters begin, how many they are, and the bytes of each."""
+    """A string value: the names of a pointer to its characters and of their number, and the bytes of one character."""
 
     at: str
     length: str
@@ -81,12 +82,15 @@ class Text(NamedTuple):
 
 
 class Unsupported(ValueError):
-    """An image has code that this engine cannot translate, which the compiler never makes; the message says what."""
+    """An image has code that this engine cannot translate.  The compiler never makes such code; the message says what it is."""
 
 
 @dataclass
 class Module:
-    """What the bodies of an image share: points, constants, routines that are called, bytes of the context."""
+    """What the bodies of an image share: points, constants, names of routines that are called, bytes of the context.
+
+    `bases` is where the instance of a body with one instance begins, `instances` the range in which those of any body begin,
+    `heights` how many calls are nested below a body, all by the number of the body."""
 
     image: Image
     bases: Mapping[int, int]
@@ -103,22 +107,22 @@ class Module:
     """The accesses of each body that has been written."""
 
     def point(self, code: str, site: int, shown: tuple[Shown, ...]) -> int:
-        """The number of a point at which a run can end; 0 is none."""
+        """Adds a point at which a run can end early.  Returns its number, from 1 on."""
         self.points.append((code, site, shown))
         return len(self.points)
 
     def constant(self, value: bytes) -> str:
-        """The name of constant bytes."""
+        """The name of a constant with these bytes."""
         return self.constants.setdefault(value, f"@k{len(self.constants)}")
 
     def room(self, size: int) -> int:
-        """Bytes of the context that nothing else uses: where they begin, seen from its fields."""
+        """Reserves bytes in front of the fields of the context.  Returns their offset from the fields, which is negative."""
         self.kept_bytes += size
         return -self.kept_bytes
 
 
 class Writer:
-    """Writes one body.  `values`, `texts` and `statements` are the tables of rows, by operation."""
+    """Writes body number `number` of the module's image.  `values`, `texts` and `statements` are tables of rows, by operation."""
 
     values: Mapping[str, Callable[..., str]]
     texts: Mapping[str, Callable[..., Text]]
@@ -142,11 +146,11 @@ class Writer:
         self.next_scratch = SCRATCH
         self.uses_instance = False
         self.passes_on = False
-        """Whether it ends with what a body that it called ended with."""
+        """True if the block is written in which a body returns what a called body returned."""
         self._names = 0
         self._prefix = "%"
-        """Of names of values: numbers grow from line to line, which LLVM reads faster than other names; only what is
-        aside stands further down."""
+        """In front of the numbers that name values.  LLVM reads names fastest if their numbers grow from line to line, so blocks
+        that are written `aside` have another prefix."""
 
     # --- lines
 
@@ -154,7 +158,7 @@ class Writer:
         self.lines.append(text)
 
     def new(self, text: str) -> str:
-        """The name of what an instruction yields."""
+        """Writes an instruction.  Returns the name of its value."""
         self._names += 1
         name = f"{self._prefix}{self._names}"
         self.lines.append(f"{name} = {text}")
@@ -165,7 +169,7 @@ class Writer:
         return f"{letter}{self._names}"
 
     def begin(self, label: str) -> None:
-        """Start a block."""
+        """Starts the block of that label."""
         self.lines.append(f"{label}:")
         self.here, self.dead = label, False
 
@@ -179,11 +183,11 @@ class Writer:
         self.dead = True
 
     def unlikely(self, condition: str, yes: str, no: str) -> None:
-        """A branch that hardly ever goes the first way."""
+        """Writes a branch that hardly ever goes to `yes`."""
         self.emit(f"br i1 {condition}, label %{yes}, label %{no}, {RARE}")
 
     def write(self, block: Block) -> None:
-        """The statements of a block, up to one that leaves it."""
+        """Writes the statements of a block, up to the first that leaves it."""
         stops = self.module.stops
         for position, node in enumerate(block, 1):
             if self.dead:
@@ -195,7 +199,7 @@ class Writer:
 
     @contextmanager
     def aside(self, label: str) -> Iterator[None]:
-        """What is written meanwhile becomes a block at the end of the body, out of the way."""
+        """What is written in this context becomes a block at the end of the body, out of the way of the code that runs."""
         (hot, prefix), (self.lines, self._prefix) = (self.lines, self._prefix), ([f"{label}:"], "%c")
         yield
         self.cold += self.lines
@@ -204,31 +208,31 @@ class Writer:
     # --- operands
 
     def value(self, node: Node) -> str:
-        """The value of an expression (not of a text)."""
+        """Writes an expression that is no text.  Returns the name of its value."""
         return self.values[node[0]](self, *node[1:])
 
     def text(self, node: Node) -> Text:
-        """The value of a text expression.  Its bytes stay as they are until the next statement."""
+        """Writes a text expression.  The bytes of the value stay as they are until the next statement."""
         return self.texts[node[0]](self, *node[1:])
 
     def wide(self, node: Node) -> str:
-        """The value of an integer expression in 64 bits."""
+        """Writes an integer expression.  Returns the name of its value in 64 bits."""
         return self.widened(self.value(node), node[1])
 
     def widened(self, value: str, machine: str) -> str:
-        """An integer in 64 bits."""
+        """Extends an integer to 64 bits."""
         if ir(machine) == "i64":
             return value
         return self.new(f"{'sext' if machine[0] == 'i' else 'zext'} {ir(machine)} {value} to i64")
 
     def temporary(self, number: int, machine: str) -> str:
-        """Where a temporary is kept."""
+        """The name of the stack slot of a temporary."""
         name = f"%t{number}.{machine}"
         self.temporaries[name] = stored(machine)
         return name
 
     def call(self, routine: str, *operands: str) -> str:
-        """What a routine yields for numbers of 64 bits."""
+        """Writes the call of a routine of the library with numbers of 64 bits.  Returns the name of its result."""
         self.module.routines.add(routine)
         return self.new(f"call i64 @{routine}({', '.join(f'i64 {operand}' for operand in operands)})")
 
@@ -259,7 +263,7 @@ class Writer:
         return self.new(f"getelementptr inbounds i8, ptr %m, i64 {offset}")
 
     def scope(self, address: Address, count: int) -> str:
-        """What marks an access at the end of its line, so that LLVM can be told what it cannot meet."""
+        """The mark of an access for the end of its line (see `alias_scopes`); empty for one behind a reference."""
         return "" if self.loose(address) else self.regions.mark(address, count)
 
     @staticmethod
@@ -268,16 +272,16 @@ class Writer:
         return isinstance(address[0], tuple)
 
     def reload(self, address: Address, count: int) -> None:
-        """Behind a store that may have met the step budget: read it anew."""
+        """Behind a store: reads the step budget from memory again if the store may have touched it."""
         if self.loose(address) or not self.regions.is_apart(address, count):
             self.emit(f"store i64 {self.system(BUDGET)}, ptr %budget")
 
     # --- traps
 
     def trap_if(self, condition: str, code: str, site: int, *shown: tuple[Any, ...]) -> None:
-        """End the run if the condition is TRUE.
+        """Writes a branch that ends the run with trap `code` if the condition is TRUE.
 
-        `shown` are the values of the trap: (machine type, operand), ("text", at, length) or ("const", value)."""
+        `shown` are the values of the trap: (machine type, name), ("text", address, length) or ("const", value)."""
         bad, good = self.label("x"), self.label()
         self.unlikely(condition, bad, good)
         with self.aside(bad):
@@ -296,7 +300,7 @@ class Writer:
         self.dead = True
 
     def passing_on(self) -> str:
-        """The label of the block in which a body ends as one did that it called, whose answer stands in the budget."""
+        """The label of the block that returns what a called body returned, which stands in the budget."""
         if not self.passes_on:
             self.passes_on = True
             with self.aside("passing_on"):
@@ -305,7 +309,7 @@ class Writer:
         return "passing_on"
 
     def end(self, code: str, site: int, shown: tuple[Any, ...] = ()) -> None:
-        """Leave the body for a point, here."""
+        """Writes the end of the run at a new point.  `shown` is that of `trap_if`."""
         kinds: list[Shown] = []
         place = 0
         for kind, *operands in shown:
@@ -320,7 +324,7 @@ class Writer:
         self.emit(f"ret i64 {ENDED + self.module.point(code, site, tuple(kinds))}")
 
     def _instance(self) -> int | None:
-        """Where the instance begins whose body ends here; None if that is found in the context."""
+        """Where the instance of this body begins; None if the code writes that into the context, because there are several."""
         if self.body.kind == "FUNCTION":
             return NO_INSTANCE
         if self.base is None:
@@ -329,7 +333,7 @@ class Writer:
         return self.base
 
     def _raw(self, kind: str, operand: str) -> str:
-        """The 64 bits in which a value of a trap is told."""
+        """Converts a value of a trap to the 64 bits in which the context has it."""
         if kind == "f32":
             operand = self.new(f"fpext float {operand} to double")
         return self.new(f"bitcast double {operand} to i64") if is_float(kind) else self.widened(operand, kind)
@@ -337,7 +341,7 @@ class Writer:
     # --- addresses
 
     def pointer(self, address: Address, count: int) -> str:
-        """Where an address lies in the host; its `count` bytes are used."""
+        """Writes the address of `count` bytes.  Returns the name of the pointer."""
         base, offset, terms = address
         start = "%m"
         if base == "self":
@@ -354,7 +358,7 @@ class Writer:
         return start
 
     def offset(self, address: Address, count: int) -> str:
-        """How many bytes from the start of the memory an address lies, in 64 bits."""
+        """Writes how many bytes behind the start of memory an address lies.  Returns the name of the number, in 64 bits."""
         base, offset, terms = address
         if isinstance(base, tuple):
             return self._behind(address, count)
@@ -367,7 +371,8 @@ class Writer:
         return total
 
     def _behind(self, address: Address, count: int) -> str:
-        """The offset of what lies behind a reference, which is checked (R0110)."""
+        """Writes the offset of `count` bytes behind a reference, with the check that they lie in the object that the reference
+        names (R0110).  Returns the name of the number."""
         (_, pointer, site), offset, terms = address
         reference = self.value(pointer)
         form = "i128" if any(abs(stride * edge) >> 56 for stride, term in terms for edge in value_range(term)) else "i64"

@@ -1,4 +1,4 @@
-"""The library: routines of native code, compiled once for all images, each part when the first image calls for it."""
+"""The library of machine code: routines that all images share, compiled part by part when the first image calls one."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ PARTS: tuple[tuple[ModuleType, ...], ...] = ((native_routines,), (reading, nativ
 
 @cache
 def _functions(part: int) -> dict[str, tuple[ast.FunctionDef, ModuleType]]:
-    """The routines of a part by name."""
+    """The functions of a part by name, each with its module."""
     return {node.name: (node, module) for module in PARTS[part] for node in ast.parse(inspect.getsource(module)).body
             if isinstance(node, ast.FunctionDef)}
 
 
 def parts_of(routines: Iterable[str]) -> list[int]:
-    """The parts that hold routines, and those that these call."""
+    """The numbers of the parts that have these routines, and of those that their routines call."""
     last = max((part for part in range(len(PARTS)) for name in routines if name in _functions(part)), default=-1)
     return list(range(last + 1))
 
@@ -37,13 +37,13 @@ def routines_of(part: int) -> list[str]:
 
 
 def declaration(name: str) -> str:
-    """What a module says that calls a routine."""
+    """The declaration of a routine in LLVM's language, for modules that call it."""
     function = next(_functions(part)[name][0] for part in range(len(PARTS)) if name in _functions(part))
     return f"declare i64 @{name}({', '.join('i64' for _ in function.args.args)}) #1"
 
 
 def module_text(part: int) -> str:
-    """A part as a module of LLVM's language."""
+    """The module of a part in LLVM's language."""
     constants: dict[bytes, str] = {}
     own = _functions(part)
     lines: list[str] = []
@@ -57,7 +57,7 @@ def module_text(part: int) -> str:
 
 
 def definitions(constants: Mapping[bytes, str]) -> list[str]:
-    """Constant bytes by their names."""
+    """The definitions of constants, whose names are given by their bytes."""
     return [f"{name} = private unnamed_addr constant [{len(value)} x i8] {_bytes(value)}"
             for value, name in constants.items()]
 

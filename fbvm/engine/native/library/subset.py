@@ -1,8 +1,8 @@
-"""A small part of Python as functions of LLVM: what native code needs besides the Image's own operations is written in it.
+"""Translates a small subset of Python into functions of LLVM.  The library of machine code is written in it.
 
-All values are 64-bit numbers; `//`, `%` and `>>` take them as unsigned, comparisons as signed.  There are assignments,
-if, while, break, continue, return, calls of other routines and of the functions below, which work in Python as well, on
-addresses of the host."""
+All values are 64-bit numbers; `//`, `%` and `>>` take them as unsigned, comparisons as signed.  The subset has assignments,
+if, while, break, continue, return, calls of other routines and of the functions below.  A routine also runs in Python, on
+addresses of the host, which is how it is tested against its translation."""
 
 from __future__ import annotations
 
@@ -100,7 +100,8 @@ _SIGNS: dict[type, str] = {
 
 
 class Routine:
-    """Translates one function.  `names` are the constants of its module, `calls` the routines that it calls."""
+    """Translates one function.  `names` are the constants of its module; `constant` names constant bytes; `calls` are the
+    routines that it calls, known after `translate`."""
 
     def __init__(self, function: ast.FunctionDef, names: Mapping[str, Any], constant: Callable[[bytes], str]) -> None:
         self.function, self.names, self.constant = function, names, constant
@@ -191,7 +192,7 @@ class Routine:
     # --- expressions
 
     def condition(self, node: ast.expr, yes: str, no: str) -> None:
-        """Go to one of two labels."""
+        """Writes a branch to one of two labels."""
         if isinstance(node, ast.BoolOp):
             for value in node.values[:-1]:
                 more = self.label()

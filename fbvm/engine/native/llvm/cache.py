@@ -1,4 +1,4 @@
-"""Objects on disk: what was compiled once is loaded the next time, by any process of this user on this machine."""
+"""Objects of machine code on disk: a process loads what an earlier one of the same user has compiled."""
 
 from __future__ import annotations
 
@@ -16,19 +16,21 @@ FILES = Cache("native", b"fbvm object 1\n", 256 << 20)
 
 @dataclass(frozen=True)
 class Stored:
-    """An object, and what JSON can say about it."""
+    """An object file, and facts about it."""
 
     facts: dict[str, Any]
+    """What JSON can say: names of routines, points at which a run can end, sizes."""
     compiled: bytes
+    """The object file."""
 
 
 def name_of(*parts: str) -> str:
-    """The name for what depends on these texts, on this package's engines, on LLVM and on the processor."""
+    """The file name for an object that depends on these texts, on this package's engines, on LLVM and on the processor."""
     return cache.name_of((*parts, *host(), cache.state_of(PACKAGE / "engine")))
 
 
 def read(name: str) -> Stored | None:
-    """What was stored under a name; None if there is nothing, or nothing that can be trusted."""
+    """The object that was stored under a name; None if there is none, or if the file is damaged."""
     content = FILES.read(name)
     if content is None:
         return None
@@ -40,6 +42,6 @@ def read(name: str) -> Stored | None:
 
 
 def write(name: str, stored: Stored) -> None:
-    """Store an object under a name."""
+    """Stores an object under a name; a full disk or a missing right is no error."""
     facts = json.dumps(stored.facts, separators=(",", ":")).encode()
     FILES.write(name, len(facts).to_bytes(4, "little") + facts + stored.compiled)

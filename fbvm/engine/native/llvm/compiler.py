@@ -1,6 +1,6 @@
-"""LLVM, by way of llvmlite: module text becomes an object, an object becomes addresses of functions.
+"""LLVM, by way of llvmlite: compiles the text of a module to an object file, and loads object files.
 
-The one place that imports llvmlite, and only when asked; everything works without it but this."""
+The only module that imports llvmlite, and only when something is to be compiled or loaded."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from itertools import count
 from typing import Any
 
 MATH = {"ln": 1, "log": 1, "exp": 1, "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "pow": 2, "atan2": 2}
-"""Functions of doubles that objects call, by their names in the table of operations, and how many they take."""
+"""Functions of doubles that machine code calls, by their names in the table of operations, and how many arguments they take."""
 _NUMBERS = count(1)
 _LIBRARIES = {"linux": "libm.so.6", "win32": "ucrtbase"}
-"""Where the functions of C's math.h are that Python's `math` calls; elsewhere they come with the process."""
+"""The library with the functions of C's math.h that Python's `math` calls; on other systems the process has them itself."""
 _NAMES = {"ln": "log", "log": "log10"}
 FAULTS = {
     "-disable-loop-idiom-hashrecognize": (22,),  # 22.1.0: a CRC loop whose counter is used afterwards has a wrong counter
 }
-"""Options that switch off what LLVM is known to do wrongly, and since which of its versions they are understood."""
+"""Options that switch off passes of LLVM with known faults, and the first version that knows each option."""
 _PYTHON = {"double_to_string": "PyOS_double_to_string", "string_to_double": "PyOS_string_to_double",
            "free": "PyMem_Free"}
-"""What texts of floats need, so that they are the very texts that Python writes: functions of the interpreter written
-in C, which are called with its lock held."""
+"""Functions of the interpreter by which machine code writes and reads floats, so that the texts are those of the Python engine.
+They are called with the interpreter's lock held."""
 
 
 @cache
@@ -36,7 +36,7 @@ def available() -> bool:
 
 @cache
 def llvm() -> Any:
-    """`llvmlite.binding`, ready for this machine, with our symbols.  Raises ImportError where there is none."""
+    """The module `llvmlite.binding`, initialised for this machine.  Raises ImportError where llvmlite is missing."""
     import llvmlite.binding as binding  # type: ignore[import-untyped]
 
     if binding.llvm_version_info < (20,):  # there it is to be done by hand, and not allowed later
@@ -51,7 +51,7 @@ def llvm() -> Any:
 
 @cache
 def _symbols() -> dict[str, int]:
-    """Functions that objects call, by the names that modules give them."""
+    """The addresses of the functions outside that machine code calls, by the names that modules give them."""
     try:
         library = ctypes.CDLL(_LIBRARIES.get(sys.platform))
     except OSError:
@@ -69,7 +69,7 @@ def _address(function: Any) -> int:
 
 @cache
 def host() -> tuple[str, str, str, str]:
-    """What an object depends on besides its module: version of llvmlite, triple, processor, its features."""
+    """What an object depends on besides its module: version of llvmlite, target triple, processor, features of the processor."""
     import llvmlite
 
     binding = llvm()
@@ -83,17 +83,18 @@ def _machine(level: int) -> Any:
 
 
 def _fresh_machine(level: int) -> Any:
-    """A target machine: the host, no excess precision, no contraction of a product and a sum."""
+    """A target machine for the host, without excess precision and without fused products and sums."""
     _, triple, processor, features = host()
     return llvm().Target.from_triple(triple).create_target_machine(
         cpu=processor, features=features, opt=2 if level else 0, reloc="pic", codemodel="small")
 
 
 def compile_text(text: str, level: int) -> bytes:
-    """The object of a module: at level 0 soon, at level 2 fast; at level 1 of good instructions for what is written well,
-    without the passes over the module, which take ten times as long to load as a small module needs.
+    """Compiles the text of a module.  Returns the object file.
 
-    Raises RuntimeError for a text that is no module."""
+    Level 0 compiles soon, level 2 makes fast code.  Level 1 selects good instructions but runs no passes over the module: for
+    small modules of code that is written well, since to load the passes takes ten times as long as to compile such a
+    module.  Raises RuntimeError for a text that is no module."""
     machine = _machine(level)
     module = _optimised(text, level)
     emitted: bytes = machine.emit_object(module)
@@ -101,7 +102,7 @@ def compile_text(text: str, level: int) -> bytes:
 
 
 def _optimised(text: str, level: int) -> Any:
-    """The module of a text after the passes of a level; only level 2 has any."""
+    """The module of a text, after the passes of level 2 if that is the level."""
     binding = llvm()
     module = binding.parse_assembly(text, binding.create_context())
     module.triple = host()[1]
@@ -116,22 +117,22 @@ def _optimised(text: str, level: int) -> Any:
 
 
 def assembly(text: str, level: int) -> tuple[str, str]:
-    """A module after optimisation, and the processor's instructions: for those who want to look."""
+    """The module of a text after optimisation, and its assembly, both as text: for inspection."""
     module = _optimised(text, level)
     return str(module), _machine(level).emit_assembly(module)
 
 
 @cache
 def _jit() -> Any:
-    """What loads objects; their sections lie together, as small code wants them."""
+    """What loads object files.  It places the sections of one close together, as the small code model demands."""
     return llvm().create_lljit_compiler(_fresh_machine(2), use_jit_link=sys.platform != "win32")
 
 
 class Linked:
-    """An object in memory, ready to be called.  It stays as long as somebody has this.
+    """An object file that is loaded.  It stays in memory as long as this Python object.
 
-    `exports` are the functions and variables whose addresses are wanted, `others` functions that it may call besides
-    those of the host.  Raises RuntimeError for a damaged object."""
+    `compiled` is the object file, `exports` the functions and variables whose addresses are wanted, `others` the addresses of
+    functions that it may call besides those of the host.  Raises RuntimeError for a damaged object file."""
 
     def __init__(self, compiled: bytes, exports: Iterable[str], others: Mapping[str, int] | None = None) -> None:
         builder = llvm().JITLibraryBuilder().add_object_img(compiled).add_current_process()
@@ -142,6 +143,6 @@ class Linked:
         self._library = builder.link(_jit(), f"fbvm{next(_NUMBERS)}")
 
     def address(self, name: str) -> int:
-        """Where one of the exports is.  Raises KeyError for another name."""
+        """The address of one of the exports.  Raises KeyError for another name."""
         address: int = self._library[name]
         return address

@@ -1,7 +1,8 @@
-"""Entries: functions without arguments, each bound to one task of one PLC, which Python calls in a tenth of a microsecond.
+"""Entry points: functions of machine code without arguments, each bound to one task of one PLC.
 
-They come in blocks, made once and loaded as often as needed.  An entry reads from its slot what to call and with which
-memory and context, so that it can be bound anew and be given better code between two calls."""
+Python calls a function without arguments in a tenth of a microsecond.  Entry points are compiled in blocks, once, and loaded
+as often as needed.  Each reads from its slot which function to call, with which memory and context, so that it can be bound
+to another PLC and be given better code between two calls."""
 
 from __future__ import annotations
 
@@ -14,8 +15,9 @@ from fbvm.engine.native.llvm.cache import Stored, name_of
 from fbvm.engine.native.llvm.compiler import Linked, compile_text
 
 BLOCK = 32
-"""Entries that are loaded together."""
+"""Entry points of one block, which are loaded together."""
 SLOT_BYTES = 24
+"""A slot: the addresses of function, memory and context."""
 _FUNCTION = ctypes.PYFUNCTYPE(ctypes.c_int32)
 _ENTRY = """
 define i32 @e{0}() {{
@@ -28,7 +30,8 @@ ret i32 %p
 
 
 class EntryPoint:
-    """One entry: `call` is the function.  It has to be bound before it is called."""
+    """One entry point.  `call` executes the task and returns the point at which it ended, 0 for its end; `bind` and
+    `set_target` come before the first call."""
 
     def __init__(self, block: _Block, number: int) -> None:
         self._block, self._number = block, number
@@ -36,26 +39,26 @@ class EntryPoint:
         self.call: Callable[[], int] = _FUNCTION(block.linked.address(f"e{number}"))
 
     def bind(self, memory: int, context: int) -> None:
-        """Say over which memory and context the entry works."""
+        """Sets the addresses of memory and context."""
         self._slot[1], self._slot[2] = memory, context
 
     def set_target(self, function: int) -> None:
-        """Say what the entry calls from now on; another thread may say so."""
+        """Sets the address of the function that is called from now on.  The worker's thread may do so between two calls."""
         self._slot[0] = function
 
     @property
     def function_at(self) -> int:
-        """Where the address of what it calls lies, at any time."""
+        """The address at which the address of the function lies, whichever function that is by then."""
         return self._block.slots + SLOT_BYTES * self._number
 
     def release(self) -> None:
-        """Somebody else may have the slot; `call` must not be used any more."""
+        """Gives the slot to the next who asks for an entry point; `call` must not be used any more."""
         self._block.free.append(self._number)
         _open.append(self._block)
 
 
 class _Block:
-    """Entries that were loaded together, and the numbers of those that nobody has."""
+    """A block that is loaded, and the numbers of its free entry points."""
 
     def __init__(self) -> None:
         self.linked = Linked(_compiled(), ["slots", *(f"e{number}" for number in range(BLOCK))])
@@ -64,12 +67,12 @@ class _Block:
 
 
 _open: list[_Block] = []
-"""Blocks with free entries, each as often as it got one."""
+"""Blocks with free entry points; a block is in here once for each that was released."""
 
 
 @cache
 def _compiled() -> bytes:
-    """The object of a block."""
+    """The object file of a block."""
     entries = [_ENTRY.format(number, *(SLOT_BYTES * number + part for part in (0, 8, 16))) for number in range(BLOCK)]
     head = f"@slots = global [{SLOT_BYTES * BLOCK} x i8] zeroinitializer, align 8"
     text = "\n".join([head, *entries])
@@ -82,7 +85,7 @@ def _compiled() -> bytes:
 
 
 def entry() -> EntryPoint:
-    """An entry that nobody else has."""
+    """An entry point that is in use nowhere else, from a loaded block or a new one."""
     while _open and not _open[-1].free:
         _open.pop()
     if not _open:

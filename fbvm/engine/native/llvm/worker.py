@@ -1,7 +1,7 @@
-"""The compiler's helper process: optimises while this process goes on scanning, and ends with it.
+"""The helper process of the compiler: it optimises modules while this process goes on scanning, and ends with this process.
 
-Optimising a large program takes seconds, which would hold LLVM for others in this process and could not be broken off.
-One thread, the only one in the house, waits for the answers."""
+To optimise a large program takes seconds.  In this process that would block LLVM for all other modules and could not be broken
+off.  One thread waits for the answers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,10 @@ _SIZE_BYTES = 8
 
 
 def serve(jobs: IO[bytes], answers: IO[bytes]) -> None:
-    """Compile one module after the other until nobody asks any more; an answer of no bytes tells that it failed."""
+    """Runs in the helper process: compiles one module after the other until `jobs` ends.
+
+    A job is the size of a text in eight bytes, and the text of a module; an answer the size of an object file, and the object
+    file, which is empty if the compilation failed."""
     from fbvm.engine.native.llvm.compiler import compile_text
 
     while len(head := jobs.read(_SIZE_BYTES)) == _SIZE_BYTES:
@@ -33,7 +36,7 @@ def serve(jobs: IO[bytes], answers: IO[bytes]) -> None:
 
 
 class Worker:
-    """The helper process of this process, started with the first job."""
+    """Gives jobs to the helper process, which is started with the first job."""
 
     def __init__(self) -> None:
         self._jobs: deque[tuple[Callable[[], str], Callable[[bytes], None]]] = deque()
@@ -43,7 +46,9 @@ class Worker:
         self._owner = os.getpid()
 
     def compile(self, text: Callable[[], str], done: Callable[[bytes], None]) -> None:
-        """Have a module optimised; `done` is told its object, in the thread.  If that is not possible, it never is."""
+        """Has a module optimised.  `text` returns its text and `done` takes its object file; both are called in the thread.
+
+        If the helper process cannot be started or dies, `done` is never called."""
         with self._lock:
             self._jobs.append((text, done))
             if not self._busy:
@@ -84,7 +89,7 @@ class Worker:
         return process
 
     def stop(self) -> None:
-        """End the helper process, whatever it is doing."""
+        """Ends the helper process, whatever it is doing."""
         process, self._process = self._process, None
         if process is None or self._owner != os.getpid():
             return
