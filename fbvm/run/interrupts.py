@@ -1,4 +1,4 @@
-"""Ctrl-C takes effect between two scans, or while nobody does anything: what is half sent would be forgotten else."""
+"""Delays Ctrl-C to the end of a scan: in the middle of one, bytes could be sent without the program knowing."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from types import FrameType
 
 
 class Interrupts:
-    """While it is entered, Ctrl-C is noted; it is KeyboardInterrupt at once while the loop `waits`, and the second time.
+    """A context in which Ctrl-C is noted for `check`.
 
-    Does nothing outside the main thread, or where somebody else has a say in Ctrl-C."""
+    While the loop `waits`, and at the second Ctrl-C, KeyboardInterrupt is raised at once.  Does nothing outside the main
+    thread, or if another handler of SIGINT is installed."""
 
     def __init__(self) -> None:
         self.noted = False
@@ -35,11 +36,11 @@ class Interrupts:
         self.noted = True
 
     def begin_wait(self) -> None:
-        """From now on until `waits` is set back it takes effect at once."""
+        """From now on, until `waits` is set to False, Ctrl-C raises KeyboardInterrupt at once.  Raises one that was noted."""
         self.waits = True
         self.check()
 
     def check(self) -> None:
-        """Raises KeyboardInterrupt if one has come."""
+        """Raises KeyboardInterrupt if Ctrl-C was noted."""
         if self.noted:
             raise KeyboardInterrupt

@@ -18,12 +18,12 @@ from fbvm.run.interrupts import Interrupts
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
 from fbvm.wire.link import RealNetwork
 
-Numbers = dict[int, None]
-"""Runs by their numbers, each once, in the order of their turns."""
+RunNumbers = dict[int, None]
+"""An ordered set of run numbers."""
 PROGRESS_NS = 100_000_000
-"""How often progress is told, at most."""
-PATIENCE_NS = 1_000_000
-"""How long nobody looks at a network that has something only for PLCs which keep their period and fetch it then."""
+"""The shortest time between two calls of `progress`."""
+PAUSE_NS = 1_000_000
+"""How long the loop ignores a network that has events only for PLCs in cyclic pace, which collect them in their next scan."""
 
 
 def run(
@@ -37,33 +37,38 @@ def run(
     pace: str = CYCLIC,
     progress: Callable[[Plc], None] | None = None,
 ) -> str:
-    """Runs until the first of the bounds, as `Plc.run` has them; returns its name, or "interrupted" after Ctrl-C.
+    """Runs a PLC in real time if one of its networks is real, else in virtual time, until the first of the bounds.
 
-    `pace` "cyclic" keeps the period of the PLC; "event" (real time only) scans again at once when a unit or its network
-    has news, else when a timer ends, and at the latest when the period ends.  `progress` is called now and then, not in
-    each scan.  How long scans took is in `plc.scan_times`, how late they began in `plc.lateness`."""
+    `scans`, `for_ns`, `until` and `max_ns` are those of `Plc.run`; `writes` are written when their time has come.  `pace`
+    "cyclic" keeps the period of the PLC.  "event" (real time only) scans again at once when a unit has changed words or its
+    network has events, else when a timer ends, and at the latest when the period ends.  `progress` is called at most every
+    100 ms.
+
+    Returns what ended the run as `Plc.run` does, or "interrupted" after Ctrl-C.  How long scans took is in
+    `plc.scan_times`, how late they began in `plc.lateness`.  Raises ValueError for bounds that make no sense."""
     running = Running(plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns, writes=writes, pace=pace)
     run_all([running], (lambda: progress(plc)) if progress else None)
     return running.reason
 
 
 def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None) -> None:
-    """Runs several PLCs side by side, each until its own end; the `reason` of each says what that was.
+    """Runs several PLCs side by side, each until its own end, which its `reason` says then.
 
-    They share one time: real if a network of any of them is, so that a network may have units of several PLCs."""
+    All have the same time, real if a network of any of them is real, so that PLCs may share a network.  `progress` is called
+    at most every 100 ms."""
     networks = {id(unit.network): unit.network for run in runs for unit in run.plc.units if not unit.network.virtual_time}
     start_ns = max((run.plc.elapsed_ns for run in runs), default=0)
     interrupts = Interrupts()
-    clock: _Clock = _Virtual()
+    clock: _Clock = _VirtualClock()
     if networks:
-        clock = real = _Real(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
+        clock = real = _RealClock(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
         for run in runs:
             run.begin(start_ns + run.phase_ns, real.behind)
     else:  # nothing happens between two periods of virtual time
         for run in runs:
             run.begin(start_ns)
             run.pace, run.alone = CYCLIC, len(runs) == 1
-    queue = _Alone(runs) if len(runs) == 1 else _Queue(runs)
+    queue = _SingleRun(runs) if len(runs) == 1 else _Queue(runs)
     told_ns = time.monotonic_ns()
     try:
         with interrupts:
@@ -81,8 +86,8 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
         clock.stop()
 
 
-def _scan_all(queue: _Queue | _Alone, now_ns: int, woken: Numbers, real: bool) -> None:
-    """Scans of everybody who is woken or whose time has come, with the same time for all."""
+def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, real: bool) -> None:
+    """Scans all runs that are woken or due, with the same time for all."""
     first_ns = began_ns = time.monotonic_ns()
     for number in queue.take(now_ns, woken):
         run = queue.runs[number]
@@ -103,24 +108,24 @@ def _scan_all(queue: _Queue | _Alone, now_ns: int, woken: Numbers, real: bool) -
 
 
 class _Queue:
-    """Who scans when.
+    """A priority queue of runs by the time at which they are due.
 
-    Each stands in the row of a time, which is when it is due or before: who is woken again and again, and due later each
-    time, moves on only when that row is the next."""
+    Each run is in the row of a time, which is when it is due or earlier.  A run that is woken often, and due later each time,
+    is moved only when its row comes first; to move it each time would cost more than its scan."""
 
     def __init__(self, runs: Sequence[Running]) -> None:
         self.runs = runs
         self._times: list[int] = []
-        """Of the rows, the next first."""
+        """The times of the rows, as a heap."""
         self._rows: dict[int, list[int]] = {}
-        """Who stands where, by number; PLCs with one period share a row."""
+        """The numbers of the runs in each row; PLCs with the same period share one."""
         self._stands_ns = [NEVER] * len(runs)
-        """Time of the row in which each stands; where else it is found is out of date."""
+        """For each run the time of its row; NEVER if it is in none.  Entries of a run in other rows are out of date."""
         for number, run in enumerate(runs):
             self.put(number, run)
 
     def put(self, number: int, run: Running) -> None:
-        """Remember when a run is due, unless it has ended."""
+        """Puts a run into the row of its time, unless it has ended or is in an earlier row."""
         due_ns = run.due_ns
         if run.reason:
             self._stands_ns[number] = NEVER
@@ -134,7 +139,7 @@ class _Queue:
                 row.append(number)
 
     def next_ns(self) -> int | None:
-        """When somebody is due; None if all have ended."""
+        """The time at which the next run is due; None if all have ended."""
         runs, stands_ns = self.runs, self._stands_ns
         while self._times:
             time_ns = self._times[0]
@@ -150,8 +155,8 @@ class _Queue:
             del self._rows[heapq.heappop(self._times)]
         return None
 
-    def take(self, now_ns: int, woken: Numbers) -> Numbers:
-        """Those that are woken, and all that are due; who has scanned one puts it back."""
+    def take(self, now_ns: int, woken: RunNumbers) -> RunNumbers:
+        """Adds all runs that are due at `now_ns` to `woken`, and returns it.  The caller puts each back after its scan."""
         times = self._times
         while times and times[0] <= now_ns:
             time_ns = heapq.heappop(times)
@@ -166,20 +171,20 @@ class _Queue:
         return woken
 
 
-class _Alone:
-    """Who is alone needs no queue."""
+class _SingleRun:
+    """In place of a queue, for one run."""
 
     def __init__(self, runs: Sequence[Running]) -> None:
         self.runs = runs
 
     def put(self, number: int, run: Running) -> None:
-        """It says itself when it is due."""
+        """Nothing to do: the run itself says when it is due."""
 
     def next_ns(self) -> int | None:
         run = self.runs[0]
         return None if run.reason else run.due_ns
 
-    def take(self, now_ns: int, woken: Numbers) -> Numbers:
+    def take(self, now_ns: int, woken: RunNumbers) -> RunNumbers:
         return {0: None}
 
 
@@ -188,27 +193,27 @@ class _Clock(Protocol):
 
     real: bool
 
-    def reach(self, due_ns: int) -> tuple[int, Numbers]:
-        """Waits until then, or until somebody is woken; the time, and the runs that have news."""
+    def reach(self, due_ns: int) -> tuple[int, RunNumbers]:
+        """Waits until `due_ns`, or until a network has events for a run.  Returns the time, and the runs that are woken."""
 
     def stop(self) -> None:
         """The loop has ended."""
 
 
-class _Virtual:
-    """Time that goes where the next scan is."""
+class _VirtualClock:
+    """Virtual time: it goes to the next scan without waiting."""
 
     real = False
 
-    def reach(self, due_ns: int) -> tuple[int, Numbers]:
+    def reach(self, due_ns: int) -> tuple[int, RunNumbers]:
         return due_ns, {}
 
     def stop(self) -> None:
         """Nothing to give back."""
 
 
-class _Real:
-    """The host's time, and the networks that live in it: each is asked once whenever somebody scans."""
+class _RealClock:
+    """The host's time, and the networks that live in it; each network is served once before scans."""
 
     real = True
 
@@ -223,12 +228,12 @@ class _Real:
         self._zero_ns = time.monotonic_ns() - start_ns
 
     def behind(self, behind_ns: int) -> Clock:
-        """A clock that is behind this time by so much."""
+        """A clock for Python and machine code that is `behind_ns` behind the time of this loop."""
         monotonic_ns, zero_ns = time.monotonic_ns, self._zero_ns + behind_ns
         function = function_at(time.get_clock_info("monotonic").implementation)
         return Clock(lambda: monotonic_ns() - zero_ns, function, time.CLOCK_MONOTONIC if function else 0, zero_ns)
 
-    def reach(self, due_ns: int) -> tuple[int, Numbers]:
+    def reach(self, due_ns: int) -> tuple[int, RunNumbers]:
         zero_ns = self._zero_ns
         while (left_ns := due_ns - (now_ns := time.monotonic_ns() - zero_ns)) > 0:
             self._interrupts.begin_wait()
@@ -241,13 +246,13 @@ class _Real:
             if found:
                 if woken := self._serve(now_ns := time.monotonic_ns() - zero_ns):
                     return now_ns, woken
-                time.sleep(min(left_ns, PATIENCE_NS) / 1e9)
+                time.sleep(min(left_ns, PAUSE_NS) / 1e9)
         return now_ns, self._serve(now_ns)
 
-    def _serve(self, now_ns: int) -> Numbers:
-        """Asks the networks what happened until now; whom it wakes."""
+    def _serve(self, now_ns: int) -> RunNumbers:
+        """Serves the networks at `now_ns`.  Returns the runs in event pace for which they have events."""
         numbers = self._numbers
-        woken: Numbers = {}
+        woken: RunNumbers = {}
         for network in self._networks:
             for link in network.serve(now_ns):
                 if link in numbers:
@@ -260,5 +265,5 @@ class _Real:
 
 
 def epoch_ns() -> int:
-    """The date of this moment, in nanoseconds since 1970, for what is kept beyond a run."""
+    """The date in nanoseconds since 1970, for files that outlive a run."""
     return time.time_ns()

@@ -24,17 +24,17 @@ from fbvm.watch.values import Value, conform, parse_value
 from fbvm.wire.registers import server
 
 MANY = 10
-"""So many equal PLCs execute enough together for machine code from the first scan on."""
+"""From so many equal PLCs on machine code runs from the first scan: together they execute enough for that."""
 ENDLESS = 1 << 62
 """So many nanoseconds or scans nobody waits for."""
 MOMENT_NS = 1_000_000
-"""Equal PLCs are spread over their cycle in such steps, in real time: who scans at the same moment waits for the others,
-and waking up for each alone would cost more than the scan."""
+"""In real time equal PLCs are spread over their cycle in such steps: those that scan at the same moment wait for one another,
+and to wake up for each alone would cost more than its scan."""
 
 
 @dataclass
 class Kind:
-    """Equal PLCs, and what is watched of each."""
+    """The PLCs of one row of a project, which share an image, and what is watched of each."""
 
     row: PlcRow
     runs: list[Running] = field(default_factory=list)
@@ -48,15 +48,16 @@ class Kind:
         return [f"{self.row.name}[{number}]" for number in range(1, self.row.count + 1)]
 
     def values(self, run: Running) -> dict[str, Value]:
-        """What is watched of one of them, now."""
+        """The present values of what is watched of one of them, by name."""
         return {name: run.plc.read(place) for name, place in self.watched.items()}
 
 
 class Plant:
-    """A project that can run.  `net` stands in for the file's.  Its mistakes are in `diagnostics`; then there is no PLC.
+    """The PLCs of a project, compiled, connected and ready for `run_all`.
 
-    `wanted` says which warnings; `for_ns` and `scans` end PLCs that have no end of their own, in place of what the file
-    says.  Raises OSError if the host's network cannot be used."""
+    `net` ("loop" or "tcp") takes the place of the file's; `for_ns` and `scans`, if one is given, take the place of the file's
+    bounds for PLCs that have no end of their own; `wanted` says which warnings are shown.  Mistakes of the project are in
+    `diagnostics`; if there is an error, the plant is closed.  Raises OSError if the host's network cannot be used."""
 
     def __init__(
         self, project: Project, *, net: str | None = None, for_ns: int | None = None, scans: int | None = None,
@@ -166,7 +167,7 @@ class Plant:
 
 
 def _value(where: Place | Span, written: object) -> object:
-    """What TOML can say as a value of that type; texts are read as in a program."""
+    """A value of TOML as one of the type of `where`; texts are read as literals of a program.  Raises ValueError, TypeError."""
     if isinstance(where, Span):
         if not isinstance(written, list) or len(written) != len(where.places):
             raise ValueError(f"{where.name} takes a list of {len(where.places)} values")

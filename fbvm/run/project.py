@@ -73,7 +73,7 @@ UNIT: Keys = {
     "slot": Key(whole(0, 254), None), "mac": Key(text, None), "module": Key(whole(0, 31), None), "http": Key(flag, None),
     "ftp": Key(flag, None), "restart": Key(time_ns, None), "model": Key(text, None),
 }  # fmt: skip
-"""All of these; which a unit has is said by its type."""
+"""The keys of all units; which of them a unit has depends on its type."""
 SET: Keys = {"name": Key(text), "value": Key(anything), "at": Key(moment_ns, 0)}
 PLC: Keys = {
     "sources": Key(texts), "program": Key(text, None), "resource": Key(text, None),
@@ -94,7 +94,7 @@ class UnitRow:
     kind: str
     address: str
     options: Mapping[str, Any]
-    """What is written besides, by its keys."""
+    """What else is written, by its keys."""
 
 
 @dataclass(frozen=True)
@@ -144,14 +144,14 @@ class Project:
 
 
 def project_file(path: Path) -> Path | None:
-    """The project file that is meant by a file or a folder; None if it is none."""
+    """The project file for a path: itself if it is a .toml file, `fbvm.toml` in a folder; None for any other."""
     if path.is_dir():
         path = path / FILE
     return path if path.suffix == ".toml" and path.is_file() else None
 
 
 def read_project(path: Path) -> Project | list[Diagnostic]:
-    """The project of a file, or all that is wrong with the file.  Sources are not looked at yet."""
+    """Reads a project file.  Returns the project, or all diagnostics of the file; sources are not read yet."""
     found = read(path, str(path))
     if isinstance(found, Diagnostic):
         return [found]

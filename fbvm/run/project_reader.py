@@ -1,4 +1,4 @@
-"""Reads TOML by a table of keys: values of the right kind come out, or messages that name file, key and what to write.
+"""Reads TOML by a table of keys.  Returns values of the right kind, or diagnostics that say which key is wrong and what to write.
 
 Knows nothing of PLCs; the tables are in `project`."""
 
@@ -21,8 +21,10 @@ REQUIRED = object()
 
 @dataclass(frozen=True)
 class Key:
-    """A row: `kind` makes the value of what is written, or raises ValueError with what to write; or it is the table of
-    keys of a table, of each table of an array (`many`), or of each table by its name (`named`)."""
+    """A row of a table of keys.
+
+    `kind` converts what is written to the value, or raises ValueError with what to write.  Or it is a table of keys itself: of
+    a table, of each table in an array (`many`), or of each table by its name (`named`)."""
 
     kind: Callable[[Any], Any] | Mapping[str, Key]
     default: Any = REQUIRED
@@ -35,13 +37,13 @@ Keys = Mapping[str, Key]
 
 @dataclass
 class Reading:
-    """One file on its way; `diagnostics` grows."""
+    """One file that is being read; its mistakes come into `diagnostics`."""
 
     source: Source
     diagnostics: list[Diagnostic] = field(default_factory=list)
 
     def load(self) -> dict[str, Any]:
-        """The file as the host reads TOML; empty if it is none."""
+        """The file as Python reads TOML; {} and a diagnostic if it is no TOML."""
         try:
             return tomllib.loads(self.source.text)
         except tomllib.TOMLDecodeError as error:
@@ -54,11 +56,11 @@ class Reading:
             return {}
 
     def report(self, code: str, path: Path, message: str, hint: str = "") -> None:
-        """A message about what stands at a path."""
+        """Adds a diagnostic about what stands at a path."""
         self.diagnostics.append(Diagnostic(code, self.source, *span(self.source, path), message, hint))
 
     def table(self, written: object, keys: Keys, path: Path = ()) -> dict[str, Any]:
-        """The values of a table, defaults where nothing is written or nothing that can be used."""
+        """The values of a table by its keys, with the default where nothing usable is written."""
         if not isinstance(written, dict):
             self.report("P0103", path, f"{_called(path)} is no table", f"write [{_called(path)}] and its keys below")
             return {name: key.default for name, key in keys.items()}
@@ -129,7 +131,11 @@ def anything(value: object) -> object:
 
 
 def time_ns(value: object) -> int:
-    """`"10ms"`, more than nothing."""
+    """A time longer than 0, in nanoseconds.  Raises ValueError.
+
+    >>> time_ns("10ms")
+    10000000
+    """
     passed_ns = moment_ns(value)
     if not passed_ns:
         raise ValueError(f"{value!r} is no time that can pass")
@@ -137,7 +143,7 @@ def time_ns(value: object) -> int:
 
 
 def moment_ns(value: object) -> int:
-    """`"2s"` from power-on, or `"0s"`."""
+    """A time from power-on, 0 or more, in nanoseconds: `"2s"`.  Raises ValueError."""
     if not isinstance(value, str):
         raise ValueError(f'{value!r} is no time; write it with its unit in quotes: "10ms"')
     passed_ns = parse_time_ns(value)
@@ -169,7 +175,7 @@ def one_of(names: Sequence[str]) -> Callable[[object], str]:
 
 
 def ip(value: object) -> str:
-    """`"192.168.250.21"`."""
+    """An IPv4 address: `"192.168.250.21"`.  Raises ValueError."""
     parts = value.split(".") if isinstance(value, str) else []
     if len(parts) != 4 or not all(part.isdecimal() and int(part) <= 255 for part in parts):
         raise ValueError(f'{value!r} is no IPv4 address; write "192.168.250.21"')
@@ -177,13 +183,13 @@ def ip(value: object) -> str:
 
 
 def endpoint(value: object) -> Peer:
-    """`"192.168.250.1:502"`."""
+    """An IPv4 address and a port: `"192.168.250.1:502"`.  Raises ValueError."""
     host, port = _parted(value, "192.168.250.1:502")
     return Peer(ip(host), port)
 
 
 def host(value: object) -> tuple[str, int]:
-    """`"127.0.0.1:15020"` or `"name:15020"`."""
+    """An address or name of the host's network, and a port: `"127.0.0.1:15020"`.  Raises ValueError."""
     return _parted(value, "127.0.0.1:15020")
 
 

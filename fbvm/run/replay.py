@@ -1,6 +1,6 @@
-"""Does a journal again: the same program, the same inputs, and after each scan the same memory, to the bit.
+"""Replays a journal: the same program, the same inputs, and after each scan the same memory, to the bit.
 
-Time is what the journal says, so that an hour on real connections is done again in seconds, and nothing leaves memory.
+The time is that of the journal, so that an hour on real connections takes seconds.  Nothing is sent.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class _Recorded:
 
 
 class Replay:
-    """A journal on its way: `plc` stands where it stood after the scan that was done last.
+    """A replay in progress: `plc` is as it was after the scan that was replayed last.
 
     `header` and `entries` come from `open_journal`; `image` is the program that ran, `units` make the units by class
     name, and `engine` need not be that of the first time.  Raises JournalError if another program wrote the journal,
@@ -69,7 +69,7 @@ class Replay:
         self._entries = entries
         self.plc = Plc(image, header.cycle_ns, budget=header.budget, observed=observed, engine=engine)
         self.differs: int | None = None
-        """Number of the first scan after which the memory was not what the journal says; None if there is none."""
+        """Number of the first scan after which the memory was not that of the journal; None if there is none."""
         self.complete = False
         """True when the end of the journal was reached.  One that was cut off has none."""
         self._units = units
@@ -77,7 +77,7 @@ class Replay:
         self._fingerprint = Fingerprint(self.plc.memory)
 
     def step(self) -> bool:
-        """Everything up to the end of the next scan; False if there is none."""
+        """Replays everything up to the end of the next scan.  Returns False at the end of the journal."""
         for entry in self._entries:
             try:
                 if isinstance(entry, Scan):
@@ -91,8 +91,9 @@ class Replay:
         return False
 
     def run(self, *, scans: int | None = None, until: str | Callable[[Plc], bool] | None = None) -> str:
-        """Goes on until "scans" or "until" of `Plc.run`, to the "end" of the journal, or to the first scan that
-        "differs"; says which."""
+        """Replays scans up to a bound of `Plc.run`, the end of the journal, or the first scan with another memory.
+
+        Returns "scans", "until", "end" or "differs"."""
         never = scans is None and until is None
         goal = Goal(self.plc, scans=1 << 62 if never else scans, until=until)
         while not (reason := goal.reached()) or reason == "trap":
@@ -139,7 +140,7 @@ class Replay:
             self.differs = scan.number
 
     def _force(self, scan: Scan) -> None:
-        """Changes what is forced; the memory itself changes by what was written."""
+        """Changes what is forced, but not the memory: what a force wrote at once is among the journal's writes."""
         before = self.plc.memory.snapshot()
         for name, value in scan.forced.items():
             self.plc.force(name, value)

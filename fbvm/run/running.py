@@ -1,6 +1,6 @@
-"""One PLC on its run: what ends it, what is written into it and when, and when it scans next.
+"""One PLC in a run: its bounds, what is written into it and when, and when it scans next.
 
-Knows no clock: the loop tells the time and asks for the next one."""
+It reads no clock: the loop tells the time and asks when the next scan is due."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from fbvm.watch.paths import Place, Span
 
 CYCLIC, EVENT = "cyclic", "event"
 PACES = (CYCLIC, EVENT)
-"""cyclic: a fixed period.  event: at once when there is something new to see, else at the earliest time that matters."""
+"""cyclic: a fixed period.  event: at once when a unit changed words or a network has events, else when a timer ends."""
 MOST_AT_ONCE = 16
-"""Scans of one PLC in event pace before the network and the others have their turn again."""
+"""So many scans one burst has at most; then the loop looks at the networks and the other PLCs."""
 
 
 @dataclass(frozen=True)
@@ -50,14 +50,14 @@ class Running:
         self.plc = plc
         self.pace = pace
         self.phase_ns = phase_ns
-        """How much later than the loop it is switched on, in real time: many PLCs need not scan at the same moment."""
+        """How much later than the loop it is switched on, in real time, so that PLCs do not all scan at the same moment."""
         self._goal = Goal(plc, scans=scans, for_ns=for_ns, until=until, max_ns=max_ns)
         self.reason = self._goal.reached()
         """What ended the run, by the names of `Plc.run`; "" while it goes on."""
         self.due_ns = plc.elapsed_ns
         """When the next scan is to begin."""
         self.alone = False
-        """Nobody has to be told between two scans but who looks into this PLC, and time goes where its next scan is."""
+        """True for the only PLC of a run in virtual time: many scans may follow without coming back to the loop."""
         self._behind_ns = 0
         self._clock: Clock | None = None
         self._writes = sorted(writes, key=lambda write: write.at_ns)
@@ -68,16 +68,18 @@ class Running:
         return tuple(self._writes)
 
     def begin(self, start_ns: int, clock: Callable[[int], Clock] | None = None) -> None:
-        """The loop begins at this time of its own, which goes on by itself if there is a clock: one that is behind the
-        loop's by so much is made by `clock`."""
+        """Called when the loop starts: the PLC's first scan is at `start_ns` of the loop's time.
+
+        In real time `clock(behind_ns)` makes a clock that is `behind_ns` behind the loop's: the PLC's own, for bursts."""
         self._behind_ns = start_ns - self.plc.elapsed_ns
         self.due_ns = start_ns
         self._clock = clock(self._behind_ns) if clock and self.pace == EVENT else None
 
     def scan(self, now_ns: int) -> list[int]:
-        """One scan at this time, or more upon it, and the plan for the next.  A period that was overrun is not made up for.
+        """One scan or a burst at `now_ns` of the loop's time; plans the next, `due_ns`.  An overrun period is not made up
+        for.
 
-        Returns when the scans of a burst began."""
+        Returns the times of a burst's scans, [] for another scan."""
         plc = self.plc
         times: list[int] = []
         if self._writes:
@@ -105,13 +107,13 @@ class Running:
         return times
 
     def _write(self, told_ns: int) -> None:
-        """Writes what is to be written until then."""
+        """Writes what is due at `told_ns` of the PLC's time."""
         while self._writes and self._writes[0].at_ns <= told_ns:
             write = self._writes.pop(0)
             self.plc.write(write.where, write.value)
 
     @property
     def _cycles_left(self) -> int:
-        """How many scans of a cycle each come before the goal, or the next write."""
+        """How many scans of a cycle each may follow before the bounds have to be looked at, or something is to be written."""
         left, plc = self._goal.cycles_left, self.plc
         return min(left, -((plc.elapsed_ns - self._writes[0].at_ns) // plc.cycle_ns)) if self._writes else left

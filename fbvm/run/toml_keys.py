@@ -1,4 +1,4 @@
-"""Where the keys of a TOML text stand, since the host's TOML reader does not tell: for messages that point at them."""
+"""Finds keys in the text of a TOML file, which Python's TOML reader does not tell, for messages that point at them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from fbvm.base.diagnostics import Source
 
 Path = tuple[str | int, ...]
-"""How one gets to a value: names of keys, and numbers in arrays of tables."""
+"""The path to a value: names of keys, and numbers in arrays of tables (from 0)."""
 
 _NAME = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
 _DOTTED = rf"{_NAME}(?:\s*\.\s*{_NAME})*"
@@ -17,9 +17,15 @@ _KEY = re.compile(rf"[ \t]*({_DOTTED})\s*=[ \t]*([^\n]*)")
 
 
 def span(source: Source, path: Path) -> tuple[int, int]:
-    """Start and end of what stands for a path, or for as much of it as stands in a line of its own.
+    """The offsets of start and end of a key with its value, or of the header of a table.
 
-    A key is given with its value."""
+    If the path itself has no line of its own, as in an inline table, those of the nearest part of the path that has one.
+
+    >>> source = Source("fbvm.toml", '[plc.pump]\\nsources = ["pump.st"]\\ncycle = "10ms"\\n')
+    >>> start, end = span(source, ("plc", "pump", "cycle"))
+    >>> source.text[start:end]
+    'cycle = "10ms"'
+    """
     best, found = 0, (0, 0)
     for there, start, end in _places(source):
         same = min(len(there), len(path))
@@ -31,7 +37,7 @@ def span(source: Source, path: Path) -> tuple[int, int]:
 
 
 def _places(source: Source) -> list[tuple[Path, int, int]]:
-    """Every header and key that begins a line, with its path."""
+    """Every header and key that begins a line: path, start, end."""
     places: list[tuple[Path, int, int]] = []
     counts: dict[Path, int] = {}
     table: Path = ()
