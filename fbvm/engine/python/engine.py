@@ -1,7 +1,7 @@
-"""The Python engine, the reference: an Image becomes Python source over the flat memory, compiled by the host.
+"""The Python engine, the reference: translates an Image into Python source over the flat memory and runs that.
 
-It runs everywhere, and its observed build can stop at every statement, read and write.  It decides nothing: every
-meaning is in the table of operations."""
+It needs nothing but Python, and its observed build can stop at every statement, read and write.  It decides no meaning: that
+is in the table of operations (`fbvm.code.operations`)."""
 
 from __future__ import annotations
 
@@ -26,32 +26,33 @@ from fbvm.engine.trap import NO_INSTANCE, Stop, Trap, trap
 
 _NUMBERS = count(1)
 FRAMES_TO_SPARE = 400
-"""Python frames that callers of an engine, and its own functions, may need besides those of the program."""
+"""Python frames that the callers of an engine, and its own functions, may need besides those of the program."""
 FRAMES_A_LEVEL = 5
-"""Python frames that writing code takes for each level of tuples."""
+"""Python frames that translating takes at most for each level of nested code."""
 
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """The Python code of an image, which any number of memories can share."""
+    """The Python code of an image, which engines over any number of memories share."""
 
     source: str
     code: CodeType
     constants: dict[str, Any] = field(repr=False)
     bases: dict[int, int]
-    """Where the bodies run that were written for one instance."""
+    """Where the instance begins of each body that was written for its only one, by the body's number."""
     frames: int
     """Python frames that a run takes at most: every body once (there is no recursion), and every part outlined."""
 
 
 _programs: dict[tuple[int, bool, bool], Program] = {}
-"""What has been made of the images that there are, which one test after the other may want."""
+"""The programs of images that are still in use, by image, `observed` and `anywhere`."""
 
 
 def translate(image: Image, observed: bool = False, anywhere: bool = False) -> Program:
-    """The code of an image; the same object as long as there is the image.
+    """The Python code of an image; the same object as long as the image is in use.
 
-    Bodies that have one instance are written for it, unless they shall run `anywhere`."""
+    `observed` is the build that yields observations.  Bodies with one instance are written for that instance, unless `anywhere`
+    is True."""
     key = id(image), observed, anywhere
     known = _programs.get(key)
     if known is not None:
@@ -86,11 +87,12 @@ def _written(image: Image, observed: bool, anywhere: bool, name: str) -> Program
 class PythonEngine:
     """Runs an image over a memory.
 
-    The caller sets time and budget in the system page before a run.  `source` is the Python text that runs, which
-    tracebacks show.  A program's mistakes come back as a Trap; memory is then what was stored before it."""
+    The caller writes time and step budget into the system page before a run.  `source` is the Python text that runs, which
+    tracebacks show.  A program's mistake comes back as a Trap; the memory then has what was stored before it.  Raises
+    ValueError for a memory that is too small."""
 
     machine = None
-    """It runs no machine code."""
+    """The machine code that runs now: never any."""
 
     def __init__(self, image: Image, memory: Memory, observed: bool = False) -> None:
         if memory.size < image.layout.size:
@@ -113,9 +115,10 @@ class PythonEngine:
         return [names[function_name(number, body)] for number, body in enumerate(self.image.bodies)]
 
     def substitute(self, body: int, function: Callable[[int], None]) -> None:
-        """Python in place of a body, for tests: `function` is called with the byte offset of the instance.
+        """Runs a Python function in place of the body of that number, for tests.
 
-        An observed run sees it as one write of the whole instance."""
+        `function` is called with the byte of the memory at which the instance begins.  An observed run sees one write of the
+        whole instance."""
         self.substitutes[body] = function
         self._bodies = self._bind(self._program)
         self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in self.image.tasks]
@@ -126,13 +129,13 @@ class PythonEngine:
         return self._program.source
 
     def run(self, task_index: int) -> Trap | None:
-        """Execute the programs of a task in their order, until the end or a trap.
+        """Executes the programs of a task in their order, in an observed build without stopping.
 
-        An observed build runs to the end as well, with nobody looking."""
+        Returns the trap that ended them, if any."""
         return self._run(self._tasks[task_index])
 
     def call(self, body: int, base: int = 0) -> Trap | None:
-        """Execute one body for the instance at `base`, as `run` does."""
+        """Executes one body for the instance that begins at byte `base`.  Returns the trap that ended it, if any."""
         bodies = self._bodies
         if self._program.bases.get(body, base) != base:
             bodies = self._bind(translate(self.image, self.observed, anywhere=True))
@@ -149,7 +152,7 @@ class PythonEngine:
         return None
 
     def _instance_of(self, stop: Stop) -> int:
-        """Where the instance begins whose body was stopped: the innermost body among the frames of the host."""
+        """Where the instance begins whose body was stopped: that of the innermost body among the Python frames."""
         found, at = NO_INSTANCE, stop.__traceback__
         while at is not None:
             number = self._numbers.get(at.tb_frame.f_code.co_name)
@@ -159,9 +162,9 @@ class PythonEngine:
         return found
 
     def observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
-        """Execute a task step by step: yields every observation, returns like `run`.
+        """Executes a task step by step: a generator of observations, which returns what `run` returns.
 
-        Raises ValueError for a plain build, which has none."""
+        Raises ValueError for a plain build, which has no observations."""
         if not self.observed:
             raise ValueError("a plain build has no observations")
         return self._steps(self.image.tasks[task_index].programs)

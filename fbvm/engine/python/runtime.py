@@ -1,7 +1,7 @@
-"""The names that generated code uses: typed views of one memory, and operations that are no expression of Python.
+"""The names that generated Python uses: typed views of one memory, and functions for operations that Python has no operator for.
 
-A function that can trap takes the site last and raises Stop.  Numbers are worked on in `base.arithmetic`, strings in
-`base.strings`, literals in `texts`; here they only meet memory and sites."""
+A function that can trap takes the number of the site last and raises Stop.  Arithmetic is in `base.arithmetic`, strings are in
+`base.strings`, literals in `syntax.st.texts`; here they are given memory and sites."""
 
 from __future__ import annotations
 
@@ -28,15 +28,16 @@ from fbvm.syntax.st import texts
 
 T = TypeVar("T")
 NO_SITE = -1
-"""The site of what no statement asked for."""
+"""In place of a site: no statement is the cause."""
 
 
 class Observation(NamedTuple):
-    """What an observed run tells: `kind` and `site` as in `observe`, `detail` evaluated.
+    """What an observed run reports.
 
-    Of read and write it is (type, byte offset in the buffer, bit), of contact (element, BOOL).  Besides, a body says
-    when it begins and when it has ended: `kind` is call or return, `site` the statement that calls (NO_SITE for a
-    program), `detail` (number of the body, byte offset of its instance).  After a trap nothing returns."""
+    `kind` and `site` are those of the operation `observe`; `detail` is evaluated: (type, byte of the memory, bit) for read and
+    write, (element, BOOL) for contact.  Two more kinds report that a body begins ("call") and has ended ("return"): `site` is
+    the statement that calls, NO_SITE for a program, and `detail` (number of the body, byte at which its instance begins).
+    After a trap no "return" is reported."""
 
     kind: str
     site: int
@@ -44,7 +45,7 @@ class Observation(NamedTuple):
 
 
 def stop(code: str, site: int, *values: Any) -> Any:
-    """A trap as an expression."""
+    """Raises Stop; a function, so that it can stand in an expression."""
     raise Stop(code, site, *values)
 
 
@@ -55,7 +56,7 @@ def within(value: int, low: int, high: int, code: str, site: int) -> int:
 
 
 def quotient(a: int, b: int, site: int) -> int:
-    """That of `base.arithmetic`; written out, as `sited` would cost divisions a call more."""
+    """As `arithmetic.quotient`; written out here because `sited` would cost each division one call more."""
     if b == 0:
         raise Stop("R0101", site, a, b)
     return a // b if (a < 0) == (b < 0) else -(-a // b)
@@ -78,7 +79,7 @@ def mux(k: int, choices: tuple[T, ...], site: int) -> T:
 
 
 def sited(function: Callable[..., T]) -> Callable[..., T]:
-    """A function of arithmetic with the site as one more argument, whose Undefined is a trap there."""
+    """Gives a function of arithmetic one more argument, a site, at which its exception Undefined becomes a trap."""
 
     def answer(*operands: Any) -> T:
         try:
@@ -117,7 +118,7 @@ _PURE: dict[str, Any] = {
 def environment(memory: Memory, objects: Objects) -> dict[str, Any]:
     """The globals of generated code over a memory.
 
-    Views are named by machine type, `u1` is that of BOOL; `get_x` and `put_x` work at any offset of `buffer`."""
+    A view is named by its machine type (`i16`), that of BOOL `u1`; `get_i16` and `put_i16` work at any byte of `buffer`."""
     names: dict[str, Any] = dict(_PURE)
     for machine, view in memory.views.items():
         names["u1" if machine == "b" else machine] = view
@@ -127,7 +128,7 @@ def environment(memory: Memory, objects: Objects) -> dict[str, Any]:
 
 
 def _extents(memory: Memory, objects: Objects) -> Callable[[int], tuple[int, int]]:
-    """Where the object of that number lies: its first byte and the first behind; none at all if it has ended."""
+    """A function from the number of an object to its extent: first byte, and the byte behind the last; (0, 0) if it has ended."""
     u32, first, held_bits = memory.views["u32"], objects.leases_at // 4, objects.held_bits
     extents, leases = objects.extents, objects.leases
 

@@ -1,7 +1,7 @@
-"""What the rows of expressions write with: names, addresses, the three ways to read an operand.
+"""Writes the expressions of one body as Python: names, addresses, and three forms of an operand.
 
-Integers stay Python's own inside a sum or product and are brought into their type once, at its end; a wrap that cannot
-happen is left out.  What is nested deeper than Python's parser allows moves into functions of its own."""
+Inside a sum or product integers stay Python's own and are wrapped into their type once, at the end; a wrap that cannot happen is
+left out.  Expressions nested deeper than Python's parser allows are moved into functions of their own."""
 
 from __future__ import annotations
 
@@ -20,9 +20,10 @@ ARITHMETIC = ("add", "sub", "mul", "neg", "abs", "convert")
 
 
 class Rows(NamedTuple):
-    """How operations are written: `values` by the operands of each row; the others, for the whole node, are shortcuts.
+    """The tables of rows, by operation.
 
-    `loose` writes a number that has still to be brought into its type, `conditions` something true for TRUE."""
+    `values` write the very value and are called with the operands.  `loose` and `conditions` are shortcuts, called with the
+    node: they write a number that is still to be wrapped into its type, and something that is true in Python for TRUE."""
 
     values: Mapping[str, Callable[..., str]]
     loose: Mapping[str, Callable[[Expressions, Node], str]]
@@ -33,7 +34,11 @@ _QUOTED = re.compile(r"'(?:[^'\\]|\\.)*'|\"(?:[^\"\\]|\\.)*\"")
 
 
 def bare(text: str) -> str:
-    """The same expression without the one pair of parentheses that holds it all."""
+    """The same expression without the pair of parentheses around all of it, if it has one.
+
+    >>> bare("(a + b)"), bare("(a) + (b)")
+    ('a + b', '(a) + (b)')
+    """
     if not text.startswith("(") or not text.endswith(")"):
         return text
     depth = 0
@@ -45,18 +50,22 @@ def bare(text: str) -> str:
 
 
 def plus(text: str, number: int) -> str:
-    """`text` and a constant more."""
+    """The expression `text` plus a constant.
+
+    >>> plus("b1", 4), plus("b1", 0), plus("12", -2)
+    ('b1 + 4', 'b1', '10')
+    """
     if text.isdigit():
         return str(int(text) + number)
     return text if number == 0 else f"{text} + {number}" if number > 0 else f"{text} - {-number}"
 
 
 class Expressions:
-    """Writes the expressions of one body and notes what they need around them.
+    """Writes the expressions of one body.
 
-    `bases` are the sizes in which the instance's base is counted, `routines` functions that the body has to define,
-    `constants` objects by the name under which generated code finds them, `base` the place of the body's one
-    instance if it has just one."""
+    `constants` are objects by the names under which generated code finds them; `base` is the byte at which the body's only
+    instance begins, None if there are several.  Known afterwards: `bases`, the sizes in which the code counts the base of its
+    instance, and `routines`, functions that the body has to define."""
 
     def __init__(self, rows: Rows, constants: dict[str, Any], base: int | None) -> None:
         self.rows = rows

@@ -10,7 +10,7 @@ from fbvm.engine.native.emit.writer import Writer, ir, literal, signed
 from fbvm.engine.ranges import is_float
 
 ONE_STEP = platform.machine() in ("x86_64", "AMD64")
-"""Whether the processor has an instruction that rounds and tells what does not fit (CVTSS2SI and its like)."""
+"""True if the processor has an instruction that rounds a float and reports what does not fit (CVTSS2SI of x86-64)."""
 
 
 def convert(w: Writer, machine: str, source: str, a: Node) -> str:
@@ -29,7 +29,9 @@ def convert(w: Writer, machine: str, source: str, a: Node) -> str:
 
 
 def nearest(w: Writer, machine: str, source: str, a: Node, site: int) -> str:
-    """A tie goes to the even number: below the least one it fits, above the greatest one not."""
+    """Rounds a float to the nearest integer, a tie to the even one; traps (R0105) what does not fit.
+
+    Half below the least integer still fits, because that is even; half above the greatest does not, because that is odd."""
     value, kind = w.value(a), ir(source)
     if ONE_STEP and width(machine) < 64:
         return _in_one_step(w, machine, source, value, "cvt", site)
@@ -52,7 +54,7 @@ def truncate(w: Writer, machine: str, source: str, a: Node, site: int) -> str:
 
 
 def _in_one_step(w: Writer, machine: str, source: str, value: str, how: str, site: int) -> str:
-    """What the processor makes of a float: its least number of NaN and of what does not fit, which is none of ours."""
+    """Rounds by one instruction of x86-64, which yields its least integer for NaN and for what does not fit; both trap."""
     form = "i32" if width(machine) < 32 else "i64"
     count, extension, letter = {"f32": (4, "sse", "s"), "f64": (2, "sse2", "d")}[source]
     lanes = f"<{count} x {ir(source)}>"
@@ -67,7 +69,7 @@ def _in_one_step(w: Writer, machine: str, source: str, value: str, how: str, sit
 
 
 def _whole(w: Writer, machine: str, kind: str, value: str) -> str:
-    """A float that fits, toward zero.
+    """Converts a float that fits to an integer, toward zero.
 
     Never by `fptoui`: up to 22.1.0 at least, LLVM aborts the process on the lesser of its result and 0 at level 0."""
     if signed(machine):
@@ -113,9 +115,9 @@ def bits(w: Writer, machine: str, source: str, a: Node) -> str:
 
 
 def canonical_bits(w: Writer, value: str, machine: str) -> str:
-    """The bits of a float, those of every NaN the canonical ones.
+    """The bits of a float, with those of the canonical NaN for every NaN.
 
-    Asked of integers: LLVM holds any NaN of arithmetic for as good as another, and would leave out the choice of one."""
+    The choice is made on integers: on floats LLVM takes any NaN for as good as another and would leave it out."""
     kind, (magnitude, infinite, nan) = f"i{width(machine)}", PATTERNS[machine]
     bits = w.new(f"bitcast {ir(machine)} {value} to {kind}")
     above = w.new(f"icmp ugt {kind} {w.new(f'and {kind} {bits}, {magnitude}')}, {infinite}")

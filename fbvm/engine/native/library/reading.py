@@ -1,7 +1,8 @@
 """Routines of native code that read numbers from text, in the subset that `library.subset` translates.
 
-They take what `syntax.st.literals` takes, and find the same fault first.  A routine named `read_...` yields GOOD, MALFORMED
-or OUTSIDE (the type cannot hold it) and writes the value to `out`: an integer, or the bits of a double."""
+They accept the texts that `syntax.st.literals` accepts, and report the same mistake first.  A routine `read_...` returns GOOD,
+MALFORMED or OUTSIDE (the type cannot hold the value), and writes the value to the address `out`: an integer, or the bits of a
+double."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Routines of native code over bytes, and those that write values as text, in the subset that `library.subset` translates.
+"""Routines of machine code that work on bytes and write values as text, in the subset that `library.subset` translates.
 
-Texts are given as the address of their first byte and their length.  A routine named `put_...` writes a text and yields
-its length."""
+A text is given as the address of its first byte and its length.  A routine `put_...` writes a text to the address `out` and
+returns its length."""
 
 from __future__ import annotations
 
