@@ -10,15 +10,30 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from house import (
+    HOUSE,
+    MODULES,
+    PACKAGE,
+    branches,
+    circles,
+    dotted,
+    folder_of,
+    functions,
+    imports,
+    name_of,
+    room_of,
+    statements,
+    tree,
+)
 
 from fbvm.base.codes import CODES
 from fbvm.base.dialects import DIALECTS
 from fbvm.code.operations import EXPRESSIONS, STATEMENTS
 
-HOUSE = Path(__file__).resolve().parent.parent
-PACKAGE = HOUSE / "fbvm"
 LONGEST_FILE, LONGEST_FUNCTION = 450, 60
 
+MOST_BRANCHES = 20
+"""Cyclomatic complexity of a function."""
 MOST_FILES = 22
 """Modules that one folder may hold, beside `__init__.py`."""
 
@@ -34,6 +49,25 @@ FLOORS = {
     "cli": 8, "": 8, "__main__": 8,
 }  # fmt: skip
 """A room may import from its own floor and from below.  Rooms without a folder yet have their place already."""
+ORDERS = {
+    "syntax": ("tree", "st", "ladder/instructions", "ladder/drawing", "ladder", "sfc", "recovery", "", "formatter"),
+    "check": ("symbols", "expressions", "calls", "declarations", "lint", ""),
+    "interchange": ("plcopen", "plcopen/read", "plcopen/write"),
+    "code": ("", "builder", "layout", "pictures", "lowering", "store", "compiler"),
+    "engine": ("", "python", "native/llvm", "native/library", "native/emit", "native/scans", "native", "choice"),
+    "units": ("", "etn21", "port"),
+    "machine": ("scan", "fast", ""),
+    "record": ("trace", "draw", "export", "page"),
+    "cli": ("shared", "programs", "running", "recordings", "projects", ""),
+}
+"""The folders of a room, the lowest first; "" is the room itself.  A folder imports from those before it."""
+_VERBS = ORDERS["cli"][1:-1]
+UNRELATED = {("syntax/ladder/drawing", "syntax/st"), ("syntax/sfc", "syntax/ladder"), ("syntax/recovery", "syntax/ladder"),
+             ("syntax/recovery", "syntax/sfc"), ("interchange/plcopen/write", "interchange/plcopen/read"),
+             ("units/port", "units/etn21"), *((f"cli/{one}", f"cli/{other}") for one in _VERBS for other in _VERBS)}  # fmt: skip
+"""A folder, and another one before it that it does not import all the same."""
+ANYWHERE = {"fbvm.syntax.text"}
+"""Modules that import nothing of their room."""
 STAIRS = {
     "language": {"syntax", "check", "interchange", "code", "engine"},
     "machine": {"wire", "units", "net"},
@@ -70,14 +104,6 @@ VENDORS = {*DIALECTS, "schneider", "tianxing", "twincat"} - {"standard"}
 DATES = {"datetime", "date", "datetime.datetime", "datetime.date"}
 
 
-@cache
-def tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
-
-
-MODULES = sorted(PACKAGE.rglob("*.py"))
-
-
 @pytest.fixture(autouse=True, scope="module")
 def _let_go() -> Iterator[None]:
     """A million nodes that no other test wants."""
@@ -86,49 +112,9 @@ def _let_go() -> Iterator[None]:
         known.cache_clear()
 
 
-def name_of(path: Path) -> str:
-    return path.relative_to(PACKAGE).as_posix()
-
-
-def room_of(dotted: str) -> str:
-    """The room of `fbvm.units.etn21.unit` is "units", that of `fbvm` itself ""."""
-    parts = dotted.split(".")
-    return parts[1] if len(parts) > 1 else ""
-
-
-BLOCKS = ("body", "orelse", "finalbody", "handlers", "cases")
-"""Where statements hold others."""
-
-
-@cache
-def statements(path: Path) -> list[ast.AST]:
-    """All statements of a module, also within functions."""
-    found: list[ast.AST] = [tree(path)]
-    for node in found:
-        found += [inner for block in BLOCKS for inner in getattr(node, block, ())]
-    return found
-
-
-@cache
-def imports(path: Path) -> list[str]:
-    """Dotted names of all that a module imports, also within functions."""
-    found = []
-    for node in statements(path):
-        if isinstance(node, ast.Import):
-            found += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{name_of(path)}: relative import"
-            for alias in node.names:
-                is_module = (HOUSE / Path(*(node.module or "").split("."), f"{alias.name}.py")).exists()
-                is_room = node.module == "fbvm" and (PACKAGE / alias.name).is_dir()
-                found.append(f"{node.module}.{alias.name}" if is_module or is_room else node.module or "")
-    return found
-
-
 def climbing(path: Path) -> list[str]:
     """What a module imports from above, from the other stair or from a neighbour it does not know."""
-    dotted = ".".join(("fbvm", *path.relative_to(PACKAGE).with_suffix("").parts))
-    room = room_of(dotted.removesuffix(".__init__"))
+    room = room_of(dotted(path))
     wrong = []
     for imported in imports(path):
         if imported.split(".")[0] != "fbvm" or (imported == "fbvm" and room == "cli"):
@@ -149,8 +135,7 @@ def out_of_place(path: Path) -> list[str]:
 
 
 def too_long(path: Path) -> list[str]:
-    long = [node.name for node in statements(path) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-            and (node.end_lineno or 0) - node.lineno + 1 > LONGEST_FUNCTION]  # fmt: skip
+    long = [node.name for node in functions(path) if (node.end_lineno or 0) - node.lineno + 1 > LONGEST_FUNCTION]
     lines = len(path.read_text(encoding="utf-8").splitlines())
     return long + [f"{lines} lines"] * (lines > LONGEST_FILE)
 
@@ -175,6 +160,56 @@ def wrong(rule: Callable[[Path], list[str]]) -> dict[str, list[str]]:
 
 def test_imports_never_climb() -> None:
     assert wrong(climbing) == {}
+
+
+def test_no_modules_import_one_another() -> None:
+    """Nor round about, nor for types alone, nor inside functions."""
+    graph = {dotted(path): {name for name in imports(path) if name.split(".")[0] == "fbvm"} - {dotted(path)} for path in MODULES}
+    assert circles(graph) == [], "what all of them need belongs into a module below them; what ties them together, into one above"
+
+
+def place_of(folder: str) -> int:
+    """Where a folder stands in the order of its room."""
+    room, _, rest = folder.partition("/")
+    return ORDERS[room].index(rest) if room in ORDERS else 0
+
+
+def below_out_of_order(path: Path) -> list[str]:
+    """What a module imports from folders of its room that stand behind its own."""
+    here = folder_of(dotted(path))
+    others = [name for name in imports(path) if room_of(name) == room_of(dotted(path)) and name not in ANYWHERE | {"fbvm"}]
+    return [name for name in others if (there := folder_of(name)) != here
+            and (place_of(there) > place_of(here) or (here, there) in UNRELATED)]  # fmt: skip
+
+
+def test_folders_of_a_room_import_those_before_them() -> None:
+    assert wrong(below_out_of_order) == {}
+
+
+def test_every_folder_has_its_place_in_the_order() -> None:
+    folders = {folder_of(dotted(path)) for path in MODULES if path.name != "__init__.py"}
+    inner = {folder.partition("/")[0] for folder in folders if "/" in folder}
+    assert {folder for folder in folders if folder.partition("/")[0] in inner} == {
+        f"{room}/{folder}".rstrip("/") for room, order in ORDERS.items() for folder in order}
+
+
+TOPS = {"fbvm.check.checker"}
+PARTS = {"fbvm.check.calls.calls": TOPS | {"fbvm.check.statements"}, "fbvm.check.declarations.interfaces": TOPS,
+         "fbvm.check.declarations.globals": TOPS, "fbvm.check.expressions.rules": TOPS}  # fmt: skip
+"""Rules of the check, and who in `check/` puts them together."""
+
+
+def test_only_the_checker_puts_the_rules_of_the_check_together() -> None:
+    modules = [path for path in MODULES if room_of(dotted(path)) == "check"]
+    assert {part: {dotted(path) for path in modules if part in imports(path)} for part in PARTS} == PARTS
+
+
+def too_many_ways(path: Path) -> list[str]:
+    return [f"{function.name}: {ways}" for function in functions(path) if (ways := branches(function)) > MOST_BRANCHES]
+
+
+def test_the_ways_through_a_function_can_be_followed() -> None:
+    assert wrong(too_many_ways) == {}, "make a table of what differs, or a function of each kind of case"
 
 
 def test_every_room_has_a_floor() -> None:
@@ -231,6 +266,13 @@ def test_no_room_for_leftovers() -> None:
 
 def test_fblib_and_grammar_hold_no_python() -> None:
     assert not [*(HOUSE / "fblib").rglob("*.py"), *(HOUSE / "grammar").rglob("*.py")]
+
+
+def test_files_that_the_architecture_names_are_there() -> None:
+    named = re.findall(r"`((?:[\w.]+/)+[\w.]*)`", (HOUSE / "ARCHITECTURE.md").read_text(encoding="utf-8"))
+    roots = [HOUSE, PACKAGE, *(PACKAGE / room for room in ORDERS)]
+    assert len(named) > 50
+    assert [name for name in named if not any((root / name).exists() for root in roots)] == []
 
 
 # --- diagnostics ------------------------------------------------------------------------------------------------------

@@ -18,7 +18,7 @@ from fbvm.net.tcp import TcpNetwork
 from fbvm.run.project import PlcRow, Project, SetRow
 from fbvm.run.running import Running, TimedWrite
 from fbvm.run.toml_keys import Path, span
-from fbvm.units.backplane import KINDS, make_unit
+from fbvm.machine.backplane import KINDS, make_unit
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, conform, parse_value
 from fbvm.wire.registers import server

@@ -47,7 +47,7 @@ from fbvm.run.project_reader import (
 )
 from fbvm.run.running import PACES
 from fbvm.syntax.text import read
-from fbvm.units.backplane import KINDS as UNIT_KINDS
+from fbvm.machine.backplane import KINDS as UNIT_KINDS
 from fbvm.wire.link import Peer
 
 FILE = "fbvm.toml"

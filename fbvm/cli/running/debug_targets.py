@@ -18,7 +18,7 @@ from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import Project, read_project
 from fbvm.run.running import Running
-from fbvm.units.backplane import usual_units
+from fbvm.machine.backplane import usual_units
 from fbvm.wire.tap import TapEvent
 
 

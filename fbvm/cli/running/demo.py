@@ -35,7 +35,7 @@ from fbvm.net.tcp import TcpNetwork
 from fbvm.record.draw.chart import draw
 from fbvm.record.trace.recorder import Recorder
 from fbvm.run import loop
-from fbvm.units.backplane import ETN21_ADDRESS
+from fbvm.machine.backplane import ETN21_ADDRESS
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 

@@ -33,7 +33,7 @@ from fbvm.record.trace.recorder import Recorder
 from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
 from fbvm.run.running import EVENT, PACES, TimedWrite
-from fbvm.units.backplane import usual_units
+from fbvm.machine.backplane import usual_units
 from fbvm.watch.places import parse_for
 
 

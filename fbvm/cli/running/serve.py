@@ -25,7 +25,7 @@ from fbvm.record.trace import memory_images
 from fbvm.record.trace.requests import RequestLog
 from fbvm.run import loop
 from fbvm.run.running import EVENT
-from fbvm.units.backplane import ETN21_ADDRESS
+from fbvm.machine.backplane import ETN21_ADDRESS
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 
