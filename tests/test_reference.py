@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import doctest
+import importlib
 import re
+import subprocess
 import sys
 from functools import cache
 from pathlib import Path
@@ -32,18 +35,29 @@ def _extensions(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @cache
 def pages() -> dict[str, str]:
-    import product_pages
-
-    return product_pages.pages()
+    made: dict[str, str] = importlib.import_module("product_pages").pages()
+    return made
 
 
 def page(name: str) -> str:
     return pages()[f"reference/{name}"]
 
 
+def module_names() -> list[str]:
+    """The modules whose public names have pages, without `fbvm`."""
+    sys.path.insert(0, str(EXTENSIONS))
+    try:
+        return list(importlib.import_module("product_pages.python_api").MODULES)
+    finally:
+        sys.path.remove(str(EXTENSIONS))
+
+
+def module_members(name: str) -> list[str]:
+    return list(module("python_api").MODULES.get(name) or importlib.import_module(name).__all__)
+
+
 def module(name: str) -> Any:
-    __import__(f"product_pages.{name}")
-    return sys.modules[f"product_pages.{name}"]
+    return importlib.import_module(f"product_pages.{name}")
 
 
 def test_each_command_has_a_section_with_each_of_its_options() -> None:
@@ -129,7 +143,7 @@ def test_each_assumption_is_listed_with_its_place() -> None:
 
 
 def test_a_file_is_written_only_if_it_changed(tmp_path: Path) -> None:
-    product_pages = __import__("product_pages")
+    product_pages = importlib.import_module("product_pages")
     product_pages.write(tmp_path)
     path = tmp_path / "reference" / "memory.md"
     before = path.stat().st_mtime_ns
@@ -153,11 +167,39 @@ def test_links_of_a_file_lead_where_they_led() -> None:
         "[port](port.md#slots), [license](../../../LICENSE), [web](https://example.org)")  # fmt: skip
 
 
+EXPLAINED = [path for path in sorted((HOUSE / "docs").rglob("*.md")) if ">>>" in path.read_text(encoding="utf-8")]
+
+
+@pytest.mark.parametrize("path", EXPLAINED, ids=lambda path: path.stem)
+def test_what_a_page_shows_in_python_happens(path: Path) -> None:
+    assert doctest.testfile(str(path), module_relative=False).failed == 0
+
+
+@pytest.mark.parametrize("name", ["fbvm", *module_names()])
+def test_what_a_docstring_shows_happens(name: str) -> None:
+    """Docstrings of the public names of a module, wherever these live."""
+    finder, runner = doctest.DocTestFinder(), doctest.DocTestRunner()
+    public = importlib.import_module(name)
+    for thing in {id(one): one for one in (getattr(public, each) for each in module_members(name))}.values():
+        if getattr(thing, "__module__", "").startswith("fbvm"):
+            home = importlib.import_module(thing.__module__)
+            for case in finder.find(thing, module=home, globs={}):
+                runner.run(case)
+    assert runner.summarize(verbose=False).failed == 0
+
+
+def test_a_file_of_the_repository_that_a_page_names_is_there() -> None:
+    named = {name for folder in ("decisions", "explanation") for path in (HOUSE / "docs" / folder).glob("*.md")
+             for name in re.findall(r"`((?:fbvm|fblib|tests|grammar)/[\w./-]+)`", path.read_text(encoding="utf-8"))}  # fmt: skip
+    assert sorted(name for name in named if not (HOUSE / name).exists()) == []
+
+
 @pytest.mark.slow
 def test_the_documentation_is_built_without_a_warning(tmp_path: Path) -> None:
-    build = pytest.importorskip("sphinx.cmd.build")
-    pytest.importorskip("furo")
-    kept, made = tmp_path / "trees", tmp_path / "html"
-    assert build.main(["-W", "--keep-going", "-q", "-d", str(kept), str(HOUSE / "docs"), str(made)]) == 0
+    pytest.importorskip("sphinx")
+    made = tmp_path / "html"
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", tmp_path / "trees", HOUSE / "docs", made]
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert result.returncode == 0, result.stderr
     for name in pages():
         assert (made / f"{name}.html").is_file()
