@@ -5,7 +5,6 @@ from __future__ import annotations
 import doctest
 import importlib
 import re
-import subprocess
 import sys
 from functools import cache
 from pathlib import Path
@@ -192,14 +191,3 @@ def test_a_file_of_the_repository_that_a_page_names_is_there() -> None:
     named = {name for folder in ("decisions", "explanation") for path in (HOUSE / "docs" / folder).glob("*.md")
              for name in re.findall(r"`((?:fbvm|fblib|tests|grammar)/[\w./-]+)`", path.read_text(encoding="utf-8"))}  # fmt: skip
     assert sorted(name for name in named if not (HOUSE / name).exists()) == []
-
-
-@pytest.mark.slow
-def test_the_documentation_is_built_without_a_warning(tmp_path: Path) -> None:
-    pytest.importorskip("sphinx")
-    made = tmp_path / "html"
-    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", tmp_path / "trees", HOUSE / "docs", made]
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert result.returncode == 0, result.stderr
-    for name in pages():
-        assert (made / f"{name}.html").is_file()
