@@ -39,8 +39,8 @@ MODULES: dict[str, tuple[str, ...]] = {
     "fbvm.units.contract": ("Unit", "AreaMemory"),
 }  # fmt: skip
 """Other modules with names for users; without names those of `__all__`."""
-PLUGIN = HOUSE / "fbvm/testing/plugin.py"
-OPTIONS = (PLUGIN, HOUSE / "fbvm/testing/warned.py")
+PLUGIN = HOUSE / "fbvm/testing"
+"""Where the modules of the pytest plugin are."""
 
 
 def pages() -> dict[str, str]:
@@ -98,10 +98,9 @@ def _entry(module: str, name: str) -> str:
 
 def _plugin() -> str:
     """Fixtures by their docstrings, and options and settings as pytest is given them."""
-    body = ast.parse(PLUGIN.read_text(encoding="utf-8")).body
-    functions = [node for node in body if isinstance(node, ast.FunctionDef) and not node.name.startswith("_")]
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in sorted(PLUGIN.rglob("*.py"))]
+    functions = [node for tree in trees for node in tree.body if isinstance(node, ast.FunctionDef) and node.name[0] != "_"]
     fixtures = [node for node in functions if any("fixture" in ast.unparse(mark) for mark in node.decorator_list)]
-    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in OPTIONS]
     calls = [node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)]
     return page(
         "# pytest", "The plugin is loaded wherever fbvm is installed.",
