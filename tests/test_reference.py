@@ -17,9 +17,9 @@ import fbvm
 from fbvm.base.areas import AREAS
 from fbvm.base.codes import CODES
 from fbvm.base.dialects import DIALECTS
-from fbvm.cli.main import HOMES, main
+from fbvm.cli.main import GROUP_OF, main
 from fbvm.run.project_reader import REQUIRED
-from fbvm.syntax.ladder.instruction_set import instruction_set
+from fbvm.syntax.ladder.instructions.instruction_set import instruction_set
 from fbvm.units.backplane import KINDS as UNIT_KINDS
 from fbvm.units.etn21 import codes as etn21_codes
 
@@ -61,7 +61,7 @@ def module(name: str) -> Any:
 
 def test_each_command_has_a_section_with_each_of_its_options() -> None:
     context = click.Context(main, info_name="fbvm")
-    for verb in HOMES:
+    for verb in GROUP_OF:
         section = page("command-line").partition(f"### fbvm {verb}\n")[2].partition("\n### ")[0]
         command = main.get_command(context, verb)
         assert command is not None
@@ -182,7 +182,7 @@ def test_what_a_docstring_shows_happens(name: str) -> None:
     for thing in {id(one): one for one in (getattr(public, each) for each in module_members(name))}.values():
         if getattr(thing, "__module__", "").startswith("fbvm"):
             home = importlib.import_module(thing.__module__)
-            for case in finder.find(thing, module=home, globs={}):
+            for case in finder.find(thing, module=home):
                 runner.run(case)
     assert runner.summarize(verbose=False).failed == 0
 

@@ -25,7 +25,7 @@ def pages() -> dict[str, str]:
         _options(group, context),
         "## Exit status", table(("status", "meaning"), [(number, meaning) for number, meaning in statuses().items()]),
     ]  # fmt: skip
-    for heading, verbs in entry.ROOMS.values():
+    for heading, verbs in entry.VERB_GROUPS.values():
         rows = [(f"[{code(verb)}](#fbvm-{verb})", said) for verb, said in verbs.items()]
         parts += [f"## {heading}", table(("command", ""), rows)]
         for verb in verbs:
