@@ -15,7 +15,10 @@ sys.path.append(str(Path(__file__).parent / "_ext"))
 
 project = "fbvm"
 release = version = __version__
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx_click", "sphinx_copybutton", "repository_files", "structured_text"]
+extensions = [
+    "myst_parser", "sphinx.ext.autodoc", "sphinx_click", "sphinx_copybutton", "repository_files", "structured_text",
+    "product_pages",
+]  # fmt: skip
 exclude_patterns = ["_ext"]
 nitpicky = True
 

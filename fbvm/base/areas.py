@@ -27,6 +27,8 @@ class Area:
     """The number of units, from the first on, that a program must not write."""
     retained: bool = False
     """Kept over a warm start and a mode change."""
+    title: str = ""
+    """What it holds, for lists."""
 
     @property
     def size_bytes(self) -> int:
@@ -34,20 +36,20 @@ class Area:
 
 
 _ROWS = (
-    # name, offset, count, bits of a unit, read-only, retained
-    ("CF", 1024, 128, 1, 128, False),  # condition flags and clock pulses, on the system page
-    ("CIO", 4096, 6144, 16, 0, False),
-    ("W", 16384, 512, 16, 0, False),
-    ("H", 17408, 1536, 16, 0, True),
-    ("A", 20480, 960, 16, 448, True),
-    ("TF", 22528, 4096, 1, 0, False),  # completion flags of timers
-    ("CNF", 23040, 4096, 1, 0, True),  # completion flags of counters
-    ("T", 24576, 4096, 16, 0, False),
-    ("C", 32768, 4096, 16, 0, True),
-    ("I", 40960, 4096, 8, 0, False),
-    ("Q", 45056, 4096, 8, 0, False),
-    ("M", 49152, 65536, 8, 0, False),
-    ("D", 114688, 32768, 16, 0, True),
+    # name, offset, count, bits of a unit, read-only, retained, title; CF lies on the system page
+    ("CF", 1024, 128, 1, 128, False, "condition flags and clock pulses"),
+    ("CIO", 4096, 6144, 16, 0, False, "inputs, outputs and words of units"),
+    ("W", 16384, 512, 16, 0, False, "work words"),
+    ("H", 17408, 1536, 16, 0, True, "holding words"),
+    ("A", 20480, 960, 16, 448, True, "auxiliary words of the system"),
+    ("TF", 22528, 4096, 1, 0, False, "completion flags of timers"),
+    ("CNF", 23040, 4096, 1, 0, True, "completion flags of counters"),
+    ("T", 24576, 4096, 16, 0, False, "present values of timers"),
+    ("C", 32768, 4096, 16, 0, True, "present values of counters"),
+    ("I", 40960, 4096, 8, 0, False, "inputs of portable programs"),
+    ("Q", 45056, 4096, 8, 0, False, "outputs of portable programs"),
+    ("M", 49152, 65536, 8, 0, False, "memory of portable programs"),
+    ("D", 114688, 32768, 16, 0, True, "data words"),
 )
 AREAS: dict[str, Area] = {row[0]: Area(*row) for row in _ROWS}
 FLAG_AREAS = frozenset(("CF", "TF", "CNF"))

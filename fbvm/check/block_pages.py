@@ -25,8 +25,11 @@ def _files() -> dict[str, Path]:
 def page(name: str) -> str | None:
     """The page of that name in any case; None if there is none."""
     path = _files().get(fold(name.strip()))
-    if path is None:
-        return None
+    return page_of(path) if path else None
+
+
+def page_of(path: Path) -> str | None:
+    """The page of what a file of the libraries declares; None for a file without a block or function."""
     shown = _interface(path.read_text(encoding="utf-8").splitlines())
     if not any(line.startswith(HEADS) for line in shown):
         return None

@@ -11,6 +11,7 @@ from fbvm.check.lint.suppression import ANY, Wanted
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 from fbvm.engine.native import engine as native
+from fbvm.machine.backplane import KINDS, make_unit
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
@@ -18,7 +19,6 @@ from fbvm.net.tcp import TcpNetwork
 from fbvm.run.project import PlcRow, Project, SetRow
 from fbvm.run.running import Running, TimedWrite
 from fbvm.run.toml_keys import Path, span
-from fbvm.machine.backplane import KINDS, make_unit
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, conform, parse_value
 from fbvm.wire.registers import server

@@ -28,6 +28,7 @@ from typing import Any
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.dialects import DIALECTS
 from fbvm.engine.choice.tiers import CHOICES
+from fbvm.machine.backplane import KINDS as UNIT_KINDS
 from fbvm.net.faults import FOREVER, KINDS, NO_FAULT, Fault
 from fbvm.run.project_reader import (
     Key,
@@ -47,7 +48,6 @@ from fbvm.run.project_reader import (
 )
 from fbvm.run.running import PACES
 from fbvm.syntax.text import read
-from fbvm.machine.backplane import KINDS as UNIT_KINDS
 from fbvm.wire.link import Peer
 
 FILE = "fbvm.toml"
@@ -55,36 +55,81 @@ NETS = ("loop", "tcp")
 MOST = 100_000
 """PLCs of one kind."""
 
+MOST_NUMBER = 1 << 62
+
 RUN: Keys = {
-    "net": Key(one_of(NETS), "loop"), "seed": Key(whole(0, 1 << 62), 0), "for": Key(time_ns, None),
-    "scans": Key(whole(0, 1 << 62), None),
-}  # fmt: skip
-SERVER: Keys = {"address": Key(endpoint), "host": Key(host, None)}
-DOOR: Keys = {"address": Key(endpoint), "host": Key(host)}
+    "net": Key(one_of(NETS), "The network: in memory with virtual time, or real connections with real time.", "loop"),
+    "seed": Key(whole(0, MOST_NUMBER), "Where the random numbers of the network in memory begin.", 0),
+    "for": Key(time_ns, "How long PLCs without an end of their own run.", None),
+    "scans": Key(whole(0, MOST_NUMBER), "How many scans PLCs without an end of their own do.", None),
+}
+SERVER: Keys = {
+    "address": Key(endpoint, "Where programs find the server."),
+    "host": Key(host, "Where the server is with real connections; without it where `address` says.", None),
+}
+DOOR: Keys = {
+    "address": Key(endpoint, "The address of a unit, and a port at which its program waits."),
+    "host": Key(host, "Where on the host others reach it; port 0: one that the system chooses."),
+}
 FAULT: Keys = {
-    "kind": Key(one_of(tuple(KINDS)), None), "peer": Key(endpoint, None), "from": Key(moment_ns, 0),
-    "until": Key(time_ns, FOREVER), "latency": Key(time_ns, None), "jitter": Key(time_ns, None),
-    "segment_bytes": Key(whole(1, 65535), None), "gap": Key(moment_ns, None), "join": Key(time_ns, None),
-    "random_cut": Key(flag, None), "silent": Key(flag, None), "reset": Key(flag, None), "error": Key(text, None),
-}  # fmt: skip
+    "kind": Key(one_of(tuple(KINDS)), "A named fault, of which the other keys change single values.", None),
+    "peer": Key(endpoint, "Only connections with this endpoint; 0.0.0.0 and port 0 fit any.", None),
+    "from": Key(moment_ns, "Since when after power-on.", 0),
+    "until": Key(time_ns, "Until when after power-on; without it to the end.", FOREVER),
+    "latency": Key(time_ns, "How long data take for one way.", None),
+    "jitter": Key(time_ns, "How much longer than that at most, by the seed.", None),
+    "segment_bytes": Key(whole(1, 65535), "Data arrive in pieces of so many bytes.", None),
+    "gap": Key(moment_ns, "The time between two pieces.", None),
+    "join": Key(time_ns, "What is sent arrives together at multiples of this time.", None),
+    "random_cut": Key(flag, "Pieces have 1 to `segment_bytes` bytes, by the seed.", None),
+    "silent": Key(flag, "Nothing passes: a dead host, a pulled cable.", None),
+    "reset": Key(flag, "What is open breaks.", None),
+    "error": Key(text, "Opening fails at once with this errno name, such as ECONNREFUSED.", None),
+}
 UNIT: Keys = {
-    "type": Key(one_of(tuple(UNIT_KINDS)), "ETN21"), "address": Key(ip),
-    "number": Key(whole(0, 15), None), "timing": Key(one_of(("exact", "real")), None), "seed": Key(whole(0, 1 << 62), None),
-    "slot": Key(whole(0, 254), None), "mac": Key(text, None), "module": Key(whole(0, 31), None), "http": Key(flag, None),
-    "ftp": Key(flag, None), "restart": Key(time_ns, None), "model": Key(text, None),
-}  # fmt: skip
+    "type": Key(one_of(tuple(UNIT_KINDS)), "What kind of unit it is.", "ETN21"),
+    "address": Key(ip, "The unit's IP address; those of further equal PLCs count up from it."),
+    "number": Key(whole(0, 15), "ETN21: the unit number.", None),
+    "timing": Key(one_of(("exact", "real")), "ETN21: services end after fixed or after seeded numbers of scans.", None),
+    "seed": Key(whole(0, MOST_NUMBER), "ETN21: where the random numbers of real timing begin.", None),
+    "slot": Key(whole(0, 254), "NOC: the slot in the rack, 0 to 16, or 254 for the port of the CPU.", None),
+    "mac": Key(text, "NOC: the MAC address that the program reads.", None),
+    "module": Key(whole(0, 31), "NOC: the number of the module type that the program reads.", None),
+    "http": Key(flag, "NOC: whether the HTTP service is configured.", None),
+    "ftp": Key(flag, "NOC: whether the FTP service is configured.", None),
+    "restart": Key(time_ns, "NOC: how long a restart takes.", None),
+    "model": Key(text, "Tianxing: \"T3\" with 8 connections or \"T4\" with 32.", None),
+}
 """The keys of all units; which of them a unit has depends on its type."""
-SET: Keys = {"name": Key(text), "value": Key(anything), "at": Key(moment_ns, 0)}
+SET: Keys = {
+    "name": Key(text, "A variable, an address or a range."),
+    "value": Key(anything, "Its new value: a number, true or false, a text such as \"T#5s\", or a list for a range."),
+    "at": Key(moment_ns, "When after power-on.", 0),
+}
 PLC: Keys = {
-    "sources": Key(texts), "program": Key(text, None), "resource": Key(text, None),
-    "dialect": Key(one_of(tuple(DIALECTS)), "standard"), "libraries": Key(texts, ()), "cycle": Key(time_ns, 10_000_000),
-    "pace": Key(one_of(PACES), PACES[0]), "engine": Key(one_of(CHOICES), "auto"), "count": Key(whole(1, MOST), None),
-    "until": Key(text, None), "watch": Key(texts, ()), "unit": Key(UNIT, (), many=True), "set": Key(SET, (), many=True),
-}  # fmt: skip
+    "sources": Key(texts, "Its source files, from the folder of the project file."),
+    "program": Key(text, "The PROGRAM to run, where sources have several and no CONFIGURATION.", None),
+    "resource": Key(text, "The RESOURCE to run, where a CONFIGURATION has several.", None),
+    "dialect": Key(one_of(tuple(DIALECTS)), "How to answer what compilers disagree about.", "standard"),
+    "libraries": Key(texts, "Folders of blocks that are asked before the shipped ones.", ()),
+    "cycle": Key(time_ns, "The cycle time.", 10_000_000),
+    "pace": Key(one_of(PACES), "When to scan: once a period, or as soon as something happens (real connections only).",
+                PACES[0]),
+    "engine": Key(one_of(CHOICES), "What executes the program: Python first and machine code when it pays, or one alone.",
+                  "auto"),
+    "count": Key(whole(1, MOST), "So many equal PLCs, named pump[1], pump[2] and so on.", None),
+    "until": Key(text, "The condition that ends its run, such as \"Main.Done AND D200 > 5\".", None),
+    "watch": Key(texts, "What is printed of it at the end: variables, addresses, ranges.", ()),
+    "unit": Key(UNIT, "A unit on its backplane.", (), many=True),
+    "set": Key(SET, "A value to be written once.", (), many=True),
+}
 PROJECT: Keys = {
-    "run": Key(RUN, None), "server": Key(SERVER, (), many=True), "door": Key(DOOR, (), many=True),
-    "fault": Key(FAULT, (), many=True), "plc": Key(PLC, named=True),
-}  # fmt: skip
+    "run": Key(RUN, "The run as a whole.", None),
+    "server": Key(SERVER, "A Modbus TCP server that programs talk to.", (), many=True),
+    "door": Key(DOOR, "Where others reach a unit with real connections.", (), many=True),
+    "fault": Key(FAULT, "What goes wrong on the network in memory; of several rows that fit the first counts.", (), many=True),
+    "plc": Key(PLC, "A PLC, or several equal ones, by name.", named=True),
+}
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,22 @@ REQUIRED = object()
 
 
 @dataclass(frozen=True)
+class Kind:
+    """A kind of value: what people call it, and the function that makes the value of what is written.
+
+    The function raises ValueError with what to write instead."""
+
+    called: str
+    value: Callable[[object], Any]
+
+
+@dataclass(frozen=True)
 class Key:
-    """A row of a table of keys.
+    """A row: `kind` of its value; or the table of keys of a table, of each table of an array (`many`), or of each table by
+    its name (`named`).  `meaning` is a sentence for messages and for the page of all keys."""
 
-    `kind` converts what is written to the value, or raises ValueError with what to write.  Or it is a table of keys itself: of
-    a table, of each table in an array (`many`), or of each table by its name (`named`)."""
-
-    kind: Callable[[Any], Any] | Mapping[str, Key]
+    kind: Kind | Mapping[str, Key]
+    meaning: str
     default: Any = REQUIRED
     many: bool = False
     named: bool = False
@@ -74,19 +83,19 @@ class Reading:
     def _value(self, table: Mapping[str, Any], name: str, key: Key, path: Path) -> Any:
         if name not in table:
             if key.default is REQUIRED:
-                self.report("P0104", path, f"{_called(path)} is missing")
+                self.report("P0104", path, f"{_called(path)} is missing", key.meaning)
             return key.default
         written = table[name]
-        if not callable(key.kind):
+        if not isinstance(key.kind, Kind):
             return self._tables(written, key, path)
         try:
-            return key.kind(written)
+            return key.kind.value(written)
         except ValueError as error:
-            self.report("P0103", path, f"{_called(path)}: {error}")
+            self.report("P0103", path, f"{_called(path)}: {error}", key.meaning)
             return key.default
 
     def _tables(self, written: Any, key: Key, path: Path) -> Any:
-        assert not callable(key.kind)
+        assert not isinstance(key.kind, Kind)
         if key.many:
             if not isinstance(written, list):
                 self.report("P0103", path, f"{_called(path)} is no list of tables", f"write [[{_called(path)}]]")
@@ -108,42 +117,32 @@ def _called(path: Path) -> str:
 # --- kinds --------------------------------------------------------------------------------------------------------------
 
 
-def text(value: object) -> str:
+def _text(value: object) -> str:
     if not isinstance(value, str) or not value:
         raise ValueError(f"{value!r} is no text; write it in quotes")
     return value
 
 
-def texts(value: object) -> tuple[str, ...]:
+def _texts(value: object) -> tuple[str, ...]:
     if not isinstance(value, list) or not value or not all(isinstance(item, str) and item for item in value):
         raise ValueError(f'{value!r} is no list of texts; write ["one", "other"]')
     return tuple(value)
 
 
-def flag(value: object) -> bool:
+def _flag(value: object) -> bool:
     if not isinstance(value, bool):
         raise ValueError(f"{value!r} is neither true nor false")
     return value
 
 
-def anything(value: object) -> object:
-    return value
-
-
-def time_ns(value: object) -> int:
-    """A time longer than 0, in nanoseconds.  Raises ValueError.
-
-    >>> time_ns("10ms")
-    10000000
-    """
-    passed_ns = moment_ns(value)
+def _time_ns(value: object) -> int:
+    passed_ns = _moment_ns(value)
     if not passed_ns:
         raise ValueError(f"{value!r} is no time that can pass")
     return passed_ns
 
 
-def moment_ns(value: object) -> int:
-    """A time from power-on, 0 or more, in nanoseconds: `"2s"`.  Raises ValueError."""
+def _moment_ns(value: object) -> int:
     if not isinstance(value, str):
         raise ValueError(f'{value!r} is no time; write it with its unit in quotes: "10ms"')
     passed_ns = parse_time_ns(value)
@@ -152,45 +151,16 @@ def moment_ns(value: object) -> int:
     return passed_ns
 
 
-def whole(first: int, last: int) -> Callable[[object], int]:
-    """A whole number from first to last."""
-
-    def kind(value: object) -> int:
-        if not isinstance(value, int) or isinstance(value, bool) or not first <= value <= last:
-            raise ValueError(f"{value!r} is no whole number from {first} to {last}")
-        return value
-
-    return kind
-
-
-def one_of(names: Sequence[str]) -> Callable[[object], str]:
-    """One of these texts."""
-
-    def kind(value: object) -> str:
-        if value not in names:
-            raise ValueError(f"{value!r} is none of {', '.join(names)}")
-        return str(value)
-
-    return kind
-
-
-def ip(value: object) -> str:
-    """An IPv4 address: `"192.168.250.21"`.  Raises ValueError."""
+def _ip(value: object) -> str:
     parts = value.split(".") if isinstance(value, str) else []
     if len(parts) != 4 or not all(part.isdecimal() and int(part) <= 255 for part in parts):
         raise ValueError(f'{value!r} is no IPv4 address; write "192.168.250.21"')
     return str(value)
 
 
-def endpoint(value: object) -> Peer:
-    """An IPv4 address and a port: `"192.168.250.1:502"`.  Raises ValueError."""
-    host, port = _parted(value, "192.168.250.1:502")
-    return Peer(ip(host), port)
-
-
-def host(value: object) -> tuple[str, int]:
-    """An address or name of the host's network, and a port: `"127.0.0.1:15020"`.  Raises ValueError."""
-    return _parted(value, "127.0.0.1:15020")
+def _endpoint(value: object) -> Peer:
+    address, port = _parted(value, "192.168.250.1:502")
+    return Peer(_ip(address), port)
 
 
 def _parted(value: object, example: str) -> tuple[str, int]:
@@ -198,3 +168,37 @@ def _parted(value: object, example: str) -> tuple[str, int]:
     if not colon or not before or not port.isdecimal() or int(port) > 65535:
         raise ValueError(f'{value!r} is no address and port; write "{example}"')
     return before, int(port)
+
+
+def whole(first: int, last: int) -> Kind:
+    """A whole number from first to last."""
+
+    def value_of(value: object) -> int:
+        if not isinstance(value, int) or isinstance(value, bool) or not first <= value <= last:
+            raise ValueError(f"{value!r} is no whole number from {first} to {last}")
+        return value
+
+    return Kind(f"a whole number from {first} to {last}" if last < 1 << 62 else f"a whole number from {first}", value_of)
+
+
+def one_of(names: Sequence[str]) -> Kind:
+    """One of these texts."""
+
+    def value_of(value: object) -> str:
+        if value not in names:
+            raise ValueError(f"{value!r} is none of {', '.join(names)}")
+        return str(value)
+
+    return Kind(" or ".join(f'"{name}"' for name in names), value_of)
+
+
+text = Kind("a text", _text)
+texts = Kind("a list of texts", _texts)
+flag = Kind("true or false", _flag)
+anything = Kind("a value", lambda value: value)
+time_ns = Kind('a time above 0, such as "10ms"', _time_ns)
+moment_ns = Kind('a time, such as "2s" or "0s"', _moment_ns)
+ip = Kind('an IPv4 address, such as "192.168.250.21"', _ip)
+endpoint = Kind('an IPv4 address and a port, such as "192.168.250.1:502"', _endpoint)
+host = Kind('an address or a name of the host and a port, such as "127.0.0.1:15020"',
+            lambda value: _parted(value, "127.0.0.1:15020"))

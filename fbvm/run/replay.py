@@ -9,10 +9,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from fbvm.code.image import Image
+from fbvm.machine.backplane import UNITS
 from fbvm.machine.goal import Goal
 from fbvm.machine.plc import Mode, Plc, Stopped
 from fbvm.net.journal import Act, End, Entry, Fingerprint, Header, JournalError, Scan
-from fbvm.machine.backplane import UNITS
 from fbvm.units.contract import Unit
 from fbvm.wire.link import Event, Request
 

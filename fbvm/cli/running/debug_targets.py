@@ -12,13 +12,13 @@ from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import Mapping
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.code.image import Image
+from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.record.trace.packets import Dissector, Packet
 from fbvm.run.plant import ENDLESS, Plant
 from fbvm.run.project import Project, read_project
 from fbvm.run.running import Running
-from fbvm.machine.backplane import usual_units
 from fbvm.wire.tap import TapEvent
 
 

@@ -30,12 +30,12 @@ from fbvm.cli.running.peer import LISTENING
 from fbvm.cli.shared import status
 from fbvm.cli.shared.run_result import chart_width
 from fbvm.code.compiler import compile_files
+from fbvm.machine.backplane import ETN21_ADDRESS
 from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.draw.chart import draw
 from fbvm.record.trace.recorder import Recorder
 from fbvm.run import loop
-from fbvm.machine.backplane import ETN21_ADDRESS
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 

@@ -24,6 +24,7 @@ from fbvm.cli.shared.sources import compile_or_exit, source_options
 from fbvm.cli.shared.traces import statement_lines, write_page, write_trace
 from fbvm.code.image import Image
 from fbvm.engine.choice.tiers import CHOICES
+from fbvm.machine.backplane import usual_units
 from fbvm.machine.plc import Plc
 from fbvm.net.journal import Journal
 from fbvm.net.loop import LoopNetwork
@@ -33,7 +34,6 @@ from fbvm.record.trace.recorder import Recorder
 from fbvm.record.trace.writer import Depth
 from fbvm.run import loop
 from fbvm.run.running import EVENT, PACES, TimedWrite
-from fbvm.machine.backplane import usual_units
 from fbvm.watch.places import parse_for
 
 

@@ -19,13 +19,13 @@ from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import time_ns
 from fbvm.code.compiler import compile_files
+from fbvm.machine.backplane import ETN21_ADDRESS
 from fbvm.machine.plc import Plc
 from fbvm.net.tcp import TcpNetwork
 from fbvm.record.trace import memory_images
 from fbvm.record.trace.requests import RequestLog
 from fbvm.run import loop
 from fbvm.run.running import EVENT
-from fbvm.machine.backplane import ETN21_ADDRESS
 from fbvm.units.etn21.unit import Etn21
 from fbvm.wire.link import Peer
 

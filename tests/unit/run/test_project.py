@@ -13,7 +13,7 @@ from fbvm.net.faults import KINDS
 from fbvm.net.loop import LoopNetwork
 from fbvm.run import run_all
 from fbvm.run.plant import MANY, Plant
-from fbvm.run.project import Project, project_file, read_project
+from fbvm.run.project import PLC, SERVER, Project, project_file, read_project
 from fbvm.run.toml_keys import span
 from fbvm.wire.link import Peer
 
@@ -151,6 +151,12 @@ def test_a_misspelt_key_is_offered_in_the_right_spelling(folder: Path) -> None:
     found = read(folder, '[plc.a]\nsources = ["c.st"]\ncycel = "1ms"\n')
     assert isinstance(found, list)
     assert found[0].render().endswith('cycel = "1ms"\n    ^^^^^^^^^^^^^\n  help: did you mean cycle?')
+
+
+def test_what_a_key_means_is_said_beside_a_wrong_value(folder: Path) -> None:
+    found = read(folder, '[plc.a]\nsources = ["c.st"]\ncycle = 10\n[[server]]\n')
+    assert isinstance(found, list)
+    assert {row.hint for row in found} == {SERVER["address"].meaning, PLC["cycle"].meaning}
 
 
 def test_a_file_that_cannot_be_read(tmp_path: Path) -> None:
