@@ -14,7 +14,7 @@ from fbvm.syntax.ladder.instructions.instruction_set import meant, spelling
 @click.command("explain")
 @click.argument("code", metavar="CODE", required=False)
 def command(code: str | None) -> None:
-    """Print the page of a diagnostic: a wrong program, the reason, the mend.  Without CODE: the list of all codes.
+    """Print the page of a diagnostic: a wrong program, the reason, the repair.  Without CODE: the list of all codes.
 
     `fbvm explain MOV` says what an instruction of ladder does, with its operands and flags; `fbvm explain TON` what a block
     or function of the libraries does, with its pins.
