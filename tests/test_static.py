@@ -9,13 +9,14 @@ import sys
 import pytest
 from house import HOUSE
 
-COMMANDS = {"mypy": [], "ruff": ["check", "--quiet", "."]}
+COMMANDS = [("ruff", "check", "--quiet", "."),
+            *(("mypy", "--platform", platform) for platform in ("linux", "win32", "darwin"))]  # fmt: skip
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("tool", COMMANDS)
-def test_nothing_is_found(tool: str) -> None:
-    if importlib.util.find_spec(tool) is None:
-        pytest.skip(f"{tool} is not installed")
-    done = subprocess.run([sys.executable, "-m", tool, *COMMANDS[tool]], cwd=HOUSE, capture_output=True, text=True, check=False)
+@pytest.mark.parametrize("command", COMMANDS, ids="-".join)
+def test_nothing_is_found(command: tuple[str, ...]) -> None:
+    if importlib.util.find_spec(command[0]) is None:
+        pytest.skip(f"{command[0]} is not installed")
+    done = subprocess.run([sys.executable, "-m", *command], cwd=HOUSE, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

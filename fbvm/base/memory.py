@@ -7,6 +7,7 @@ from __future__ import annotations
 import contextlib
 import mmap
 import struct
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -148,6 +149,6 @@ def _differences(left: bytes, right: bytes, at: int, runs: list[tuple[int, int]]
 
 def _anonymous(size: int) -> mmap.mmap:
     """A private mapping: reading a page that nobody wrote takes no memory, which a shared one would."""
-    if hasattr(mmap, "MAP_ANONYMOUS"):
-        return mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
-    return mmap.mmap(-1, size)
+    if sys.platform == "win32":
+        return mmap.mmap(-1, size)
+    return mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)

@@ -6,6 +6,7 @@ Time is real as soon as one attached network is real.  One thread, one selector,
 from __future__ import annotations
 
 import heapq
+import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol, cast
@@ -231,7 +232,10 @@ class _RealClock:
         """A clock for Python and machine code that is `behind_ns` behind the time of this loop."""
         monotonic_ns, zero_ns = time.monotonic_ns, self._zero_ns + behind_ns
         function = function_at(time.get_clock_info("monotonic").implementation)
-        return Clock(lambda: monotonic_ns() - zero_ns, function, time.CLOCK_MONOTONIC if function else 0, zero_ns)
+        number = 0
+        if sys.platform != "win32" and function:
+            number = time.CLOCK_MONOTONIC
+        return Clock(lambda: monotonic_ns() - zero_ns, function, number, zero_ns)
 
     def reach(self, due_ns: int) -> tuple[int, RunNumbers]:
         zero_ns = self._zero_ns

@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, cast
 
 import click
 
@@ -115,7 +115,8 @@ def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Se
     if path is None:
         yield
         return
-    with tempfile.TemporaryFile() as file:
+    with tempfile.TemporaryFile() as temporary:
+        file = cast(BinaryIO, temporary)
         writer = TraceWriter(plc, file, Depth.STATEMENTS, (), statement_lines(plc.image, files, libraries))
         try:
             yield
