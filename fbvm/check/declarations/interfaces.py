@@ -205,6 +205,7 @@ class _Interface:
     def _place_by_var_config(self, variable: Variable, location: tree.Location) -> None:
         """`AT %I*`: VAR_CONFIG gives each instance its place; without VAR_CONFIG it is a variable like others."""
         variable.open = self.project.completes(variable.name)
+        variable.open_location = location.text.strip() if variable.open else ""
         variable.reference = variable.reference or variable.open
         if not variable.open:
             said = "no VAR_CONFIG says" if location.text.rstrip().endswith("*") else "only its maker knows"

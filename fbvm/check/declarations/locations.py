@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 
-from fbvm.base.areas import FLAG_AREAS, Address, AddressError, parse_address
+from fbvm.base.areas import E_NAMES, FLAG_AREAS, PORTABLE_AREAS, Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, ArrayType, StringType, StructType, Type, base
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import holds_block, is_open
+from fbvm.check.symbols.facts import Variable, holds_block, is_open
 from fbvm.syntax import tree
 
 _WITHOUT_SIGN = re.compile(r"[IQM][XBWDL]?\d+(?:\.\d+)*", re.IGNORECASE)
@@ -31,6 +31,55 @@ def location_of(context: Context, declared: tree.VarDecl, kind: Type, source: So
         context.report.add("S0604", source, node, "one location cannot serve several names")
         return None
     return address if _fits(context, address, kind, source, node) else None
+
+
+_INCOMPLETE = re.compile(r"%([IQM]|[A-Z]+?)([XBWDL]?)(?:\*|\d[\d.]*)", re.I)
+_SIZES = {"X": 1, "B": 8, "W": 16, "D": 32, "L": 64}
+
+
+def completes(context: Context, address: Address, variable: Variable, node: tree.Location, source: Source) -> bool:
+    """True if VAR_CONFIG may give an address to a variable `AT %I*`: it is one of that area and, for `%IW*`, of that size.
+
+    `node` is the address as it is written.  False after a diagnostic (IEC 61131-3 ed. 3, table 16: `*` stands for what is left
+    open, and the letters in front of it are not)."""
+    area, size = _parts(variable)
+    where = f"{variable.name} is declared AT {variable.open_location}"
+    if area not in _names(address.area):
+        letters = address.area if address.area in PORTABLE_AREAS else _names(address.area)[-1]
+        context.report.add("S0604", source, node, f"{where}, and {address} lies in another area",
+                           f"write {example(variable)}, or declare it  AT %{letters}*",
+                           (variable.source, variable.node.start, "declared here"))
+        return False
+    written = 1 if address.bit is not None else address.size_bits
+    if size and written and size != written:
+        context.report.add("S0602", source, node, f"{where}, and {address} has another size", "",
+                           (variable.source, variable.node.start, "declared here"))
+        return False
+    return True
+
+
+def example(variable: Variable) -> str:
+    """An address that VAR_CONFIG may give to a variable `AT %I*`."""
+    area, _ = _parts(variable)
+    bit = base(variable.type) == BOOL
+    if area in PORTABLE_AREAS:
+        letter = "X" if bit else {1: "B", 4: "D", 8: "L"}.get(variable.type.size, "W")
+        return f"%{area}{letter}0" + (".0" if bit else "")
+    return str(Address({"DM": "D"}.get(area, area), 0, 0 if bit else None))
+
+
+def _parts(variable: Variable) -> tuple[str, int]:
+    """The area and the size in bits that a variable `AT %IW*` asks for; 0 where it leaves the size open."""
+    said = _INCOMPLETE.fullmatch(variable.open_location)
+    assert said is not None
+    return said[1].upper(), _SIZES.get(said[2].upper(), 0)
+
+
+def _names(area: str) -> tuple[str, ...]:
+    """The letters that name an area: those of its words, of its flags, and of all banks of E."""
+    if area in E_NAMES:
+        return area, "EM", "E"
+    return {"D": ("DM", "D"), "TF": ("TF", "T"), "CNF": ("CNF", "C")}.get(area, (area,))
 
 
 def _hint(text: str, declared: tree.VarDecl, kind: Type) -> str:

@@ -10,17 +10,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from fbvm.base.areas import AddressError, parse_address
+from fbvm.base.areas import Address, AddressError, parse_address
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import BOOL, BYTE, DWORD, LWORD, WORD, ArrayType, Field, StructType, Type, fold
 from fbvm.check.declarations.initial_bytes import initial_bytes
-from fbvm.check.declarations.locations import location_of
+from fbvm.check.declarations.locations import completes, example, location_of
 from fbvm.check.declarations.specs import resolve
 from fbvm.check.expressions.constant_integers import integer
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.containment import Containment
 from fbvm.check.symbols.context import Context
-from fbvm.check.symbols.facts import AccessPath, Completed, Spot, Variable
+from fbvm.check.symbols.facts import AccessPath, Completed, Spot, Variable, is_open
 from fbvm.syntax import tree
 
 _WIDTHS: dict[int, Type] = {1: BOOL, 8: BYTE, 32: DWORD, 64: LWORD}
@@ -35,6 +35,10 @@ class VarConfig:
         self.report = context.report
         self.completed: list[Completed] = []
         self.accesses: list[AccessPath] = []
+        self._given: dict[tuple[object, ...], tuple[Source, int]] = {}
+        """Where a variable got its place, or its value."""
+        self._placed: set[tuple[object, ...]] = set()
+        """Variables for which some row has a place, a wrong one included."""
         self._holds_open = Containment(context, lambda pou: any(variable.open for variable in pou.order))
 
     def resolve(self) -> None:
@@ -70,16 +74,49 @@ class VarConfig:
             return
         address = None
         if row.location is not None:
-            if declared is None or not declared.reference:
-                self.report.add("S0604", source, row.location, "only a variable AT %I*, %Q* or %M* takes a place from VAR_CONFIG",
-                                "declare it  AT %I*")
-                return
-            shown = tree.VarDecl(row.start, row.end, (), row.location, row.spec, None)
-            address = location_of(self.context, shown, spot.type, source)
+            address = self._address(row, row.location, spot, source)
             if address is None:
                 return
         initial = initial_bytes(scope, spot.type, row.initial, resolved[1]) if row.initial is not None else None
-        self.completed.append(Completed(spot, address, initial))
+        self._complete(Completed(spot, address, initial), row, source)
+
+    def _address(self, row: tree.ConfigVar, location: tree.Location, spot: Spot, source: Source) -> Address | None:
+        """The address that a row gives to a variable `AT %I*`; None after a diagnostic."""
+        self._placed.add((spot.root, _key(spot)))
+        variable = self._declaration(spot)
+        if variable is None or not variable.open:
+            self.report.add("S0604", source, location, "only a variable AT %I*, %Q* or %M* takes a place from VAR_CONFIG",
+                            "declare it  AT %I*")
+            return None
+        if is_open(location, spot.type):
+            self.report.add("S0604", source, location, f"VAR_CONFIG gives the whole address, and {location.text} is none",
+                            "write one such as %IX0.3 or %QW2")
+            return None
+        shown = tree.VarDecl(row.start, row.end, (), location, row.spec, None)
+        address = location_of(self.context, shown, spot.type, source)
+        return address if address is not None and completes(self.context, address, variable, location, source) else None
+
+    def _declaration(self, spot: Spot) -> Variable | None:
+        """The variable of a block or program that a path leads to; None for a member of a structure, and for an element."""
+        if spot.root is None or not spot.steps or not isinstance(spot.steps[-1], Field):
+            return None
+        holder = spot.root.type
+        for step in spot.steps[:-1]:
+            holder = step.type if isinstance(step, Field) else holder.element if isinstance(holder, ArrayType) else holder
+        block = self.context.block_of(holder) if isinstance(holder, StructType) and holder.block else None
+        return block.variables.get(fold(spot.steps[-1].name)) if block is not None else None
+
+    def _complete(self, row: Completed, node: tree.ConfigVar, source: Source) -> None:
+        """Keep what a row says, unless a row before it has given the same variable an address, or a value."""
+        for what, given in (("place", row.address), ("value", row.initial)):
+            key = what, row.spot.root, _key(row.spot)
+            if given is not None and key in self._given:
+                self.report.add("S0202", source, node.path, f"this variable has got its {what} already", "",
+                                (*self._given[key], "by this row"))
+                return
+            if given is not None:
+                self._given[key] = source, node.start
+        self.completed.append(row)
 
     def _access(self, row: tree.Access, source: Source, program: Spot | None = None) -> None:
         spot = self._spot(row.path, source, program)
@@ -177,12 +214,11 @@ class VarConfig:
 
     def _left_out(self) -> None:
         """Report instances with a variable AT %I* for which no VAR_CONFIG gives an address."""
-        done = {(row.spot.root, _key(row.spot)) for row in self.completed if row.address is not None}
         for root in self.context.global_order:
             for path, key, variable in () if root.reference else self._open_in(root.type, root.name, ()):
-                if (root, key) not in done:
+                if (root, key) not in self._placed:
                     self.report.add("S0801", variable.source, variable.node, f"no VAR_CONFIG says where {path} lies",
-                                    f"write  {path} AT %IX0.0 : {variable.type};  or the whole address here")
+                                    f"write  {path} AT {example(variable)} : {variable.type};  or the whole address here")
 
     def _open_in(self, kind: Type, path: str, key: tuple[object, ...]) -> Iterator[tuple[str, tuple[object, ...], Variable]]:
         if not self._holds_open(kind):

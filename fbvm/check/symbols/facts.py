@@ -53,6 +53,8 @@ class Variable:
     reference: bool = False
     open: bool = False
     """True for `AT %I*` that VAR_CONFIG completes: a reference then, which never changes."""
+    open_location: str = ""
+    """What is written behind AT if `open`: `%I*`, `%QX*`, `%IW1.2.3`."""
     any_length: bool = False
     """True for an in-out STRING that is declared without a length."""
     location: Address | None = None
