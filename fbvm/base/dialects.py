@@ -157,6 +157,7 @@ ALIKE = (
     ("AND and OR whose right side has effects", "Both sides are worked out; AND_THEN and OR_ELSE leave out what cannot matter."),
     ("FOR whose limit is the last value of its type", "Ends."),
     ("TIME_TO_DWORD, DWORD_TO_TIME", "Milliseconds modulo 2**32; in seconds under matiec."),
+    ("A number that TIME or DATE cannot hold; DT + TIME past 2262-04-11", "The program stops (R0105); TIME + TIME wraps."),
     ("SIZEOF of ten INT", "20: the bytes that they fill."),
     ("TON, TOF, TP when ET = PT exactly", "The time is over."),
     ("TON with PT = T#0s, in the scan in which IN rises", "Q is TRUE at once; in the scan after it under matiec."),

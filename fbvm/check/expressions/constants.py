@@ -122,6 +122,19 @@ def binary(op: str, kind: Type, a: Value, b: Value) -> Value:
     return value if kind is UNTYPED_INT else wrap(kind, value)
 
 
+def is_moment(kind: Type) -> bool:
+    """True for DATE and DT and their L types, whose sums and differences must stay in their range."""
+    return isinstance(kind, Elementary) and kind.name.endswith(("DATE", "DATE_AND_TIME"))
+
+
+def moment(op: str, a: int, b: int) -> int:
+    """The value of `a + b` or `a - b` where a is a DATE or DT, in ns.  Raises NotConstant outside 1677-09-22 to 2262-04-11."""
+    value = a + b if op == "+" else a - b
+    if arithmetic.wrap(value, "i64") != value:
+        raise NotConstant("it is outside the range of 64 bits of nanoseconds, for dates 1677-09-22 to 2262-04-11")
+    return value
+
+
 def _finish(kind: Type, value: float) -> float:
     return arithmetic.single(value) if machine(kind) == "f32" and kind is not UNTYPED_REAL else value
 

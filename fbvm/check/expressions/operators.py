@@ -352,7 +352,11 @@ def _folded(scope: Scope, expr: tree.Binary, operand: Type, result: Type) -> Typ
         try:
             if not is_untyped(operand) and not is_any(operand, "ANY_DURATION", "ANY_DATE"):
                 a, b = constants.convert(a, operand), constants.convert(b, operand)
-            scope.facts.constants[expr] = constants.binary(expr.op, operand, a, b)
+            left = scope.facts.types[expr.left]
+            if expr.op in "+-" and isinstance(a, int) and isinstance(b, int) and constants.is_moment(left):
+                scope.facts.constants[expr] = constants.moment(expr.op, a, b)
+            else:
+                scope.facts.constants[expr] = constants.binary(expr.op, operand, a, b)
         except constants.NotConstant as error:
             scope.error("S0703", expr, f"the constant expression has no value: {error}")
             return None

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 
+from fbvm.base.arithmetic import limits
 from fbvm.base.types import DAY_NS, DINT, EnumType, StringType, Type, base, machine
 from fbvm.check.expressions.values import is_any
 from fbvm.check.symbols.facts import StandardCall
@@ -70,7 +71,7 @@ def convert(emitter: Emitter, a: list[Node], call: StandardCall, site: int) -> N
     if is_time[0]:
         return _from_time(node, target, site, _tick(emitter, source))
     if is_time[1]:
-        return _to_time(node, source, site, _tick(emitter, target))
+        return _to_time(node, source, target, site, _tick(emitter, target))
     return _number(emitter, node, source, target, site)
 
 
@@ -231,12 +232,21 @@ def _from_time(node: Node, target: Type, site: int, tick: int) -> Node:
     return node if form == "i64" else ("convert", form, "i64", node)
 
 
-def _to_time(node: Node, source: Type, site: int, tick: int) -> Node:
-    """A number of ticks as a time."""
+def _to_time(node: Node, source: Type, target: Type, site: int, tick: int) -> Node:
+    """A number of ticks as a time; traps (R0105) outside the range of the type.  The bits of an LWORD are those of an L type."""
     form = machine(source)
+    is_time_of_day = target.name.endswith("TIME_OF_DAY")
+    low, high = (0, DAY_NS - 1) if is_time_of_day else limits("i64")
     if form in FLOATS:
         wide = node if form == "f64" else ("convert", "f64", "f32", node)
-        return ("nearest", "i64", "f64", ("mul", "f64", wide, ("const", "f64", float(tick))), site)
+        nearest = ("nearest", "i64", "f64", ("mul", "f64", wide, ("const", "f64", float(tick))), site)
+        return ("check", "i64", nearest, low, high, "R0105", site) if is_time_of_day else nearest
+    low, high = -(-low // tick), high // tick
+    if form == "u64" and tick == 1 and is_any(source, "ANY_BIT"):
+        node, form = ("convert", "i64", form, node), "i64"
+    least, most = limits(form)
+    if least < low or high < most:
+        node = ("check", form, node, max(low, least), high, "R0105", site)
     wide = node if form == "i64" else ("convert", "i64", form, node)
     return wide if tick == 1 else ("mul", "i64", wide, ("const", "i64", tick))
 

@@ -88,6 +88,12 @@ def _divide(form: str, a: Any, b: Any, site: int) -> Any:
     return arithmetic.wrap(arithmetic.quotient(a, b), form)
 
 
+def _check(form: str, value: int, low: int, high: int, code: str, site: int) -> int:
+    if not low <= value <= high:
+        raise arithmetic.Undefined(code, value, low, high)
+    return value
+
+
 _ROWS: dict[str, Callable[..., Any]] = {
     "add": _wrapped(operator.add), "sub": _wrapped(operator.sub), "mul": _wrapped(operator.mul), "div": _divide,
     "abs": _wrapped(abs), "pow": _wrapped(arithmetic.power), "atan2": _wrapped(arithmetic.arctangent),
@@ -106,7 +112,7 @@ _ROWS: dict[str, Callable[..., Any]] = {
     "select": lambda form, g, a, b: b if g else a,
     "min": _extreme(lambda a, b: a if a <= b else b, arithmetic.lesser),
     "max": _extreme(lambda a, b: a if a >= b else b, arithmetic.greater),
-    "floor_div": lambda form, a, b: a // b,
+    "floor_div": lambda form, a, b: a // b, "check": _check,
     "from_bcd": lambda form, source, a, site: arithmetic.from_bcd(a, form),
     "to_bcd": lambda form, source, a, site: arithmetic.to_bcd(a, form),
     "length": lambda form, a: arithmetic.wrap(len(a), form), "find": lambda form, a, b: strings.find(a, b),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from fbvm.base.arithmetic import limits
 from fbvm.base.types import BOOL, LREAL, RefType, Type, base, machine
+from fbvm.check.expressions import constants
 from fbvm.check.expressions.values import is_any
 from fbvm.code.builder.conversions import day_start, to_float
 from fbvm.code.lowering import pointers
@@ -83,8 +85,11 @@ def _time(body: BodyContext, expr: tree.Binary, operand: Type) -> Node:
     right = base(body.facts.types[expr.right])
     if expr.op in "+-":
         a, b = body.operands((expr.left, None), (expr.right, None))
-        node = (_ARITHMETIC[expr.op], "i64", a, b)
-        return _time_of_day(body, node) if operand.name.endswith("TIME_OF_DAY") else node
+        if operand.name.endswith("TIME_OF_DAY"):
+            return _time_of_day(body, (_ARITHMETIC[expr.op], "i64", a, _time_of_day(body, b)))
+        if constants.is_moment(base(body.facts.types[expr.left])):
+            return _moment(body, expr, a, b)
+        return (_ARITHMETIC[expr.op], "i64", a, b)
     if not is_any(right, "ANY_REAL"):
         a, b = body.operands((expr.left, None), (expr.right, None))
         b = b if machine(right) == "i64" else ("convert", "i64", machine(right), b)
@@ -93,6 +98,16 @@ def _time(body: BodyContext, expr: tree.Binary, operand: Type) -> Node:
     a = ("convert", "f64", "i64", a)
     product = ("mul", "f64", a, b) if expr.op == "*" else ("div", "f64", a, b, body.site(expr))
     return ("nearest", "i64", "f64", product, body.site(expr))
+
+
+def _moment(body: BodyContext, expr: tree.Binary, a: Node, b: Node) -> Node:
+    """A sum or difference with a DATE or DT in front: traps (R0105) where 64 bits of ns do not hold it."""
+    a, b = body.to_temporary(a), body.to_temporary(b)
+    zero, least, most = (("const", "i64", value) for value in (0, *limits("i64")))
+    below, above = ("min", "i64", b, zero), ("max", "i64", b, zero)
+    span = (("sub", "i64", least, below), ("sub", "i64", most, above)) if expr.op == "+" else \
+        (("add", "i64", least, above), ("add", "i64", most, below))
+    return (_ARITHMETIC[expr.op], "i64", ("within", "i64", a, *span, "R0105", body.site(expr)), b)
 
 
 def _time_of_day(body: BodyContext, node: Node) -> Node:
