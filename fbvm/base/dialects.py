@@ -24,6 +24,7 @@ class Dialect:
     seconds: bool = False
     hexadecimal_bits: bool = False
     real_bits_by_value: bool = False
+    reals_of_other_widths: bool = False
     loop_ends_each_pass: bool = False
     loop_counters_wrap: bool = False
     arithmetic_of_bits: bool = False
@@ -55,7 +56,10 @@ QUESTIONS = {
                           "0, and position 1"),
     "seconds": ("TIME_TO_REAL(T#5s), INT_TO_TIME(5000): the unit", "milliseconds", "seconds"),
     "hexadecimal_bits": ("DWORD_TO_STRING(255)", "'255'", "'16#FF'"),
-    "real_bits_by_value": ("REAL_TO_DWORD(1.5), DWORD_TO_REAL", "the bits, of one width", "the value, rounded"),
+    "real_bits_by_value": ("REAL_TO_DWORD(2.0), DWORD_TO_REAL(2), LREAL_TO_LWORD, LWORD_TO_LREAL",
+                           "the bits stay: 16#40000000, 2.8E-45", "the value: 2, 2.0"),
+    "reals_of_other_widths": ("WORD_TO_REAL(7), REAL_TO_BYTE, LREAL_TO_DWORD: a bit string of another width than the real",
+                              "an error", "the value, rounded"),
     "loop_ends_each_pass": ("end and step of FOR", "worked out once, in front of the loop",
                             "worked out on every pass, the end in front of it, the step behind it"),
     "loop_counters_wrap": ("FOR i := 120 TO 127, where i is a SINT: what i is behind it", "127: the next one does not fit",
@@ -105,18 +109,18 @@ STANDARD = Dialect("standard", "the third edition, and CODESYS's answer where it
 _ROWS = (
     STANDARD,
     Dialect("codesys", "programs for CODESYS, TwinCAT and their like", ("codesys/blocks",), last_of_mux=True,
-            lenient_positions=True, real_bits_by_value=True, arithmetic_of_bits=True, integers_and_bits=True,
-            numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True, bare_actions=True,
-            locals_are_read=True, programs_are_written=True, lenient_texts="leading", initial_variables=True, reals_wrap=True,
-            ties_away=True),
+            lenient_positions=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
+            integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
+            bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading", initial_variables=True,
+            reals_wrap=True, ties_away=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True,
-            lenient_texts="leading"),
-    Dialect("rusty", "programs for RuSTy", real_bits_by_value=True, loop_ends_each_pass=True, loop_counters_wrap=True,
+            real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading"),
+    Dialect("rusty", "programs for RuSTy", reals_of_other_widths=True, loop_ends_each_pass=True, loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
             pointers_count_elements=True, pragmas_act=True, initial_variables=True, locals_are_written=True,
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True),
-    Dialect("omron", "programs that shall run in Sysmac Studio",
+    Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True,
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )
 DIALECTS: dict[str, Dialect] = {row.name: row for row in _ROWS}

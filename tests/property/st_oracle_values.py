@@ -149,7 +149,7 @@ def converted(source: str, kind: str, value: Any) -> Any:
     if source == "TIME" and kind in NUMBERS:
         return wrapped(kind, truncated(value, 10**6))
     if kind == "TIME" and source in NUMBERS:
-        return value * 10**6
+        return within(kind, value * 10**6)
     return wrapped(kind, int(value))
 
 
@@ -178,8 +178,17 @@ def of_date(source: str, kind: str, value: int) -> int:
 
 
 def moved(kind: str, sign: str, value: int, step: int) -> int:
+    """A moment or a time of day and a duration: the latter modulo 24 hours, the former in its range."""
     value += step if sign == "+" else -step
-    return value % DAY_NS if kind in DAYTIMES else value
+    return value % DAY_NS if kind in DAYTIMES else within(kind, value)
+
+
+def within(kind: str, value: int) -> int:
+    """The value, if a time or a date can hold it."""
+    low, high = limits(kind)
+    if not low <= value <= high:
+        raise Trapped("R0105")
+    return value
 
 
 def to_text(source: str, kind: str, value: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fbvm.base.arithmetic import Undefined
+from fbvm.base.dialects import takers
 from fbvm.base.types import (
     ELEMENTARY,
     GENERIC,
@@ -26,7 +27,7 @@ from fbvm.check.calls import functions, intrinsics
 from fbvm.check.calls.arguments import Arguments, callee
 from fbvm.check.calls.functions import Conversion, Signature
 from fbvm.check.expressions import references, unknown_names
-from fbvm.check.expressions.assignability import BOUNDS_HINT, as_number, convertible, is_untyped, same
+from fbvm.check.expressions.assignability import BOUNDS_HINT, UNSIGNED, as_number, convertible, is_untyped, same
 from fbvm.check.expressions.literals import as_character
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import MAKERS, is_any
@@ -350,13 +351,24 @@ def _conversion(scope: Scope, call: tree.Call, row: Conversion) -> Type | None:
         return None
     if isinstance(source, StringType):
         source = string(functions.RESULT_STRING, source.wide)
-    by_value = scope.dialect.real_bits_by_value and row.form == "TO" and is_any(source, *_NUMBERS) and \
+    by_value = scope.dialect.reals_of_other_widths and row.form == "TO" and is_any(source, *_NUMBERS) and \
         is_any(target, *_NUMBERS)
     if not convertible(row.form, base(source), target) and not by_value:
-        scope.error("S0405", call, f"{callee(call)} is not defined for {source}", "")
+        scope.error("S0405", call, f"{callee(call)} is not defined for {source}", _by_way_of(base(source), target))
         return None
     scope.facts.calls[call] = StandardCall(row.form, [(value, base(source))], (base(source), target))
     return target
+
+
+def _by_way_of(source: Type, target: Type) -> str:
+    """The hint for a real and a bit string of two widths: an integer between them says that the value is meant."""
+    if is_any(source, "ANY_BIT") and is_any(target, "ANY_REAL"):
+        number = UNSIGNED.get(source.name, "INT")
+        return f"write {number}_TO_{target}({source}_TO_{number}(...)), or take {takers('reals_of_other_widths')}"
+    if is_any(source, "ANY_REAL") and is_any(target, "ANY_BIT"):
+        number = UNSIGNED.get(target.name, "INT")
+        return f"write {number}_TO_{target}({source}_TO_{number}(...)), or take {takers('reals_of_other_widths')}"
+    return ""
 
 
 def _own(scope: Scope, value: tree.Expr, row: Conversion) -> Type | None:

@@ -144,10 +144,10 @@ def _wide_to_char(emitter: Emitter, node: Node) -> Node:
 
 
 def _number(emitter: Emitter, node: Node, source: Type, target: Type, site: int) -> Node:
-    """Among BOOL, integers, bit strings, enumerations and reals.  Between reals and bit strings the bits stay the same, or
-    in a dialect the value."""
+    """Among BOOL, integers, bit strings, enumerations and reals.  Between reals and bit strings of their width the bits stay
+    the same, or in a dialect the value; a dialect that takes other widths converts the value."""
     a, b = machine(source), machine(target)
-    by_value = emitter.dialect.real_bits_by_value
+    by_value = emitter.dialect.real_bits_by_value or source.size != target.size
     if a == b:
         return node
     if b == "b":
