@@ -125,6 +125,7 @@ CODES: dict[str, Code] = {
         "S0693": "number of a timer or counter used twice",
         "S0790": "text is cut",
         "S0791": "constant loses digits",
+        "S0792": "constant is infinite or no number",
         "S0890": "program that no task runs",
         "X0190": "not taken over, and not needed to run",
         "X0290": "loop of wires",

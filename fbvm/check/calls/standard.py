@@ -68,6 +68,7 @@ def _fold(scope: Scope, call: tree.Call, called: StandardCall) -> None:
         return
     if value is not None:
         scope.facts.constants[call] = value
+        scope.unbounded(call, values)
 
 
 def _typed(scope: Scope, call: tree.Call, name: str, want: Type | None, as_value: bool) -> Type | str | None:

@@ -69,20 +69,12 @@ def wrap(kind: Type, value: int) -> int:
     return arithmetic.wrap(value, machine(kind))
 
 
-def _power(a: float, b: float) -> float:
-    result = arithmetic.power(float(a), float(b))
-    if not math.isfinite(result):
-        raise NotConstant("its power is not defined or too large")
-    return result
-
-
 def _real(op: str, a: float, b: float) -> float:
-    if op == "/" and b == 0:
-        raise NotConstant("it divides by zero")
-    result = a + b if op == "+" else a - b if op == "-" else a * b if op == "*" else a / b
-    if not math.isfinite(result):
-        raise NotConstant("its value is too large")
-    return result
+    """The value by IEEE 754, as the program computes it: infinite or NAN where no other number is."""
+    if op == "**":
+        return arithmetic.power(a, b)
+    result = a + b if op == "+" else a - b if op == "-" else a * b if op == "*" else arithmetic.divide(a, b)
+    return result if result == result else arithmetic.NAN
 
 
 def _integer(op: str, a: int, b: int) -> int:
@@ -104,7 +96,7 @@ def binary(op: str, kind: Type, a: Value, b: Value) -> Value:
         return bool(_COMPARE[op](a, b))
     if op == "**":
         assert not isinstance(a, bytes | str) and not isinstance(b, bytes | str)
-        return _finish(kind, _power(a, b))
+        return _finish(kind, _real(op, float(a), float(b)))
     if base_of(kind) == BOOL:
         x, y = bool(a), bool(b)
         return {"and": x and y, "or": x or y, "xor": x != y}[_LOGIC[op]]
@@ -112,10 +104,10 @@ def binary(op: str, kind: Type, a: Value, b: Value) -> Value:
     if machine(kind) in ("f32", "f64") and kind is not UNTYPED_INT:
         return _finish(kind, _real(op, float(a), float(b)))
     if isinstance(b, float):  # a duration times or by a real: to the nearest ns, ties to even
-        product = round(_real(op, float(a), b))
-        if wrap(kind, product) != product:
-            raise NotConstant("its value is too large")
-        return product
+        product = _real(op, float(a), b)
+        if not math.isfinite(product) or wrap(kind, round(product)) != round(product):
+            raise NotConstant("it divides by zero" if op == "/" and not b else "its value is too large")
+        return round(product)
     value = _integer(op, int(a), int(b))
     if base_of(kind).name.endswith("TIME_OF_DAY"):
         return value % DAY_NS

@@ -32,7 +32,7 @@ from fbvm.check.expressions.literals import as_character
 from fbvm.check.expressions.operator_hints import bit_hint, report_undefined
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.expressions.values import is_any
-from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL
+from fbvm.check.symbols.facts import UNTYPED_INT, UNTYPED_REAL, Value
 from fbvm.syntax import tree
 
 COMPARISONS = ("=", "<>", "<", ">", "<=", ">=")
@@ -344,22 +344,33 @@ def _folded(scope: Scope, expr: tree.Binary, operand: Type, result: Type) -> Typ
     scope.facts.operands.setdefault(expr, operand)
     a, b = scope.facts.constants.get(expr.left), scope.facts.constants.get(expr.right)
     if a is None or b is None:
-        if b == 0 and expr.op in ("/", "MOD") and is_any(operand, "ANY_INT"):
-            scope.error("S0703", expr.right, "this divides by zero")
-            return None
-        return result
+        return result if b != 0 or _may_divide_by_zero(scope, expr, operand) else None
     if isinstance(operand, Elementary | EnumType | StringType):
         try:
-            if not is_untyped(operand) and not is_any(operand, "ANY_DURATION", "ANY_DATE"):
-                a, b = constants.convert(a, operand), constants.convert(b, operand)
-            left = scope.facts.types[expr.left]
-            if expr.op in "+-" and isinstance(a, int) and isinstance(b, int) and constants.is_moment(left):
-                scope.facts.constants[expr] = constants.moment(expr.op, a, b)
-            else:
-                scope.facts.constants[expr] = constants.binary(expr.op, operand, a, b)
+            scope.facts.constants[expr] = _constant(scope, expr, operand, a, b)
         except constants.NotConstant as error:
             scope.error("S0703", expr, f"the constant expression has no value: {error}")
             return None
+        scope.unbounded(expr, (a, b))
     if operand is UNTYPED_INT and result is BOOL or operand is UNTYPED_REAL and result is BOOL:
         scope.facts.operands[expr] = LREAL if operand is UNTYPED_REAL else LINT
     return result
+
+
+def _may_divide_by_zero(scope: Scope, expr: tree.Binary, operand: Type) -> bool:
+    """False after a diagnostic for an integer that is divided by the constant 0; a warning for a real."""
+    if expr.op in ("/", "MOD") and is_any(operand, "ANY_INT"):
+        scope.error("S0703", expr.right, "this divides by zero")
+        return False
+    if expr.op == "/" and is_any(operand, "ANY_REAL"):
+        scope.loses(expr.right, "S0792", "this divides by zero: the result is infinite or no number")
+    return True
+
+
+def _constant(scope: Scope, expr: tree.Binary, operand: Type, a: Value, b: Value) -> Value:
+    """The value of an operator between constants.  Raises NotConstant."""
+    if expr.op in "+-" and isinstance(a, int) and isinstance(b, int) and constants.is_moment(scope.facts.types[expr.left]):
+        return constants.moment(expr.op, a, b)
+    if not is_untyped(operand) and not is_any(operand, "ANY_DURATION", "ANY_DATE"):
+        a, b = constants.convert(a, operand), constants.convert(b, operand)
+    return constants.binary(expr.op, operand, a, b)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
+
 from fbvm.base.diagnostics import Source
 from fbvm.base.types import (
     BOOL,
@@ -127,15 +130,23 @@ class Scope:
 
     def _in_range(self, expr: tree.Expr, value: Value, target: Type, code: str) -> bool:
         if isinstance(target, StringType) and isinstance(value, bytes | str) and len(value) > target.capacity and code != "S0503":
-            self._loses(expr, "S0790", f"the text has {len(value)} characters, and {target} keeps {target.capacity} of them")
+            self.loses(expr, "S0790", f"the text has {len(value)} characters, and {target} keeps {target.capacity} of them")
         if isinstance(target, SubrangeType) and isinstance(value, int) and not target.low <= value <= target.high:
             self.error("S0702", expr, f"{value} is outside {target.low}..{target.high} of {target}")
             return False
         return True
 
-    def _loses(self, expr: tree.Expr, code: str, message: str) -> None:
-        """Record a warning for a constant that its place does not hold as it is written."""
+    def loses(self, expr: tree.Expr, code: str, message: str) -> None:
+        """Record a warning for a constant whose value is not the one that is written."""
         self.facts.losses.append((self.source, expr, code, message))
+
+    def unbounded(self, expr: tree.Expr, operands: Iterable[Value]) -> None:
+        """Record a warning if the constant `expr` is infinite or no number and its operands are finite."""
+        value = self.facts.constants.get(expr)
+        if isinstance(value, float) and not math.isfinite(value) and \
+                all(math.isfinite(operand) for operand in operands if isinstance(operand, float)):
+            self.loses(expr, "S0792", "this is no number (NAN)" if value != value else
+                       f"this is infinite ({'-' if value < 0 else ''}INF)")
 
     def condition(self, expr: tree.Expr, what: str) -> None:
         """Infer an expression that must be BOOL; `what` names the statement in the message."""
@@ -159,7 +170,8 @@ class Scope:
         if isinstance(kind, EnumType) and self.dialect.numbers_of_enumerations:
             kind = kind.base
         if self.dialect.narrowing and untyped is UNTYPED_REAL and is_any(kind, "ANY_INT"):
-            untyped, value = UNTYPED_INT, int(value)
+            untyped, value = UNTYPED_INT, int(value) if math.isfinite(value) else cut(value, kind)
+            assert isinstance(value, int)
         if untyped is UNTYPED_REAL and not is_any(kind, "ANY_REAL") or \
                 not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_REAL"):
             self.error(code, expr, f"{untyped} does not fit {target}", literal_hint(value, kind))
@@ -170,8 +182,9 @@ class Scope:
                        literal_hint(value, kind) if kind == BOOL else "")
             return None
         self.facts.constants[expr] = held = convert(value, kind)
+        self.unbounded(expr, (value,))
         if untyped is UNTYPED_INT and isinstance(held, float) and held != value:
-            self._loses(expr, "S0791", f"{kind} cannot hold {value}: it becomes {held:.0f}")
+            self.loses(expr, "S0791", f"{kind} cannot hold {value}: it becomes {held:.0f}")
         self.facts.types[expr] = target
         return target
 

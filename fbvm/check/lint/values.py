@@ -70,7 +70,7 @@ def _fraction(body: Body, expr: tree.Expr, kind: Type) -> None:
         if isinstance(node, tree.Unary):
             todo.append(node.operand)
         elif isinstance(node, tree.Binary) and not is_any(body.facts.operands.get(node, LREAL), "ANY_REAL") and \
-                not isinstance(body.facts.constants.get(node.left), float):
+                not any(isinstance(body.facts.constants.get(side), float) for side in (node.left, node.right)):
             if node.op == "/":
                 _divided(body, node, kind)
             elif node.op in ("+", "-", "*"):
