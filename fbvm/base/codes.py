@@ -126,6 +126,7 @@ CODES: dict[str, Code] = {
         "S0790": "text is cut",
         "S0791": "constant loses digits",
         "S0792": "constant is infinite or no number",
+        "S0793": "power of constants taken as an integer",
         "S0890": "program that no task runs",
         "X0190": "not taken over, and not needed to run",
         "X0290": "loop of wires",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from fbvm.base.codes import CODES
-from fbvm.base.types import fold
+from fbvm.base.types import DINT, LINT, fold
 from fbvm.check.expressions.scope import Scope
 from fbvm.check.symbols.facts import UNTYPED_INT
 from fbvm.syntax import tree
@@ -23,12 +23,14 @@ def integer(scope: Scope, expr: tree.Expr, known: Mapping[str, int] | None = Non
     if kind is None:
         return None
     value = scope.facts.constants.get(expr)
+    if isinstance(value, float) and scope.takes_power(expr, LINT):
+        return int(value)
     if isinstance(value, bool) or not isinstance(value, int):
         what = f"{kind}" if value is not None else "not known before the program runs"
         if value is None and is_undefined(scope, expr):
             return None
         scope.error("S0701", expr, f"a constant integer is needed here; this is {what}",
-                    "write a number" if value is not None else
+                    scope.power_hint(expr, DINT) or "write a number" if value is not None else
                     "write a literal, or declare the name in a VAR CONSTANT section")
         return None
     return value

@@ -23,7 +23,7 @@ from fbvm.base.types import (
     base,
     fold,
 )
-from fbvm.check.expressions import any_parameters
+from fbvm.check.expressions import any_parameters, powers
 from fbvm.check.expressions.assignability import (
     assignable,
     conversion_hint,
@@ -122,11 +122,19 @@ class Scope:
             if expr in self.facts.constants:
                 self.facts.constants[expr] = cut(self.facts.constants[expr], base(target))
             return True
+        if self.takes_power(expr, base(target)):
+            self.facts.types[expr] = UNTYPED_REAL
+            return self.adopt(expr, target, code) is not None
         constant, value = code in _CONSTANT_PLACES and not is_block(kind), self.facts.constants.get(expr)
         self.error(code, expr, f"{role or 'the value'} is {kind}, but {target} is needed here",
-                   hidden_hint(expr, target) or
+                   hidden_hint(expr, target) or self.power_hint(expr, target) or
                    (literal_hint(value, base(target)) if constant else mismatch_hint(expr, kind, target)))
         return False
+
+    def power_hint(self, expr: tree.Expr, target: Type) -> str:
+        """The hint for a power where an integer is needed, "" for another expression."""
+        hint = powers.hint(self.facts, expr, self.text(expr), target) if powers.power_in(self.facts, expr) is not None else ""
+        return f"** gives {self.facts.types[expr]}: {hint}" if hint else ""
 
     def _in_range(self, expr: tree.Expr, value: Value, target: Type, code: str) -> bool:
         if isinstance(target, StringType) and isinstance(value, bytes | str) and len(value) > target.capacity and code != "S0503":
@@ -169,12 +177,12 @@ class Scope:
             return target
         if isinstance(kind, EnumType) and self.dialect.numbers_of_enumerations:
             kind = kind.base
-        if self.dialect.narrowing and untyped is UNTYPED_REAL and is_any(kind, "ANY_INT"):
+        if untyped is UNTYPED_REAL and self._becomes_integer(expr, kind):
             untyped, value = UNTYPED_INT, int(value) if math.isfinite(value) else cut(value, kind)
             assert isinstance(value, int)
         if untyped is UNTYPED_REAL and not is_any(kind, "ANY_REAL") or \
                 not is_any(kind, "ANY_INT", "ANY_BIT", "ANY_REAL"):
-            self.error(code, expr, f"{untyped} does not fit {target}", literal_hint(value, kind))
+            self._misfits(expr, untyped, target, code)
             return None
         span = limits(target)
         if span is not None and not span[0] <= value <= span[1]:
@@ -187,6 +195,26 @@ class Scope:
             self.loses(expr, "S0791", f"{kind} cannot hold {value}: it becomes {held:.0f}")
         self.facts.types[expr] = target
         return target
+
+    def takes_power(self, expr: tree.Expr, kind: Type) -> bool:
+        """True for a power of integers whose value a dialect takes where an integer is needed; a warning where it has to."""
+        if not self.dialect.whole_powers or not powers.takes(kind) or not powers.is_whole(self.facts, expr):
+            return False
+        if not self.dialect.narrowing:
+            self.loses(expr, "S0793", f"** gives LREAL, whose value is taken as {kind}")
+        return True
+
+    def _becomes_integer(self, expr: tree.Expr, kind: Type) -> bool:
+        """True for an untyped real that a dialect takes as an integer."""
+        return self.takes_power(expr, kind) or self.dialect.narrowing and is_any(kind, "ANY_INT")
+
+    def _misfits(self, expr: tree.Expr, untyped: Type, target: Type, code: str) -> None:
+        """Report an expression of literals that does not fit its place: a literal of another kind, or a power."""
+        power = powers.power_in(self.facts, expr) if untyped is UNTYPED_REAL else None
+        if power is not None:
+            self.error(code, expr, powers.message(target), powers.hint(self.facts, expr, self.text(expr), target))
+        else:
+            self.error(code, expr, f"{untyped} does not fit {target}", literal_hint(self.facts.constants[expr], base(target)))
 
     def note_call(self, pou: Pou, node: tree.Node) -> None:
         """Record that the POU of this scope calls another one."""
