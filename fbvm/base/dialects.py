@@ -44,6 +44,7 @@ class Dialect:
     lenient_texts: str = ""
     """How a text that is no literal is converted: "leading", "whole", or "" for a trap."""
     whole_powers: bool = False
+    no_open_inputs: bool = False
     narrowing: bool = False
     sums_in_dint: bool = False
     reals_saturate: bool = False
@@ -90,6 +91,8 @@ QUESTIONS = {
                           "the value that y begins with; in a FUNCTION, and for VAR_TEMP, what y has when the body starts"),
     "whole_powers": ("2 ** 3, EXPT(2, 10) of constants, where an integer is needed", "an error that names the conversion",
                      "8, 1024: the value if it is whole; under codesys with a warning (S0793)"),
+    "no_open_inputs": ("ARRAY [*] as VAR_INPUT of a FUNCTION", "taken: the function reads the argument where it lies, without a copy, and cannot write it",
+                       "refused (S0903); VAR_IN_OUT takes it"),
     "narrowing": ("DINT where INT is needed, REAL where DINT is, BOOL where a number is, a reference to another type",
                   "an error that names the conversion",
                   "cut to the width; without its fraction, the nearest number that there is; 1 and 0; as it is"),
@@ -115,16 +118,16 @@ _ROWS = (
             lenient_positions=True, real_bits_by_value=True, reals_of_other_widths=True, arithmetic_of_bits=True,
             integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True, mixed_arguments=True,
             bare_actions=True, locals_are_read=True, programs_are_written=True, lenient_texts="leading", initial_variables=True,
-            reals_wrap=True, ties_away=True, whole_powers=True),
+            reals_wrap=True, ties_away=True, whole_powers=True, no_open_inputs=True),
     Dialect("matiec", "programs for matiec, OpenPLC and Beremiz", ("matiec/blocks",), seconds=True, hexadecimal_bits=True,
-            real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading"),
+            real_bits_by_value=True, reals_of_other_widths=True, lenient_texts="leading", no_open_inputs=True),
     Dialect("rusty", "programs for RuSTy", reals_of_other_widths=True, loop_ends_each_pass=True, loop_counters_wrap=True,
             arithmetic_of_bits=True, integers_and_bits=True, numbers_of_enumerations=True, number_times_duration=True,
             integers_are_nanoseconds=True, mixed_arguments=True, locals_are_read=True, programs_are_written=True,
             pointers_count_elements=True, pragmas_act=True, initial_variables=True, locals_are_written=True,
             narrowing=True, sums_in_dint=True, reals_saturate=True, lenient_texts="whole", written_out=True, ties_away=True,
             whole_powers=True),
-    Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True,
+    Dialect("omron", "programs that shall run in Sysmac Studio", reals_of_other_widths=True, no_open_inputs=True,
             refused=frozenset(("POINTER TO", "REFERENCE TO", "REF_TO", "WSTRING", "alias"))),
 )
 DIALECTS: dict[str, Dialect] = {row.name: row for row in _ROWS}

@@ -176,9 +176,13 @@ class _Interface:
             return
         if self.scope.dialect.pragmas_act and passes_places(self.pou.source, section):
             made.kind = "VAR_IN_OUT"
-        elif isinstance(made.type, AnyType) or is_block(made.type):
+        elif isinstance(made.type, AnyType) or is_block(made.type) or self._is_open_input(made):
             made.kind = "VAR_IN_OUT"
-            made.constant = is_block(made.type)
+            made.constant = not isinstance(made.type, AnyType)
+
+    def _is_open_input(self, made: Variable) -> bool:
+        """True for an input ARRAY [*] of a FUNCTION, which reads the argument where it lies and may not write it."""
+        return isinstance(made.type, OpenArrayType) and self.pou.is_function and not self.scope.dialect.no_open_inputs
 
     def _place(self, variable: Variable, declared: tree.VarDecl) -> None:
         variable.reference = variable.kind == "VAR_IN_OUT"
@@ -217,8 +221,13 @@ class _Interface:
         kind = variable.type
         if isinstance(kind, _WITH_BOUNDS) and variable.kind != "VAR_IN_OUT":
             what = kind.name if isinstance(kind, AnyType) else "ARRAY [*]"
-            self._error("S0205", declared.spec, f"{what} cannot be {variable.kind}",
-                        "declare it in VAR_IN_OUT")
+            if variable.kind == "VAR_INPUT" and self.pou.is_function:
+                self._error("S0903", declared.spec, f"{what} as an input is not in the dialect {self.scope.dialect.name}",
+                            "declare it in VAR_IN_OUT, or VAR_IN_OUT CONSTANT")
+            else:
+                self._error("S0205", declared.spec, f"{what} cannot be {variable.kind} of a {self.pou.kind}",
+                            "declare it in VAR_IN_OUT" + ("; only a FUNCTION takes it as VAR_INPUT" if
+                                                          variable.kind == "VAR_INPUT" and what == "ARRAY [*]" else ""))
 
     def _edge(self, variable: Variable, declared: tree.VarDecl) -> None:
         if variable.kind != "VAR_INPUT" or base(variable.type) != BOOL or self.pou.is_function:
