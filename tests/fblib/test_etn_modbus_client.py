@@ -208,14 +208,78 @@ def test_a_silent_network() -> None:
     assert rig.ask("08 00 00 00 01") == "08 00 00 00 01"
 
 
+GOOD, SILENT, GARBLED = "03 02 12 34", "error 0080", "error 0045"
 ENDS = {
-    "late": "error 0080", "two pieces": "", "byte by byte": "", "twice": "", "wrong transaction": "error 0080",
-    "wrong unit": "error 0080", "wrong function": "error 0080", "wrong content": "passed on",
-    "one byte short": "passed on",
-    "server failure": "error 0004", "wrong protocol": "error 0080", "impossible length": "error 0045",
-    "garbage": "error 0045", "silence": "error 0080", "half": "error 0080", "half, then fin": "error 0081",
-    "fin": "error 0081", "reset": "error 004B", "half, then reset": "error 004B",
-}  # fmt: skip
+    "two pieces": GOOD,
+    "byte by byte": GOOD,
+    "twice": GOOD,
+    "again later": GOOD,
+    "a wrong one first": GOOD,
+    "a wrong one last": GOOD,
+    "garbage behind": GOOD,
+    "a byte behind": GOOD,
+    "flood behind": GOOD,
+    "right, then fin": GOOD,
+    "right, then closed": GOOD,
+    "right, then reset": GOOD,
+    "wrong content": "03 FD 12 34",
+    "one byte short": "03 02 12",
+    "two bytes more": "03 04 12 34 00 00",
+    "function only": "03",
+    "exception 00": "83 00",
+    "illegal function": "error 0001",
+    "server failure": "error 0004",
+    "gateway without target": "error 000B",
+    "exception 0C": "error 000C",
+    "exception FF": "error 00FF",
+    "impossible length": GARBLED,
+    "length 0": GARBLED,
+    "length 1": GARBLED,
+    "length 255": GARBLED,
+    "length one less": "03 02 12",
+    "garbage": GARBLED,
+    "garbage first": GARBLED,
+    "flood": GARBLED,
+    "half, then fin": "error 0081",
+    "fin": "error 0081",
+    "half closed": "error 0081",
+    "header, then closed": "error 0081",
+    "reset": "error 004B",
+    "half, then reset": "error 004B",
+    "one byte, then reset": "error 004B",
+}
+"""What a request for one register ends with, by misdeed: the PDU of a reply, or an error; all others end like silence."""
+ENDS_OF_REAL = {"right, then reset": "error 004B"}
+"""The misdeeds that end otherwise with the delays of timing "real": a reset throws away what was not read yet."""
+RUDE_ENDS = {
+    "nobody listens": ["error 004A"] * 3,
+    "never accepts": ["error 2210"] * 3,
+    "closes at once": ["error 2210"] * 3,
+    "half closes at once": ["error 2210"] * 3,
+    "resets at once": ["error 2210"] * 3,
+    "closes after a while": ["error 2210", GOOD, "error 2210"],
+    "closes between requests": [GOOD] * 3,
+    "resets between requests": [GOOD] * 3,
+    "takes one connection only": [GOOD, "error 004A", "error 004A"],
+    "never reads": [SILENT] * 3,
+    "never reads, then resets": ["error 004B"] * 3,
+    "closes in mid-request": ["error 0081"] * 3,
+    "resets in mid-request": ["error 004B"] * 3,
+    "hears every second request": [SILENT, GOOD, SILENT],
+    "previous reply instead": [SILENT] * 3,
+    "previous reply first": [GOOD] * 3,
+    "previous reply behind": [GOOD] * 3,
+    "speaks first": [GOOD] * 3,
+    "speaks first, garbage": [GARBLED] * 3,
+    "drips for ever": [SILENT] * 3,
+    "floods from the start": [GOOD, SILENT, GOOD],
+}
+"""What three requests end with, each a second after the end of the one before, by server."""
+RUDE_ENDS_OF_REAL = {
+    "closes after a while": ["error 2210"] * 3,
+    "resets between requests": ["error 004B"] * 3,
+    "floods from the start": [SILENT] * 3,
+}
 
 
 READ = "03 00 00 00 01"
@@ -241,13 +305,8 @@ def test_a_server_that_misbehaves(misdeed: str, timing: str) -> None:
     """What the PDU of a reply says is the user's to judge; everything around it the block's."""
     rig = Rig(ModbusPeer(None, MISDEEDS[misdeed]), timing=timing).connect()
     rig.peer.server.holding_registers[0] = 0x1234
-    got = rig.ask(READ)
-    expected = ENDS.get(misdeed, "any")
-    if expected == "passed on":
-        assert got.startswith("03")
-    elif expected != "any":
-        broken = timing == "real" and expected == "error 004B"
-        assert got in (expected or "03 02 12 34", "error 0081" if broken else "")
+    of_real = ENDS_OF_REAL if timing == "real" else {}
+    assert rig.ask(READ) == of_real.get(misdeed, ENDS.get(misdeed, SILENT))
     recovers(rig)
 
 
@@ -259,10 +318,18 @@ def test_a_rude_server(rude: str, timing: str) -> None:
     rig = Rig(timing=timing)
     rig.peer.server.holding_registers[0] = 0x1234
     rig.network.place(SERVER, RUDE_PEERS[rude](rig.peer.server))
+    ended = []
     for _ in range(3):
         rig.scan(100)
-        assert rig.ask(READ) == "03 02 12 34" or rig.plc.read("Main.Client.Error")
+        ended.append(rig.ask(READ))
+    of_real = RUDE_ENDS_OF_REAL if timing == "real" else {}
+    assert ended == of_real.get(rude, RUDE_ENDS[rude])
     recovers(rig)
+
+
+def test_every_misdeed_has_its_end() -> None:
+    assert set(ENDS_OF_REAL) < set(ENDS) < set(MISDEEDS)
+    assert set(RUDE_ENDS_OF_REAL) < set(RUDE_ENDS) == set(RUDE_PEERS)
 
 
 def test_the_connection_is_opened_again_when_the_server_has_closed_it() -> None:

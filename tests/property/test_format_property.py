@@ -28,6 +28,10 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 CORPUS = ("tests/lang/**/", "tests/golden/**/", "tests/bench/", "tests/conformance/", "fblib/**/", "examples/**/")
 PROGRAMS = re.compile(r"(?m)^(?=// ----)")
 """Where a file of several programs is to be cut, so that an error in one does not hide the others."""
+EXPECTS_ERROR = re.compile(r"// *error\b")
+"""The comment of a program that shows an error, which may be one of syntax."""
+WRONG = ROOT / "tests" / "golden" / "errors"
+"""The folder of texts with errors of syntax."""
 LONG = 100_000
 """Bytes of a file that takes seconds."""
 PLACES = {"start", "end", "op_start"}
@@ -35,9 +39,14 @@ PLACES = {"start", "end", "op_start"}
 
 @cache
 def programs(path: Path) -> list[str]:
-    """The texts of a file that can be formatted."""
-    pieces = PROGRAMS.split(path.read_text(encoding="utf-8"))
-    return [piece for piece in pieces if piece.strip() and not syntax_errors(piece)]
+    """The texts of a file that can be formatted: all but those of tests/golden/errors and those that expect an error."""
+    readable = []
+    for piece in PROGRAMS.split(path.read_text(encoding="utf-8")):
+        wrong = syntax_errors(piece)
+        assert not wrong or path.parent == WRONG or EXPECTS_ERROR.search(piece), f"{path.name}: {wrong[0]}"
+        if piece.strip() and not wrong:
+            readable.append(piece)
+    return readable
 
 
 def syntax_errors(text: str) -> list[str]:
@@ -109,7 +118,8 @@ def each_file(quick: tuple[str, ...]) -> pytest.MarkDecorator:
 
 @each_file(("tests/golden", "examples"))
 def test_every_program_keeps_its_meaning(path: Path) -> None:
-    assert all(check(text) for text in programs(path))
+    for text in programs(path):
+        check(text)
 
 
 def image(text: str) -> object:
@@ -127,7 +137,8 @@ def image(text: str) -> object:
 
 @each_file(("tests/golden", "examples/project", "examples/row", "examples/tank"))
 def test_every_program_is_compiled_to_the_same_image(path: Path) -> None:
-    assert all(image(text) == image(write(text)) for text in programs(path))
+    for text in programs(path):
+        assert image(text) == image(write(text))
 
 
 # --- changes that must not matter ---
