@@ -1,0 +1,273 @@
+"""Breaks fbvm in small ways and counts how many of them the tests find.  It gates nothing.
+
+    python tests/bench/mutants.py ROOM [--count N] [--seed S] [--seconds T]
+
+ROOM is a folder or file of `fbvm/` or `fblib/`: `check`, `units/etn21`, `omron/mtcp_etn`, `record/draw/why.py`.  A mutant is
+one edit of one file: another relation, AND for OR, a constant plus one, a condition negated, a statement removed, None for a
+result.  Each is written into a copy of the repository in a temporary folder, where the tests of the room run without the slow
+ones, first those that name the file.  A mutant that no test finds is printed as a difference.
+
+A survivor is a question, not always a gap: some mutants mean the same program (a limit one higher, a quicker way left out)."""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import difflib
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+HOUSE = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(HOUSE))
+
+from fbvm.base.diagnostics import Source, errors  # noqa: E402
+from fbvm.syntax import tree  # noqa: E402
+from fbvm.syntax.parser import parse  # noqa: E402
+from fbvm.syntax.st.lexer import Lexer  # noqa: E402
+from fbvm.syntax.tree.node import Node, names_of  # noqa: E402
+
+COPIED = ("fbvm", "fblib", "grammar", "tests", "examples", "docs", "pyproject.toml", "README.md", "ARCHITECTURE.md",
+          "CONFORMANCE.md", "CHANGELOG.md", "LICENSE")  # fmt: skip
+TESTS = {
+    "fblib": ("tests/fblib", "tests/unit/units"), "base": ("tests/unit/base", "tests/lang"),
+    "syntax": ("tests/unit/syntax", "tests/golden", "tests/lang", "tests/property"), "wire": ("tests/unit/wire", "tests/fblib"),
+    "check": ("tests/unit/check", "tests/lang", "tests/unit/code"), "interchange": ("tests/plcopen",),
+    "net": ("tests/unit/net", "tests/unit/units", "tests/fblib"), "code": ("tests/unit/code", "tests/lang", "tests/unit/engine"),
+    "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
+    "processor": ("tests/unit/machine", "tests/unit/units"),
+    "machine": ("tests/unit/machine", "tests/unit/units", "tests/unit/run"),
+    "record": ("tests/unit/record", "tests/unit/cli"), "testing": ("tests/unit/testing",), "cli": ("tests/unit/cli",),
+}  # fmt: skip
+"""The folders of tests that matter for a room; for others that of its own name."""
+RELATIONS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "==": "!=", "!=": "==", "is": "is not", "is not": "is",
+             "in": "not in", "not in": "in"}  # fmt: skip
+OPERATORS = re.compile(r"\bis\s+not\b|\bnot\s+in\b|\bis\b|\bin\b|[<>!=]=|[<>]")
+ST_WORDS = {"<": "<=", "<=": "<", ">": ">=", ">=": ">", "=": "<>", "<>": "=", "AND": "OR", "OR": "AND", "TRUE": "FALSE",
+            "FALSE": "TRUE"}  # fmt: skip
+SLOWEST = 4
+"""Times that of the tests without a mutant, after which a mutant counts as found: it runs for ever."""
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One edit of one file: `text[start:end]` becomes `new`."""
+
+    path: Path
+    start: int
+    end: int
+    new: str
+
+    def apply(self, text: str) -> str:
+        """The text of the file with the edit."""
+        return text[: self.start] + self.new + text[self.end :]
+
+
+# --- edits ------------------------------------------------------------------------------------------------------------
+
+
+def mutants(path: Path, text: str) -> list[Mutant]:
+    """All mutants of a source file, Python or ST by its suffix; each differs from `text` and can be parsed."""
+    found = dict.fromkeys(Mutant(path, *edit) for edit in (_python if path.suffix == ".py" else _st)(text))
+    return [mutant for mutant in found if mutant.apply(text) != text and _is_readable(path, mutant.apply(text))]
+
+
+def _is_readable(path: Path, text: str) -> bool:
+    if path.suffix == ".py":
+        try:
+            compile(text, str(path), "exec")
+        except (SyntaxError, ValueError):
+            return False
+        return True
+    return not errors(parse(Source(path.name, text))[1])
+
+
+Edit = tuple[int, int, str]
+
+
+def _python(text: str) -> Iterator[Edit]:
+    """The edits of a Python source."""
+    module = ast.parse(text)
+    lines = text.splitlines(keepends=True)
+    starts = [0]
+    for line in lines:
+        starts.append(starts[-1] + len(line))
+
+    def place(line: int, column: int) -> int:
+        return starts[line - 1] + len(lines[line - 1].encode()[:column].decode())
+
+    def span(node: ast.expr | ast.stmt) -> tuple[int, int]:
+        assert node.end_lineno is not None and node.end_col_offset is not None
+        return place(node.lineno, node.col_offset), place(node.end_lineno, node.end_col_offset)
+
+    for node in _executed(module):
+        if isinstance(node, ast.Compare):
+            for one, other in zip([node.left, *node.comparators], node.comparators, strict=False):
+                yield from _between(text, span(one)[1], span(other)[0], OPERATORS, RELATIONS)
+        elif isinstance(node, ast.BoolOp):
+            for one, other in zip(node.values, node.values[1:], strict=False):
+                yield from _between(text, span(one)[1], span(other)[0], re.compile(r"\band\b|\bor\b"), {"and": "or", "or": "and"})
+        elif isinstance(node, ast.Constant) and isinstance(node.value, int | float):
+            yield *span(node), str(not node.value if isinstance(node.value, bool) else node.value + 1)
+        elif isinstance(node, ast.AugAssign) or isinstance(node, ast.Expr) and isinstance(node.value, ast.Call) or \
+                isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Attribute | ast.Subscript):
+            yield *span(node), "pass"
+        elif isinstance(node, ast.Return) and node.value is not None and not isinstance(node.value, ast.Constant):
+            yield *span(node), "return None"
+        if isinstance(node, ast.If | ast.While | ast.IfExp) and not isinstance(node.test, ast.Constant):
+            start, end = span(node.test)
+            yield start, end, f"(not ({text[start:end]}))"
+
+
+def _executed(node: ast.AST) -> Iterator[ast.AST]:
+    """The nodes below one that are more than text and types: no annotation, format string or `if TYPE_CHECKING`."""
+    yield node
+    for name, inner in ast.iter_fields(node):
+        for child in inner if isinstance(inner, list) else [inner]:
+            checked = isinstance(child, ast.If) and isinstance(child.test, ast.Name) and child.test.id == "TYPE_CHECKING"
+            if isinstance(child, ast.AST) and name not in ("annotation", "returns") and not checked and \
+                    not isinstance(child, ast.JoinedStr):
+                yield from _executed(child)
+
+
+def _between(text: str, start: int, end: int, pattern: re.Pattern[str], instead: dict[str, str]) -> Iterator[Edit]:
+    """The edit of the operator that stands between two operands."""
+    found = pattern.search(text, start, end)
+    if found:
+        yield found.start(), found.end(), instead[" ".join(found[0].split())]
+
+
+def _st(text: str) -> Iterator[Edit]:
+    """The edits of a source in Structured Text."""
+    for token in Lexer(text, lambda *message: None).tokens():
+        if token.type == "NUMBER" and re.fullmatch(r"[0-9]+", token.text):
+            yield token.start, token.end, str(int(token.text) + 1)
+        elif token.type == "NUMBER" and (based := re.fullmatch(r"16#([0-9A-Fa-f]+)", token.text)):
+            yield token.start, token.end, f"16#{int(based[1], 16) + 1:X}"
+        elif token.text.upper() in ST_WORDS:
+            yield token.start, token.end, ST_WORDS[token.text.upper()]
+    for node in _nodes(parse(Source("mutant.st", text))[0]):
+        if isinstance(node, tree.Assign | tree.CallStatement | tree.Return | tree.Exit):
+            yield node.start, node.end, ""
+        elif isinstance(node, tree.If):
+            for condition, _ in node.branches:
+                yield condition.start, condition.end, f"NOT ({text[condition.start : condition.end]})"
+
+
+def _nodes(part: object) -> Iterator[Node]:
+    if isinstance(part, tuple):
+        for item in part:
+            yield from _nodes(item)
+    elif isinstance(part, Node):
+        yield part
+        for name in names_of(part):
+            yield from _nodes(getattr(part, name))
+
+
+# --- runs -------------------------------------------------------------------------------------------------------------
+
+
+def files_of(room: str, house: Path = HOUSE) -> list[Path]:
+    """The sources of a room, relative to the repository.  Raises ValueError for a name that no folder or file has."""
+    for base in ("", "fbvm", "fblib"):
+        path = house / base / room
+        if room and path.is_file():
+            return [path.relative_to(house)]
+        if room and path.is_dir():
+            return [file.relative_to(house) for file in sorted(path.rglob("*")) if file.suffix in (".py", ".st")]
+    raise ValueError(f"there is no room {room!r} in fbvm/ or fblib/")
+
+
+def tests_of(path: Path, house: Path = HOUSE) -> list[str]:
+    """The test files for a source file, in the order in which they run: first those that name the file, by folder."""
+    room = path.parts[0] if path.parts[0] == "fblib" else path.parts[1].removesuffix(".py")
+    files = [file for folder in TESTS.get(room, (f"tests/unit/{room}",)) for file in sorted((house / folder).rglob("test_*.py"))]
+    files.sort(key=lambda file: re.search(rf"\b{path.stem}\b", file.read_text(encoding="utf-8")) is None)
+    return [file.relative_to(house).as_posix() for file in files]
+
+
+class Copy:
+    """A copy of the repository in which the tests run; the repository itself is only read."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder / "fbvm"
+        self._environment = {**os.environ, "PYTHONPATH": str(self.folder), "XDG_CACHE_HOME": str(folder / "cache")}
+        for name in COPIED:
+            if (HOUSE / name).is_dir():
+                shutil.copytree(HOUSE / name, self.folder / name, ignore=shutil.ignore_patterns("__pycache__", "node_modules"))
+            elif (HOUSE / name).is_file():
+                shutil.copyfile(HOUSE / name, self.folder / name)
+
+    def passes(self, tests: list[str], limit_s: float) -> bool:
+        """True if the tests pass; False for a failure, and for tests that take more than `limit_s` seconds."""
+        command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-m", "not slow", *tests]
+        with subprocess.Popen(command, cwd=self.folder, env=self._environment, stdout=subprocess.DEVNULL,
+                              stderr=subprocess.DEVNULL, start_new_session=True) as running:
+            try:
+                return running.wait(limit_s) == 0
+            except subprocess.TimeoutExpired:
+                os.killpg(running.pid, signal.SIGKILL)
+                return False
+
+    def survives(self, mutant: Mutant, tests: list[str], limit_s: float) -> bool:
+        """True if no test finds a mutant; afterwards the file is as it was."""
+        file = self.folder / mutant.path
+        text = file.read_text(encoding="utf-8")
+        try:
+            file.write_text(mutant.apply(text), encoding="utf-8")
+            return self.passes(tests, limit_s)
+        finally:
+            file.write_text(text, encoding="utf-8")
+
+
+def difference(mutant: Mutant, text: str) -> str:
+    """A mutant for people: file and line, then the changed lines."""
+    line = text.count("\n", 0, mutant.start) + 1
+    rows = difflib.unified_diff(text.splitlines(), mutant.apply(text).splitlines(), lineterm="", n=1)
+    return "\n".join([f"{mutant.path.as_posix()}:{line}", *list(rows)[3:]])
+
+
+def main() -> int:
+    options = argparse.ArgumentParser(description=__doc__.partition("\n\n")[0])
+    options.add_argument("room")
+    options.add_argument("--count", type=int, default=20, help="mutants that are tried (20)")
+    options.add_argument("--seed", type=int, default=0, help="which of all mutants (0)")
+    options.add_argument("--seconds", type=float, default=600, help="none is begun after this time (600)")
+    given = options.parse_args()
+    begun = time.monotonic()
+    texts = {path: (HOUSE / path).read_text(encoding="utf-8") for path in files_of(given.room)}
+    found = [mutant for path, text in texts.items() for mutant in mutants(path, text)]
+    chosen = random.Random(given.seed).sample(found, min(given.count, len(found)))
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Copy(Path(folder))
+        survivors, tried, whole_s = [], 0, {}
+        for mutant in chosen:
+            tests = tests_of(mutant.path)
+            if tuple(sorted(tests)) not in whole_s:
+                start = time.monotonic()
+                if not copy.passes(tests, given.seconds):
+                    print("the tests fail without a mutant", *tests, sep="\n", file=sys.stderr)
+                    return 1
+                whole_s[tuple(sorted(tests))] = time.monotonic() - start
+            if time.monotonic() - begun > given.seconds:
+                break
+            tried += 1
+            if copy.survives(mutant, tests, 10 + SLOWEST * whole_s[tuple(sorted(tests))]):
+                survivors.append(mutant)
+                print(difference(mutant, texts[mutant.path]), end="\n\n", flush=True)
+    print(f"{given.room}: {tried - len(survivors)} of {tried} mutants found, {len(survivors)} survived; "
+          f"{len(found)} exist, seed {given.seed}, {time.monotonic() - begun:.0f} s")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,122 @@
+"""The mutants of tests/bench/mutants.py: each differs from its source, can be compiled, and is gone when it has been tried."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+HOUSE = Path(__file__).resolve().parent.parent
+
+
+def load() -> Any:
+    path = HOUSE / "tests" / "bench" / "mutants.py"
+    described = importlib.util.spec_from_file_location("mutants", path)
+    assert described is not None and described.loader is not None
+    module = sys.modules["mutants"] = importlib.util.module_from_spec(described)
+    described.loader.exec_module(module)
+    return module
+
+
+m = load()
+PYTHON = '''"""Text with 1 < 2."""
+LIMIT: int = 3  # ö
+
+
+def f(a: Literal[1], ö: bool = True) -> int:
+    if a <= LIMIT and not ö:
+        a.count += 1
+        a.call(f"{a == 1}")
+    return a if a is not None else -2
+'''
+ST = """FUNCTION F : INT
+VAR_INPUT a : INT; b : BOOL := TRUE; END_VAR
+(* 1 < 2 *)
+IF a < 10 AND b THEN
+    F := 16#0F; // 7
+END_IF;
+END_FUNCTION
+"""
+
+
+def lines(name: str, text: str) -> list[str]:
+    """The changed lines of all mutants of a text."""
+    made = m.mutants(Path(name), text)
+    return [line[1:].strip() for one in made for line in m.difference(one, text).splitlines()
+            if line.startswith("+")]
+
+
+def test_mutants_of_python() -> None:
+    assert sorted(lines("x.py", PYTHON)) == sorted([
+        "LIMIT: int = 4  # ö",
+        "def f(a: Literal[1], ö: bool = False) -> int:",
+        "if a < LIMIT and not ö:",
+        "if a <= LIMIT or not ö:",
+        "if (not (a <= LIMIT and not ö)):",
+        "a.count += 2",
+        "pass",
+        "pass",
+        "return a if a is None else -2",
+        "return a if a is not None else -3",
+        "return a if (not (a is not None)) else -2",
+        "return None",
+    ])
+
+
+def test_mutants_of_st() -> None:
+    assert sorted(lines("x.st", ST)) == sorted([
+        "VAR_INPUT a : INT; b : BOOL := FALSE; END_VAR",
+        "IF a <= 10 AND b THEN",
+        "IF a < 11 AND b THEN",
+        "IF a < 10 OR b THEN",
+        "IF NOT (a < 10 AND b) THEN",
+        "F := 16#10; // 7",
+        "; // 7",
+    ])
+
+
+def test_every_mutant_of_a_file_differs_from_it_and_compiles() -> None:
+    path = Path("fbvm/wire/modbus.py")
+    text = (HOUSE / path).read_text(encoding="utf-8")
+    made = m.mutants(path, text)
+    assert len(made) > 50
+    texts = [one.apply(text) for one in made]
+    assert len({text, *texts}) == len(made) + 1
+    for one in texts:
+        compile(one, str(path), "exec")
+
+
+def test_a_room_has_files_and_tests() -> None:
+    files = m.files_of("units/etn21")
+    assert Path("fbvm/units/etn21/mail.py") in files
+    assert m.files_of("omron/etn21")[0] == Path("fblib/omron/etn21/ETN21_Accept.st")
+    tests = m.tests_of(Path("fbvm/record/draw/why.py"))
+    assert tests[0].startswith("tests/unit/record/") and "tests/unit/cli/test_cli.py" in tests
+    with pytest.raises(ValueError, match="no room 'nowhere'"):
+        m.files_of("nowhere")
+
+
+def test_every_room_has_tests() -> None:
+    rooms = [path for path in sorted((HOUSE / "fbvm").iterdir()) if (path / "__init__.py").is_file()]
+    assert len(rooms) > 10
+    for room in rooms:
+        assert m.tests_of(room.relative_to(HOUSE) / "x.py"), room
+
+
+@pytest.mark.slow
+def test_a_copy_runs_the_mutant_and_is_restored(tmp_path: Path) -> None:
+    """The tests of the copy import the copy's sources, and the repository keeps its own."""
+    copy = m.Copy(tmp_path)
+    path = Path("fbvm/wire/modbus.py")
+    text = (HOUSE / path).read_text(encoding="utf-8")
+    tests = ["tests/unit/wire"]
+    assert copy.passes(tests, 100)
+    start = text.index("\nMAX_PDU_BYTES = ") + 1
+    broken = m.Mutant(path, start, text.index("\n", start), "MAX_PDU_BYTES = 9")
+    assert not copy.survives(broken, tests, 100)
+    same = m.Mutant(path, len(text), len(text), "\n")
+    assert copy.survives(same, tests, 100)
+    assert (HOUSE / path).read_text(encoding="utf-8") == (copy.folder / path).read_text(encoding="utf-8") == text
