@@ -251,7 +251,7 @@ def main() -> int:
         copy = Copy(Path(folder))
         survivors, tried, whole_s = [], 0, {}
         for mutant in chosen:
-            tests = tests_of(mutant.path)
+            tests = tests_of(mutant.path, copy.folder)
             if tuple(sorted(tests)) not in whole_s:
                 start = time.monotonic()
                 if not copy.passes(tests, given.seconds):
