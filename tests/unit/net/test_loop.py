@@ -9,7 +9,7 @@ from rows import each_of
 
 from fbvm.net.faults import Fault
 from fbvm.net.loop import CONNECT_TIMEOUT_NS, LoopLink, LoopNetwork
-from fbvm.net.peers import Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer, Station
+from fbvm.net.peers import Action, Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer, Station
 from fbvm.net.stream import RETRANSMIT_LIMIT_NS, WINDOW_BYTES
 from fbvm.wire import modbus
 from fbvm.wire.link import (
@@ -240,6 +240,38 @@ def test_one_pair_of_endpoints_is_one_connection() -> None:
     assert link.events(2)[0] == Closed(1)
     link.submit([Close(2), Connect(3, SERVER, local_port=49152)], 3)
     assert link.events(3)[-1] == Opened(3, 49152, SERVER)
+
+
+@each_of(("greeting", "close", "again"), [
+    ([], Close(1), "EADDRINUSE"),  # the peer has not sent its FIN
+    ([], Close(1, reset=True), ""),
+    ([Leave()], Close(1), ""),
+    ([Reset()], Close(1), ""),
+    ([Fin()], Close(1, reset=True), ""),
+])
+def test_a_fixed_local_port_is_free_when_the_connection_has_ended_on_both_sides(
+    greeting: list[Action], close: Close, again: str
+) -> None:
+    network = LoopNetwork()
+    network.place(SERVER, peer := ScriptedPeer(greeting=greeting, farewell=[]))
+    link = network.attach(UNIT)
+    link.submit([Connect(1, SERVER, local_port=3000), Grant(1, 10)], 0)
+    assert link.events(0)[0] == Opened(1, 3000, SERVER)
+    link.submit([close], 1)
+    assert link.events(1)[-1] == Closed(1)
+    peer.greeting = []
+    link.submit([Connect(1, SERVER, local_port=3000)], 2)
+    assert link.events(2) == [Failed(1, "open", again) if again else Opened(1, 3000, SERVER)]
+
+
+def test_a_reset_throws_away_what_waits_and_is_told_once() -> None:
+    network, link = opened(ScriptedPeer(reads=False))
+    told: list[TapKind] = []
+    network.tap = lambda now_ns, unit, event: told.append(event.kind)
+    link.submit([Send(1, bytes(WINDOW_BYTES + 1))], 1)
+    link.submit([Close(1, reset=True), Close(1, reset=True)], 2)
+    assert link.events(2)[-1] == Closed(1)
+    assert told == [TapKind.DATA, TapKind.RST]
 
 
 def test_a_peer_that_never_reads_closes_the_window() -> None:

@@ -215,6 +215,16 @@ def test_0049_for_60_s_after_a_close_from_this_side_assumed(switch: Switch) -> N
     assert reopened(rig, switch) == "0000"
 
 
+@pytest.mark.parametrize(("early_ns", "code"), [(1, "0049"), (0, "0000"), (-1, "0000")])
+def test_the_last_instant_of_the_60_s(early_ns: int, code: str) -> None:
+    """The port is free in the refresh that comes exactly 60 s after the one that ended the close."""
+    rig = Rig()
+    rig.open(local_port=3000)
+    rig.close()
+    rig.now_ns += 60_000_000_000 - rig.cycle_ns - early_ns
+    assert reopened(rig) == code
+
+
 @pytest.mark.parametrize("end", [PeerClosed(1), Broken(1, "ECONNRESET")])
 def test_the_port_is_free_at_once_after_a_close_from_the_peer(end: Event) -> None:
     rig = Rig()

@@ -232,3 +232,14 @@ def test_messages_read_well() -> None:
         "10 write multiple registers, address 1, quantity 1, data 00 02"
     )
     assert str(decode_request(b"\x03\x00")) == "03 read holding registers, data 00, (too short)"
+
+
+def test_the_words_of_exceptions() -> None:
+    """MODBUS Application Protocol V1.1b3, section 7; other codes have no words."""
+    words = {
+        0x01: "illegal function", 0x02: "illegal data address", 0x03: "illegal data value", 0x04: "server device failure",
+        0x05: "acknowledge", 0x06: "server device busy", 0x08: "memory parity error", 0x0A: "gateway path unavailable",
+        0x0B: "gateway target device failed to respond",
+    }  # fmt: skip
+    assert {code: str(decode_reply(bytes((0x83, code)))) for code in range(1, 0x0D)} == {
+        code: f"03 read holding registers, exception {code:02X} {words.get(code, 'unknown')}" for code in range(1, 0x0D)}
