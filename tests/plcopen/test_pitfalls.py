@@ -198,6 +198,55 @@ def test_a_loop_through_a_variable_is_cut_there() -> None:
     assert states(made, "n m", ["", ""]) == ["6 6", "7 7"]
 
 
+@each_of(("places", "marks", "wanted"), [
+    (("0,0", "0,50"), ("", ""), ["1 1", "0 0", "1 1"]),
+    (("0,50", "0,0"), ("", ""), ["1 0", "0 1", "1 0"]),
+    (("50,0", "0,0"), ("", ""), ["1 0", "0 1", "1 0"]),
+    (("0,0", "0,50"), ('executionOrderId="2"', 'executionOrderId="1"'), ["1 0", "0 1", "1 0"]),
+    (("0,50", "0,0"), ('executionOrderId="1"', 'executionOrderId="2"'), ["1 1", "0 0", "1 1"]),
+])
+def test_a_loop_is_cut_at_the_wire_into_its_first_block(
+    places: tuple[str, str], marks: tuple[str, str], wanted: list[str]
+) -> None:
+    """x is a XOR y, y is b XOR x: the first of the two takes what the other one gave a pass before."""
+    made = imported(pou(value(1, "a") + value(2, "b")
+                        + block(3, "XOR", "IN1=1 IN2=4.OUT", "OUT", at=places[0], marks=marks[0])
+                        + block(4, "XOR", "IN1=2 IN2=3.OUT", "OUT", at=places[1], marks=marks[1])
+                        + result(5, "3.OUT", "x") + result(6, "4.OUT", "y"), "a b x y", language="FBD"))
+    assert codes(made) == ["X0190", "X0290"]
+    assert states(made, "x y", ["a=1", "", ""]) == wanted
+
+
+def test_a_wire_out_of_a_loop_is_not_cut() -> None:
+    """Although it goes to the block that stands first, z is b XOR x of the same pass."""
+    made = imported(pou(value(1, "a") + value(2, "b") + block(7, "XOR", "IN1=2 IN2=3.OUT", "OUT", at="0,0")
+                        + block(3, "XOR", "IN1=1 IN2=3.OUT", "OUT", at="0,50") + result(5, "3.OUT", "x")
+                        + result(6, "7.OUT", "z"), "a b x z", language="FBD"))
+    assert codes(made) == ["X0190", "X0290"]
+    assert states(made, "x z", ["a=1", "", "b=1"]) == ["1 1", "0 0", "1 0"]
+
+
+def test_a_loop_of_a_contact_and_a_block_is_cut_in_front_of_the_block() -> None:
+    """Although the contact stands first: it takes the block's output of this pass, the block the contact's of the last."""
+    made = imported(pou(RAIL + contact(2, "3.OUT", "c", at="0,0") + block(3, "XOR", "IN1=4 IN2=2", "OUT", at="50,50")
+                        + contact(4, "1", "a", at="0,50") + coil(5, "3.OUT", "x", at="100,50"), "a c x"))
+    assert codes(made) == ["X0190", "X0290"]
+    assert states(made, "x", ["a=1", "c=1", "", ""]) == ["1", "1", "0", "1"]
+
+
+def test_a_loop_of_two_blocks_and_a_variable_is_cut_behind_the_variable() -> None:
+    """Wherever it stands: y is 10 * (1 + n), and n is y when both blocks have been evaluated."""
+    for places in (("0,0", "0,50", "0,90"), ("0,50", "0,90", "0,0"), ("0,90", "0,0", "0,50")):
+        variable_in_it = (f'<inOutVariable localId="5"><position x="0" y="{places[2][2:]}"/>{wires("4.OUT")}'
+                          "<connectionPointOut/><expression>n</expression></inOutVariable>")
+        made = imported(pou(value(1, "1") + value(2, "10") + variable_in_it
+                            + block(3, "ADD", "IN1=1 IN2=5", "OUT", at=places[0])
+                            + block(4, "MUL", "IN1=2 IN2=3.OUT", "OUT", at=places[1]) + result(6, "4.OUT", "y"),
+                            variable("n", "INT", "4") + variable("y", "INT"), language="FBD"))
+        assert codes(made) == ["X0190", "X0290"]
+        assert states(made, "n y", ["", ""]) == ["50 50", "510 510"], places
+
+
 def test_power_goes_on_behind_a_coil() -> None:
     made = imported(pou(RAIL + contact(2, "1", "a") + coil(3, "2", "x", 'negated="true"') + contact(4, "3", "b")
                         + coil(5, "4", "y") + '<rightPowerRail localId="6"/>', "a b x y"))

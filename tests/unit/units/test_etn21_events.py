@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from etn21_rig import SERVER, Rig
 
+from fbvm.units.etn21.map import Switch
 from fbvm.wire.link import Close, Closed, Failed, PeerClosed, Received
 
 
@@ -25,8 +26,11 @@ def test_events_that_find_no_room_come_in_the_next_refreshes_in_their_order() ->
     rig = Rig()
     rig.open()
     counts = []
-    rig.scan(*[Received(1, b"new", SERVER)] * 130, PeerClosed(1))
-    for _ in range(4):
+    rig.scan(*[Received(1, b"new", SERVER)] * 130)
+    for events in ([Received(1, b"last"), PeerClosed(1)], [], [], []):
         counts.append((rig.waiting(), rig.state()))
-        rig.scan()
-    assert counts == [(192, 4), (384, 4), (390, 5), (390, 5)]
+        rig.scan(*events)
+    assert counts == [(192, 4), (384, 4), (394, 5), (394, 5)]
+    rig.parameters(count=394)
+    assert rig.ask(Switch.RECEIVE) == "0000"
+    assert b"".join(int(word).to_bytes(2, "big") for word in rig.d[1000:1197]) == b"new" * 130 + b"last"
