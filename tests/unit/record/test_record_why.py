@@ -194,3 +194,70 @@ def test_an_interlock_is_why_its_outputs_are_off() -> None:
         "└ if Main.Stop = TRUE since scan 5 (50ms), from outside the program",
     ]
     assert ask(trace, "Main.n", 9, 1).causes == []
+
+
+FIRST = """PROGRAM Main
+VAR Seen, Copied, Given, Taken : INT; END_VAR
+IF Seen = 0 THEN
+Seen := 5;
+END_IF
+IF Copied = 0 THEN
+Copied := Seen;
+END_IF
+IF Taken = 0 THEN
+Taken := Given;
+END_IF
+END_PROGRAM
+"""
+
+
+def recorded_from(first: int, scans: int) -> Trace:
+    """A trace of FIRST whose first scan has that number; Given is written from outside before the first and third of them."""
+    plc, file = Plc(image(FIRST)), io.BytesIO()
+    for _ in range(first):
+        plc.scan()
+        plc.write("Main.Seen", 0)
+        plc.write("Main.Copied", 0)
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    for number in range(scans):
+        if number in (0, 2):
+            plc.write("Main.Given", 7 + number)
+        plc.scan()
+    writer.close()
+    return Trace(io.BytesIO(file.getvalue()))
+
+
+@pytest.mark.parametrize("first", [0, 20])
+@pytest.mark.parametrize("asked", [0, 1, 98, 99, 100, 101])
+def test_a_cause_in_the_first_recorded_scan(first: int, asked: int) -> None:
+    """Also from outside the program, and where the search begins with the scans behind it."""
+    trace, at = recorded_from(first, 102), f"since scan {first} ({f'{first * 10}ms' if first else '0s'})"
+    assert cause_text(trace, ask(trace, "Main.Copied", first + asked)).splitlines() == [
+        f"Main.Copied = 5 {at}, by pump.st:7 in Main",
+        f"├ Main.Seen = 5 {at}, by pump.st:4 in Main",
+        f"│ └ if Main.Seen = 0 {'since the trace begins' if first else 'since power-on'}",
+        f"└ if Main.Copied = 0 {'since the trace begins' if first else 'since power-on'}",
+    ]
+
+
+def test_a_cause_before_all_windows_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fbvm.record.draw.why.WINDOWS", (2, 4))
+    trace = recorded_from(20, 12)
+    for asked in range(12):
+        assert cause_text(trace, ask(trace, "Main.Seen", 20 + asked)).splitlines() == [
+            "Main.Seen = 5 since scan 20 (200ms), by pump.st:4 in Main", "└ if Main.Seen = 0 since the trace begins"]
+
+
+@pytest.mark.parametrize("first", [0, 20])
+def test_a_cause_from_outside_in_the_third_scan_and_none_before_the_first(first: int) -> None:
+    """What was written before the first recorded scan is there when the trace begins."""
+    trace, begin = recorded_from(first, 105), "since the trace begins" if first else "since power-on"
+    assert cause_text(trace, ask(trace, "Main.Taken", first + 4)).splitlines() == [
+        f"Main.Taken = 7 since scan {first} ({f'{first * 10}ms' if first else '0s'}), by pump.st:10 in Main",
+        f"├ Main.Given = 7 {begin}",
+        f"└ if Main.Taken = 0 {begin}",
+    ]
+    assert cause_text(trace, ask(trace, "Main.Given", first + 1)) == f"Main.Given = 7 {begin}"
+    for asked in (2, 3, 100, 101, 102, 104):
+        assert cause_text(trace, ask(trace, "Main.Given", first + asked)) == \
+            f"Main.Given = 9 since scan {first + 2} ({10 * first + 20}ms), from outside the program"
