@@ -60,6 +60,7 @@ def go_through(cases: Iterable[tuple[str, Callable[[], None]]]) -> None:
         except pytest.fail.Exception as failure:
             failed.append(AssertionError(str(failure)))
             failed[-1].add_note(f"row: {name}")
+    assert tried > 0, "no case was tried"
     if len(failed) == 1:
         raise failed[0]
     if failed:

@@ -261,7 +261,11 @@ def test_a_refused_request_writes_nothing() -> None:
         "10 00 00 00 01 02 12 34 56", "10 00 00 00 7C F8" + " 11" * 247, "0F 00 00 00 08 01 55", "16 00 00 00 00 00 00",
         "17 00 00 00 01 00 00 00 01 02 12 34",
     ]  # fmt: skip
-    assert all(int(client.ask(pdu)[:2], 16) & 0x80 for pdu in refused)
+    assert [client.ask(pdu) for pdu in refused] == [
+        "85 03", "85 03", "85 03", "86 02", "86 03", "86 03",
+        "90 02", "90 03", "90 03", "90 03",
+        "90 03", "90 03", "8F 01", "96 01", "97 01",
+    ]  # fmt: skip
     assert rig.foreign_words() == before
 
 

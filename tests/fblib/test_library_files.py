@@ -45,7 +45,8 @@ def test_each_file_holds_one_pou_and_says_what_it_is_for() -> None:
 def test_a_library_is_described(folder: Path) -> None:
     described = tomllib.loads((folder / "library.toml").read_text(encoding="utf-8"))
     assert {"title", "sheet", "globals"} <= described.keys()
-    assert all((folder / name).is_file() for name in described["globals"])
+    files = {path.name for path in folder.glob("*.st") if re.search(r"^VAR_GLOBAL", path.read_text("utf-8"), re.MULTILINE)}
+    assert set(described["globals"]) == files
     assert (folder / "README.md").is_file()
 
 

@@ -68,7 +68,7 @@ def outcomes(declarations: str, lines: list[str], last: str = "") -> list[str]:
         made = compile_sources([Source("fold.st", text)], runnable=True)
         if made.image is not None:
             break
-        assert all(1 < error.line < len(lines) + 2 for error in made.errors), made.errors[0].render()
+        assert made.errors and all(1 < error.line < len(lines) + 2 for error in made.errors), made.errors[0].render()
         errors |= {error.line - 2: error.code for error in made.errors}
     plc, results = Plc(made.image), []
     for number in range(len(lines)):

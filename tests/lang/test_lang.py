@@ -28,6 +28,8 @@ if not native.available():  # where it is, machine code is compared with both of
     @pytest.mark.slow
     @each_file
     def test_programs_on_both_builds_of_python(file: list[Program]) -> None:
+        if not any(p.runs for p in file):
+            pytest.skip("all of its programs have errors")
         go_through((f"{p.name}:{p.line} {p.title}", partial(check, p, BUILDS)) for p in file if p.runs)
 
 

@@ -59,7 +59,8 @@ END_PROGRAM
 PROGRAM Main
 VAR
     n : INT; t : STRING[20] := 'abc'; short : STRING[5]; wide : WSTRING[12] := "wide"; r : ARRAY [0..5] OF INT;
-    q : ARRAY [0..3] OF BOOL; d : TIME := T#1s; hour : TIME_OF_DAY := TOD#23:59:58; day : DATE := D#2024-02-28; stamp : DATE_AND_TIME;
+    q : ARRAY [0..3] OF BOOL; d : TIME := T#1s; hour : TIME_OF_DAY := TOD#23:59:58; day : DATE := D#2024-02-28;
+    stamp : DATE_AND_TIME;
 END_VAR
 n := n + 7;
 t := CONCAT(LEFT(t, 3), INT_TO_STRING(n), RIGHT(t, 2)); short := MID(t, 4, 2);
@@ -108,7 +109,8 @@ TRAPS = [
     ("a := 10 / z;", "R0101"), ("a := 10 MOD z;", "R0101"), ("b[z] := 1;", "R0102"), ("a := b[z + 4];", "R0102"),
     ("s := a;", "R0103"), ("WHILE TRUE DO ; END_WHILE", "R0104"), ("FOR a := 1 TO 9 BY z DO ; END_FOR", "R0109"),
     ("a := r^;", "R0110"), ("a := LREAL_TO_INT(x);", "R0105"), ("w := UINT_TO_BCD_WORD(60000);", "R0105"),
-    ("w := SHL(w, z - 1);", "R0106"), ("a := STRING_TO_INT(t);", "R0111"), ("a := F(0);", "R0101"), ("x := SQRT(-x); a := LREAL_TO_INT(x);", "R0105"),
+    ("w := SHL(w, z - 1);", "R0106"),
+    ("a := STRING_TO_INT(t);", "R0111"), ("a := F(0);", "R0101"), ("x := SQRT(-x); a := LREAL_TO_INT(x);", "R0105"),
 ]  # fmt: skip
 TRAPPING = """
 FUNCTION F : INT
