@@ -40,7 +40,7 @@ COPIED = ("fbvm", "fblib", "grammar", "tests", "examples", "docs", "pyproject.to
           "CONFORMANCE.md", "CHANGELOG.md", "LICENSE")  # fmt: skip
 TESTS = {
     "fblib": ("tests/fblib", "tests/unit/units"), "base": ("tests/unit/base", "tests/lang"),
-    "syntax": ("tests/unit/syntax", "tests/golden", "tests/lang", "tests/property"), "wire": ("tests/unit/wire", "tests/fblib"),
+    "syntax": ("tests/unit/syntax", "tests/golden", "tests/lang", "tests/property"), "wire": ("tests/unit/wire", "tests/unit/net"),
     "check": ("tests/unit/check", "tests/lang", "tests/unit/code"), "interchange": ("tests/plcopen",),
     "net": ("tests/unit/net", "tests/unit/units", "tests/fblib"), "code": ("tests/unit/code", "tests/lang", "tests/unit/engine"),
     "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),
@@ -129,12 +129,12 @@ def _python(text: str) -> Iterator[Edit]:
 
 
 def _executed(node: ast.AST) -> Iterator[ast.AST]:
-    """The nodes below one that are more than text and types: no annotation, format string or `if TYPE_CHECKING`."""
+    """The nodes below one that are more than text and types: no annotation, decorator, format string or `if TYPE_CHECKING`."""
     yield node
     for name, inner in ast.iter_fields(node):
         for child in inner if isinstance(inner, list) else [inner]:
             checked = isinstance(child, ast.If) and isinstance(child.test, ast.Name) and child.test.id == "TYPE_CHECKING"
-            if isinstance(child, ast.AST) and name not in ("annotation", "returns") and not checked and \
+            if isinstance(child, ast.AST) and name not in ("annotation", "returns", "decorator_list") and not checked and \
                     not isinstance(child, ast.JoinedStr):
                 yield from _executed(child)
 
