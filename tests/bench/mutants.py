@@ -40,7 +40,8 @@ COPIED = ("fbvm", "fblib", "grammar", "tests", "examples", "docs", "pyproject.to
           "CONFORMANCE.md", "CHANGELOG.md", "LICENSE")  # fmt: skip
 TESTS = {
     "fblib": ("tests/fblib", "tests/unit/units"), "base": ("tests/unit/base", "tests/lang"),
-    "syntax": ("tests/unit/syntax", "tests/golden", "tests/lang", "tests/property"), "wire": ("tests/unit/wire", "tests/unit/net"),
+    "syntax": ("tests/unit/syntax", "tests/golden", "tests/lang", "tests/property"),
+    "wire": ("tests/unit/wire", "tests/unit/net"),
     "check": ("tests/unit/check", "tests/lang", "tests/unit/code"), "interchange": ("tests/plcopen",),
     "net": ("tests/unit/net", "tests/unit/units", "tests/fblib"), "code": ("tests/unit/code", "tests/lang", "tests/unit/engine"),
     "engine": ("tests/unit/engine", "tests/lang", "tests/property"), "units": ("tests/unit/units", "tests/fblib"),

@@ -16,7 +16,7 @@ def test_events_that_wait_at_power_on_are_forgotten() -> None:
     assert rig.unit.reset(rig.memory) == [Close(1, reset=True)]
     inside = rig.unit.exchanged
     assert inside is not None
-    assert [inside.processor.view(name, "u32")[0] for name in ("ETN21_Posted", "ETN21_Behind")] == [0, 0]
+    assert [inside.processor.view(name)[0] for name in ("ETN21_Posted", "ETN21_Behind")] == [0, 0]
     rig.scan(Closed(1))
     rig.open()
     assert (rig.code(), rig.waiting()) == ("0000", 0)
