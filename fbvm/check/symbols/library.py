@@ -21,7 +21,6 @@ Pins that other tools call otherwise have their other names there too:
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -31,6 +30,7 @@ from pathlib import Path
 from fbvm.base.areas import AREAS, Mailbox, refusal
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.toml import TomlError, load_toml
 from fbvm.base.types import fold
 from fbvm.check.symbols.facts import Report
 from fbvm.syntax import tree
@@ -96,8 +96,10 @@ def _libraries_below(root: Path) -> Iterator[Library]:
 def _described(described: Path) -> dict[str, object]:
     """What a `library.toml` says; a key that looks like one of ours must be one."""
     try:
-        table = tomllib.loads(described.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        table = load_toml(described.read_text(encoding="utf-8"))
+    except TomlError as error:
+        raise LibraryError(described, f"{error} (at line {error.line}, column {error.column})") from error
+    except UnicodeDecodeError as error:
         raise LibraryError(described, str(error)) from error
     for key in table:
         if key not in _KEYS and (meant := get_close_matches(key, _KEYS, n=1, cutoff=0.8)):

@@ -10,6 +10,7 @@ from typing import Any, BinaryIO, cast
 
 import click
 
+from fbvm.base.digits import whole_number
 from fbvm.cli.shared.files import writing
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
@@ -24,6 +25,8 @@ from fbvm.record.trace.writer import Depth, TraceWriter, source_lines
 from fbvm.watch.paths import UnknownPlace
 
 SUFFIX = ".fbtrace"
+LAST_SCAN = 1 << 62
+"""No run has so many scans."""
 
 
 class ScanRange(click.ParamType[range]):
@@ -37,8 +40,8 @@ class ScanRange(click.ParamType[range]):
             return value
         first, dots, last = str(value).partition("..")
         try:
-            start = int(first or 0)
-            end = int(last) if last else start if not dots else 1 << 62
+            start = min(whole_number(first or "0"), LAST_SCAN)
+            end = min(whole_number(last), LAST_SCAN) if last else start if not dots else LAST_SCAN
         except ValueError:
             self.fail(f"{value!r} is not scans such as 41 or 10..60", param, ctx)
         if start < 0 or end < start:

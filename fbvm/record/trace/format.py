@@ -40,6 +40,8 @@ PHASE, SCAN, FRAME, END, STATEMENT, READ, WRITE, CONTACT, NETWORK = range(9)
 PHASES = (Phase.INPUTS, Phase.PROGRAM, Phase.REFRESH)
 _CHUNK = struct.Struct("<BIIQI")
 LARGEST_BYTES = 1 << 30
+LONGEST_SHIFT = 140
+"""No number in a block takes more than 20 bytes."""
 
 
 class TraceError(ValueError):
@@ -126,6 +128,8 @@ class Cursor:
             if byte < 0x80:
                 return value
             shift += 7
+            if shift > LONGEST_SHIFT:
+                raise IndexError("a number is too large")
 
     def bytes(self, size: int) -> bytes:
         self.at += size
