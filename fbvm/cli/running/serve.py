@@ -14,6 +14,7 @@ from typing import IO, NoReturn
 import click
 
 from fbvm.base.data import data_folder
+from fbvm.base.files import reason
 from fbvm.cli.running.peer import LISTENING
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
@@ -90,7 +91,9 @@ def _plc(settings: dict[str, int], image: Path | None) -> Plc:
     if image and image.exists():
         try:
             memory_images.load(plc.memory, image)
-        except (OSError, memory_images.ImageError) as error:
+        except OSError as error:
+            raise click.UsageError(f"{image} cannot be read: {reason(error)}") from None
+        except memory_images.ImageError as error:
             raise click.UsageError(str(error)) from None
     return plc
 

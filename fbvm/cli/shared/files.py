@@ -8,6 +8,8 @@ from pathlib import Path
 
 import click
 
+from fbvm.base.files import reason
+
 
 @contextmanager
 def writing(target: Path | str) -> Iterator[None]:
@@ -15,4 +17,4 @@ def writing(target: Path | str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise click.UsageError(f"{target} cannot be written: {(error.strerror or str(error)).lower()}") from None
+        raise click.UsageError(f"{target} cannot be written: {reason(error)}") from None

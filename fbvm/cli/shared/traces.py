@@ -11,6 +11,7 @@ from typing import Any, BinaryIO, cast
 import click
 
 from fbvm.base.digits import whole_number
+from fbvm.base.files import reason
 from fbvm.cli.shared.files import writing
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
@@ -65,7 +66,7 @@ def open_trace(path: Path) -> Iterator[Trace]:
     try:
         trace = Trace.open(path)
     except OSError as error:
-        raise click.UsageError(f"{path} cannot be read: {error.strerror}") from None
+        raise click.UsageError(f"{path} cannot be read: {reason(error)}") from None
     except TraceError as error:
         raise click.UsageError(f"{path}: {error}") from None
     try:

@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from fbvm.base.files import IMAGE_BYTES, read_file
 from fbvm.base.memory import Memory
 
 OF_UNITS = {"CIO": range(1500, 1900), "D": range(30000, 31600)}  # 25 and 100 words a unit, W421 6-6-2 p111
@@ -42,8 +43,8 @@ def load(memory: Memory, path: Path) -> None:
 
     Raises OSError, and ImageError for a file that is no image or has words that this memory lacks."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+        found = json.loads(read_file(path, IMAGE_BYTES).decode("utf-8"))
+    except (ValueError, RecursionError) as error:
         raise ImageError(f"{path} is not JSON: {error}") from None
     spaces = found.get("spaces") if isinstance(found, dict) else None
     if not isinstance(spaces, dict):

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
 from fbvm.base.areas import Mailbox
+from fbvm.base.files import open_file
 from fbvm.base.memory import Memory
 from fbvm.code.image import Layout, RungPicture, SfcPicture, Site
 from fbvm.machine.plc import Phase
@@ -132,7 +133,7 @@ class Trace:
     @classmethod
     def open(cls, path: Path | str) -> Trace:
         """Opens a trace file; close it, or use it in a `with` statement.  Raises OSError, TraceError."""
-        file = Path(path).open("rb")  # noqa: SIM115 - the trace closes it
+        file = open_file(path)
         try:
             return cls(file)
         except BaseException:

@@ -116,7 +116,7 @@ class Chart:
 
     def _free(self, stem: str) -> str:
         name, number = stem, 1
-        while name.upper() in self.scope.taken:
+        while self.scope.is_taken(name):
             number += 1
             name = f"{stem}_{number}"
         self.scope.taken.add(name.upper())
