@@ -37,7 +37,7 @@ def command(file: Path, folder: Path, force: bool, as_json: bool) -> None:
             if (folder / name).is_symlink():
                 (folder / name).unlink()  # the file goes into the folder, not where a link leads
             (folder / name).write_text(text, encoding="utf-8")
-            if not as_json:
-                click.echo(str(folder / name))
+    for name in made.files if not as_json else ():
+        click.echo(str(folder / name))
     if made.errors:
         sys.exit(status.PROGRAM_ERRORS)

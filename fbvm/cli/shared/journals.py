@@ -17,7 +17,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.files import LINE_CHARACTERS, open_file, reason
 from fbvm.cli.shared import status
 from fbvm.cli.shared.e_banks import with_e_banks
-from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.sources import compile_options, report_diagnostics
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
@@ -32,7 +32,7 @@ def start_journal(
 ) -> Journal:  # fmt: skip
     """Starts a journal in a file, with the texts of the program and the `options` of the run; `stack` closes it."""
     with writing(path):
-        file = stack.enter_context(path.open("w", encoding="utf-8", newline="\n"))
+        file = stack.enter_context(TextIOWrapper(growing_file(path), encoding="utf-8", newline="\n"))
     texts = [read(name, str(name)) for name in files]
     journal = Journal(file, {
         "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program, "chosen": compile_options(),

@@ -12,7 +12,7 @@ import click
 
 from fbvm.base.digits import whole_number
 from fbvm.base.files import reason
-from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.files import growing_file, writing
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.record.page.data import page_data
@@ -101,7 +101,7 @@ def write_trace(
         yield
         return
     with writing(path):
-        file = path.open("wb")
+        file = growing_file(path)
     with file:
         try:
             writer = TraceWriter(plc, file, Depth(depth), selected, statement_lines(plc.image, files, libraries))

@@ -33,9 +33,25 @@ def save(memory: Memory, path: Path, counts: Mapping[str, int]) -> None:
             words.pop()
         spaces[name] = words
     lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(words)}" for name, words in spaces.items())
-    part = path.with_name(path.name + ".new")
-    part.write_text(f'{{"spaces": {{\n{lines}\n}}}}\n', encoding="utf-8")
-    os.replace(part, path)
+    part = _beside(path)
+    try:
+        part.write_text(f'{{"spaces": {{\n{lines}\n}}}}\n', encoding="utf-8")
+        os.replace(part, path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def check_writable(path: Path) -> None:
+    """Raises OSError if an image cannot be written into this file; leaves the file as it is."""
+    part = _beside(path)
+    part.write_bytes(b"")
+    part.unlink()
+
+
+def _beside(path: Path) -> Path:
+    """The file that is written before it replaces an image."""
+    return path.with_name(path.name + ".new")
 
 
 def load(memory: Memory, path: Path) -> None:
