@@ -12,6 +12,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from fbvm.base.digits import whole_number
+
 PAGE_BYTES = 4096
 
 
@@ -194,14 +196,14 @@ def parse_address(text: str, areas: Mapping[str, Area] = AREAS) -> Address:
     if not match:
         mailbox = _MAILBOX.fullmatch(text)
         if mailbox and mailbox[1].upper() in areas:
-            bit = int(mailbox[3]) if mailbox[3] is not None else None
-            return check_address(Address(mailbox[1].upper(), int(mailbox[2]), bit), areas)
+            bit = whole_number(mailbox[3]) if mailbox[3] is not None else None
+            return check_address(Address(mailbox[1].upper(), whole_number(mailbox[2]), bit), areas)
         raise AddressError(f"{text!r} is not an address")
     name = (match[1] or "CIO").upper().replace(" ", "")
     if name.startswith("E") or name == "DM":
         name = "D" if name == "DM" else name[:2]
-    bit = int(match[5]) if match[5] is not None else None
-    return check_address(Address(name, int(match[4]), bit))
+    bit = whole_number(match[5]) if match[5] is not None else None
+    return check_address(Address(name, whole_number(match[4]), bit))
 
 
 def _portable(match: re.Match[str]) -> Address:
@@ -209,11 +211,11 @@ def _portable(match: re.Match[str]) -> Address:
     if size == 1:
         if match[4] is None and match[2] == "":
             raise AddressError(f"%{area}{match[3]} has no size: write %{area}X{match[3]}.0 or %{area}W{match[3]}")
-        return check_address(Address(area, int(match[3]), int(match[4] or 0), 1))
-    whole = check_address(Address(area, int(match[3]), None, size))
+        return check_address(Address(area, whole_number(match[3]), whole_number(match[4] or "0"), 1))
+    whole = check_address(Address(area, whole_number(match[3]), None, size))
     if match[4] is None:
         return whole
-    bit = int(match[4])
+    bit = whole_number(match[4])
     if bit >= size:
         raise AddressError(f"bit {bit} does not exist; bits of {whole} are 0 to {size - 1}")
     return Address(area, whole.byte_offset() + bit // 8, bit % 8, 1)

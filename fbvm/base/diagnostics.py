@@ -41,7 +41,8 @@ class Source:
         return starts
 
     def place(self, offset: int) -> tuple[int, int]:
-        """Line and column, both from 1, of a character offset."""
+        """Line and column, both from 1, of a character offset; behind the text those of its end."""
+        offset = min(max(offset, 0), len(self.text))
         row = bisect.bisect_right(self.line_starts, offset) - 1
         return row + 1, offset - self.line_starts[row] + 1
 

@@ -7,6 +7,7 @@ from functools import cache
 from pathlib import Path
 
 from fbvm.base.data import data_folder
+from fbvm.base.digits import whole_number
 from fbvm.syntax.ladder.instructions.instruction_set import KINDS, Instruction, instruction_set
 
 FLAGS = ("P_ER", "P_CY", "P_GT", "P_GE", "P_EQ", "P_NE", "P_LE", "P_LT", "P_N", "P_OF", "P_UF")
@@ -23,7 +24,7 @@ def find(name: str) -> Instruction | None:
     if found is None and spelt[:1] in _PREFIXES:
         found = rows.get(spelt[1:]) or rows.get(f"LD{spelt[1:]}")
     if found is None and spelt.isdecimal():
-        found = next((row for row in rows.values() if row.code and int(row.code) == int(spelt)), None)
+        found = next((row for row in rows.values() if row.code and int(row.code) == whole_number(spelt)), None)
     return found
 
 

@@ -1,18 +1,22 @@
 """The command `fbvm` and its verbs.
 
 Exit status: 0 good, 1 a check failed, 2 usage, 3 the program has errors, 4 running stopped, 5 the network could not be
-used, 130 ended by Ctrl-C.
+used, 130 ended by Ctrl-C, 141 nobody reads the output any more.
 """
 
 from __future__ import annotations
 
 import importlib
 import sys
+from typing import Any
 
 import click
 
 import fbvm
+from fbvm.base.files import reason
 from fbvm.cli.shared import status
+from fbvm.cli.shared.files import OutputError
+from fbvm.cli.shared.streams import give_up_output, prepare_streams
 
 VERB_GROUPS = {
     "running": ("Run PLCs", {
@@ -54,12 +58,36 @@ class _Verbs(click.Group):
     """Loads the module of a verb when it is called, so that `fbvm check` starts quickly."""
 
     def invoke(self, ctx: click.Context) -> object:
-        """Runs the verb.  Ctrl-C ends it with status 130."""
+        """Runs the verb.  Ctrl-C ends it with status 130, a reader that has gone with 141, in silence; an output that the host
+        refuses with 4 for a file that grows during a run, else with 2."""
         try:
             return super().invoke(ctx)
+        except OutputError as error:
+            click.echo(str(error), err=True)
+            sys.exit(status.STOPPED)
+        except BrokenPipeError:
+            give_up_output()
+            sys.exit(status.OUTPUT_CLOSED)
         except KeyboardInterrupt:
             click.echo("interrupted", err=True)
             sys.exit(status.INTERRUPTED)
+
+    def main(self, *arguments: Any, **options: Any) -> Any:
+        """Runs the command line and writes what is still in the buffer of the standard output."""
+        prepare_streams()
+        try:
+            try:
+                return super().main(*arguments, **options)
+            finally:
+                sys.stdout.flush()
+        except BrokenPipeError:
+            give_up_output()
+            sys.exit(status.OUTPUT_CLOSED)
+        except OSError as error:
+            give_up_output()
+            said = f"{error.filename} cannot be used" if error.filename else "the output cannot be written"
+            click.echo(f"{said}: {reason(error)}", err=True)
+            sys.exit(status.USAGE)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(GROUP_OF)

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol, cast
 
+from fbvm.base.digits import whole_number
 from fbvm.base.memory import Memory
 from fbvm.base.types import fold
 from fbvm.code.image import Image, Site
@@ -219,7 +220,7 @@ def find_line(image: Image, where: str) -> tuple[str, frozenset[int]]:
     statements = _statements(image)
     if colon and number.strip().isdecimal():
         inside = _of_file(statements, file.strip())
-        line = _line_from(inside, int(number), where)
+        line = _line_from(inside, whole_number(number), where)
     else:
         inside = _of_pou(statements, where.strip())
         line = min(site.line for site in inside.values())

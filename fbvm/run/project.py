@@ -27,6 +27,7 @@ from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.dialects import DIALECTS
+from fbvm.base.files import SETTINGS_BYTES
 from fbvm.engine.choice.tiers import CHOICES
 from fbvm.machine.backplane import KINDS as UNIT_KINDS
 from fbvm.net.faults import FOREVER, KINDS, NO_FAULT, Fault
@@ -197,7 +198,7 @@ def project_file(path: Path) -> Path | None:
 
 def read_project(path: Path) -> Project | list[Diagnostic]:
     """Reads a project file.  Returns the project, or all diagnostics of the file; sources are not read yet."""
-    found = read(path, str(path))
+    found = read(path, str(path), most_bytes=SETTINGS_BYTES)
     if isinstance(found, Diagnostic):
         return [found]
     reading = Reading(found)

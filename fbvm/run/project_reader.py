@@ -4,13 +4,14 @@ Knows nothing of PLCs; the tables are in `project`."""
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from typing import Any
 
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.digits import whole_number
+from fbvm.base.toml import TomlError, load_toml
 from fbvm.run.toml_keys import Path, span
 from fbvm.watch.values import parse_time_ns
 from fbvm.wire.link import Peer
@@ -54,14 +55,12 @@ class Reading:
     def load(self) -> dict[str, Any]:
         """The file as Python reads TOML; {} and a diagnostic if it is no TOML."""
         try:
-            return tomllib.loads(self.source.text)
-        except tomllib.TOMLDecodeError as error:
-            what, _, where = str(error).rpartition(" (at ")
-            line, column = [int(part) for part in where.rstrip(")").replace("line ", "").split(", column ")] \
-                if where.startswith("line ") else (len(self.source.line_starts), 1)  # fmt: skip
-            start = self.source.line_starts[min(line, len(self.source.line_starts)) - 1] + column - 1
+            return load_toml(self.source.text)
+        except TomlError as error:
+            starts = self.source.line_starts
+            start = starts[min(error.line, len(starts)) - 1] + error.column - 1
             hint = "texts stand in quotes, tables begin with [name]; see https://toml.io"
-            self.diagnostics.append(Diagnostic("P0101", self.source, start, start + 1, (what or str(error)).lower(), hint))
+            self.diagnostics.append(Diagnostic("P0101", self.source, start, start + 1, str(error).lower(), hint))
             return {}
 
     def report(self, code: str, path: Path, message: str, hint: str = "") -> None:
@@ -153,7 +152,7 @@ def _moment_ns(value: object) -> int:
 
 def _ip(value: object) -> str:
     parts = value.split(".") if isinstance(value, str) else []
-    if len(parts) != 4 or not all(part.isdecimal() and int(part) <= 255 for part in parts):
+    if len(parts) != 4 or not all(part.isdecimal() and whole_number(part) <= 255 for part in parts):
         raise ValueError(f'{value!r} is no IPv4 address; write "192.168.250.21"')
     return str(value)
 
@@ -165,9 +164,9 @@ def _endpoint(value: object) -> Peer:
 
 def _parted(value: object, example: str) -> tuple[str, int]:
     before, colon, port = value.rpartition(":") if isinstance(value, str) else ("", "", "")
-    if not colon or not before or not port.isdecimal() or int(port) > 65535:
+    if not colon or not before or not port.isdecimal() or whole_number(port) > 65535:
         raise ValueError(f'{value!r} is no address and port; write "{example}"')
-    return before, int(port)
+    return before, whole_number(port)
 
 
 def whole(first: int, last: int) -> Kind:

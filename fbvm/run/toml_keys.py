@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 
 from fbvm.base.diagnostics import Source
 
@@ -26,13 +27,17 @@ def span(source: Source, path: Path) -> tuple[int, int]:
     >>> source.text[start:end]
     'cycle = "10ms"'
     """
-    best, found = 0, (0, 0)
-    for there, start, end in _places(source):
-        same = min(len(there), len(path))
-        if there[:same] != path[:same]:
-            continue
-        if same > best:
-            best, found = same, (start, end)
+    places = _by_path(source)
+    return next((places[path[:size]] for size in range(len(path), 0, -1) if path[:size] in places), (0, 0))
+
+
+@lru_cache(maxsize=8)
+def _by_path(source: Source) -> dict[Path, tuple[int, int]]:
+    """The first place of each path and of all that stand in it: a table is where its first key is, if it has no header."""
+    found: dict[Path, tuple[int, int]] = {}
+    for path, start, end in _places(source):
+        for size in range(1, len(path) + 1):
+            found.setdefault(path[:size], (start, end))
     return found
 
 

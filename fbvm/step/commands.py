@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 
+from fbvm.base.digits import whole_number
 from fbvm.base.types import fold
 from fbvm.machine.plc import Mode, Plc
 from fbvm.record.draw.table import ScanTable
@@ -349,9 +350,9 @@ def completed(session: Session, takes: str, word: str, words: Mapping[str, objec
 def _count(text: str, least: int = 1) -> int:
     if not text:
         return 1
-    if not text.isdecimal() or int(text) < least:
+    if not text.isdecimal() or whole_number(text) < least:
         raise CommandError(f"{text!r} is no number of steps")
-    return int(text)
+    return whole_number(text)
 
 
 def _place(session: Session, text: str) -> Place:

@@ -155,7 +155,8 @@ def _hints(wrong: Sequence[Diagnostic], sources: Sequence[Source], libraries: Se
     for name in names:
         declared = re.compile(rf"^[ \t]*(?:FUNCTION_BLOCK|FUNCTION|TYPE)\s+{re.escape(name)}\b", re.I | re.M)
         for file in files[:MOST_FILES]:
-            if declared.search(file.read_text(encoding="utf-8", errors="replace")):
+            found = read(file, file.name)
+            if isinstance(found, Source) and declared.search(found.text):
                 shown = os.path.relpath(file) if file.is_absolute() and file.is_relative_to(Path.cwd()) else file
                 yield (f"{name} is declared in {shown}; a test finds it in a file of its own name, {name}.st, in src/ or in a "
                        "folder of fbvm_libraries")

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from fbvm.base.areas import FLAG_AREAS, PORTABLE_AREAS, Address, AddressError, Area, parse_address
+from fbvm.base.digits import whole_number
 from fbvm.base.types import (
     BOOL,
     BYTE,
@@ -252,7 +253,7 @@ def _step(place: Place, match: re.Match[str]) -> Place:
     bit = match["bit"][1:].strip()
     if isinstance(place.type, StructType) and bit[0] in "Xx":
         return member(place, bit)  # a member that is called as a bit is written
-    return _part(place, int(bit.lstrip("%Xx")))
+    return _part(place, whole_number(bit.lstrip("%Xx")))
 
 
 def _of(parent: Place, field: Field, name: str, distance: int) -> Place:
@@ -290,7 +291,7 @@ def _element(place: Place, text: str) -> Place:
     if not isinstance(kind, ArrayType):
         raise UnknownPlace(f"{place.name} is {place.type.name}, not an array")
     try:
-        indexes = [int(part) for part in text.split(",")]
+        indexes = [whole_number(part) for part in text.split(",")]
     except ValueError:
         raise UnknownPlace(f"{place.name}[{text}]: a subscript is a whole number") from None
     bounds = kind.bounds

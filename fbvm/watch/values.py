@@ -13,6 +13,7 @@ import struct
 from typing import TypeAlias
 
 from fbvm.base.arithmetic import shortest
+from fbvm.base.digits import MOST_DIGITS, whole_number
 from fbvm.base.strings import packed
 from fbvm.base.types import (
     BOOL,
@@ -57,11 +58,15 @@ def parse_time_ns(text: str) -> int:
     total, at = 0, 0
     while piece := _PIECE.match(rest, at):
         whole, _, part = piece[1].replace("_", "").partition(".")
+        if len(part) > MOST_DIGITS:
+            raise ValueError(f"a time with {len(part)} digits behind its point is finer than any clock")
         unit = literals.UNITS_NS[piece[2].lower()]
-        total += int(whole) * unit + (int(part) * unit // 10 ** len(part) if part else 0)
+        total += whole_number(whole) * unit + (int(part) * unit // 10 ** len(part) if part else 0)
         at = piece.end()
     if not at or at != len(rest):
         raise ValueError(f"{text!r} is no time; write 10ms, 1.5s or T#1m30s")
+    if total >= 1 << 63:
+        raise ValueError("a time has at most 64 bits of nanoseconds, about 292 years")
     return sign * total
 
 
@@ -204,7 +209,7 @@ def literal(text: str) -> tuple[Value, Type | None]:
         return _BITS[fold(text)], BOOL
     if match := _INTEGER.fullmatch(text):
         digits, radix = (match[3], int(match[2])) if match[2] else (match[4], 16) if match[4] else (match[5], 10)
-        number = int(digits.replace("_", ""), radix)
+        number = whole_number(digits.replace("_", "")) if radix == 10 else int(digits.replace("_", ""), radix)
         return (-number if match[1] == "-" else number), None
     if _REAL.fullmatch(text):
         return float(text.replace("_", "")), None

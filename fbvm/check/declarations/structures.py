@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 
+from fbvm.base.digits import whole_number
 from fbvm.base.types import BOOL, Field, StructType, Type, base, fold
 from fbvm.check.symbols.facts import holds_block, is_block
 from fbvm.check.symbols.size_limits import MAX_SIZE
@@ -86,7 +87,7 @@ def _located(name: str, kind: Type, location: tree.Location) -> tuple[int, int |
     match = _LOCATION.fullmatch(location.text)
     if match is None:
         return f"{location.text} is no place in a structure"
-    offset, bit = int(match[2]) * _UNITS[match[1].upper()], int(match[3]) if match[3] else None
+    offset, bit = whole_number(match[2]) * _UNITS[match[1].upper()], whole_number(match[3]) if match[3] else None
     if (bit is not None) != (match[1].upper() == "X") or bit is not None and base(kind) != BOOL:
         return f"{name} is {kind} and cannot lie at {location.text}"
     if is_block(kind) and offset % kind.align:

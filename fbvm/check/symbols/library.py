@@ -21,7 +21,6 @@ Pins that other tools call otherwise have their other names there too:
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -31,6 +30,8 @@ from pathlib import Path
 from fbvm.base.areas import AREAS, Mailbox, refusal
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.files import SETTINGS_BYTES, read_file, reason
+from fbvm.base.toml import TomlError, load_toml
 from fbvm.base.types import fold
 from fbvm.check.symbols.facts import Report
 from fbvm.syntax import tree
@@ -70,7 +71,10 @@ class LibraryError(ValueError):
     @property
     def diagnostic(self) -> Diagnostic:
         """The error as a diagnostic."""
-        text = self.described.read_text(encoding="utf-8", errors="replace") if self.described.is_file() else ""
+        try:
+            text = read_file(self.described, SETTINGS_BYTES).decode("utf-8", "replace")
+        except OSError:
+            text = ""
         return Diagnostic("P0201", Source(str(self.described), text), 0, len(text.partition("\n")[0]), self.why)
 
 
@@ -84,7 +88,7 @@ def _libraries_below(root: Path) -> Iterator[Library]:
         if not sources and "library.toml" not in names:
             continue
         described = folder / "library.toml"
-        table = _described(described) if described.is_file() else {}
+        table = _described(described) if os.path.lexists(described) else {}
         name = folder.relative_to(root).as_posix() if folder != root else root.name
         files = {fold(source[:-len(".st")]): folder / source for source in sources}
         spaces = _listed(table, "spaces", described, "a list of names")
@@ -96,9 +100,13 @@ def _libraries_below(root: Path) -> Iterator[Library]:
 def _described(described: Path) -> dict[str, object]:
     """What a `library.toml` says; a key that looks like one of ours must be one."""
     try:
-        table = tomllib.loads(described.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        table = load_toml(read_file(described, SETTINGS_BYTES).decode("utf-8"))
+    except TomlError as error:
+        raise LibraryError(described, f"{error} (at line {error.line}, column {error.column})") from error
+    except UnicodeDecodeError as error:
         raise LibraryError(described, str(error)) from error
+    except OSError as error:
+        raise LibraryError(described, f"it cannot be read: {reason(error)}") from error
     for key in table:
         if key not in _KEYS and (meant := get_close_matches(key, _KEYS, n=1, cutoff=0.8)):
             raise LibraryError(described, f"{key} says nothing; did you mean {meant[0]}?")

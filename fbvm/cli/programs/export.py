@@ -11,7 +11,7 @@ import click
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.sources import report_diagnostics
-from fbvm.interchange.plcopen.write.exporting import export_xml
+from fbvm.interchange.plcopen.write.exporting import BEGINNING, export_xml
 
 
 @click.command("export")
@@ -24,7 +24,10 @@ def command(files: tuple[Path, ...], document: Path, as_json: bool) -> None:
 
     Structured Text stays as it is, LADDER .. END_LADDER and charts are drawn. Status 3 if something is left out."""
     latest = max(file.stat().st_mtime for file in files)
-    created = datetime.fromtimestamp(int(latest), UTC).strftime("%Y-%m-%dT%H:%M:%S")
+    try:
+        created = datetime.fromtimestamp(int(latest), UTC).strftime("%Y-%m-%dT%H:%M:%S")
+    except (ArithmeticError, ValueError, OSError):  # a time that no calendar has
+        created = BEGINNING
     made = export_xml(files, document.stem, created)
     if made.diagnostics or as_json:
         report_diagnostics(made.diagnostics, as_json)

@@ -14,6 +14,7 @@ import click
 
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source, whole_lines
+from fbvm.base.files import SOURCE_BYTES, read_file, reason
 from fbvm.base.types import fold
 from fbvm.check.calls.standard import is_known
 from fbvm.cli.shared import status
@@ -22,7 +23,7 @@ from fbvm.cli.shared.sources import show_diagnostic
 from fbvm.syntax.formatter.formatter import formatted
 from fbvm.syntax.formatter.names import Outside
 from fbvm.syntax.parser import parse
-from fbvm.syntax.text import MARKS, decode, read
+from fbvm.syntax.text import MARKS, decode, read, refusal
 from fbvm.syntax.tree import Declaration, Pou, TypeDecl
 
 STREAM = Path("-")
@@ -94,8 +95,11 @@ def _read(path: Path) -> tuple[Source | None, bytes]:
         data = sys.stdin.buffer.read()
         source = decode(data, "stdin")
     else:
-        source = read(path, str(path))
-        data = path.read_bytes() if isinstance(source, Source) else b""
+        try:
+            data = read_file(path, SOURCE_BYTES)
+            source = decode(data, str(path))
+        except OSError as error:
+            data, source = b"", refusal(str(path), reason(error))
     if isinstance(source, Source):
         return source, data
     show_diagnostic(source)

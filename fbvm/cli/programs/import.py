@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -25,7 +26,7 @@ def command(file: Path, folder: Path, force: bool, as_json: bool) -> None:
     Ladder becomes LADDER .. END_LADDER where mnemonics say exactly what was drawn, else statements; diagrams of function
     blocks become statements in the order of their evaluation. Status 3 if the program lacks something now."""
     made = import_xml(file)
-    there = [name for name in made.files if (folder / name).exists()]
+    there = [name for name in made.files if os.path.lexists(folder / name)]
     if there and not force:
         raise click.UsageError(f"{folder / there[0]} is there already; --force writes over it")
     if made.diagnostics or as_json:
@@ -33,8 +34,10 @@ def command(file: Path, folder: Path, force: bool, as_json: bool) -> None:
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in made.files.items():
+            if (folder / name).is_symlink():
+                (folder / name).unlink()  # the file goes into the folder, not where a link leads
             (folder / name).write_text(text, encoding="utf-8")
-            if not as_json:
-                click.echo(str(folder / name))
+    for name in made.files if not as_json else ():
+        click.echo(str(folder / name))
     if made.errors:
         sys.exit(status.PROGRAM_ERRORS)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import click
 
+from fbvm.base.files import TABLE_BYTES, read_file, reason
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.traces import SUFFIX, open_trace, recording_of, scans_option
@@ -99,8 +100,10 @@ def _to_trace(source: Path, target: Path) -> None:
         raise click.UsageError(f"{target}: a table becomes a trace; end it with {SUFFIX}")
     made = BytesIO()
     try:
-        with source.open(encoding="utf-8-sig", newline="") as file:
-            read_csv(file, made)
+        text = read_file(source, TABLE_BYTES).decode("utf-8-sig")
+        read_csv(StringIO(text, newline=""), made)
+    except OSError as error:
+        raise click.UsageError(f"{source} cannot be read: {reason(error)}") from None
     except (CsvError, UnicodeDecodeError) as error:
         raise click.UsageError(f"{source}: {error}") from None
     target.write_bytes(made.getvalue())

@@ -14,7 +14,7 @@ from fbvm.cli.shared import status
 from fbvm.cli.shared.breakpoints import breakpoint_options, halt_lines, set_breakpoints
 from fbvm.cli.shared.drawings import draw_executed_charts, draw_executed_rungs
 from fbvm.cli.shared.e_banks import e_banks_in, with_e_banks
-from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.journals import start_journal
 from fbvm.cli.shared.networks import build_network, mailbox_names
 from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, charted_names, mapping, setting, show_option, time_ns
@@ -191,7 +191,7 @@ def _warn_unused_mappings(plc: Plc, network: LoopNetwork | TcpNetwork) -> None:
 
 def _capture(stack: ExitStack, path: Path, network: LoopNetwork | TcpNetwork, plc: Plc) -> Capture:
     with writing(path):
-        file = stack.enter_context(path.open("wb"))
+        file = stack.enter_context(growing_file(path))
     return Capture(file, 0 if network.virtual_time else loop.epoch_ns(), lambda address: f"scan {plc.scans}")
 
 

@@ -7,6 +7,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from io import TextIOWrapper
 from pathlib import Path
 from types import FrameType
 from typing import IO, NoReturn
@@ -14,9 +15,10 @@ from typing import IO, NoReturn
 import click
 
 from fbvm.base.data import data_folder
+from fbvm.base.files import reason
 from fbvm.cli.running.peer import LISTENING
 from fbvm.cli.shared import status
-from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.files import OutputError, growing_file, writing
 from fbvm.cli.shared.options import time_ns
 from fbvm.code.compiler import compile_files
 from fbvm.machine.backplane import ETN21_ADDRESS
@@ -57,7 +59,7 @@ def command(
 ) -> None:  # fmt: skip
     """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM.
 
-    Status 5 if the port cannot be used, 4 if a trap stopped the program, else 0."""
+    Status 5 if the port cannot be used, 4 if a trap stopped the program, 2 if the memory could not be saved, else 0."""
     settings = {"Sockets": sockets, "Read_Only": read_only, "Fn0F": fn0f, "Full_DM": full_dm}
     if idle_ns is not None:
         settings["Idle_Time"] = idle_ns
@@ -70,14 +72,18 @@ def command(
         if log:
             network.tap = RequestLog(_opened(stack, log), loop.epoch_ns(), lambda: plc.scans).tap
         plc.attach(Etn21(0, ETN21_ADDRESS), network)
-        reason = _start(plc, network)
+        reason, saved = _start(plc, network), True
         while reason != "trap" and not signals.end:
-            reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=EVENT)
+            try:
+                reason = loop.run(plc, until=lambda _: signals.end or signals.save, pace=EVENT)
+            except OutputError:  # the log; the memory is saved nevertheless
+                _save(plc, image)
+                raise
             signals.save = False
-            _save(plc, image)
+            saved = _save(plc, image)
     if plc.trap:
         click.echo(str(plc.trap), err=True)
-    sys.exit(status.STOPPED if reason == "trap" else status.GOOD)
+    sys.exit(status.STOPPED if reason == "trap" else status.GOOD if saved else status.USAGE)
 
 
 def _plc(settings: dict[str, int], image: Path | None) -> Plc:
@@ -87,17 +93,24 @@ def _plc(settings: dict[str, int], image: Path | None) -> Plc:
     plc = Plc(program, CYCLE_NS)
     for name, value in settings.items():
         plc.write(f"Main.Server.{name}", value)
+    if image:
+        with writing(image):
+            memory_images.check_writable(image)
     if image and image.exists():
         try:
             memory_images.load(plc.memory, image)
-        except (OSError, memory_images.ImageError) as error:
+        except OSError as error:
+            raise click.UsageError(f"{image} cannot be read: {reason(error)}") from None
+        except memory_images.ImageError as error:
             raise click.UsageError(str(error)) from None
     return plc
 
 
 def _opened(stack: ExitStack, log: Path) -> IO[str]:
     with writing(log):
-        return stack.enter_context(click.open_file(str(log), "a", encoding="utf-8"))
+        if str(log) == "-":
+            return sys.stdout
+        return stack.enter_context(TextIOWrapper(growing_file(log, "ab"), encoding="utf-8"))
 
 
 def _network(bind: str, port: int) -> TcpNetwork:
@@ -163,9 +176,12 @@ class Signals:
                 signal.signal(number, call)
 
 
-def _save(plc: Plc, image: Path | None) -> None:
+def _save(plc: Plc, image: Path | None) -> bool:
+    """Saves the memory, if `image` is given; says why it cannot and returns False if the host refuses."""
     if image:
         try:
             memory_images.save(plc.memory, image, SERVED)
         except OSError as error:
-            click.echo(f"{image} cannot be written: {error.strerror}", err=True)
+            click.echo(f"{image} cannot be written: {reason(error)}", err=True)
+            return False
+    return True

@@ -1,12 +1,57 @@
-"""Files that verbs write; an error of the host is reported as an error of usage."""
+"""Files that verbs write; an error of the host is reported in words."""
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
 
 import click
+
+from fbvm.base.files import reason
+
+
+class OutputError(Exception):
+    """A file that grows during a run could not be written any further; the message names the file and the reason."""
+
+
+class _GrowingFile(io.RawIOBase):
+    """A file to which a run appends.  The first error of the host raises OutputError; what is written afterwards is dropped, so
+    that the file is good up to where it was cut."""
+
+    def __init__(self, path: Path | str, mode: str = "wb") -> None:
+        super().__init__()
+        self._path, self._failed = path, False
+        self._file = open(path, mode, buffering=0)  # noqa: SIM115 - close closes it
+
+    def writable(self) -> bool:
+        return True
+
+    def write(self, data: bytes, /) -> int:  # type: ignore[override]
+        """Writes all bytes."""
+        left = memoryview(data).cast("B")
+        size = len(left)
+        while left and not self._failed:
+            try:
+                left = left[self._file.write(left) or 0 :]
+            except OSError as error:
+                self._failed = True
+                raise OutputError(f"{self._path} cannot be written any further: {reason(error)}") from None
+        return size
+
+    def close(self) -> None:
+        """Closes the file."""
+        self._file.close()
+        super().close()
+
+
+def growing_file(path: Path | str, mode: str = "wb") -> BinaryIO:
+    """Opens a file to which a run appends.  An error of the host while it is written raises OutputError; nothing is written
+    behind the gap, so that the file is good up to there.  Raises OSError if the file cannot be opened."""
+    raw: io.RawIOBase = _GrowingFile(path, mode)
+    return io.BufferedWriter(raw)
 
 
 @contextmanager
@@ -15,4 +60,4 @@ def writing(target: Path | str) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise click.UsageError(f"{target} cannot be written: {(error.strerror or str(error)).lower()}") from None
+        raise click.UsageError(f"{target} cannot be written: {reason(error)}") from None

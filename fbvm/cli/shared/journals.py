@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from functools import partial
+from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +14,10 @@ import click
 
 import fbvm
 from fbvm.base.diagnostics import Source
+from fbvm.base.files import LINE_CHARACTERS, open_file, reason
 from fbvm.cli.shared import status
 from fbvm.cli.shared.e_banks import with_e_banks
-from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.sources import compile_options, report_diagnostics
 from fbvm.code.compiler import compile_sources
 from fbvm.code.image import Image
@@ -29,7 +32,7 @@ def start_journal(
 ) -> Journal:  # fmt: skip
     """Starts a journal in a file, with the texts of the program and the `options` of the run; `stack` closes it."""
     with writing(path):
-        file = stack.enter_context(path.open("w", encoding="utf-8", newline="\n"))
+        file = stack.enter_context(TextIOWrapper(growing_file(path), encoding="utf-8", newline="\n"))
     texts = [read(name, str(name)) for name in files]
     journal = Journal(file, {
         "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program, "chosen": compile_options(),
@@ -46,17 +49,17 @@ def open_journal_file(path: Path) -> Iterator[tuple[Header, Iterator[Entry]]]:
     """Opens a journal file for a `with` block: its header and its entries.  A JournalError in the block ends the verb with
     status 2."""
     try:
-        with path.open(encoding="utf-8", newline="\n") as file:
+        with TextIOWrapper(open_file(path), encoding="utf-8", newline="\n") as file:
             yield open_journal(_text(file))
     except JournalError as error:
         raise click.UsageError(f"{path}: {error}") from None
     except OSError as error:
-        raise click.UsageError(f"{path} cannot be read: {error.strerror}") from None
+        raise click.UsageError(f"{path} cannot be read: {reason(error)}") from None
 
 
-def _text(lines: Iterable[str]) -> Iterator[str]:
+def _text(file: TextIOWrapper) -> Iterator[str]:
     try:
-        for number, line in enumerate(lines):
+        for number, line in enumerate(iter(partial(file.readline, LINE_CHARACTERS), "")):
             if number == 0 and not line.startswith("{"):
                 raise JournalError("this is no journal of fbvm; `fbvm run --journal FILE` writes one")
             yield line

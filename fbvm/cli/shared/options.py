@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from click import BadParameter, Context, Parameter, option
 
+from fbvm.base.digits import whole_number
 from fbvm.watch.values import parse_time_ns, split_list
 from fbvm.wire.link import Peer
 
@@ -74,7 +75,7 @@ def mapping(value: str) -> Mapping:
         raise BadParameter(f"{value!r} is not IP:PORT=HOST:PORT or IP:PORT=peer")
     ip, port = _endpoint(said)
     parts = ip.split(".")
-    if len(parts) != 4 or not all(part.isdecimal() and int(part) <= 255 for part in parts):
+    if len(parts) != 4 or not all(part.isdecimal() and whole_number(part) <= 255 for part in parts):
         raise BadParameter(f"{ip!r} is no IPv4 address; a program knows no names")
     if real.strip() == "peer":
         return Mapping(Peer(ip, port), None, 0)
@@ -83,9 +84,9 @@ def mapping(value: str) -> Mapping:
 
 def _endpoint(text: str) -> tuple[str, int]:
     host, colon, port = text.strip().rpartition(":")
-    if not colon or not host or not port.isdecimal() or int(port) > 65535:
+    if not colon or not host or not port.isdecimal() or whole_number(port) > 65535:
         raise BadParameter(f"{text!r} is not an address and a port such as 192.168.250.1:502")
-    return host, int(port)
+    return host, whole_number(port)
 
 
 def _shown(context: Context, parameter: Parameter, given: tuple[str, ...]) -> tuple[str, ...]:

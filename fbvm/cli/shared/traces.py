@@ -10,7 +10,9 @@ from typing import Any, BinaryIO, cast
 
 import click
 
-from fbvm.cli.shared.files import writing
+from fbvm.base.digits import whole_number
+from fbvm.base.files import reason
+from fbvm.cli.shared.files import growing_file, writing
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.record.page.data import page_data
@@ -24,6 +26,8 @@ from fbvm.record.trace.writer import Depth, TraceWriter, source_lines
 from fbvm.watch.paths import UnknownPlace
 
 SUFFIX = ".fbtrace"
+LAST_SCAN = 1 << 62
+"""No run has so many scans."""
 
 
 class ScanRange(click.ParamType[range]):
@@ -37,8 +41,8 @@ class ScanRange(click.ParamType[range]):
             return value
         first, dots, last = str(value).partition("..")
         try:
-            start = int(first or 0)
-            end = int(last) if last else start if not dots else 1 << 62
+            start = min(whole_number(first or "0"), LAST_SCAN)
+            end = min(whole_number(last), LAST_SCAN) if last else start if not dots else LAST_SCAN
         except ValueError:
             self.fail(f"{value!r} is not scans such as 41 or 10..60", param, ctx)
         if start < 0 or end < start:
@@ -62,7 +66,7 @@ def open_trace(path: Path) -> Iterator[Trace]:
     try:
         trace = Trace.open(path)
     except OSError as error:
-        raise click.UsageError(f"{path} cannot be read: {error.strerror}") from None
+        raise click.UsageError(f"{path} cannot be read: {reason(error)}") from None
     except TraceError as error:
         raise click.UsageError(f"{path}: {error}") from None
     try:
@@ -97,7 +101,7 @@ def write_trace(
         yield
         return
     with writing(path):
-        file = path.open("wb")
+        file = growing_file(path)
     with file:
         try:
             writer = TraceWriter(plc, file, Depth(depth), selected, statement_lines(plc.image, files, libraries))

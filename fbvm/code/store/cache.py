@@ -14,6 +14,7 @@ from typing import Any
 from fbvm.base.cache import Cache, name_of, state_of
 from fbvm.base.data import PACKAGE, data_folder
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.files import SOURCE_BYTES, read_file, reason
 from fbvm.code.image import Image
 from fbvm.code.store.encoding import decode, encode
 
@@ -81,5 +82,13 @@ def _own() -> str:
 def _library(folder: Path) -> str:
     """A hash of all that compiling may find in a folder of libraries."""
     parts = [part for path in sorted(folder.rglob("*")) if path.suffix in (".st", ".toml")
-             for part in (path.relative_to(folder).as_posix(), path.read_text(encoding="latin-1"))]  # fmt: skip
+             for part in (path.relative_to(folder).as_posix(), _content(path))]
     return name_of([str(folder), *parts])
+
+
+def _content(path: Path) -> str:
+    """The text of a file, or why there is none."""
+    try:
+        return read_file(path, SOURCE_BYTES).decode("latin-1")
+    except OSError as error:
+        return reason(error)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import codecs
 import re
-import stat
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,9 +15,10 @@ from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
 from fbvm.base.diagnostics import Diagnostic, Source
+from fbvm.base.files import SOURCE_BYTES, open_file, reason
 from fbvm.syntax.text import MARKS
 
-MAX_BYTES = 64 << 20
+MAX_BYTES = SOURCE_BYTES
 MAX_DEPTH = 200
 """Deepest nesting; projects of editors have less than 40."""
 MAX_ELEMENTS = 1_000_000
@@ -88,14 +88,10 @@ def read_markup(path: Path, name: str) -> tuple[Source, Element] | Diagnostic:
     """The text and the root element of a file, or the diagnostic that says why there is none.  Never raises for what a file
     contains."""
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):
-            return Diagnostic("X0101", Source(name, ""), 0, 0, f"{name} is no file")
-        if status.st_size > MAX_BYTES:
-            return _too_large(name)
-        data = path.read_bytes()
+        with open_file(path) as file:
+            data = file.read(MAX_BYTES + 1)
     except OSError as error:
-        return Diagnostic("X0101", Source(name, ""), 0, 0, f"{name} cannot be read: {(error.strerror or str(error)).lower()}")
+        return Diagnostic("X0101", Source(name, ""), 0, 0, f"{name} cannot be read: {reason(error)}")
     return parse_markup(data, name)
 
 

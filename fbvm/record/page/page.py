@@ -8,6 +8,7 @@ from __future__ import annotations
 import base64
 import html
 import json
+import re
 import zlib
 from functools import cache
 from pathlib import Path
@@ -15,6 +16,8 @@ from typing import Any
 
 FOLDER = Path(__file__).parent
 SCRIPTS = ("model.js", "chart.js", "panels.js", "main.js")
+_PLACE = re.compile(r"\{\{(title|style|script|data)\}\}")
+"""Where the parts of a page go in `page.html`; what is put in is not searched again."""
 
 
 def page(data: dict[str, Any]) -> str:
@@ -26,10 +29,7 @@ def page(data: dict[str, Any]) -> str:
         "script": "\n".join(_file(name) for name in SCRIPTS),
         "data": base64.b64encode(packed).decode("ascii"),
     }
-    made = _file("page.html")
-    for name, text in parts.items():
-        made = made.replace("{{" + name + "}}", text)
-    return made
+    return _PLACE.sub(lambda place: parts[place[1]], _file("page.html"))
 
 
 @cache

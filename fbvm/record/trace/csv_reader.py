@@ -10,6 +10,7 @@ from decimal import Decimal
 from typing import Any, BinaryIO, TextIO, TypeAlias
 
 from fbvm.base.areas import SLOTS_OFFSET, AddressError, parse_address
+from fbvm.base.digits import whole_number
 from fbvm.base.types import BOOL, LINT, LREAL, TIME, ULINT, Field, StructType, Type, array, fold, string
 from fbvm.check.symbols.size_limits import MAX_SIZE
 from fbvm.code.image import Image, Layout
@@ -43,8 +44,12 @@ class Column:
 
 
 def read_csv(file: TextIO, out: BinaryIO) -> int:
-    """Writes a trace with the scans of a CSV table to `out`; returns the number of scans.  Raises RowsError."""
-    rows = list(csv.reader(file))
+    """Writes a trace with the scans of a CSV table to `out`; returns the number of scans.  Raises CsvError."""
+    table = csv.reader(file)
+    try:
+        rows = list(table)
+    except csv.Error as error:
+        raise CsvError(f"line {table.line_num}: {error}") from None
     if not rows or rows[0][:2] != [SCAN, TIME_MS]:
         raise CsvError(f"line 1: the first two columns are {SCAN} and {TIME_MS}")
     for number, row in enumerate(rows[1:], 2):
@@ -87,7 +92,7 @@ def _kind(heading: str, cells: Sequence[str]) -> tuple[Type, Callable[[str], Any
     if all(cell in ("TRUE", "FALSE") for cell in cells):
         return BOOL, lambda cell: cell == "TRUE"
     if all(_INTEGER.fullmatch(cell) for cell in cells):
-        return (ULINT if any(int(cell) > LINT.high for cell in cells) else LINT), int
+        return (ULINT if any(whole_number(cell) > LINT.high for cell in cells) else LINT), int
     if all(_NUMBER.fullmatch(cell) or cell in ("nan", "inf", "-inf") for cell in cells):
         return LREAL, float
     return string(min(LONGEST_TEXT, max(map(len, cells), default=1))), str

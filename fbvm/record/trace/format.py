@@ -39,7 +39,11 @@ LINE = 32
 PHASE, SCAN, FRAME, END, STATEMENT, READ, WRITE, CONTACT, NETWORK = range(9)
 PHASES = (Phase.INPUTS, Phase.PROGRAM, Phase.REFRESH)
 _CHUNK = struct.Struct("<BIIQI")
-LARGEST_BYTES = 1 << 30
+LARGEST_BYTES = 1 << 29
+LARGEST_HEADER_BYTES = 1 << 26
+"""Most bytes of a block and of the header, unpacked."""
+LONGEST_SHIFT = 140
+"""No number in a block takes more than 20 bytes."""
 
 
 class TraceError(ValueError):
@@ -87,14 +91,16 @@ def _is_there(file: BinaryIO) -> bool:
 def read_chunk(file: BinaryIO, at: int) -> bytes:
     """The payload of the chunk at a position.  Raises TraceError if it is damaged."""
     file.seek(at)
-    _, size, check, *_ = _CHUNK.unpack(file.read(_CHUNK.size))
+    kind, size, check, *_ = _CHUNK.unpack(file.read(_CHUNK.size))
+    if size > LARGEST_BYTES:
+        raise TraceError(f"the chunk at byte {at} is too large")
     packed = file.read(size)
     if zlib.crc32(packed) != check:
         raise TraceError(f"the chunk at byte {at} is damaged")
     engine = zlib.decompressobj()
-    payload = engine.decompress(packed, LARGEST_BYTES)
+    payload = engine.decompress(packed, LARGEST_HEADER_BYTES if kind == HEADER else LARGEST_BYTES)
     if not engine.eof:
-        raise TraceError(f"the chunk at byte {at} does not end")
+        raise TraceError(f"the chunk at byte {at} does not end, or is too large")
     return payload
 
 
@@ -126,6 +132,8 @@ class Cursor:
             if byte < 0x80:
                 return value
             shift += 7
+            if shift > LONGEST_SHIFT:
+                raise IndexError("a number is too large")
 
     def bytes(self, size: int) -> bytes:
         self.at += size

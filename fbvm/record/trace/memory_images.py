@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from fbvm.base.files import IMAGE_BYTES, read_file
 from fbvm.base.memory import Memory
 
 OF_UNITS = {"CIO": range(1500, 1900), "D": range(30000, 31600)}  # 25 and 100 words a unit, W421 6-6-2 p111
@@ -32,9 +33,25 @@ def save(memory: Memory, path: Path, counts: Mapping[str, int]) -> None:
             words.pop()
         spaces[name] = words
     lines = ",\n".join(f"  {json.dumps(name)}: {json.dumps(words)}" for name, words in spaces.items())
-    part = path.with_name(path.name + ".new")
-    part.write_text(f'{{"spaces": {{\n{lines}\n}}}}\n', encoding="utf-8")
-    os.replace(part, path)
+    part = _beside(path)
+    try:
+        part.write_text(f'{{"spaces": {{\n{lines}\n}}}}\n', encoding="utf-8")
+        os.replace(part, path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def check_writable(path: Path) -> None:
+    """Raises OSError if an image cannot be written into this file; leaves the file as it is."""
+    part = _beside(path)
+    part.write_bytes(b"")
+    part.unlink()
+
+
+def _beside(path: Path) -> Path:
+    """The file that is written before it replaces an image."""
+    return path.with_name(path.name + ".new")
 
 
 def load(memory: Memory, path: Path) -> None:
@@ -42,8 +59,8 @@ def load(memory: Memory, path: Path) -> None:
 
     Raises OSError, and ImageError for a file that is no image or has words that this memory lacks."""
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+        found = json.loads(read_file(path, IMAGE_BYTES).decode("utf-8"))
+    except (ValueError, RecursionError) as error:
         raise ImageError(f"{path} is not JSON: {error}") from None
     spaces = found.get("spaces") if isinstance(found, dict) else None
     if not isinstance(spaces, dict):

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
 from fbvm.base.areas import Mailbox
+from fbvm.base.files import open_file
 from fbvm.base.memory import Memory
 from fbvm.code.image import Layout, RungPicture, SfcPicture, Site
 from fbvm.machine.plc import Phase
@@ -27,6 +28,7 @@ from fbvm.record.trace.format import (
     END,
     FRAME,
     HEADER,
+    LARGEST_BYTES,
     LINE,
     MAGIC,
     NETWORK,
@@ -107,6 +109,8 @@ class Trace:
             boxes = tuple(Mailbox(str(name), *map(int, sizes)) for name, *sizes in head["mailboxes"])
             layout = Layout(int(head["slots"]), tuple(head["e_banks"]), boxes)
             self.areas, self.size = layout.areas, layout.size
+            if not 0 <= layout.slots_size <= LARGEST_BYTES:
+                raise ValueError(f"{layout.slots_size} bytes of slots")
             self.cycle_ns = int(head["cycle_ns"])
             self.depth = Depth(head["depth"])
             self.selected: tuple[str, ...] = tuple(head["selected"])
@@ -122,14 +126,14 @@ class Trace:
                 for address, known in head["meanings"].items()}  # fmt: skip
             self._lines: dict[str, dict[int, str]] = {
                 file: {int(n): str(text) for n, text in rows.items()} for file, rows in head["lines"].items()}
-        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
+        except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise TraceError(f"the trace's header is damaged: {error}") from None
         self.names = Names(self.symbols, self.areas, self._extents)
 
     @classmethod
     def open(cls, path: Path | str) -> Trace:
         """Opens a trace file; close it, or use it in a `with` statement.  Raises OSError, TraceError."""
-        file = Path(path).open("rb")  # noqa: SIM115 - the trace closes it
+        file = open_file(path)
         try:
             return cls(file)
         except BaseException:
@@ -205,7 +209,7 @@ class Trace:
             player = _Player(self, cursor, memory, follower, part)
             try:
                 yield from player.play()
-            except (IndexError, KeyError) as error:
+            except (ArithmeticError, LookupError, TypeError, ValueError, RecursionError) as error:
                 raise TraceError(f"the block of scan {block.first} is damaged: {error}") from None
 
 
@@ -320,7 +324,7 @@ def _header(payload: bytes) -> dict[str, Any]:
         head = json.loads(payload)
         if head["format"] != FORMAT:
             raise TraceError(f"a trace of format {head['format']}; this version of fbvm reads format {FORMAT}")
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise error if isinstance(error, TraceError) else TraceError(f"the trace's header is damaged: {error}") from None
     made: dict[str, Any] = head
     return made

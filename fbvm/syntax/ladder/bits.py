@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from fbvm.base.digits import whole_number
 from fbvm.syntax.ladder.context import RungContext, StepRefused
 from fbvm.syntax.tree import Expr
 from fbvm.syntax.tree.ladder import Element
@@ -71,7 +72,7 @@ class BitLogic:
     def _branch_point(self) -> str:
         """The TR bit that is the operand of the step; "" if the operand is no TR bit."""
         text = self.context.line.step.operands[0].upper()
-        return text if text.startswith("TR") and text[2:].isdigit() else ""
+        return text if text.startswith("TR") and text[2:].isdecimal() else ""
 
     def _join_blocks(self, how: str) -> None:
         context = self.context
@@ -104,7 +105,7 @@ class BitLogic:
     def _branch(self, bit: str) -> None:
         """OUT TR0: keep the execution condition for LD TR0."""
         context = self.context
-        if int(bit[2:]) >= BRANCH_POINTS:
+        if whole_number(bit[2:]) >= BRANCH_POINTS:
             raise StepRefused(f"there is no {bit}", f"TR0 to TR{BRANCH_POINTS - 1} are there")
         if bit in context.branches:
             raise StepRefused(f"{bit} is written twice in this rung",

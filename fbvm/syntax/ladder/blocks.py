@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from fbvm.base.digits import whole_number
 from fbvm.syntax.ladder.context import RungContext
 from fbvm.syntax.ladder.drawing.diagram import WIRE
 from fbvm.syntax.ladder.instructions.instruction_set import Instruction
@@ -115,7 +116,7 @@ class LadderBlocks:
         """The number of a timer or counter, written as a number or as a symbol; None if `text` is neither."""
         text = self.context.operands.numbered.get(text.upper(), text)
         digits = text[1:] if text[:1].upper() == letter.upper() else text
-        return int(digits) if digits.isdigit() and int(digits) < TIMERS else None
+        return whole_number(digits) if digits.isdecimal() and whole_number(digits) < TIMERS else None
 
     def _numbered(self, letter: str) -> list[Expr]:
         """The completion flag and the present value of the timer or counter in the first operand."""
@@ -139,11 +140,12 @@ class LadderBlocks:
         context = self.context
         texts = [context.operands.numbered.get(text.upper(), text).upper() for text in context.line.step.operands]
         kinds, digits = {text[0] for text in texts}, [text[1:] for text in texts]
-        if len(kinds) > 1 or not kinds <= {"T", "C"} or not all(each.isdigit() and int(each) < TIMERS for each in digits):
+        numbers = [whole_number(each) if each.isdecimal() else TIMERS for each in digits]
+        if len(kinds) > 1 or not kinds <= {"T", "C"} or max(numbers) >= TIMERS:
             raise OperandError(f"{' and '.join(context.line.step.operands)} are no timers and no counters",
                                f"write T0000 T0009 or C0000 C0009, up to {TIMERS - 1}")
         highest = 0x9999 if context.line.step.mnemonic == "CNR" else 0xFFFF
-        values = [context.truth(kinds == {"C"}), *(context.number(int(each)) for each in digits), context.number(highest)]
+        values = [context.truth(kinds == {"C"}), *map(context.number, numbers), context.number(highest)]
         context.emit(context.when(context.variation(context.power()), context.call_of("CX_CNR", *values)))
 
     # --- addresses and failures ---
@@ -155,7 +157,7 @@ class LadderBlocks:
         context.operand(1)
         at = Call(context.start, context.end, NameRef(context.start, context.end, "__PLC_ADDRESS"),
                   (Argument(place.start, place.end, "", None, place),))
-        point = context.call_of("CX_Point", context.number(int(register[2:])), at)
+        point = context.call_of("CX_Point", context.number(whole_number(register[2:])), at)
         context.emit(context.when(context.variation(context.power()), point))
 
     def failure(self, function: str) -> None:
@@ -163,9 +165,9 @@ class LadderBlocks:
         context, (number, message) = self.context, self.context.line.step.operands
         digits = number.lstrip("#&")
         least = 0 if function == "CX_FAL" else 1
-        if not digits.isdigit() or not least <= int(digits) < FAILURES:
+        if not digits.isdecimal() or not least <= whole_number(digits) < FAILURES:
             raise OperandError(f"{number} is no number of a failure", f"numbers are {least} to {FAILURES - 1}")
-        code, done = context.number(int(digits)), []
+        code, done = context.number(whole_number(digits)), []
         if message[0] in "#&":
             done.append(context.call_of(function, code, context.operand(1)))
         else:

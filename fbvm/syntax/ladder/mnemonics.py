@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import NamedTuple
 
+from fbvm.base.digits import whole_number
 from fbvm.syntax.ladder.drawing.grid import DrawingError
 from fbvm.syntax.ladder.drawing.reading import Picture, Placed, is_drawn, read_drawing, remark_of
 from fbvm.syntax.ladder.instructions.instruction_set import NO_INSTRUCTIONS, Instruction, instruction_set, meant, spelling
@@ -284,7 +285,7 @@ class _LineReader:
             before = RungText(word.start)
             self.rungs.append(before)
         before.start, before.declared = word.start, True
-        before.number = int(number.text) if number else None
+        before.number = whole_number(number.text) if number else None
         before.comment = comment.text.strip() if comment else ""
 
     def step(self, number: Token | None, prefix: Token | None, mnemonic: Token, code: Token | None,
@@ -292,7 +293,7 @@ class _LineReader:
         written = prefix.text if prefix else ""
         self._refuse_statement(mnemonic, operands)
         row = instruction("", mnemonic.text, mnemonic.start, mnemonic.end)
-        if code and int(code.text[1:-1]) != int(row.code or 1000):
+        if code and whole_number(code.text[1:-1]) != int(row.code or 1000):
             raise Refusal(code.start, code.end,
                           f"{row.mnemonic} has the function code {row.code or 'none'}, not {code.text[1:-1]}",
                           "leave the code out, or write the mnemonic that belongs to it")
@@ -345,4 +346,4 @@ def closes(lines: list[Line]) -> bool:
 
 
 def _is_branch(operand: str) -> bool:
-    return operand.upper().startswith("TR") and operand[2:].isdigit()
+    return operand.upper().startswith("TR") and operand[2:].isdecimal()

@@ -20,6 +20,7 @@ from fbvm.base.areas import (
     AddressError,
     parse_address,
 )
+from fbvm.base.digits import whole_number
 from fbvm.syntax import tree
 from fbvm.syntax.tree import Argument, Binary, Call, Direct, Expr, Index, Literal, Member, Name, NameRef
 from fbvm.syntax.tree.ladder import Memory, Words
@@ -165,7 +166,7 @@ class Operands:
 
     def _register(self, register: re.Match[str], wanted: str, start: int, end: int) -> Expr:
         """IR0 as two words, DR0 as one."""
-        kind, number = register[1].upper(), int(register[2])
+        kind, number = register[1].upper(), whole_number(register[2])
         if number >= REGISTERS:
             raise OperandError(f"there is no {register[0]}", f"{kind}0 to {kind}{REGISTERS - 1} are there")
         if wanted not in ("dAax" if kind == "IR" else "wWAa"):
@@ -177,13 +178,13 @@ class Operands:
     def _pointed(self, text: str, wanted: str, start: int, end: int) -> Expr:
         """`,IR0` and its forms: the word, or the bit, at the address in an index register; the address of a bit counts bits."""
         found = _POINTED.fullmatch(text)
-        if not found or int(found[3]) >= REGISTERS:
+        if not found or whole_number(found[3]) >= REGISTERS:
             raise OperandError(f"{text} is no operand",
                                f"write ,IR0 +5,IR0 DR0,IR0 ,IR0+ or ,-IR0, with IR0 to IR{REGISTERS - 1}")
         if wanted in "tcmx":
             raise OperandError(f"{text} cannot be {self.role}",
                                "numbers of timers and counters are known before the program runs")
-        offset, down, register, up = found[1] or "", len(found[2]), int(found[3]), len(found[4])
+        offset, down, register, up = found[1] or "", len(found[2]), whole_number(found[3]), len(found[4])
         if down and up or offset and (down or up):
             raise OperandError(f"{text} has more than one offset", "a register is counted up, or down, or has an offset")
         if down or up:
@@ -197,9 +198,9 @@ class Operands:
             more = self._called("INT_TO_UDINT", start, end, self._called("WORD_TO_INT", start, end, data))
             place = Binary(start, end, "+", place, more, start)
         elif offset:
-            if not -2048 <= int(offset) <= 2047:
+            if not -2048 <= whole_number(offset) <= 2047:
                 raise OperandError(f"{text} leads too far", "offsets are -2048 to +2047")
-            place = Binary(start, end, "+", place, self._number(int(offset) & 0xFFFF_FFFF, start, end), start)
+            place = Binary(start, end, "+", place, self._number(whole_number(offset) & 0xFFFF_FFFF, start, end), start)
         return self._memory(place, wanted, start, end)
 
     def _memory(self, address: Expr, wanted: str, start: int, end: int) -> Expr:
@@ -227,7 +228,7 @@ class Operands:
         place: Expr = NameRef(start, end, first)
         for part in rest:
             if part.startswith("["):
-                place = Index(start, end, place, (Literal(start, end, "int", int(part[1:-1]), None, part[1:-1]),))
+                place = Index(start, end, place, (Literal(start, end, "int", whole_number(part[1:-1]), None, part[1:-1]),))
             else:
                 place = Member(start, end, place, Name(start, end, part))
         if wanted in "aA":
@@ -245,9 +246,9 @@ def _number(text: str, bits: int) -> int:
             raise OperandError(f"{text} is no constant", "behind # stand hexadecimal digits")
         value = int(digits, 16)
     else:
-        if not digits.isdigit():
+        if not digits.isdecimal():
             raise OperandError(f"{text} is no constant", "behind &, + and - stand decimal digits")
-        value = int(digits) * (-1 if text[0] == "-" else 1)
+        value = whole_number(digits) * (-1 if text[0] == "-" else 1)
     low, high = (-(1 << bits - 1), (1 << bits - 1) - 1) if text[0] in "+-" else (0, (1 << bits) - 1)
     if not low <= value <= high:
         raise OperandError(f"{text} does not fit in {bits} bits", "")
@@ -258,9 +259,9 @@ def _check_decimal(text: str, wanted: str, role: str) -> None:
     """Refuse a constant with digits above 9 where BCD is read: the instruction would never be executed."""
     bits = _BITS[_TYPES[wanted]]
     digits = f"{_number(text, bits):0{bits // 4}X}"
-    if not digits.isdigit():
+    if not digits.isdecimal():
         raise OperandError(f"{text} is {digits} hex, and {role} is read as BCD",
-                           f"write #{text[1:]}" if text[1:].isdigit() else "BCD has the digits 0 to 9")
+                           f"write #{text[1:]}" if text[1:].isdecimal() else "BCD has the digits 0 to 9")
 
 
 def _is_address(text: str) -> bool:
@@ -271,7 +272,7 @@ def _is_address(text: str) -> bool:
 def _address(text: str, wanted: str) -> Address:
     """The address that a text means for an operand of the kind `wanted`.  Raises OperandError."""
     if _OLD.fullmatch(text) and wanted in "bB":
-        text = f"{int(text[:-2])}.{text[-2:]}"
+        text = f"{whole_number(text[:-2])}.{text[-2:]}"
     if wanted in "bBv" and re.fullmatch(r"[TC]\d+", text, re.I):
         text = ("TF" if text[0] in "Tt" else "CNF") + text[1:]
     try:

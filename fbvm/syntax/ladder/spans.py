@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from fbvm.base.digits import whole_number
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.context import Interlock, RungContext, StepRefused
 from fbvm.syntax.ladder.mnemonics import RungText
@@ -273,7 +274,7 @@ class Spans:
 
     def _number(self, operand: str, what: str, numbers: int = NUMBERS) -> str:
         number = _number(operand)
-        if not number.isdigit() or int(number) >= numbers:
+        if not number.isdecimal() or whole_number(number) >= numbers:
             raise StepRefused(f"{operand} is no number of {'an' if what[0] in 'aeiou' else 'a'} {what}",
                               f"numbers are 0 to {numbers - 1}")
         return number
@@ -331,4 +332,4 @@ _OPEN = {"FOR": ("FOR without NEXT", "FOR and NEXT stand in pairs"),
 def _number(operand: str) -> str:
     """The number of a jump as text without sign and leading zeros."""
     digits = operand.lstrip("#&")
-    return str(int(digits)) if digits.isdigit() else operand
+    return str(whole_number(digits)) if digits.isdecimal() else operand

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 
+from fbvm.base.digits import whole_number
 from fbvm.syntax.ladder.mnemonics import Symbol
 from fbvm.syntax.tree import ArraySpec, Literal, Location, Name, NamedType, TypeSpec, VarDecl
 
@@ -23,7 +24,7 @@ def number(symbol: Symbol) -> str:
     if symbol.type not in NUMBERED:
         return ""
     digits = symbol.address.lstrip("TtCc")
-    return f"{symbol.type[0]}{int(digits)}" if digits.isdigit() else ""
+    return f"{symbol.type[0]}{whole_number(digits)}" if digits.isdecimal() else ""
 
 
 def declaration(symbol: Symbol) -> VarDecl:
@@ -38,5 +39,5 @@ def _spec(kind: str, start: int, end: int) -> TypeSpec:
     named = NamedType(start, end, _TYPES.get(found[1] if found else kind, found[1] if found else kind))
     if not found:
         return named
-    bounds = tuple(Literal(start, end, "int", value, None, str(value)) for value in (0, int(found[2]) - 1))
+    bounds = tuple(Literal(start, end, "int", value, None, str(value)) for value in (0, whole_number(found[2]) - 1))
     return ArraySpec(start, end, ((bounds[0], bounds[1]),), named)

@@ -56,7 +56,7 @@ def decimal_comma(automaton: Automaton, token: Token, following: list[Token]) ->
     if token.type != "COMMA" or len(following) < 2 or following[1].type != "NUMBER" or before.type != "NUMBER":
         return None
     number = following[1]
-    if before.end != token.start or number.start != token.end or not before.text.isdigit():
+    if before.end != token.start or number.start != token.end or not before.text.isdecimal():
         return None
     if "RANGE" in expected(automaton.states):
         return None

@@ -97,7 +97,7 @@ class Expressions(Builder):
     def part(self, of: Expr, token: Token) -> Part:
         text = token.text[1:].lstrip()
         size, digits = (text[1].upper(), text[2:]) if text[0] == "%" else ("X", text)
-        if not digits.isdigit() or len(digits) > 9:
+        if not digits.isdecimal() or len(digits) > 9:
             self.report("S0105", token.start, token.end, f"`{token.text}` is no part of a variable",
                         "write the number of the bit, .3 or .%X3, or of the byte or word, .%B1 or .%W1")
             digits = "0"

@@ -244,7 +244,7 @@ def duration(text: str) -> int:
         if not part or len(part[0]) > LONGEST:
             known = "units are d h m s ms us ns, as in `T#1d2h3m4s5ms`"
             raise Malformed(f"`{_short(rest)}` is no part of a duration",
-                            f"write its unit: `T#{_short(rest)}ms`" if rest.isdigit() else known)
+                            f"write its unit: `T#{_short(rest)}ms`" if rest.isdecimal() else known)
         unit = units.index(part[3].lower())
         if unit <= last:
             raise Malformed(f"unit `{part[3]}` stands too late or twice in the duration",

@@ -10,6 +10,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from fbvm.base.digits import whole_number
 from fbvm.interchange.plcopen.markup import Element
 from fbvm.interchange.plcopen.read.diagram import Diagram, Object, placed, read_diagram
 from fbvm.interchange.plcopen.read.document import Body, Pou, Reading
@@ -115,7 +116,7 @@ class Chart:
 
     def _free(self, stem: str) -> str:
         name, number = stem, 1
-        while name.upper() in self.scope.taken:
+        while self.scope.is_taken(name):
             number += 1
             name = f"{stem}_{number}"
         self.scope.taken.add(name.upper())
@@ -169,7 +170,7 @@ class Chart:
     def _transition(self, arrow: Arrow, diagram: Diagram) -> list[str]:
         element = arrow.element
         priority = element.get("priority")
-        marked = f" (PRIORITY := {priority})" if priority.isdigit() and int(priority) else ""
+        marked = f" (PRIORITY := {priority})" if priority.isdecimal() and whole_number(priority) else ""
         way = f"{marked} FROM {_names(arrow.sources)} TO {_names(arrow.targets)}"
         name, condition, body = self._condition(element, diagram)
         if body:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from math import inf, isfinite
 from typing import NamedTuple
 
+from fbvm.base.digits import whole_number
 from fbvm.interchange.plcopen.markup import Element
 from fbvm.interchange.plcopen.read.document import Reading
 from fbvm.interchange.plcopen.read.types import own_text
@@ -145,7 +146,7 @@ class _DiagramReader:
 
     def _register(self, made: Object) -> None:
         """Note an object by its localId, a connector also by its name."""
-        if not made.id.isdigit():
+        if not made.id.isdecimal():
             if made.element.name != "vendorElement":
                 made.broken = True
                 self.reading.report("X0105", made.element, f"<{made.element.name}> has no number as its localId")
@@ -242,8 +243,8 @@ def _number(text: str) -> float:
 def _object(reading: Reading, element: Element, place: int) -> Object:
     x, y = placed(element)
     order = element.get("executionOrderId")
-    made = Object(element.name, element.get("localId"), place, x, y, int(order) if order.isdigit() else 0, _text(element),
-                  element, element.get("instanceName").strip(), _true(element, "negated"), _word(element, "edge"),
+    made = Object(element.name, element.get("localId"), place, x, y, whole_number(order) if order.isdecimal() else 0,
+                  _text(element), element, element.get("instanceName").strip(), _true(element, "negated"), _word(element, "edge"),
                   _word(element, "storage"))
     if element.name == "block":
         if not made.text:

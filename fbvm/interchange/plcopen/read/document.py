@@ -5,7 +5,9 @@ Types, values and expressions are text of Structured Text by then; bodies are st
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from fbvm.base.diagnostics import Diagnostic, Source
 from fbvm.interchange.plcopen.markup import Element
@@ -149,3 +151,24 @@ class Document:
     pous: tuple[Pou, ...]
     globals: tuple[VarList, ...]
     configurations: tuple[Configuration, ...]
+
+    @cached_property
+    def pous_by_name(self) -> dict[str, Pou]:
+        """The POUs by their names in capitals."""
+        return {pou.name.upper(): pou for pou in self.pous}
+
+    @cached_property
+    def globals_by_name(self) -> dict[str, Variable]:
+        """All global variables by their names in capitals, the first of each name."""
+        found: dict[str, Variable] = {}
+        for lists in self._global_lists():
+            for variable in (variable for listed in lists for variable in listed.variables):
+                found.setdefault(variable.name.upper(), variable)
+        return found
+
+    def _global_lists(self) -> Iterator[tuple[VarList, ...]]:
+        yield self.globals
+        for configuration in self.configurations:
+            yield configuration.globals
+            for resource in configuration.resources:
+                yield resource.globals

@@ -172,7 +172,7 @@ class Parts:
         """The operand for a bit: a variable whose name a rung does not read as an address (as T1 or D5), or an address that no
         declaration has as its name."""
         text = item.text
-        if text.upper().startswith("TR") and text[2:].isdigit():
+        if text.upper().startswith("TR") and text[2:].isdecimal():
             raise Inexact
         try:
             meant = Operands().expression(text, "b", 0, 0)

@@ -6,7 +6,6 @@ Only as much as the import needs to keep a value in a variable; the program is c
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -14,7 +13,7 @@ from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source
 from fbvm.check.calls.functions import OPERATORS, SIGNATURES, TIME_OPERATORS, conversion, typed_name
 from fbvm.interchange.plcopen.read.diagram import Object, Wire
-from fbvm.interchange.plcopen.read.document import Document, Pou, Variable
+from fbvm.interchange.plcopen.read.document import Document, Pou
 from fbvm.syntax import tree
 from fbvm.syntax.ladder.operands import OperandError, Operands
 from fbvm.syntax.parser import parse
@@ -35,24 +34,30 @@ class Scope:
 
     def __init__(self, document: Document, pou: Pou) -> None:
         self.document, self.pou = document, pou
-        self.pous = {other.name.upper(): other for other in document.pous}
+        self.pous = document.pous_by_name
         self.own = {variable.name.upper(): (listed.kind, variable) for listed in pou.lists for variable in listed.variables}
-        self.taken = {*self.own, *self.pous, *(name.upper() for name, _ in (*pou.actions, *pou.transitions))}
-        self.taken |= {variable.name.upper() for listed in _globals(document) for variable in listed}
+        self.taken = {*self.own, *(name.upper() for name, _ in (*pou.actions, *pou.transitions))}
+        """The names of this POU alone, in capitals; those of the document are taken, too."""
+        self._numbers: dict[str, int] = {}
         self.made: dict[tuple[str, str], list[str]] = {}
         """Variables that the import adds: (section, type) -> names."""
 
     def new(self, stem: str, kind: str, keeps: bool) -> str:
         """Declare a variable of the type `kind`; returns its name, `stem` or `stem_2` and so on.  With `keeps`, its value lasts
         to the next pass."""
-        name, number = stem, 1
-        while name.upper() in self.taken:
-            number += 1
+        name = stem
+        while self.is_taken(name):
+            self._numbers[stem] = number = self._numbers.get(stem, 1) + 1
             name = f"{stem}_{number}"
         self.taken.add(name.upper())
         section = "VAR" if keeps or self.pou.kind == "FUNCTION" else "VAR_TEMP"
         self.made.setdefault((section, kind), []).append(name)
         return name
+
+    def is_taken(self, name: str) -> bool:
+        """Whether the POU or the document declares a name."""
+        word = name.upper()
+        return word in self.taken or word in self.pous or word in self.document.globals_by_name
 
     @property
     def is_function(self) -> bool:
@@ -83,7 +88,7 @@ class Scope:
     def declares(self, expression: str) -> bool:
         """Whether the name with which a text begins is declared."""
         match = _ROOT.match(expression)
-        return match is not None and match[0].upper() in self.taken
+        return match is not None and self.is_taken(match[0])
 
     def root(self, name: str) -> str:
         """The root of a variable: its folded name if only this POU can write it, else SHARED."""
@@ -93,7 +98,7 @@ class Scope:
         word = match[0].upper()
         kind, variable = self.own.get(word, ("", None))
         if variable is None:
-            return word if word in self.taken and word not in self.pous else SHARED
+            return word if self.is_taken(word) and word not in self.pous else SHARED
         alone = kind in ("VAR", "VAR_TEMP", "VAR_INPUT", "VAR_OUTPUT") and not variable.address
         return word if alone and "POINTER" not in variable.type and "REF" not in variable.type else SHARED
 
@@ -107,7 +112,7 @@ class Scope:
         first, *rest = re.split(r"[.]", expression)
         _, found = self.own.get(first.strip().upper(), ("", None))
         if found is None:
-            found = next((v for listed in _globals(self.document) for v in listed if v.name.upper() == first.upper()), None)
+            found = self.document.globals_by_name.get(first.upper())
         if found is not None and not rest:
             return found.type
         if found is not None and len(rest) == 1:
@@ -185,17 +190,6 @@ def _standard_type(name: str) -> str:
     if (typed := typed_name(name)) is not None:
         return name.removeprefix(f"{typed[0]}_") if typed[0] not in COMPARISONS else "BOOL"
     return ""
-
-
-def _globals(document: Document) -> Iterable[tuple[Variable, ...]]:
-    for listed in document.globals:
-        yield listed.variables
-    for configuration in document.configurations:
-        for listed in configuration.globals:
-            yield listed.variables
-        for resource in configuration.resources:
-            for listed in resource.globals:
-                yield listed.variables
 
 
 @cache

@@ -14,38 +14,52 @@ from fbvm.syntax.formatter.formatter import formatted
 GLOBALS = "globals"
 """Name of the file for lists of globals without a name."""
 TYPES = "types"
+LONGEST_NAME = 60
+"""Most characters of the name of a file; file systems take 255 bytes."""
+_DEVICE = re.compile(r"(?i)con|prn|aux|nul|(?:com|lpt)[0-9]")
+"""Names that are no files under Windows, whatever their ending."""
 
 
 def sources(reading: Reading, document: Document) -> dict[str, str]:
     """Texts by the names of their files."""
-    files: dict[str, list[str]] = {}
+    files = _Files()
     if document.types:
-        files[TYPES] = [line for data_type in document.types for line in _data_type(data_type)]
+        files.add(TYPES, [line for data_type in document.types for line in _data_type(data_type)])
     lists: dict[str, list[str]] = {}
     for listed in document.globals:
         lists.setdefault(listed.name or GLOBALS, []).extend(_section(listed))
     for name, lines in lists.items():
-        _add(files, name, lines)
+        files.add(name, lines)
     for pou in document.pous:
         reading.where = pou.name
-        _add(files, pou.name, _pou(reading, document, pou))
+        files.add(pou.name, _pou(reading, document, pou))
     reading.where = ""
     for configuration in document.configurations:
         lines = _configuration(configuration)
         if lines:
-            _add(files, configuration.name, lines)
-    return {f"{name}.st": _canonical(lines) for name, lines in files.items()}
+            files.add(configuration.name, lines)
+    return {f"{name}.st": _canonical(lines) for name, lines in files.lines.items()}
 
 
-def _add(files: dict[str, list[str]], name: str, lines: list[str]) -> None:
-    """Put lines into a file of their own; no two files differ by case only."""
-    taken = {known.casefold() for known in files}
-    name = re.sub(r"[^\w-]", "_", name)
-    free, number = name, 1
-    while free.casefold() in taken:
-        number += 1
-        free = f"{name}_{number}"
-    files[free] = lines
+class _Files:
+    """Lines by the names of their files, which all systems can have: no two differ by case only, none is long or a device."""
+
+    def __init__(self) -> None:
+        self.lines: dict[str, list[str]] = {}
+        self._taken: set[str] = set()
+        self._numbers: dict[str, int] = {}
+
+    def add(self, name: str, lines: list[str]) -> None:
+        """Puts lines into a file of their own, which is called `name` or like it."""
+        name = re.sub(r"[^\w-]", "_", name)[:LONGEST_NAME]
+        if _DEVICE.fullmatch(name):
+            name += "_"
+        free, folded = name, name.casefold()
+        while free.casefold() in self._taken:
+            self._numbers[folded] = number = self._numbers.get(folded, 1) + 1
+            free = f"{name}_{number}"
+        self._taken.add(free.casefold())
+        self.lines[free] = lines
 
 
 def _canonical(lines: Iterable[str]) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from fbvm.interchange.plcopen.markup import Element, element
 from fbvm.interchange.plcopen.write.layout import End, wired
-from fbvm.interchange.plcopen.write.types import Types
+from fbvm.interchange.plcopen.write.types import NotExportable, Types
 from fbvm.syntax import tree
 from fbvm.syntax.tree.sfc import Sfc, Step, Transition
 
@@ -129,6 +129,8 @@ class ChartWriter:
             return element("condition", element("inline", text, name=""))
         assert transition.name is not None
         body = transition.body
+        if not body:
+            raise NotExportable(transition, f"the transition {transition.name.text} has no condition that can be exported", "")
         start, end = body[0].start, transition.end
         text_end = self.types.source.text.upper().rfind("END_TRANSITION", start, end)
         self.named.append(element("transition", element("body", self.body(body, start, text_end if text_end > 0 else end)),

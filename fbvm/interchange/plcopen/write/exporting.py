@@ -65,8 +65,10 @@ def export_xml(sources: Sequence[Source | Path | str], name: str = "project", cr
 
 def _source(parts: _Parts, source: Source) -> None:
     text, diagnostics = parse(source)
-    refused = {"S0901", "S0902"}
-    parts.diagnostics += [d for d in errors(diagnostics) if d.code not in refused]
+    wrong = [d for d in errors(diagnostics) if d.code not in ("S0901", "S0902")]
+    parts.diagnostics += wrong
+    if wrong:
+        return  # there will be no document, and a damaged tree has no drawing
     types = Types(source)
     types.note(declared.section for declared in text.declarations if isinstance(declared, tree.GlobalVars))
     named = Path(source.name).stem

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.digits import whole_number
 from fbvm.interchange.plcopen.markup import Element, element
 from fbvm.interchange.plcopen.schema import ELEMENTARY, LOCATION, QUALIFIERS, SECTIONS
 from fbvm.interchange.plcopen.write.layout import own_data
@@ -53,7 +54,7 @@ class Types:
         """Note the variables of these sections that are declared AT timers and counters."""
         for variable in (variable for section in sections for variable in section.variables):
             if variable.location is not None and (found := _NUMBERED.fullmatch(variable.location.text.strip())):
-                self.numbered |= {name.text.upper(): f"{found[1].upper()}{int(found[2])}" for name in variable.names}
+                self.numbered |= {name.text.upper(): f"{found[1].upper()}{whole_number(found[2])}" for name in variable.names}
 
     # --- types ---
 

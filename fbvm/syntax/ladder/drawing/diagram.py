@@ -173,7 +173,7 @@ class _Reader:
         return point
 
     def _output(self, number: int, prefix: str, mnemonic: str, operands: tuple[str, ...]) -> None:
-        if mnemonic == "OUT" and operands[0].upper().startswith("TR") and operands[0][2:].isdigit():
+        if mnemonic == "OUT" and operands[0].upper().startswith("TR") and operands[0][2:].isdecimal():
             self.kept[operands[0].upper()] = self._point()
         elif mnemonic in COILS:
             self._point().outs.append(Coil(number, coil_mark(prefix, mnemonic), operands))

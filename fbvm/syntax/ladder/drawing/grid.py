@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 
+from fbvm.base.digits import whole_number
 from fbvm.syntax.ladder.drawing.box_lines import DOWN, LEFT, RIGHT, UP, WAY_WORDS
 from fbvm.syntax.ladder.instructions.instruction_set import instruction_set, spelling
 
@@ -117,7 +118,7 @@ class Grid:
     def _line(self, x: int, y: int) -> str:
         """The character of a cell; a blank for the sign of a number, which is no line."""
         character = self.at(x, y)
-        return " " if character in "+-" and self.at(x + 1, y).isdigit() else character
+        return " " if character in "+-" and self.at(x + 1, y).isdecimal() else character
 
     def ways(self, x: int, y: int) -> frozenset[int]:
         """The directions in which wires leave a cell; none for the cells of elements and texts."""
@@ -232,7 +233,7 @@ class Grid:
         if (x, y) in self.taken:
             return False
         if character in "+-":
-            return self.at(x + 1, y).isdigit()
+            return self.at(x + 1, y).isdecimal()
         arrow = any(link.start() <= x < link.end() for link in _LINK.finditer(self.lines[y]))
         return character not in " |[()►▶>" and not ways(character) and not arrow
 
@@ -249,7 +250,7 @@ class Grid:
         for y, line in enumerate(self.lines):
             for found in _LINK.finditer(line):
                 if not self._is_taken(found.start(), found.end(), y) and self._has_wire_beside(found, y):
-                    self.links.append((found.start(), y, len(found[0]), int(found[1])))
+                    self.links.append((found.start(), y, len(found[0]), whole_number(found[1])))
                     self._take(found.start(), found.end(), y)
             at = 0
             while found_next := self._next_element(line, at, y):

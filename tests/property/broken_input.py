@@ -1,0 +1,253 @@
+"""Damaged files of all kinds, given to all verbs that read such files: diagnostics and exit statuses come out, in time.
+
+`python tests/property/broken_input.py 100000` tries that many; a number behind it is the first seed."""
+
+from __future__ import annotations
+
+import faulthandler
+import json
+import os
+import shutil
+import struct
+import sys
+import tempfile
+import time
+import traceback
+import zlib
+from collections.abc import Callable
+from contextlib import chdir
+from functools import cache
+from pathlib import Path
+from random import Random
+
+if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).parents[2]))
+
+from click.testing import CliRunner
+
+from fbvm.cli.main import main
+
+ROOT = Path(__file__).parents[2]
+LIMIT_S = 2.0
+"""Processor time that a verb may take for a small file."""
+STATUSES = range(6)
+COUNTER = """PROGRAM Main VAR n : INT; d : INT := 3; s : STRING := 'x'; END_VAR n := n + 6 / d;
+%D5 := INT_TO_WORD(n); END_PROGRAM
+"""
+PROJECT = """[run]
+net = "loop"
+for = "20ms"
+
+[[server]]
+address = "192.168.250.1:502"
+
+[[fault]]
+kind = "slow"
+
+[plc.One]
+sources = ["counter.st"]
+cycle = "10ms"
+count = 2
+watch = ["Main.n"]
+
+[[plc.One.unit]]
+type = "ETN21"
+address = "192.168.250.21"
+
+[[plc.One.set]]
+name = "Main.d"
+value = 2
+at = "10ms"
+"""
+LIBRARY = """title = "Blocks"
+globals = ["lists.st"]
+spaces = ["Own"]
+writes = ["A"]
+
+[mailbox]
+area = "OWN"
+head = 16
+slots = 2
+slot = 8
+
+[pins]
+Twice = { IN = "x" }
+"""
+WORDS = (
+    "(*", "*)", "//", "'", '"', "$", "{", "}", "(", ")", "[", "]", ";", ":", ":=", "..", "=>", "#", "16#", "T#", "%", "%MW1",
+    "D5", "E0_1", "CIO 1.00", "AT", "VAR", "END_VAR", "IF", "END_IF", "FOR", "CASE", "END_CASE", "ARRAY[1..2] OF", "STRUCT",
+    "LADDER", "END_LADDER", "LD", "OUT", "AND", "TON", "INITIAL_STEP", "STEP", "TRANSITION", "ACTION", "END_ACTION", "PROGRAM",
+    "END_PROGRAM", "FUNCTION", "END_FUNCTION", "TYPE", "END_TYPE", "CONFIGURATION", "RESOURCE", "TASK", "REF_TO", "STRING[3]",
+    "|", "|--[ ]--", "--( )--|", "+--", "-1", "0", "1e999", "9" * 5000, "(" * 200, "[" * 200, "-" * 200, "\0", "\x1a", "\r", "\n",
+    "\t", "\u00e4", "\U0001f600", "\u2028", "\ufeff", "null", "true", "{}", "[]", '"x"', "1.5", "-0", "<!--", "&amp;", "</pou>",
+    "<variable/>", "[[", "]]", "=", "nan", "inf", ",", "{{script}}",
+)  # fmt: skip
+KINDS: dict[str, tuple[str, tuple[tuple[str, ...], ...]]] = {
+    "source": ("text.st", (
+        ("check",), ("check", "--json"), ("fmt", "--diff"), ("fmt",), ("list",), ("list", "--native"), ("ladder",), ("sfc",),
+        ("ladder", "--svg", "out.svg"), ("sfc", "--svg", "out.svg"), ("export", "-o", "out.xml"),
+        ("run", "--scans", "3", "--ladder", "0..2", "--sfc", "0..2", "--chart", "D5"), ("step",),
+        ("run", "--scans", "3", "--trace", "out.fbtrace", "--depth", "statements", "--html", "out.html",
+         "--journal", "out.journal"),
+    )),
+    "xml": ("text.xml", (("import", "-o", "out", "--force"), ("import", "-o", "out", "--force", "--json"), ("check",))),
+    "project": ("fbvm.toml", (("check",), ("check", "--json"), ("run",), ("run", "--json"), ("step",))),
+    "library": ("own/library.toml", (("check", "use.st", "--library", "own", "--"),)),
+    "journal": ("run.journal", (("replay",), ("replay", "--show", "Main.n", "--json"))),
+    "trace": ("run.fbtrace", (
+        ("chart",), ("table", "", "Main.n"), ("why", "Main.n"), ("convert", "", "out.html"), ("convert", "", "out.svg"),
+        ("convert", "", "out.csv"), ("convert", "", "out.vcd"), ("convert", "", "out.pcapng"),
+    )),
+    "csv": ("run.csv", (("convert", "", "back.fbtrace"),)),
+    "image": ("image.json", (("serve", "--bind", "nobody", "--image"),)),
+}  # fmt: skip
+"""By kind of file: its name, and the verbs that read it; "" stands for the name, which is the last argument without one."""
+
+
+@cache
+def seeds() -> dict[str, list[bytes]]:
+    """Good files of each kind."""
+    examples = [ROOT / "examples" / f"{name}.st" for name in ("demo", "ladder", "sfc", "client")]
+    sources = [*examples, *sorted((ROOT / "examples/classics").glob("*.st")), *sorted((ROOT / "fblib/iec").rglob("*.st")),
+               *sorted((ROOT / "tests/golden").rglob("*.st"))]
+    found = {"source": [path.read_bytes() for path in sources] + [COUNTER.encode()],
+             "xml": [path.read_bytes() for path in sorted((ROOT / "tests/plcopen/documents").glob("*.xml"))],
+             "project": [PROJECT.encode()], "library": [LIBRARY.encode()]}  # fmt: skip
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        Path("counter.st").write_text(COUNTER, encoding="utf-8")
+        for path in (*examples[1:3], Path("counter.st")):
+            verb("export", str(path), "-o", f"{path.stem}.xml")
+            found["xml"].append(Path(f"{path.stem}.xml").read_bytes())
+        verb("run", "counter.st", "--scans", "5", "--trace", "a.fbtrace", "--depth", "statements", "--journal", "a.journal",
+             "--set", "D7=3@20ms")  # fmt: skip
+        verb("run", str(examples[0]), "--map", "192.168.250.1:502=peer", "--scans", "60", "--trace", "b.fbtrace", "--journal",
+             "b.journal")  # fmt: skip
+        verb("convert", "a.fbtrace", "a.csv")
+        found["journal"] = [Path(name).read_bytes() for name in ("a.journal", "b.journal")]
+        found["trace"] = [Path(name).read_bytes() for name in ("a.fbtrace", "b.fbtrace")]
+        found["csv"] = [Path("a.csv").read_bytes()]
+    found["image"] = [json.dumps({"spaces": {"CIO": [1, 2, 3], "D": [65535, 0, 7]}}).encode()]
+    return found
+
+
+def verb(*arguments: str, stdin: str = "step\nstep\nback\nprint D5\n") -> tuple[int, str]:
+    """The exit status and the output of `fbvm` with these arguments.  Raises what the verb lets through."""
+    result = CliRunner().invoke(main, arguments, input=stdin, catch_exceptions=False)
+    return result.exit_code, result.output
+
+
+# --- damage -----------------------------------------------------------------------------------------------------------
+
+
+def _damaged(random: Random, data: bytes, other: bytes) -> bytes:
+    """The bytes with a few pieces left out, doubled, moved, put in from another file or from WORDS."""
+    for _ in range(random.choice((1, 1, 1, 2, 3, 6))):
+        start = random.randrange(len(data) + 1)
+        end = min(len(data), start + random.choice((0, 1, 1, 2, 5, 20, 100, 1000)))
+        piece = data[start:end]
+        there = random.randrange(len(other) + 1)
+        middle = random.choice((
+            b"", piece * 2, other[there : there + random.choice((1, 10, 100, 1000))], random.randbytes(random.choice((1, 2))),
+            random.choice(WORDS).encode(), random.choice(WORDS).encode(), b" " + random.choice(WORDS).encode() + b" ",
+        ))  # fmt: skip
+        data = data[:start] + middle + data[end:]
+        if random.random() < 0.02:
+            data = data[: random.randrange(len(data) + 1)]
+    return data
+
+
+def _unpacked(data: bytes) -> list[tuple[tuple[int, int, int], bytes]]:
+    """The chunks of a trace: kind, first scan and number of scans, and the payload."""
+    found, at = [], 8
+    while at < len(data):
+        kind, size, _, first, scans = struct.unpack_from("<BIIQI", data, at)
+        found.append(((kind, first, scans), zlib.decompress(data[at + 21 : at + 21 + size])))
+        at += 21 + size
+    return found
+
+
+def _packed(chunks: list[tuple[tuple[int, int, int], bytes]]) -> bytes:
+    text = b"FBVMTRC1"
+    for (kind, first, scans), payload in chunks:
+        packed = zlib.compress(payload, 1)
+        text += struct.pack("<BIIQI", kind, len(packed), zlib.crc32(packed), first, scans) + packed
+    return text
+
+
+def _damaged_trace(random: Random, data: bytes, other: bytes) -> bytes:
+    """A trace with damage inside of a chunk, which the checksum does not show, or anywhere."""
+    if random.random() < 0.3:
+        return _damaged(random, data, other)
+    chunks = _unpacked(data)
+    at = random.randrange(len(chunks))
+    chunks[at] = chunks[at][0], _damaged(random, chunks[at][1], random.choice(_unpacked(other))[1])
+    return _packed(chunks)
+
+
+def broken(random: Random) -> tuple[str, bytes]:
+    """A damaged file: its kind and its bytes."""
+    kind = random.choice(("source", "source", "source", *KINDS))
+    damage: Callable[[Random, bytes, bytes], bytes] = _damaged_trace if kind == "trace" else _damaged
+    return kind, damage(random, random.choice(seeds()[kind]), random.choice(seeds()[kind]))
+
+
+# --- the verbs --------------------------------------------------------------------------------------------------------
+
+
+def furnish() -> None:
+    """Puts into the current folder what files of the kinds name."""
+    Path("own").mkdir(exist_ok=True)
+    Path("counter.st").write_text(COUNTER, encoding="utf-8")
+    Path("use.st").write_text("PROGRAM Main VAR t : Twice; END_VAR t(IN := 1); END_PROGRAM\n", encoding="utf-8")
+    Path("own/Twice.st").write_text("FUNCTION_BLOCK Twice VAR_INPUT x : INT; END_VAR\nEND_FUNCTION_BLOCK\n", encoding="utf-8")
+    Path("own/lists.st").write_text("VAR_GLOBAL own_list : INT; END_VAR\n", encoding="utf-8")
+
+
+def complaint(kind: str, data: bytes) -> str | None:
+    """What a verb does wrong with a file in the current folder: a traceback, a wrong status or too much time; None if all
+    verbs behave."""
+    name, verbs = KINDS[kind]
+    for given in verbs:
+        Path(name).write_bytes(data)
+        arguments = [argument or name for argument in given] if "" in given else [*given, name]
+        if given[-1] == "--":
+            arguments = list(given[:-1])
+        began_s = time.process_time()
+        try:
+            status, output = verb(*arguments)
+        except Exception:
+            return f"fbvm {' '.join(arguments)}\n{traceback.format_exc(limit=-6)[-3000:]}"
+        took_s = time.process_time() - began_s
+        if status not in STATUSES or (status and not output.strip()):
+            return f"fbvm {' '.join(arguments)}: status {status}, output {output[-300:]!r}"
+        if took_s > LIMIT_S:
+            return f"fbvm {' '.join(arguments)}: {took_s:.1f} s"
+    return None
+
+
+def search(first: int, count: int, keep: Path) -> int:
+    """Tries files of many seeds, prints complaints and keeps the files; returns the number of complaints."""
+    said: dict[str, int] = {}
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        os.environ["FBVM_CACHE"] = folder
+        furnish()
+        for number in range(first, first + count):
+            faulthandler.dump_traceback_later(60, exit=True)
+            kind, data = broken(Random(number))
+            if wrong := complaint(kind, data):
+                last = wrong.strip().splitlines()[-2 if "Error" in wrong else -1]
+                said[last] = said.get(last, 0) + 1
+                if said[last] == 1:
+                    print(f"--- seed {number}, {kind}\n{wrong}", flush=True)
+                    keep.mkdir(exist_ok=True)
+                    (keep / f"{number}.{kind}").write_bytes(data)
+            shutil.rmtree("out", ignore_errors=True)
+    faulthandler.cancel_dump_traceback_later()
+    return sum(said.values())
+
+
+if __name__ == "__main__":
+    wanted = [int(text) for text in sys.argv[1:]] or [1000]
+    found = search(wanted[1] if len(wanted) > 1 else 0, wanted[0], Path(tempfile.gettempdir()) / "broken_input")
+    print(f"{wanted[0]} files, {found} complaints")
+    sys.exit(bool(found))

@@ -1,0 +1,176 @@
+"""A full disk, a reader that has gone, an encoding without boxes: a sentence, the exit status, and files that are good so far."""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+from rows import each_of
+
+from fbvm.base.areas import AREAS, SLOTS_OFFSET
+from fbvm.base.memory import Memory
+from fbvm.cli.main import main
+from fbvm.cli.shared import files
+from fbvm.cli.shared.files import OutputError, growing_file
+from fbvm.cli.shared.streams import ASCII, prepare_streams
+from fbvm.record.trace import memory_images
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+DEMO = str(EXAMPLES / "demo.st")
+PEER = ["--map", "192.168.250.1:502=peer"]
+FBVM = [sys.executable, "-m", "fbvm"]
+on_posix = pytest.mark.skipif(not os.path.exists("/dev/full"), reason="the system has no /dev/full")
+
+
+class SmallDisk(io.FileIO):
+    """A file on a disk that is full after some bytes."""
+
+    room_bytes = 0
+
+    def write(self, data: Any, /) -> int:
+        """Writes as much as there is room for."""
+        fitting = bytes(data)[: self.room_bytes - self.tell()]
+        if not fitting:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return super().write(fitting) or 0
+
+
+@pytest.fixture
+def disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
+    """Sets the bytes that there is room for in each file that grows."""
+    monkeypatch.chdir(tmp_path)
+
+    def small(room_bytes: int) -> None:
+        monkeypatch.setattr(SmallDisk, "room_bytes", room_bytes)
+        monkeypatch.setattr(files, "open", lambda path, mode, buffering: SmallDisk(path, mode), raising=False)
+
+    return small
+
+
+def fbvm(*arguments: str) -> Result:
+    return CliRunner().invoke(main, arguments, catch_exceptions=False)
+
+
+@pytest.mark.parametrize("option", ["--trace", "--journal", "--pcap"])
+def test_a_disk_that_is_full_during_a_run(disk: Callable[[int], None], option: str) -> None:
+    run = ["run", DEMO, *PEER, "--scans", "900", option, "out.file"]
+    assert fbvm(*run).exit_code == 0
+    whole = Path("out.file").read_bytes()
+    for room_bytes in (0, 5, len(whole) // 2, len(whole) - 1):
+        disk(room_bytes)
+        result = fbvm(*run)
+        assert result.exit_code == 4
+        assert result.stderr == "out.file cannot be written any further: no space left on device\n"
+        assert Path("out.file").stat().st_size <= room_bytes
+    if option == "--trace":
+        assert fbvm("chart", "out.file", "Main.Step", "--scans", "0..50").exit_code == 0
+    if option == "--journal":
+        disk(len(whole) // 2)
+        assert fbvm(*run).exit_code == 4
+        result = fbvm("replay", "out.file")
+        assert result.exit_code == 0
+        assert "cut off" in result.stderr
+
+
+def test_nothing_is_written_behind_a_gap(disk: Callable[[int], None]) -> None:
+    disk(4)
+    with pytest.raises(OutputError), growing_file("grown") as file:
+        file.write(b"123456")
+        file.flush()
+    assert Path("grown").read_bytes() == b"1234"
+
+
+@on_posix
+@each_of(("arguments", "status"), [
+    (("list", DEMO), 2), (("explain",), 2), (("--help",), 2), (("run", DEMO, "--scans", "2", "--show", "D0", "--json"), 2),
+    (("run", DEMO, "--scans", "2", "--html", "/dev/full"), 2), (("convert", "run.fbtrace", "/dev/full"), 2),
+])
+def test_an_output_that_is_full(tmp_path: Path, arguments: tuple[str, ...], status: int) -> None:
+    with open("/dev/full", "wb") as full:
+        done = subprocess.run([*FBVM, *arguments], stdout=full, stderr=subprocess.PIPE, text=True, cwd=tmp_path, timeout=60)
+    assert done.returncode == status
+    assert "Traceback" not in done.stderr
+    assert "written" in done.stderr or "does not exist" in done.stderr
+
+
+@on_posix
+def test_a_reader_that_has_gone(tmp_path: Path) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    done = subprocess.run([*FBVM, "explain"], stdout=write, stderr=subprocess.PIPE, text=True, cwd=tmp_path, timeout=60)
+    os.close(write)
+    assert (done.returncode, done.stderr) == (141, "")
+
+
+@on_posix
+def test_streams_that_are_closed(tmp_path: Path) -> None:
+    for closed in ("<&-", ">&-", "2>&-", "<&- >&- 2>&-"):
+        done = subprocess.run(f'"{sys.executable}" -m fbvm list "{DEMO}" {closed}', shell=True, capture_output=True, cwd=tmp_path,
+                              timeout=60)  # fmt: skip
+        assert done.returncode == 0
+        assert b"Traceback" not in done.stderr
+
+
+@each_of(("encoding", "verb"), [
+    ("cp1252", ("ladder", "ladder.st")), ("ascii", ("ladder", "ladder.st")), ("ascii", ("sfc", "sfc.st")),
+    ("cp437", ("sfc", "sfc.st")),
+])
+def test_drawings_in_an_encoding_without_boxes(encoding: str, verb: tuple[str, str]) -> None:
+    arguments = [verb[0], str(EXAMPLES / verb[1])]
+    expected = CliRunner().invoke(main, arguments).output
+    found = CliRunner(charset=encoding).invoke(main, arguments, catch_exceptions=False)
+    assert found.exit_code == 0
+    assert "?" not in found.output.replace("RUNG", "")
+    assert list(map(len, found.output.splitlines())) == list(map(len, expected.splitlines()))
+    if encoding == "ascii":
+        assert found.output == "".join(ASCII.get(character, character) for character in expected)
+
+
+def test_closed_streams_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("stdin", "stdout", "stderr"):
+        monkeypatch.setattr(sys, name, None)
+    prepare_streams()
+    print("nowhere")
+    assert sys.stdin.read() == ""
+    for stream in (sys.stdin, sys.stdout, sys.stderr):
+        stream.close()
+
+
+# --- memory images ----------------------------------------------------------------------------------------------------
+
+
+def test_serve_refuses_an_image_that_cannot_be_written(tmp_path: Path) -> None:
+    missing = str(tmp_path / "nope" / "image")
+    result = fbvm("serve", "--port", "0", "--image", missing)
+    assert result.exit_code == 2
+    assert f"{missing} cannot be written" in result.output
+
+
+def test_an_image_is_replaced_at_once_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    memory, path = Memory(SLOTS_OFFSET, AREAS), tmp_path / "image.json"
+    memory.words("D")[0] = 7
+    memory_images.save(memory, path, {"D": 10})
+    before = path.read_bytes()
+    memory.words("D")[0] = 8
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", full)
+        with pytest.raises(OSError, match="No space"):
+            memory_images.save(memory, path, {"D": 10})
+    assert [entry.name for entry in tmp_path.iterdir()] == ["image.json"]
+    assert path.read_bytes() == before
+    memory_images.check_writable(path)
+    assert path.read_bytes() == before
+
+

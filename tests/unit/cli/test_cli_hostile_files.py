@@ -1,0 +1,170 @@
+"""Devices, pipes, links and packed files in the place of a file: each is refused at once, in words."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import struct
+import sys
+import time
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from rows import each_of
+
+from fbvm.base import files
+from fbvm.cli.main import main
+from fbvm.interchange.plcopen.read.importing import import_xml
+from fbvm.record.trace import format as trace_format
+
+COUNTER = "PROGRAM Main VAR n : INT; END_VAR n := n + 1; END_PROGRAM\n"
+Fbvm = Callable[..., Result]
+needs_devices = pytest.mark.skipif(sys.platform == "win32", reason="the system has no such files")
+XML = "<project xmlns='http://www.plcopen.org/xml/tc6_0201'><types><pous>{}</pous></types></project>"
+POU = "<pou name='{}' pouType='functionBlock'><interface/><body><ST>;</ST></body></pou>"
+
+
+@pytest.fixture
+def fbvm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Fbvm:
+    """Runs the command in a folder with `counter.st`; an exception that it lets through fails the test."""
+    monkeypatch.chdir(tmp_path)
+    Path("counter.st").write_text(COUNTER, encoding="utf-8")
+    Path("own").mkdir()
+    return lambda *arguments: CliRunner().invoke(main, arguments, catch_exceptions=False)
+
+
+@needs_devices
+@each_of(("verb", "status"), [
+    (("check", "{}"), 3), (("fmt", "{}"), 3), (("list", "{}"), 3), (("export", "{}", "-o", "out.xml"), 3),
+    (("run", "{}", "--scans", "2"), 3), (("step", "{}"), 3), (("import", "{}", "-o", "out"), 3), (("replay", "{}"), 2),
+    (("chart", "{}"), 2), (("table", "{}", "D0"), 2), (("why", "D0", "{}"), 2),
+    (("serve", "--bind", "nobody", "--image", "{}"), 2),
+])
+@pytest.mark.parametrize("what", ["device", "link", "pipe"])
+def test_what_is_no_file_is_refused(fbvm: Fbvm, what: str, verb: tuple[str, ...], status: int) -> None:
+    named = {"device": "/dev/zero", "link": "zero.csv", "pipe": "pipe.csv"}[what]
+    if what == "link" and not os.path.lexists(named):
+        os.symlink("/dev/zero", named)
+    if what == "pipe" and not os.path.lexists(named):
+        os.mkfifo(named)
+    result = fbvm(*(word.format(named) for word in verb))
+    assert result.exit_code == status
+    assert "it is no file" in result.output or "is no file" in result.output
+    assert fbvm("convert", named, "back.fbtrace").exit_code == 2
+
+
+@needs_devices
+@pytest.mark.parametrize("what", ["device", "pipe"])
+def test_what_is_no_file_in_a_project_or_a_library(fbvm: Fbvm, what: str) -> None:
+    make: Callable[[str], None] = os.mkfifo if what == "pipe" else lambda path: os.symlink("/dev/zero", path)
+    for name in ("own/library.toml", "source.st"):
+        make(name)
+    result = fbvm("check", "counter.st", "--library", "own")
+    assert result.exit_code == 3
+    assert "it is no file" in result.output
+    Path("fbvm.toml").write_text('[plc.One]\nsources = ["source.st"]\n', encoding="utf-8")
+    for verb in ("check", "run"):
+        result = fbvm(verb, "fbvm.toml", *(["--scans", "2"] if verb == "run" else []))
+        assert result.exit_code == 3
+        assert "it is no file" in result.output
+    os.unlink("own/library.toml")
+    make("own/Other.st")
+    assert fbvm("check", "counter.st", "--library", "own").exit_code == 0
+    Path("counter.st").write_text("PROGRAM Main VAR o : Other; END_VAR o(); END_PROGRAM\n", encoding="utf-8")
+    assert "it is no file" in fbvm("check", "counter.st", "--library", "own").output
+
+
+def test_a_file_that_is_too_large(fbvm: Fbvm) -> None:
+    with Path("large.st").open("wb") as file:
+        file.truncate(files.SOURCE_BYTES + 1)
+    os.rename("large.st", "fbvm.toml")
+    assert "1 MiB" in fbvm("check", "fbvm.toml").output
+    assert "16 MiB" in fbvm("serve", "--bind", "nobody", "--image", "fbvm.toml").output
+    os.rename("fbvm.toml", "own/library.toml")
+    assert "1 MiB" in fbvm("check", "counter.st", "--library", "own").output
+
+
+# --- recordings -------------------------------------------------------------------------------------------------------
+
+
+def chunk(kind: int, packed: bytes, scans: int = 0) -> bytes:
+    return struct.pack("<BIIQI", kind, len(packed), zlib.crc32(packed), 0, scans) + packed
+
+
+def test_a_trace_that_is_much_larger_when_unpacked(fbvm: Fbvm) -> None:
+    assert fbvm("run", "counter.st", "--scans", "3", "--trace", "run.fbtrace").exit_code == 0
+    engine = zlib.compressobj(9)
+    packed = b"".join(engine.compress(bytes(1 << 24)) for _ in range((trace_format.LARGEST_BYTES >> 24) + 1)) + engine.flush()
+    assert len(packed) < 1 << 20
+    whole = Path("run.fbtrace").read_bytes()
+    for data in (whole + chunk(trace_format.BLOCK, packed, 1), trace_format.MAGIC + chunk(trace_format.HEADER, packed)):
+        Path("bomb.fbtrace").write_bytes(data)
+        result = fbvm("chart", "bomb.fbtrace", "D0")
+        assert result.exit_code == 2
+        assert "too large" in result.output
+
+
+@each_of("header", [b"[" * 100_000, b'{"format":' * 50_000, b'{"a":' + b"9" * 5000 + b"}"])
+def test_a_header_of_a_trace_that_is_nested_deeply(fbvm: Fbvm, header: bytes) -> None:
+    Path("deep.fbtrace").write_bytes(trace_format.MAGIC + chunk(trace_format.HEADER, zlib.compress(header)))
+    result = fbvm("chart", "deep.fbtrace")
+    assert result.exit_code == 2
+    assert "header is damaged" in result.output
+
+
+def test_a_memory_image_that_is_nested_deeply(fbvm: Fbvm) -> None:
+    Path("image.json").write_text("[" * 100_000, encoding="utf-8")
+    assert "is not JSON" in fbvm("serve", "--bind", "nobody", "--image", "image.json").output
+
+
+# --- import -----------------------------------------------------------------------------------------------------------
+
+
+def test_names_that_no_file_system_has(fbvm: Fbvm) -> None:
+    names = ["a" * 300, "A" * 300, "CON", "aux", "lpt1", "\u00e4" * 300]
+    Path("in.xml").write_text(XML.format("".join(map(POU.format, names))), encoding="utf-8")
+    assert fbvm("import", "in.xml", "-o", "out").exit_code == 0
+    written = sorted(path.name for path in Path("out").iterdir())
+    assert len(written) == len(names)
+    assert {"CON_.st", "aux_.st", "lpt1_.st"} < set(written)
+    assert fbvm("import", "in.xml", "-o", "out").exit_code == 2
+
+
+@pytest.mark.slow
+def test_the_time_of_an_import_grows_with_its_pous() -> None:
+    def took_s(count: int) -> float:
+        began_s = time.process_time()
+        assert len(import_xml(XML.format("".join(POU.format(f"P{at}") for at in range(count))).encode()).files) == count
+        return time.process_time() - began_s
+
+    took_s(10)
+    assert took_s(8000) < 8 * took_s(2000)
+
+
+@needs_devices
+def test_a_link_that_leads_nowhere_is_not_followed(fbvm: Fbvm) -> None:
+    Path("in.xml").write_text(XML.format(POU.format("Pump")), encoding="utf-8")
+    Path("out").mkdir()
+    os.symlink("../elsewhere.st", "out/Pump.st")
+    assert "is there already" in fbvm("import", "in.xml", "-o", "out").output
+    assert fbvm("import", "in.xml", "-o", "out", "--force").exit_code == 0
+    assert not Path("elsewhere.st").exists()
+    assert "Pump" in Path("out/Pump.st").read_text(encoding="utf-8")
+
+
+def test_an_export_of_a_file_with_an_impossible_time(fbvm: Fbvm) -> None:
+    os.utime("counter.st", (1e12, 1e12))
+    assert fbvm("export", "counter.st", "-o", "out.xml").exit_code == 0
+    assert re.search(r'creationDateTime="\d{4}-', Path("out.xml").read_text(encoding="utf-8"))
+
+
+def test_a_journal_with_an_endless_line(fbvm: Fbvm, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert fbvm("run", "counter.st", "--scans", "3", "--journal", "run.journal").exit_code == 0
+    assert json.loads(Path("run.journal").read_text(encoding="utf-8").splitlines()[-1]) == {"end": 3}
+    with Path("run.journal").open("a", encoding="utf-8") as file:
+        file.write('{"scan":' * 100_000)
+    assert fbvm("replay", "run.journal").exit_code == 0
