@@ -330,7 +330,7 @@ def _bounds(e: NativeEngine, operation: str, machine: str, source: str) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(native_compiler.llvm().llvm_version_info[:3] != (22, 1, 0), reason="of LLVM 22.1.0 alone it is known")
 def test_crc_bit_by_bit_shows_the_fault_that_is_switched_off() -> None:
-    program = ("from fbvm.engine.native import compiler; compiler.FAULTS.clear(); from fbvm.base import cache\n"
+    program = ("from fbvm.engine.native.llvm import compiler; compiler.FAULTS.clear(); from fbvm.base import cache\n"
                "cache.switch(False); import test_native; test_native.test_crc_bit_by_bit(2)")
     house = Path(__file__).parents[3]
     folders = (Path(__file__).parent, house / "tests", house / "tests" / "unit" / "rigs", house)

@@ -6,6 +6,8 @@ from functools import cache
 
 import pytest
 
+from fbvm import Etn21, LoopNetwork, Plc, compile_text
+from fbvm.base.areas import NEVER
 from fbvm.base.data import data_folder
 from fbvm.processor.contract import Contract, ContractError
 from fbvm.processor.processor import contract, processor
@@ -104,3 +106,14 @@ def test_names_for_charts_are_those_of_the_program() -> None:
         assert used[name] == getattr(codes, name)
     for name in ("EACCES", "EPIPE", "EMSGSIZE", "EADDRINUSE", "EADDRNOTAVAIL", "ETIMEDOUT"):
         assert used[name] == codes.ERRNO[name]
+
+
+@pytest.mark.parametrize("switched_on", [False, True])
+def test_an_idle_unit_never_wakes_whether_its_processor_runs_or_not(switched_on: bool) -> None:
+    plc = Plc(compile_text("PROGRAM Main VAR x : BOOL; END_VAR x := NOT x; END_PROGRAM").image)
+    unit = Etn21(0, "192.168.250.21")
+    if switched_on:
+        unit.faults.clear()
+    plc.attach(unit, LoopNetwork())
+    plc.run(scans=3)
+    assert (unit.wake_ns, plc.due_ns) == (NEVER, NEVER)
