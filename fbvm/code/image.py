@@ -42,8 +42,6 @@ class Body:
     kind: str
     code: Block
     instance_size: int
-    statements: int
-    """The number of statements of the body outside loops: what an execution charges to the step budget at its start."""
 
 
 @dataclass(frozen=True)

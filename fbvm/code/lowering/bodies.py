@@ -11,7 +11,7 @@ from fbvm.code.image import Body, RungPicture
 from fbvm.code.lowering import aggregates, calls, loops, operators, pointers, statements, variables
 from fbvm.code.lowering.context import BodyContext, Rules
 from fbvm.code.lowering.program import Program
-from fbvm.code.lowering.step_costs import step_cost
+from fbvm.code.lowering.step_costs import step_cost, with_costs
 from fbvm.code.operations import Node
 from fbvm.code.pictures.st_rungs import NoRung, st_rung
 from fbvm.syntax import tree
@@ -31,15 +31,14 @@ def lower_body(program: Program, checker: Checker, pou: Pou) -> Body:
     checker: has checked the POU without an error.
     pou: the POU, to which layout has given its place."""
     body = BodyContext(program, checker, pou, RULES)
-    count = step_cost(pou.tree.body)
-    body.emit(("charge", count + 1, body.entry_site))
+    body.emit(("charge", step_cost(pou.tree.body) + 1, body.entry_site))
     _enter(body)
     if program.drawn and not pou.source.library and not body.is_hidden:
         _draw(body, pou.tree.body)
     body.lower(pou.tree.body)
     body.emit(*pointers.end_leases(body))
     size = pou.type.size if pou.type is not None else 0
-    return Body(pou.name, pou.kind, tuple(body.out), size, count)
+    return Body(pou.name, pou.kind, with_costs(tuple(body.out)), size)
 
 
 def lower_reference(program: Program, checker: Checker, pou: Pou, expr: tree.Expr) -> Node:

@@ -52,7 +52,6 @@ class ObjectCode:
     kind: str
     code: Any
     instance_size: int
-    statements: int
     sites: tuple[tuple[int, Site], ...]
     """By number of a `_SiteSymbol`: the first character of the place in the source, and the site."""
     bodies: tuple[Key, ...]
@@ -67,7 +66,7 @@ class ObjectCode:
         bodies = [pous[key].number for key in self.bodies]
         bases = {name: _OFFSETS[kind](program, checker, key, of) for name, (kind, key, of) in self.bases.items()}
         code = _linked(self.code, sites, bodies, bases) if type(self.code) is list else self.code
-        return Body(self.name, self.kind, code, self.instance_size, self.statements)
+        return Body(self.name, self.kind, code, self.instance_size)
 
 
 def _linked(item: list[Any], sites: list[int], bodies: list[int], bases: dict[str, int]) -> tuple[Any, ...]:
@@ -203,7 +202,7 @@ def object_code(checker: Checker, pou: Pou) -> ObjectCode | None:
         body = lower_body(program, checker, pou)
     except _NotRelocatable:
         return None
-    return ObjectCode(body.name, body.kind, _with_lists(body.code), body.instance_size, body.statements,
+    return ObjectCode(body.name, body.kind, _with_lists(body.code), body.instance_size,
                       tuple(program.known_sites), tuple(program.bodies), program.bases)
 
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import ast
 import ctypes
+import random
 from typing import Any
 
 import pytest
+from depth import times
 from rows import each_of
 
 from fbvm.engine.native import engine as native
@@ -94,3 +96,48 @@ def test_a_part_calls_only_parts_before_it() -> None:
     assert parts_of([]) == [] and parts_of(["put_real"]) == [0] and parts_of(["read_value", "put_real"]) == [0, 1]
     assert len({name for part in range(len(PARTS)) for name in routines_of(part)}) == sum(
         len(routines_of(part)) for part in range(len(PARTS)))
+
+
+# --- search -----------------------------------------------------------------------------------------------------------
+
+
+def found(routine: Any, text: bytes, wanted: bytes, width: int) -> int:
+    one, two = ctypes.create_string_buffer(text), ctypes.create_string_buffer(wanted)
+    at = routine(ctypes.addressof(one), len(text) // width, ctypes.addressof(two), len(wanted) // width, width)
+    return int(at)
+
+
+def expected(text: bytes, wanted: bytes, width: int) -> int:
+    form = {1: "latin-1", 2: "utf-16-le"}[width]
+    return text.decode(form).find(wanted.decode(form)) + 1 if wanted else 0
+
+
+@pytest.mark.parametrize("width", [1, 2])
+def test_a_search_finds_what_python_finds(width: int) -> None:
+    numbers = random.Random(width)
+    letters = [b"a".ljust(width, b"\0"), b"b".ljust(width, b"\1"), b"c".ljust(width, b"\0")]
+    for _ in range(times(1500)):
+        kinds = letters[:numbers.randint(1, 3)]
+        text = b"".join(numbers.choices(kinds, k=numbers.randint(0, 24)))
+        wanted = b"".join(numbers.choices(kinds, k=numbers.randint(0, 7))) * numbers.randint(1, 3)
+        assert found(routines.text_find, text, wanted, width) == expected(text, wanted, width), (text, wanted)
+
+
+@each_of(("text", "wanted"), [
+    (b"a" * 400, b"a" * 100 + b"b"), (b"a" * 400, b"b" + b"a" * 100), (b"ab" * 200, b"ab" * 60 + b"b"),
+    (b"a" * 400, b"a" * 60 + b"b" + b"a" * 60), (b"aab" * 150, b"aab" * 30 + b"aaa"),
+    (b"a" * 400, b"c"), (b"a" * 399 + b"b", b"ab"),
+])  # fmt: skip
+def test_the_time_of_a_search_grows_with_the_texts_and_not_with_their_product(
+        text: bytes, wanted: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
+    reads = 0
+    peek = routines.peek
+
+    def counted(at: int) -> int:
+        nonlocal reads
+        reads += 1
+        return peek(at)
+
+    monkeypatch.setattr(routines, "peek", counted)
+    found(routines.text_find, text, wanted, 1)
+    assert reads < 6 * (len(text) + len(wanted))

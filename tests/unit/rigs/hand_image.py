@@ -44,7 +44,7 @@ def store(machine: str, offset: int, value: Node) -> Node:
 
 def image(*codes: Block, size: int = 64) -> Image:
     """One body for each code, each the body of one program instance in one task; instances lie behind the slots."""
-    bodies = tuple(Body(f"Body{n}", "PROGRAM", code, size, len(code)) for n, code in enumerate(codes))
+    bodies = tuple(Body(f"Body{n}", "PROGRAM", code, size) for n, code in enumerate(codes))
     runs = tuple(ProgramRun(body.name, n, SLOTS_OFFSET + SLOTS_BYTES + n * size) for n, body in enumerate(bodies))
     tasks = tuple(TaskRow(f"Task{n}", n, 0, "", (run,)) for n, run in enumerate(runs))
     sites = tuple(Site("Main.st", "Main", line, 5) for line in range(40))

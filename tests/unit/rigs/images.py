@@ -24,7 +24,7 @@ def counter_image(*tasks: TaskRow, extra: tuple[Node, ...] = ()) -> Image:
     """One program `Main` of type Counter; D200 counts every execution.  `extra` statements end the body."""
     return Image(
         Layout(4096),
-        (Body("Counter", "PROGRAM", (*_counting(), *extra), COUNTER.size, 4),),
+        (Body("Counter", "PROGRAM", (*_counting(), *extra), COUNTER.size),),
         tasks or (task("Main"),),
         {"MAIN": Field("Main", COUNTER, SLOTS_OFFSET), "GO": Field("Go", t.BOOL, SLOTS_OFFSET + 100)},
         ((SLOTS_OFFSET + 14, b"\1\0"), (SLOTS_OFFSET + 24, b"\5\0")),

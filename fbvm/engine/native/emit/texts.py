@@ -290,8 +290,8 @@ def _length(w: Writer, machine: str, a: Node) -> str:
 
 def _find(w: Writer, machine: str, a: Node, b: Node) -> str:
     text, wanted = w.text(a), w.text(b)
-    routine = "text_find" if text.unit == 1 else "wide_find"
-    return cut(w, w.call(routine, w.integer(text.at), text.length, w.integer(wanted.at), wanted.length), machine)
+    found = w.call("text_find", w.integer(text.at), text.length, w.integer(wanted.at), wanted.length, str(text.unit))
+    return cut(w, found, machine)
 
 
 def _first(w: Writer, machine: str, a: Node) -> str:

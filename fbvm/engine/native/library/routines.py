@@ -37,18 +37,6 @@ def text_order(a: int, m: int, b: int, n: int) -> int:
     return m - n
 
 
-def text_find(a: int, m: int, b: int, n: int) -> int:
-    """Position of the first b in a; 0 if there is none or b is empty."""
-    if n == 0:
-        return 0
-    i = 0
-    while i + n <= m:
-        if text_order(a + i, n, b, n) == 0:
-            return i + 1
-        i += 1
-    return 0
-
-
 def reverse_items(at: int, count: int, stride: int, size: int) -> int:
     """The bytes of each of `count` items backwards."""
     while count > 0:
@@ -91,18 +79,6 @@ def wide_order(a: int, m: int, b: int, n: int) -> int:
     return m - n
 
 
-def wide_find(a: int, m: int, b: int, n: int) -> int:
-    """Position of the first b in a; 0 if there is none or b is empty."""
-    if n == 0:
-        return 0
-    i = 0
-    while i + n <= m:
-        if wide_order(a + 2 * i, n, b, n) == 0:
-            return i + 1
-        i += 1
-    return 0
-
-
 def widen(out: int, at: int, n: int) -> int:
     """n characters of one byte as characters of two."""
     i = 0
@@ -123,6 +99,97 @@ def narrow(out: int, at: int, n: int) -> int:
             poke(out + i, ord("?"))
         i += 1
     return n
+
+
+# --- search ---------------------------------------------------------------------------------------------------------
+
+
+def code_at(at: int, i: int, width: int) -> int:
+    """The code of character i of a text whose characters have `width` bytes, 1 or 2."""
+    if width == 1:
+        return peek(at + i)
+    return wide(at, i)
+
+
+def text_find(a: int, m: int, b: int, n: int, width: int) -> int:
+    """Position of the first b in a; 0 if there is none or b is empty.
+
+    The two-way algorithm of Crochemore and Perrin ("Two-way string-matching", J. ACM 38, 1991): for texts of m and n characters
+    it takes a time proportional to m + n, whatever they are, and no memory.  b is cut at a critical place.  What lies behind
+    the cut is compared first, forwards, then what lies in front of it, backwards."""
+    if n == 0 or n > m:
+        return 0
+    cut = critical_cut(b, n, width)
+    period = cut >> 32
+    cut &= 0xFFFFFFFF
+    repeats = 1
+    i = 0
+    while i < cut and repeats != 0:
+        if code_at(b, i, width) != code_at(b, period + i, width):
+            repeats = 0
+        i += 1
+    if repeats == 0:
+        period = cut + 1
+        if n - cut > cut:
+            period = n - cut + 1
+    at = 0
+    known = 0
+    while at + n <= m:
+        i = cut
+        if known > i:
+            i = known
+        while i < n and code_at(b, i, width) == code_at(a, at + i, width):
+            i += 1
+        if i < n:
+            at += i - cut + 1
+            known = 0
+            continue
+        i = cut
+        while i > known and code_at(b, i - 1, width) == code_at(a, at + i - 1, width):
+            i -= 1
+        if i <= known:
+            return at + 1
+        at += period
+        known = 0
+        if repeats != 0:
+            known = n - period
+    return 0
+
+
+def critical_cut(b: int, n: int, width: int) -> int:
+    """Where a text is cut for a search, and from bit 32 on the period of what lies behind the cut."""
+    least = last_suffix(b, n, width, 0)
+    greatest = last_suffix(b, n, width, 1)
+    if (least & 0xFFFFFFFF) > (greatest & 0xFFFFFFFF):
+        return least
+    return greatest
+
+
+def last_suffix(b: int, n: int, width: int, backwards: int) -> int:
+    """Where the suffix of a text begins that is the last in the order of characters, or in the opposite order; from bit 32 on its
+    period."""
+    begin = 0
+    other = 1
+    same = 0
+    period = 1
+    while other + same < n:
+        one = code_at(b, begin + same, width)
+        two = code_at(b, other + same, width)
+        if one == two:
+            same += 1
+            if same == period:
+                other += period
+                same = 0
+        elif (two < one and backwards == 0) or (two > one and backwards != 0):
+            other += same + 1
+            same = 0
+            period = other - begin
+        else:
+            begin = other
+            other += 1
+            same = 0
+            period = 1
+    return begin + (period << 32)
 
 
 # --- decimal digits in nibbles --------------------------------------------------------------------------------------
