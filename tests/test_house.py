@@ -86,7 +86,7 @@ ONLY_IN = {
     "socket": {"net/tcp.py", "net/udp.py"},
     "selectors": {"net"},
     "time": {"run"},
-    "threading": {"engine/native/code.py", "engine/native/llvm/worker.py", "run/watchdog.py", "dap"},
+    "threading": {"engine/native/code.py", "engine/native/llvm/worker.py", "dap"},
     "subprocess": {"engine/native/llvm/worker.py", "cli", "campaign", "testing"},
     "llvmlite": {"engine/native/llvm/compiler.py"},
     "concurrent": {"campaign"},

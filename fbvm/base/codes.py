@@ -146,6 +146,7 @@ CODES: dict[str, Code] = {
         "R0109": "FOR step is zero",
         "R0110": "reference is null or its object has ended",
         "R0111": "text cannot be converted",
+        "R0112": "watch cycle time exceeded",
         "R0120": "the program has stopped itself",
     }),
 }

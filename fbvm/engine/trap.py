@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fbvm.base.codes import CODES
@@ -55,6 +55,7 @@ _WORDS = {
     "R0106": "shift or rotate by {0}",
     "R0107": "selector {0} of MUX outside 0..{1}",
     "R0108": "string position or length {0} out of range",
+    "R0112": "the scan took longer than the watch cycle time of {0} ms",
     "R0111": "text {0!r} cannot be converted to {1}",
 }
 _CONVERSION = {1: "{0} has no such form", 2: "{0!r} does not fit {1}", 3: "{0} outside {1}..{2}"}
@@ -78,3 +79,9 @@ def trap(image: Image, code: str, site: int, values: tuple[Any, ...] = (), insta
 
 def _shown(value: Any) -> Any:
     return value.decode("latin-1") if isinstance(value, bytes) else value
+
+
+def too_long(ended: Trap, watch_ns: int) -> Trap:
+    """The trap of a scan that took longer than the watch cycle time, from the one of the step budget that has ended it."""
+    values = (watch_ns // 1_000_000,)
+    return replace(ended, code="R0112", values=values, message=f"R0112 {ended.site}: {_WORDS['R0112'].format(*values)}")

@@ -168,6 +168,7 @@ class Breakpoints:
             trap = stoppable.go_on()
         else:
             stoppable = self.stoppable(engine)
+            stoppable.allow(engine.allowance)
             trap = stoppable.run(task_index)
         if stoppable.seen:
             self.halted = self._halt(stoppable, stoppable.seen.site)

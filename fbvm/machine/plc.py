@@ -22,6 +22,7 @@ from fbvm.machine.scan.clock_words import CLOCK_WORDS, ClockWords
 from fbvm.machine.scan.refresh import Attached, IORefresh
 from fbvm.machine.scan.start import Kept, retained, start, write
 from fbvm.machine.scan.tasks import TaskSchedule, too_short_intervals
+from fbvm.machine.scan.watch_cycle import WatchCycle
 from fbvm.machine.scan_times import Lateness, ScanTimes
 from fbvm.machine.state import RUN, Mode, Phase, State, Stopped, state_after
 from fbvm.net.journal import Journal
@@ -75,6 +76,7 @@ class Plc:
         self.engine: Engine = engine_for(image, self.memory, engine, observed)
         self._system = self.memory.views["i64"]
         self._clock_words = ClockWords(self.memory)
+        self.watch_cycle = WatchCycle(self.memory)
         self.units: list[Attached] = []
         self.watchers: list[Callable[[Plc], None]] = []
         """Called at the end of each scan, after its I/O refresh: recorders, watches."""
@@ -119,17 +121,17 @@ class Plc:
             now_ns = self._time(now_ns)
             if path := self._fast_path():
                 self.now_ns = now_ns
-                self.trap = path.once(now_ns, self.budget)
+                self.trap = self.watch_cycle.judged(path.once(now_ns, self.budget))
                 self.scans += 1
                 self._tell()
                 return self.trap
             self._begin(now_ns)
         if self._mode is RUN:
-            self.trap = self._execute()
+            self.trap = self.watch_cycle.judged(self._execute())
             if self.halted:
                 return None
             if self._forces:
-                self._apply_forces()
+                places.write_all(self.memory, self._forces)
             if self.phases:
                 self._over(Phase.PROGRAM)
         self._end()
@@ -149,7 +151,7 @@ class Plc:
         self._oversee(now_ns)
         if self._mode is RUN:
             if self._forces:
-                self._apply_forces()
+                places.write_all(self.memory, self._forces)
             if self.phases:
                 self._over(Phase.INPUTS)
             self._due.extend(self._schedule.due(now_ns))
@@ -163,7 +165,7 @@ class Plc:
         self.scans += 1
         self._system[SCANS // 8] = self.scans
         if self._journal:
-            self._journal.after()
+            self._journal.after(self.watch_cycle.ended(self.trap, self.budget))
         self._tell()
 
     def _tell(self) -> None:
@@ -274,7 +276,7 @@ class Plc:
         if self.watchers or self._past.maxlen or self.trap or not (path := self._fast_path()):
             return times
         try:
-            self.trap = path.burst(times, most, now_ns, clock, self.budget)
+            self.trap = self.watch_cycle.judged(path.burst(times, most, now_ns, clock, self.budget))
         finally:  # Ctrl-C may come between two of them
             if times:
                 self.scans += len(times)
@@ -338,10 +340,6 @@ class Plc:
         """What is forced, by name."""
         return {place.name: value for place, value in self._forces.items()}
 
-    def _apply_forces(self) -> None:
-        for place, value in self._forces.items():
-            places.write(self.memory, place, value)
-
     # --- units --------------------------------------------------------------------------------------------------------
 
     def attach(self, unit: Unit, network: Network) -> None:
@@ -392,6 +390,7 @@ class Plc:
 
     def _restart(self, kept: Kept) -> None:
         start(self.memory, self.image, kept)
+        self.watch_cycle.clear()
         self._schedule.reset()
         self._leave()
         self._first = True

@@ -80,6 +80,8 @@ class Scan:
     settings: dict[int, dict[str, Any]] = field(default_factory=dict)
     events: dict[int, tuple[Event, ...]] = field(default_factory=dict)
     budget: int | None = None
+    watch: tuple[int, int] | None = None
+    """For a scan that took longer than the watch cycle time: the steps that it had charged, and that time in ns."""
 
 
 @dataclass(frozen=True)
@@ -183,8 +185,10 @@ class Journal:
         if events:
             self._line.setdefault("events", {})[str(unit)] = [_from_event(event) for event in events]
 
-    def after(self) -> None:
-        """Writes the line of a scan; called after the scan."""
+    def after(self, watch: tuple[int, int] | None = None) -> None:
+        """Writes the line of a scan; called after the scan.  `watch` is that of `Scan`."""
+        if watch is not None:
+            self._line["watch"] = watch
         self._scans += 1
         self._write({**self._line, "memory": self._settle()})
 
@@ -271,11 +275,16 @@ def _entry(line: dict[str, Any]) -> Entry:
             {int(unit): dict(given) for unit, given in line.get("settings", {}).items()},
             {int(unit): tuple(map(_to_event, told)) for unit, told in line.get("events", {}).items()},
             int(line["budget"]) if "budget" in line else None,
+            _watch(*line["watch"]) if "watch" in line else None,
         )  # fmt: skip
     for what in ("mode", "start", "unit"):
         if what in line:
             return Act(what, line[what], writes)
     raise ValueError("no entry of a journal")
+
+
+def _watch(steps: int, watch_ns: int) -> tuple[int, int]:
+    return int(steps), int(watch_ns)
 
 
 def _from_event(event: Event) -> list[Any]:

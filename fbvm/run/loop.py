@@ -17,6 +17,7 @@ from fbvm.machine.plc import Plc
 from fbvm.run.host_clock import function_at
 from fbvm.run.interrupts import Interrupts
 from fbvm.run.running import CYCLIC, EVENT, Running, TimedWrite
+from fbvm.run.watchdog import Watchdog
 from fbvm.wire.link import RealNetwork
 
 RunNumbers = dict[int, None]
@@ -61,7 +62,9 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
     start_ns = max((run.plc.elapsed_ns for run in runs), default=0)
     interrupts = Interrupts()
     clock: _Clock = _VirtualClock()
+    watchdogs: list[Watchdog] = []
     if networks:
+        watchdogs = [Watchdog(run.plc) for run in runs]
         clock = real = _RealClock(cast(list[RealNetwork], list(networks.values())), runs, start_ns, interrupts)
         for run in runs:
             run.begin(start_ns + run.phase_ns, real.behind)
@@ -75,7 +78,7 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
         with interrupts:
             while (due_ns := queue.next_ns()) is not None:
                 now_ns, woken = clock.reach(due_ns)
-                _scan_all(queue, now_ns, woken, clock.real)
+                _scan_all(queue, now_ns, woken, watchdogs)
                 interrupts.check()
                 if progress and time.monotonic_ns() - told_ns >= PROGRESS_NS:
                     told_ns = time.monotonic_ns()
@@ -85,10 +88,12 @@ def run_all(runs: Sequence[Running], progress: Callable[[], None] | None = None)
             run.reason = run.reason or "interrupted"
     finally:
         clock.stop()
+        for watchdog in watchdogs:
+            watchdog.stop()
 
 
-def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, real: bool) -> None:
-    """Scans all runs that are woken or due, with the same time for all."""
+def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, watchdogs: list[Watchdog]) -> None:
+    """Scans all runs that are woken or due, with the same time for all.  In real time each run has a watchdog."""
     first_ns = began_ns = time.monotonic_ns()
     for number in queue.take(now_ns, woken):
         run = queue.runs[number]
@@ -96,13 +101,17 @@ def _scan_all(queue: _Queue | _SingleRun, now_ns: int, woken: RunNumbers, real: 
             continue
         plc, due_ns = run.plc, run.due_ns
         scan = plc.scans
+        if watchdogs:
+            watchdogs[number].begin(began_ns)
         times = run.scan(now_ns)
+        if watchdogs:
+            watchdogs[number].end()
         ended_ns = time.monotonic_ns()
         if times:
             plc.scan_times.note_burst(scan, times, ended_ns - began_ns)
         elif scans := plc.scans - scan:
             plc.scan_times.note(scan, (ended_ns - began_ns) // scans, scans)
-            if real and run.pace == CYCLIC:
+            if watchdogs and run.pace == CYCLIC:
                 plc.lateness.note(scan, now_ns - due_ns + began_ns - first_ns)
         began_ns = ended_ns
         queue.put(number, run)
@@ -192,8 +201,6 @@ class _SingleRun:
 class _Clock(Protocol):
     """The time of the loop."""
 
-    real: bool
-
     def reach(self, due_ns: int) -> tuple[int, RunNumbers]:
         """Waits until `due_ns`, or until a network has events for a run.  Returns the time, and the runs that are woken."""
 
@@ -204,8 +211,6 @@ class _Clock(Protocol):
 class _VirtualClock:
     """Virtual time: it goes to the next scan without waiting."""
 
-    real = False
-
     def reach(self, due_ns: int) -> tuple[int, RunNumbers]:
         return due_ns, {}
 
@@ -215,8 +220,6 @@ class _VirtualClock:
 
 class _RealClock:
     """The host's time, and the networks that live in it; each network is served once before scans."""
-
-    real = True
 
     def __init__(self, networks: Sequence[RealNetwork], runs: Sequence[Running], start_ns: int,
                  interrupts: Interrupts) -> None:  # fmt: skip

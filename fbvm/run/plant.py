@@ -111,6 +111,7 @@ class Plant:
             except ValueError as error:
                 self._report((*where, "engine"), str(error))
                 return
+            plc.watch_cycle.time_ns = row.watch_cycle_ns
             if number == 0:
                 kind.watched = dict(self._watched(plc, row))
                 writes = list(self._writes(plc, row.sets, where))

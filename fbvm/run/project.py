@@ -30,6 +30,7 @@ from fbvm.base.dialects import DIALECTS
 from fbvm.base.files import SETTINGS_BYTES
 from fbvm.engine.choice.tiers import CHOICES
 from fbvm.machine.backplane import KINDS as UNIT_KINDS
+from fbvm.machine.scan.watch_cycle import LONGEST_NS, SHORTEST_NS, USUAL_NS
 from fbvm.net.faults import FOREVER, KINDS, NO_FAULT, Fault
 from fbvm.run.project_reader import (
     Key,
@@ -44,6 +45,7 @@ from fbvm.run.project_reader import (
     one_of,
     text,
     texts,
+    time_between,
     time_ns,
     whole,
 )
@@ -114,6 +116,8 @@ PLC: Keys = {
     "dialect": Key(one_of(tuple(DIALECTS)), "How to answer what compilers disagree about.", "standard"),
     "libraries": Key(texts, "Folders of blocks that are asked before the shipped ones.", ()),
     "cycle": Key(time_ns, "The cycle time.", 10_000_000),
+    "watch_cycle": Key(time_between(SHORTEST_NS, LONGEST_NS, "from 10ms to 40s"),
+                       "The longest time that a scan may take, where time is real.", USUAL_NS),
     "pace": Key(one_of(PACES), "When to scan: once a period, or as soon as something happens (real connections only).",
                 PACES[0]),
     "engine": Key(one_of(CHOICES), "What executes the program: Python first and machine code when it pays, or one alone.",
@@ -163,6 +167,7 @@ class PlcRow:
     dialect: str
     libraries: tuple[Path, ...]
     cycle_ns: int
+    watch_cycle_ns: int
     pace: str
     engine: str
     count: int | None
@@ -249,7 +254,8 @@ def _check_units(reading: Reading, plcs: Mapping[str, Any]) -> None:
 def _plc(name: str, row: Mapping[str, Any], folder: Path) -> PlcRow:
     return PlcRow(
         name, tuple(folder / source for source in row["sources"]), row["program"], row["resource"], row["dialect"],
-        tuple(folder / library for library in row["libraries"]), row["cycle"], row["pace"], row["engine"], row["count"],
+        tuple(folder / library for library in row["libraries"]), row["cycle"],
+        row["watch_cycle"], row["pace"], row["engine"], row["count"],
         row["until"], row["watch"],
         tuple(UnitRow(unit["type"], unit["address"], _options(unit)) for unit in row["unit"]),
         tuple(SetRow(one["name"], one["value"], one["at"]) for one in row["set"]),

@@ -180,6 +180,18 @@ def whole(first: int, last: int) -> Kind:
     return Kind(f"a whole number from {first} to {last}" if last < 1 << 62 else f"a whole number from {first}", value_of)
 
 
+def time_between(shortest_ns: int, longest_ns: int, spoken: str) -> Kind:
+    """A time in these bounds, which `spoken` names."""
+
+    def value_of(value: object) -> int:
+        found = _time_ns(value)
+        if not shortest_ns <= found <= longest_ns:
+            raise ValueError(f"{value!r} is no time {spoken}")
+        return found
+
+    return Kind(f"a time {spoken}", value_of)
+
+
 def one_of(names: Sequence[str]) -> Kind:
     """One of these texts."""
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 from fbvm.code.image import Image
+from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.machine.backplane import UNITS
 from fbvm.machine.goal import Goal
 from fbvm.machine.plc import Mode, Plc, Stopped
@@ -135,7 +136,11 @@ class Replay:
         self._write(scan.writes)
         for number, events in scan.events.items():
             self._links[number].next = list(events)
+        if scan.watch is not None:
+            steps, plc.watch_cycle.time_ns = scan.watch
+            plc.engine.allowance = Allowance(plc.budget - steps + 1)
         plc.scan(scan.now_ns)
+        plc.engine.allowance = WHOLE_BUDGET
         if self._fingerprint.settle() != scan.fingerprint and self.differs is None:
             self.differs = scan.number
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
@@ -40,6 +40,12 @@ def write(memory: Memory, place: Place, value: object) -> None:
             memory.u8[offset : offset + len(data)] = data
         else:
             memory.write(offset, "b", data != b"\0", bit)
+
+
+def write_all(memory: Memory, values: Mapping[Place, object]) -> None:
+    """Writes each value to its place, as `write` does."""
+    for place, value in values.items():
+        write(memory, place, value)
 
 
 def dereferenced(memory: Memory, place: Place) -> Place | None:

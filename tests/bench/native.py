@@ -133,12 +133,13 @@ def in_python(image: Image, step_ns: int) -> Callable[[int], object]:
 
 @contextmanager
 def without(what: str) -> Iterator[None]:
-    """New code is made without checks or without the budget, to see what they cost."""
+    """New code is made without checks, without the budget, or without the look whether the watch cycle time is over, to see what
+    they cost."""
     trap_if, charge = Writer.trap_if, native_statements.EMITTERS["charge"]
     cache.switch(False)
     if what == "checks":
         Writer.trap_if = lambda self, *operands: None  # type: ignore[method-assign]
-    native_statements.EMITTERS["charge"] = lambda w, count, site: None
+    native_statements.EMITTERS["charge"] = _charge_without_a_look if what == "look" else lambda w, count, site: None
     try:
         yield
     finally:
@@ -146,9 +147,17 @@ def without(what: str) -> Iterator[None]:
         cache.switch(True)
 
 
+def _charge_without_a_look(w: Writer, count: int, site: int) -> None:
+    left = w.new(f"sub i64 {w.new('load i64, ptr %budget')}, {count}")
+    w.emit(f"store i64 {left}, ptr %budget")
+    w.put_system(BUDGET, left)
+    w.trap_if(w.new(f"icmp slt i64 {left}, 0"), "R0104", site)
+
+
 def programs() -> None:
     print("time per scan: C by hand in ns, all else as a ratio to it")
-    print(f"{'':<8}{'C, ns':>10}{'O2':>8}{'O0':>8}{'python':>9}{'O2 without budget':>20}{'and checks':>12}{'O2 with stops':>15}")
+    print(f"{'':<8}{'C, ns':>10}{'O2':>8}{'O0':>8}{'python':>9}{'O2 without look':>18}{'budget':>8}{'and checks':>12}"
+          f"{'O2 with stops':>15}")
     with tempfile.TemporaryDirectory() as folder:
         for name, step_ns in PROGRAMS.items():
             path = BENCH / "programs" / f"{name}.st"
@@ -156,12 +165,12 @@ def programs() -> None:
             hand = shortest_ns(by_hand(name, Path(folder), step_ns))
             ratios = [shortest_ns(natively(image, 2, step_ns)) / hand, shortest_ns(natively(image, 0, step_ns), 50) / hand,
                       shortest_ns(in_python(image, step_ns), 3) / hand]
-            for what in ("budget", "checks"):
+            for what in ("look", "budget", "checks"):
                 with without(what):
                     ratios.append(shortest_ns(natively(compiled(path), 2, step_ns)) / hand)
             ratios.append(shortest_ns(with_stops(image, step_ns)) / hand)
-            print(f"{name:<8}{hand:>10,.1f}{ratios[0]:>8.2f}{ratios[1]:>8.1f}{ratios[2]:>9.0f}{ratios[3]:>20.2f}{ratios[4]:>12.2f}"
-                  f"{ratios[5]:>15.2f}", flush=True)
+            print(f"{name:<8}{hand:>10,.1f}{ratios[0]:>8.2f}{ratios[1]:>8.1f}{ratios[2]:>9.0f}{ratios[3]:>18.2f}{ratios[4]:>8.2f}"
+                  f"{ratios[5]:>12.2f}{ratios[6]:>15.2f}", flush=True)
 
 
 def took_ms(work: Callable[[], Any]) -> tuple[float, Any]:

@@ -33,8 +33,9 @@ if not native.available():  # where it is, machine code is compared with both of
         go_through((f"{p.name}:{p.line} {p.title}", partial(check, p, BUILDS)) for p in file if p.runs)
 
 
-ELSEWHERE = {"S0107", *(code for code in CODES if code.startswith(("P", "X")))}
-"""Codes that no program here provokes: that of a file which is no text, those of project files and of PLCopen documents."""
+ELSEWHERE = {"S0107", "R0112", *(code for code in CODES if code.startswith(("P", "X")))}
+"""Codes that no program here provokes: that of a file which is no text, that of the watch cycle
+time, which is real time, those of project files and of PLCopen documents."""
 
 
 def test_every_code_has_a_program() -> None:

@@ -65,10 +65,10 @@ def _pulses() -> list[tuple[str, str, str]]:
 
 
 def _words() -> list[tuple[str, str]]:
-    """Words and bits of A: of the scan by the module that writes them, of failures by the library that does."""
-    module = HOUSE / "fbvm/machine/scan/clock_words.py"
+    """Words and bits of A: of the scan by the modules that write them, of failures by the library that does."""
+    modules = [HOUSE / "fbvm/machine/scan" / name for name in ("clock_words.py", "watch_cycle.py")]
     rows = []
-    for said in sentences_of_constants(module):
+    for said in (sentence for module in modules for sentence in sentences_of_constants(module)):
         if found := re.match(r"(A\d+(?:\.\d+)?(?: and A\d+)?)(?:: |, | )(.*)", said):
             rows.append((code(found[1]), found[2][:1].upper() + found[2][1:]))
     comments = re.findall(r"AT (A[\d.]+)\s*: [^;]*;\s*(?://\s*(.*))?$", FLAGS.read_text(encoding="utf-8"), re.M)

@@ -17,7 +17,17 @@ from fbvm.cli.shared.e_banks import e_banks_in, with_e_banks
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.journals import start_journal
 from fbvm.cli.shared.networks import build_network, mailbox_names
-from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, charted_names, mapping, setting, show_option, time_ns
+from fbvm.cli.shared.options import (
+    CYCLE_NS,
+    Mapping,
+    Setting,
+    charted_names,
+    mapping,
+    setting,
+    show_option,
+    time_ns,
+    watch_cycle_option,
+)
 from fbvm.cli.shared.project_arguments import project_argument
 from fbvm.cli.shared.run_result import RunProgress, RunResult
 from fbvm.cli.shared.sources import compile_or_exit, source_options
@@ -61,6 +71,7 @@ from fbvm.watch.places import parse_for
               help="Where an endpoint that the program names really is.")
 @click.option("--pace", type=click.Choice(PACES), default=PACES[0], show_default=True,
               help="With tcp: keep the cycle, or scan again at once when something arrived.")
+@watch_cycle_option
 @click.option("--pcap", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Write what passed the network, for Wireshark.")
 @click.option("--journal", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
@@ -108,6 +119,7 @@ def command(
         said = {name: options[name] for name in ("net", "pace", "timing", "seed", "engine")}
         journal = start_journal(stack, path, files, program, libraries, banks, said) if path else None
         plc = _plc(image, cycle_ns, options["engine"], journal)
+        plc.watch_cycle.time_ns = options["watch_ns"]
         if options["pcap"]:
             network.tap = _capture(stack, options["pcap"], network, plc).tap
         for unit in usual_units(mailbox_names(image), options["timing"], options["seed"]):

@@ -19,7 +19,7 @@ from fbvm.base.files import reason
 from fbvm.cli.running.peer import LISTENING
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import OutputError, growing_file, writing
-from fbvm.cli.shared.options import time_ns
+from fbvm.cli.shared.options import time_ns, watch_cycle_option
 from fbvm.code.compiler import compile_files
 from fbvm.machine.backplane import ETN21_ADDRESS
 from fbvm.machine.plc import Plc
@@ -49,12 +49,13 @@ SERVED = {"CIO": 5801, "D": 32768}
 @click.option("--fn0f", is_flag=True, help="Serve 0F, write multiple coils, too.")
 @click.option("--full-dm", is_flag=True, help="Let 10, write multiple registers, begin anywhere in D.")
 @click.option("--idle", "idle_ns", type=time_ns, metavar="TIME", help="Leave a client that is silent so long (60s).")
+@watch_cycle_option
 @click.option("--image", type=click.Path(dir_okay=False, path_type=Path), metavar="FILE",
               help="Memory: loaded at the start if the file is there, saved at the end and on SIGUSR1.")
 @click.option("--log", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path), metavar="FILE",
               help="Write who asked what, a JSON object a line; - is the terminal.")
 def command(
-    bind: str, port: int, sockets: int, read_only: bool, fn0f: bool, full_dm: bool, idle_ns: int | None,
+    bind: str, port: int, sockets: int, read_only: bool, fn0f: bool, full_dm: bool, idle_ns: int | None, watch_ns: int,
     image: Path | None, log: Path | None,
 ) -> None:  # fmt: skip
     """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM.
@@ -67,6 +68,7 @@ def command(
     with ExitStack() as stack:
         stack.enter_context(signals.installed())
         plc = _plc(settings, image)
+        plc.watch_cycle.time_ns = watch_ns
         network = _network(bind, port)
         stack.callback(network.close)
         if log:

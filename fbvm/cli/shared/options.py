@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from click import BadParameter, Context, Parameter, option
 
 from fbvm.base.digits import whole_number
+from fbvm.machine.scan.watch_cycle import LONGEST_NS, SHORTEST_NS, USUAL_NS
 from fbvm.watch.values import parse_time_ns, split_list
 from fbvm.wire.link import Peer
 
@@ -26,6 +27,18 @@ def time_ns(value: str | int) -> int:
     if passed_ns <= 0:
         raise BadParameter(f"{value} is not a time that can pass")
     return passed_ns
+
+
+def watch_cycle_ns(value: str | int) -> int:
+    """The nanoseconds of a watch cycle time.  Raises BadParameter for one that a CPU unit does not take."""
+    found = time_ns(value)
+    if not SHORTEST_NS <= found <= LONGEST_NS:
+        raise BadParameter(f"{value} is no watch cycle time: it is from 10ms to 40s")
+    return found
+
+
+watch_cycle_option = option("--watch-cycle", "watch_ns", type=watch_cycle_ns, default=USUAL_NS, metavar="TIME", show_default="1s",
+                            help="With real connections: the longest time that a scan may take, from 10ms to 40s.")
 
 
 @dataclass(frozen=True)

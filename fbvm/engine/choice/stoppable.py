@@ -12,6 +12,7 @@ from typing import NamedTuple
 from fbvm.base.areas import BUDGET
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
+from fbvm.engine.allowance import Allowance
 from fbvm.engine.choice.tiers import STATEMENTS_TO_PAY
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
@@ -63,6 +64,12 @@ class StoppableEngine:
     def native(self) -> bool:
         """True if machine code runs."""
         return self._native is not None
+
+    def allow(self, allowance: Allowance) -> None:
+        """Sets how much of the step budget runs may use up."""
+        self._python.allowance = allowance
+        if self._native:
+            self._native.allowance = allowance
 
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of a task up to their end, a trap, or a stop, after which `seen` is set.

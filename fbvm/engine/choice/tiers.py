@@ -13,6 +13,7 @@ from typing import Protocol
 from fbvm.base.areas import BUDGET
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
+from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
 from fbvm.engine.native.engine import NativeEngine
@@ -38,6 +39,9 @@ class Engine(Protocol):
         """Executes the programs of one task once.  Returns the trap that ended them, if any.
 
         The caller has written time and step budget into the memory's system page."""
+
+    allowance: Allowance
+    """How much of the step budget runs may use up."""
 
 
 def engine_for(image: Image, memory: Memory, choice: str = "auto", observed: bool = False) -> Engine:
@@ -94,6 +98,7 @@ class TieredEngine:
         self._budget = memory.views["i64"]
         self._done = 0
         self._asked = False
+        self._allowance = WHOLE_BUDGET
         self._fast: NativeEngine | None = None
         self._engine: Engine = NativeEngine(image, memory, level=0) if len(image.sites) >= LARGE_PROGRAM else self.python
 
@@ -102,6 +107,7 @@ class TieredEngine:
         """The Python engine, made when first needed: a large program may never need it."""
         if self._python is None:
             self._python = PythonEngine(self._image, self._memory)
+            self._python.allowance = self._allowance
         return self._python
 
     @property
@@ -118,6 +124,18 @@ class TieredEngine:
     def native(self) -> bool:
         """True once fast machine code runs."""
         return self._fast is not None
+
+    @property
+    def allowance(self) -> Allowance:
+        """How much of the step budget runs may use up."""
+        return self._allowance
+
+    @allowance.setter
+    def allowance(self, allowance: Allowance) -> None:
+        self._allowance = allowance
+        for engine in (self._engine, self._fast, self._python):
+            if engine is not None:
+                engine.allowance = allowance
 
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of one task once, on the engine of the present tier."""
@@ -139,3 +157,4 @@ class TieredEngine:
         """Goes over to fast machine code if that is ready."""
         if self._code.ready and not self.substitutes:
             self._engine = self._fast = NativeEngine(self._image, self._memory, level=2)
+            self._fast.allowance = self._allowance

@@ -12,6 +12,7 @@ from weakref import finalize
 from fbvm.base.areas import BUDGET, NOW
 from fbvm.base.memory import Memory
 from fbvm.code.image import Image
+from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.native.code import Code, code_of
 from fbvm.engine.native.emit.context import Context
 from fbvm.engine.native.emit.writer import Unsupported
@@ -46,6 +47,7 @@ class NativeEngine:
         self._code.prepare(level)
         self._context = Context(self._code.kept_bytes, self._code.context_bytes, memory.size,
                                 0 if stops is None else stops.at)
+        self._allowance = WHOLE_BUDGET
         self._stops = stops  # which stays while machine code looks into it
         self._place = (ctypes.c_char * memory.size).from_buffer(memory.map)  # which stays while this does
         self._memory_at = ctypes.addressof(self._place)
@@ -74,6 +76,16 @@ class NativeEngine:
     def machine(self) -> NativeEngine:
         """The machine code that runs now: this engine."""
         return self
+
+    @property
+    def allowance(self) -> Allowance:
+        """How much of the step budget runs may use up."""
+        return self._allowance
+
+    @allowance.setter
+    def allowance(self, allowance: Allowance) -> None:
+        self._allowance = allowance
+        self._context.allow(allowance)
 
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of a task in their order.  Returns the trap that ended them, if any."""

@@ -18,6 +18,7 @@ from weakref import finalize
 
 from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Body, Image, ProgramRun
+from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.bases import fixed_bases
 from fbvm.engine.depths import with_recursion_room
 from fbvm.engine.python.runtime import NO_SITE, Observation, environment
@@ -100,6 +101,7 @@ class PythonEngine:
         self.image, self.memory, self.observed = image, memory, observed
         self.substitutes: dict[int, Callable[[int], None]] = {}
         self._numbers = {function_name(number, body): number for number, body in enumerate(image.bodies)}
+        self._allowance = WHOLE_BUDGET
         self._program = translate(image, observed)
         self._bodies = self._bind(self._program)
         self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in image.tasks]
@@ -108,6 +110,8 @@ class PythonEngine:
         """The bodies of a program over this memory."""
         names = environment(self.memory, self.image.objects) | program.constants
         exec(program.code, names)
+        self._names = names
+        self.allowance = self._allowance
         for number, function in self.substitutes.items():
             body = self.image.bodies[number]
             names[function_name(number, body)] = _reporting(function, body) if self.observed else function
@@ -127,6 +131,16 @@ class PythonEngine:
     def source(self) -> str:
         """The generated Python."""
         return self._program.source
+
+    @property
+    def allowance(self) -> Allowance:
+        """How much of the step budget runs may use up."""
+        return self._allowance
+
+    @allowance.setter
+    def allowance(self, allowance: Allowance) -> None:
+        self._allowance = allowance
+        self._names["least"], self._names["ask"] = allowance.least, partial(_ask, self._names, allowance)
 
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of a task in their order, in an observed build without stopping.
@@ -179,6 +193,15 @@ class PythonEngine:
             return trap(self.image, stop.code, stop.site, stop.values, self._instance_of(stop))
         return None
 
+
+
+def _ask(names: dict[str, Any], allowance: Allowance, left: int, site: int) -> None:
+    """Called by generated code with fewer steps left than `least`: ends the run, or allows more."""
+    if allowance.ask is not None:
+        names["least"] = least = allowance.ask(left)
+        if left >= least:
+            return
+    raise Stop("R0104", site)
 
 
 def _reporting(function: Callable[[int], None], body: Body) -> Callable[[int], Generator[Observation, None, None]]:

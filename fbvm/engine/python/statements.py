@@ -317,7 +317,7 @@ def _call(w: BodyWriter, pou: int, address: Address | None) -> None:
 
 def _charge(w: BodyWriter, count: int, site: int) -> None:
     w.line(f"i64[{BUDGET // 8}] = n = i64[{BUDGET // 8}] - {count}")
-    w.line(f"if n < 0: stop('R0104', {site})")
+    w.line(f"if n < least: ask(n, {site})")
 
 
 def _due(w: BodyWriter, a: Node) -> None:

@@ -14,6 +14,7 @@ from typing import NamedTuple, TypeAlias
 from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Image
 from fbvm.code.operations import detail_size
+from fbvm.engine.allowance import Allowance
 from fbvm.engine.choice.tiers import substitutes_of
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.python.runtime import NO_SITE, Observation
@@ -116,6 +117,15 @@ class ObservedEngine:
         self._shadow = bytearray(memory.size)
         self._frame, self._generated_depth = OUTSIDE, 0
         """The current frame, and the depth of calls inside a call that no statement of the source has made."""
+
+    @property
+    def allowance(self) -> Allowance:
+        """How much of the step budget runs may use up."""
+        return self._engine.allowance
+
+    @allowance.setter
+    def allowance(self, allowance: Allowance) -> None:
+        self._engine.allowance = allowance
 
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of one task once and reports their events; returns the trap that ended them, if any."""

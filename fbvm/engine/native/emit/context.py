@@ -12,12 +12,14 @@ from typing import Any
 
 from fbvm.base.arithmetic import NAN
 from fbvm.base.memory import STRUCTS
+from fbvm.engine.allowance import Allowance
 from fbvm.engine.native.library.reading import CLEANED
 
-FIELDS = {"size": 0, "values": 8, "result": 32, "f32": 40, "f64": 48, "stops": 56}
-"""Offsets of its 64-bit fields: size of the memory; up to three values of a trap; a second result of a routine, or the instance
-of a trap; the canonical NaN of each float type (here LLVM does not see it, which takes one NaN for as good as another); the
-address of the table of `stops`."""
+FIELDS = {"size": 0, "values": 8, "least": 32, "ask": 40, "result": 48, "f32": 56, "f64": 64, "stops": 72}
+"""Offsets of its 64-bit fields: size of the memory; up to three values of a trap; the fewest steps that may be left of the
+budget, and the address of the function that may allow fewer, or 0; a second result of a routine, or the instance of a trap; the
+canonical NaN of each float type (here LLVM does not see it, which takes one NaN for as good as another); the address of the
+table of `stops`."""
 DIGITS = FIELDS["result"] + CLEANED
 """Where routines of the library write the text of a number before they read the number."""
 SCRATCH = 512
@@ -29,6 +31,8 @@ the instance whose body was executed: (INSTANCE, offset), with None if it is in 
 INSTANCE = "instance"
 Point = tuple[str, int, tuple[Shown, ...]]
 """A point at which a run can end early: code of the trap, number of the site, values."""
+
+_ASK = ctypes.PYFUNCTYPE(ctypes.c_int64, ctypes.c_int64)
 
 
 class Context:
@@ -42,10 +46,17 @@ class Context:
         self._start = kept_bytes
         self._place = (ctypes.c_char * len(self._content)).from_buffer(self._content)
         self.at = ctypes.addressof(self._place) + kept_bytes
+        self._ask: object = None
         self._put("<q", "size", memory_bytes)
         self._put("<q", "stops", stops_at)
         self._put("<f", "f32", NAN)
         self._put("<d", "f64", NAN)
+
+    def allow(self, allowance: Allowance) -> None:
+        """Sets the allowance of the runs from now on."""
+        self._ask = _ASK(allowance.ask) if allowance.ask else None  # which stays while machine code may call it
+        self._put("<q", "least", allowance.least)
+        self._put("<q", "ask", ctypes.cast(self._ask, ctypes.c_void_p).value or 0 if self._ask else 0)
 
     def _put(self, form: str, field: str, value: float) -> None:
         struct.pack_into(form, self._content, self._start + FIELDS[field], value)

@@ -19,6 +19,7 @@ from fbvm.engine.native.emit.conversions import ONE_STEP
 from fbvm.engine.native.emit.expressions import VALUES
 from fbvm.engine.native.emit.object_bounds import objects
 from fbvm.engine.native.emit.statements import EMITTERS
+from fbvm.engine.native.emit.step_charges import ASK
 from fbvm.engine.native.emit.stop_checks import GUARD, at_end
 from fbvm.engine.native.emit.writer import RARE, TRAPPED, Module, Writer
 from fbvm.engine.native.library.library import declaration, definitions
@@ -103,7 +104,7 @@ def _translated(image: Image, stops: bool) -> Translation:
     bodies = [_body(module, number) for number in module.heights]
     tasks = [_task(module, number) for number in range(len(image.tasks))]
     routines = [declaration(name) for name in sorted(module.routines)]
-    text = "\n".join([*definitions(module.constants), objects(image.objects), *bodies, *tasks, *routines, *_declarations(),
+    text = "\n".join([*definitions(module.constants), objects(image.objects), *bodies, *tasks, *routines, *_declarations(), ASK,
                       ATTRIBUTES, METADATA, *[GUARD] * stops])
     return Translation(text, tuple(module.regions), tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
                        tuple(sorted(module.routines)))

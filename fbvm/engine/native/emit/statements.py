@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from fbvm.base.areas import BUDGET, DUE
+from fbvm.base.areas import DUE
 from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
 from fbvm.engine.case_tables import case_table
 from fbvm.engine.native.emit.expressions import flag_mask, place
+from fbvm.engine.native.emit.step_charges import charge
 from fbvm.engine.native.emit.stop_checks import observe
 from fbvm.engine.native.emit.texts import in_bytes, keep
 from fbvm.engine.native.emit.writer import TRAPPED, Writer, ir, signed, stored
@@ -208,13 +209,6 @@ def _call(w: Writer, pou: int, address: Address | None) -> None:
     w.begin(good)
 
 
-def _charge(w: Writer, count: int, site: int) -> None:
-    left = w.new(f"sub i64 {w.new('load i64, ptr %budget')}, {count}")
-    w.emit(f"store i64 {left}, ptr %budget")
-    w.put_system(BUDGET, left)
-    w.trap_if(w.new(f"icmp slt i64 {left}, 0"), "R0104", site)
-
-
 def _due(w: Writer, a: Node) -> None:
     value = w.value(a)
     sooner, after = w.label(), w.label()
@@ -238,7 +232,7 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "store": _store, "store_raw": _store_raw, "store_bit": _store_bit, "store_flag": _store_flag,
     "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
     "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
-    "charge": _charge, "due": _due, "stop": _stop,
+    "charge": charge, "due": _due, "stop": _stop,
     "observe": _observe,
 }
 """How each statement is written: called with the operands of its row."""
