@@ -1,5 +1,7 @@
-"""A soak of the blocks: python tests/bench/soak.py [memory|sockets|all].
+"""A soak of the blocks and of scans: python tests/bench/soak.py [scans|memory|sockets|all].
 
+`scans` is 10,000,000 scans in virtual time, in one piece and one by one, of a program with timers, counters and texts; at the end
+each timer has ended exactly as often as its time fits into the time that has passed.
 `memory` is one hour of the PLC's time in virtual time, over a network that cuts and joins as it likes; `sockets` is two
 minutes on real connections to a server in a process of its own.  All blocks are busy all the time.  Prints what was
 done and what the process holds as it goes; ends with an error if a command fails, a word is wrong, or anything grows.
@@ -17,7 +19,7 @@ sys.path[:0] = [str(HOUSE), str(HOUSE / "tests" / "fblib")]
 
 from soak_plant import BLOCKS, SERVER, UNIT_ADDRESS, Usage, check, contents, plant, usage  # noqa: E402
 
-from fbvm import Etn21, LoopNetwork, ModbusPeer, Plc, TcpNetwork  # noqa: E402
+from fbvm import Etn21, LoopNetwork, ModbusPeer, Plc, TcpNetwork, compile_text  # noqa: E402
 from fbvm.cli.running.demo import modbus_server  # noqa: E402
 from fbvm.net.faults import Fault  # noqa: E402
 from fbvm.run import run  # noqa: E402
@@ -54,6 +56,55 @@ def soak(plc: Plc, seconds: int, go: Callable[[int], str]) -> None:
     print(f"no error, nothing grew: {counts}")
 
 
+SCANS, CYCLE_NS = 10_000_000, 10_000_000
+SCANS_BYTES = 2 << 20
+"""How much a process may grow in these scans after the first parts, in which the helper delivers fast code."""
+WARM_PARTS = 3
+TIMERS = """
+PROGRAM Main
+VAR t : TON; ends, scans : LINT; half : TP; edges : CTU; edge : R_TRIG; s : STRING; level : LREAL; END_VAR
+t(IN := NOT t.Q, PT := T#70ms);
+IF t.Q THEN ends := ends + 1; END_IF;
+scans := scans + 1;
+half(IN := t.Q, PT := T#30ms);
+edge(CLK := half.Q);
+edges(CU := edge.Q, PV := 1000, R := edges.Q);
+level := level + (20.0 - level) * 0.001;
+s := CONCAT(LINT_TO_STRING(scans), ' scans');
+END_PROGRAM
+"""
+SCANS_OF_A_TIMER = 9
+"""A TON of 70 ms ends seven scans of 10 ms after its start; one scan resets it, and the next starts it again."""
+
+
+def one_by_one(plc: Plc, count: int) -> None:
+    for _ in range(count):
+        plc.scan()
+
+
+def scans() -> None:
+    image = compile_text(TIMERS).image
+    assert image
+    ways: dict[str, Callable[[Plc, int], object]] = {
+        "in one piece": lambda plc, count: plc.run(scans=count),
+        "one by one": one_by_one,
+    }
+    for way, go in ways.items():
+        plc, first = Plc(image, CYCLE_NS, engine="native"), None
+        began_s = time.time()
+        for part in range(PARTS):
+            go(plc, SCANS // PARTS)
+            now = usage()
+            first = now if part < WARM_PARTS else first or now
+            print(f"{way}: {plc.scans:10,} scans {plc.scans / (time.time() - began_s):10,.0f}/s   {now.objects:,} objects, "
+                  f"{now.handles} handles, {now.resident_bytes >> 10:,} KiB", flush=True)
+            assert plc.trap is None, plc.trap
+            assert plc.read("Main.scans") == plc.scans
+            assert plc.read("Main.ends") == (plc.scans + 1) // SCANS_OF_A_TIMER, "a timer has drifted"
+            assert now.handles == first.handles, "handles are not constant"
+            assert now.resident_bytes <= first.resident_bytes + SCANS_BYTES, "memory grows"
+
+
 def memory() -> None:
     plc, network, peer = plant(), LoopNetwork(1, latency_ns=2_000_000), ModbusPeer(contents())
     network.faults.append(Fault(segment_bytes=120, random_cut=True, gap_ns=1_000_000))
@@ -81,7 +132,7 @@ def sockets() -> None:
 
 if __name__ == "__main__":
     wanted = sys.argv[1] if len(sys.argv) > 1 else "all"
-    for name, work in (("memory", memory), ("sockets", sockets)):
+    for name, work in (("scans", scans), ("memory", memory), ("sockets", sockets)):
         if wanted in (name, "all"):
             print(f"--- {name}")
             work()
