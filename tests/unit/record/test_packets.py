@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import io
 
+from rows import each_of
+
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Phase, Plc
 from fbvm.net.loop import LoopNetwork
@@ -53,6 +55,17 @@ def test_without_its_beginning_a_conversation_is_known_by_the_port() -> None:
     assert said(data(True, asked))[0].endswith("address 7, quantity 1")
     assert said(data(False, modbus.Adu(1, 1, modbus.exception_reply(3, 2)).to_bytes())) == [
         "Modbus 1, unit 1: 03 read holding registers, exception 02 illegal data address"]
+
+
+@each_of(("code", "words"), [
+    (1, "illegal function"), (2, "illegal data address"), (3, "illegal data value"), (4, "server device failure"),
+    (5, "acknowledge"), (6, "server device busy"), (8, "memory parity error"), (10, "gateway path unavailable"),
+    (11, "gateway target device failed to respond"),
+])  # fmt: skip
+def test_exceptions_have_the_words_of_the_specification(code: int, words: str) -> None:
+    """MODBUS Application Protocol Specification V1.1b3, section 7."""
+    reply = modbus.Adu(1, 1, modbus.exception_reply(3, code)).to_bytes()
+    assert said(data(False, reply)) == [f"Modbus 1, unit 1: 03 read holding registers, exception {code:02X} {words}"]
 
 
 def test_what_is_no_modbus_is_counted() -> None:
