@@ -58,6 +58,8 @@ def test_ordinary_statements_are_steps(body: str, expected: list[int]) -> None:
     ("s, t : STRING[65_534];", "s := t;", [2, 256]),
     ("s, t : WSTRING[65_534];", "s := t;", [2, 512]),
     ("b : BOOL; s, t : STRING[20_000];", "b := s = t;", [2, 156]),
+    ("b : BOOL; s, t : STRING[20_000];", "s := SEL(b, s, t);", [2, 234]),
+    ("s, t : STRING[20_000];", "s := MAX(s, t);", [2, 234]),
     ("a : INT; s, t : STRING[65_534];", "CASE a OF 1: s := t; END_CASE;", [3, 256]),
 ])  # fmt: skip
 def test_work_is_charged_by_its_size(declarations: str, body: str, expected: list[int]) -> None:

@@ -114,6 +114,15 @@ def test_scans_of_a_burst_are_told_from_each_other_by_their_time(asking: Asking)
     assert not asking.may_go_on(800_000, 300 * 19 + 1000)
 
 
+def test_a_scan_behind_one_that_has_asked_has_its_time_from_its_own_beginning(asking: Asking) -> None:
+    asking.begin(0)
+    assert asking.may_go_on(1_000_000, 100)
+    asking.dog.end()
+    asking.plc.memory.views["i64"][NOW // 8] = 200
+    asking.begin(200)
+    assert not asking.may_go_on(1_000_000, 1200)
+
+
 def test_where_breakpoints_are_set_nobody_is_ended(asking: Asking) -> None:
     asking.plc.breakpoints.condition("Main.n > 100")
     asking.begin(0)
