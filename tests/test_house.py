@@ -84,8 +84,8 @@ SEPARATE = {("units", "net"), ("net", "units"), ("units", "engine"), ("engine", 
 """Neighbours that do not import each other."""
 ONLY_IN = {
     "socket": {"net/tcp.py", "net/udp.py"},
-    "selectors": {"net"},
-    "time": {"run"},
+    "selectors": {"net", "base/host.py"},
+    "time": {"run", "base/host.py"},
     "threading": {"engine/native/code.py", "engine/native/llvm/worker.py", "dap"},
     "subprocess": {"engine/native/llvm/worker.py", "cli", "campaign", "testing"},
     "llvmlite": {"engine/native/llvm/compiler.py"},
@@ -100,6 +100,24 @@ ONLY_IN = {
     "lark": {"syntax"},
 }
 """Modules that are used in these places only."""
+SYSTEM_MODULES = {"fcntl", "grp", "msvcrt", "platform", "posix", "pwd", "resource", "termios", "winreg", "winsound", "_winapi"}
+SYSTEM_NAMES = {
+    "sys": {"platform", "getwindowsversion"},
+    "os": {"name", "uname", "replace", "rename", "link", "symlink", "chmod", "chown", "fchmod", "umask", "getuid", "geteuid",
+           "kill", "killpg", "fork", "O_NONBLOCK", "O_BINARY", "O_NOFOLLOW", "set_blocking"},
+    "time": {"CLOCK_MONOTONIC", "clock_gettime", "clock_gettime_ns"},
+    "select": {"epoll", "poll", "kqueue"},
+    "selectors": {"EpollSelector", "KqueueSelector", "SelectSelector"},
+    "mmap": {"MAP_PRIVATE", "MAP_ANONYMOUS"},
+    "signal": {"SIGTERM", "SIGHUP", "SIGUSR1", "SIGUSR2", "SIGBREAK", "SIGALRM", "SIGPIPE", "signal", "setitimer",
+               "pthread_sigmask"},
+}  # fmt: skip
+"""Names of Python's library that only some systems have, or that mean something else on each."""
+HOST = "base/host.py"
+SYSTEM_ELSEWHERE = {
+    "run/interrupts.py": {"signal.signal"},  # delays Ctrl-C, which every system has, in the loop that it belongs to
+}
+"""What stands outside of `base/host.py` all the same, and why."""
 VENDORS = {*DIALECTS, "schneider", "tianxing", "twincat"} - {"standard"}
 DATES = {"datetime", "date", "datetime.datetime", "datetime.date"}
 
@@ -238,6 +256,28 @@ def test_what_must_stay_absent() -> None:
 
 def test_files_and_functions_fit_on_a_desk() -> None:
     assert wrong(too_long) == {}
+
+
+def of_systems(path: Path) -> list[str]:
+    """The names of Python's library with which a module asks or uses what differs by operating system."""
+    if name_of(path) == HOST:
+        return []
+    found = [name for name in imports(path) if name.split(".")[0] in SYSTEM_MODULES]
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+            if node.attr in SYSTEM_NAMES.get(node.value.id, ()):
+                found.append(f"{node.value.id}.{node.attr}")
+        elif isinstance(node, ast.ImportFrom):
+            found += [f"{node.module}.{each.name}" for each in node.names if each.name in SYSTEM_NAMES.get(node.module or "", ())]
+        elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("hasattr", "getattr") and len(node.args) > 1:
+            asked, name = node.args[:2]
+            if isinstance(name, ast.Constant) and ast.unparse(asked) in {*SYSTEM_NAMES, "socket", "stat", "ctypes", "errno"}:
+                found.append(f"{ast.unparse(asked)}.{name.value}")
+    return sorted(set(found) - SYSTEM_ELSEWHERE.get(name_of(path), set()))
+
+
+def test_what_differs_by_operating_system_stands_in_one_module() -> None:
+    assert wrong(of_systems) == {}
 
 
 def vendors(path: Path) -> list[str]:

@@ -1,30 +1,49 @@
 """Files with results that are used again by later processes of the same user.
 
 The name of a file is the hash of all inputs of its contents; a file ends with a hash of its contents, so damaged files are
-ignored.  Nothing is unpickled.  A file that cannot be read or written only costs time."""
+ignored.  Nothing is unpickled.  A file that cannot be read or written only costs time.  Files are executed as machine code, so
+only those are read that nobody but this user could have written."""
 
 from __future__ import annotations
 
 import hashlib
 import os
-import stat
 import sys
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from fbvm.base.data import cache_folder
+from fbvm.base.host import replace, why_untrusted
 
 _DIGEST_BYTES = 32
 _on = True
+_warn: Callable[[str], None] | None = None
+_warned: set[Path] = set()
 
 
 def switch(on: bool) -> None:
     """Switches all caches on or off."""
     global _on
     _on = on
+
+
+def warn_by(warn: Callable[[str], None]) -> None:
+    """Has `warn` called with a sentence when a folder or a file is passed over because others could have written it.
+
+    The sentence comes once a process for each of them.  Without this, nothing is said."""
+    global _warn
+    _warn = warn
+
+
+def make_folder() -> Path:
+    """The folder of all caches, which is made for this user alone if it is missing.  Raises OSError."""
+    folder = cache_folder()
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(mode=0o700, exist_ok=True)
+    return folder
 
 
 def name_of(parts: Iterable[str]) -> str:
@@ -78,10 +97,13 @@ class Cache:
     def read(self, name: str) -> bytes | None:
         """The contents that were written under a name; None without a file, or for a damaged or foreign one."""
         folder = self.folder
-        if not _on or not _private(folder):
+        if not _on or not _is_private(folder):
             return None
         try:
-            content = (folder / name).read_bytes()
+            with open(folder / name, "rb") as file:
+                if not _trusts(folder / name, os.fstat(file.fileno())):
+                    return None
+                content = file.read()
             body, digest = content[:-_DIGEST_BYTES], content[-_DIGEST_BYTES:]
             if not body.startswith(self.head) or hashlib.sha256(body).digest() != digest:
                 return None
@@ -96,13 +118,18 @@ class Cache:
             return
         folder, body = self.folder, self.head + content
         try:
-            folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-            if not _private(folder):
+            make_folder()
+            folder.mkdir(mode=0o700, exist_ok=True)
+            if not _is_private(folder):
                 return
-            handle, part = tempfile.mkstemp(dir=folder, suffix=".part")
-            with os.fdopen(handle, "wb") as file:
-                file.write(body + hashlib.sha256(body).digest())
-            os.replace(part, folder / name)
+            handle, name_of_part = tempfile.mkstemp(dir=folder, suffix=".part")
+            part = Path(name_of_part)
+            try:
+                with os.fdopen(handle, "wb") as file:
+                    file.write(body + hashlib.sha256(body).digest())
+                replace(part, folder / name)
+            finally:
+                part.unlink(missing_ok=True)
             self._make_room(folder)
         except OSError:
             return
@@ -120,15 +147,24 @@ class Cache:
             count -= 1
 
 
-def _private(folder: Path) -> bool:
-    """True if only this user can write files into a folder, since their contents are trusted."""
+def _is_private(folder: Path) -> bool:
+    """True if only this user can write into a folder of one kind of files, and into the folder of all caches above it.
+
+    Either may be a link, if the link is this user's, too."""
     try:
-        found = folder.stat()
-    except OSError:
+        return all(_trusts(each, each.stat()) and (not each.is_symlink() or _trusts(each, each.lstat(), is_link=True))
+                   for each in (folder.parent, folder))  # fmt: skip
+    except OSError:  # it is missing
         return False
-    if sys.platform == "win32":
-        return True
-    return found.st_uid == os.geteuid() and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def _trusts(path: Path, found: os.stat_result, is_link: bool = False) -> bool:
+    """True if nobody but this user could have written what was found at a path; else warns."""
+    why = why_untrusted(found, is_link)
+    if why and _warn and path not in _warned:
+        _warned.add(path)
+        _warn(f"{path} in the cache is not used: it {why}")
+    return not why
 
 
 def _files(folder: Path) -> Iterator[tuple[float, int, str]]:

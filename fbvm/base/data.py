@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-import sys
 from functools import cache
 from pathlib import Path
+
+from fbvm.base.host import cache_home
 
 PACKAGE = Path(__file__).resolve().parent.parent
 """The folder of this package."""
@@ -28,8 +29,4 @@ def cache_folder() -> Path:
     The folder may be missing and may not be writable."""
     if named := os.environ.get("FBVM_CACHE"):
         return Path(named)
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local") / "fbvm" / "cache"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "fbvm"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "fbvm"
+    return cache_home()

@@ -1,12 +1,18 @@
-"""Reading of files that others made: only regular files and only up to a size, so that no device or pipe holds a reader up."""
+"""Files: of others' making only regular ones are read, and only up to a size, so that no device or pipe holds a reader up; of our
+own making all are whole, since they are written beside and then put in place."""
 
 from __future__ import annotations
 
 import errno
 import os
+import shutil
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
+
+from fbvm.base.host import WAITLESS, replace
 
 MIB = 1 << 20
 SOURCE_BYTES = 64 * MIB
@@ -35,7 +41,7 @@ def reason(error: OSError) -> str:
 def open_file(path: Path | str) -> BinaryIO:
     """Opens a regular file for reading, or a link to one.  Raises OSError, which is Unreadable for a pipe, a device or a socket;
     never waits for another process."""
-    number = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    number = os.open(path, WAITLESS)
     try:
         mode = os.fstat(number).st_mode
         if stat.S_ISDIR(mode):
@@ -55,3 +61,34 @@ def read_file(path: Path | str, most_bytes: int) -> bytes:
     if len(data) > most_bytes:
         raise Unreadable(errno.EFBIG, f"it has more than {most_bytes // MIB} MiB")
     return data
+
+
+@contextmanager
+def new_file(path: Path) -> Iterator[BinaryIO]:
+    """A file for a `with` block that writes all of `path`: it takes the place of what is there when the block ends, and never does
+    if an exception ends it, Ctrl-C among them.
+
+    A link keeps leading where it leads, and a file that is there keeps its rights.  Devices and pipes are written directly.
+    Raises OSError."""
+    target = path.resolve()
+    if os.path.lexists(target) and not target.is_file():
+        with open(target, "wb") as device:
+            yield device
+        return
+    part = target.with_name(f".fbvm.{os.getpid()}.part")
+    try:
+        with open(part, "wb") as file:
+            yield file
+        if target.exists():
+            if not os.access(target, os.W_OK):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
+            shutil.copymode(target, part)
+        replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def write_file(path: Path, content: bytes | str) -> None:
+    """Writes all of a file, as `new_file` does; a text in UTF-8.  Raises OSError, and leaves what was there."""
+    with new_file(path) as file:
+        file.write(content.encode("utf-8") if isinstance(content, str) else content)

@@ -5,14 +5,13 @@ Only pages that are written take memory.  The layout is that of the areas; varia
 from __future__ import annotations
 
 import contextlib
-import mmap
 import struct
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from fbvm.base.areas import PAGE_BYTES, Area
+from fbvm.base.host import anonymous_memory
 
 WHOLE_BYTES = 255
 """Bit number of a value that fills bytes."""
@@ -44,7 +43,7 @@ class Memory:
             raise ValueError(f"a memory has whole pages of {PAGE_BYTES} bytes; {size} bytes are none")
         self.size = size
         self.areas = dict(areas)
-        self.map = _anonymous(size)
+        self.map = anonymous_memory(size)
         self.u8 = memoryview(self.map)
         self.views: dict[str, memoryview] = {
             machine: self.u8.cast(letter) for machine, letter in FORMATS.items()}  # type: ignore[call-overload]
@@ -145,10 +144,3 @@ def _differences(left: bytes, right: bytes, at: int, runs: list[tuple[int, int]]
         runs[-1] = (runs[-1][0], runs[-1][1] + 1)
     else:
         runs.append((at, 1))
-
-
-def _anonymous(size: int) -> mmap.mmap:
-    """A private mapping: reading a page that nobody wrote takes no memory, which a shared one would."""
-    if sys.platform == "win32":
-        return mmap.mmap(-1, size)
-    return mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)

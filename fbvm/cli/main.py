@@ -13,6 +13,7 @@ from typing import Any
 import click
 
 import fbvm
+from fbvm.base import cache
 from fbvm.base.files import reason
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import OutputError
@@ -75,6 +76,7 @@ class _Verbs(click.Group):
     def main(self, *arguments: Any, **options: Any) -> Any:
         """Runs the command line and writes what is still in the buffer of the standard output."""
         prepare_streams()
+        cache.warn_by(lambda sentence: click.echo(sentence, err=True))
         try:
             try:
                 return super().main(*arguments, **options)

@@ -10,9 +10,9 @@ import select
 import selectors
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Callable
 from typing import Protocol
 
+from fbvm.base import host
 from fbvm.net.addresses import AddressMap
 from fbvm.net.host_link import HostLink
 from fbvm.wire.link import Peer
@@ -20,7 +20,6 @@ from fbvm.wire.tap import Tap, TapEvent, TapKind
 
 READ, WRITE = selectors.EVENT_READ, selectors.EVENT_WRITE
 TCP, UDP = "tcp", "udp"
-FD_SETSIZE = 1024
 COARSE_S = 0.001
 """The resolution of epoll's timeout, too coarse for a short cycle time: the rest is waited for by select."""
 MAX_CALLERS = 64
@@ -34,13 +33,6 @@ def errno_name(error: OSError | int) -> str:
     """The POSIX name of an error of the host."""
     number = error if isinstance(error, int) else error.errno or errno.EIO
     return errno.errorcode.get(number, "EIO").removeprefix("WSA")
-
-
-def _number(selector: selectors.BaseSelector) -> int | None:
-    """The file number of a selector, for select; None if the selector has none, or one that is too high for select."""
-    fileno: Callable[[], int] | None = getattr(selector, "fileno", None)
-    number = fileno() if fileno else -1
-    return number if 0 <= number < FD_SETSIZE else None
 
 
 class HasFileno(Protocol):
@@ -89,7 +81,7 @@ class Switchboard(ABC):
         self.map = address_map
         self.links: dict[str, HostLink] = {}
         self._selector = selectors.DefaultSelector()
-        self._number = _number(self._selector)
+        self._number = host.selector_number(self._selector)
         self.watched = 0
         """The number of sockets that are registered with the selector."""
         self._found: list[tuple[selectors.SelectorKey, int]] = []
@@ -127,7 +119,7 @@ class Switchboard(ABC):
         timeout_s = max(timeout_s, 0.0)
         coarse_s = timeout_s if self._number is None else timeout_s // COARSE_S * COARSE_S
         if coarse_s or self._number is None:
-            self._found = self._selector.select(coarse_s)
+            self._found = host.select(self._selector, coarse_s)
         if self._found or self._number is None:
             return bool(self._found)
         return bool(select.select([self._number], [], [], timeout_s - coarse_s)[0])

@@ -6,15 +6,14 @@ One selector serves all links; sockets are handled in `events` and `submit` of a
 from __future__ import annotations
 
 import errno
-import os
 import socket
 import struct
-import sys
 from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
+from fbvm.base.host import keeps_ports, linger_format, shares_ports
 from fbvm.net.addresses import AddressMap, dotted, fits, impossible
 from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, undeliverable
 from fbvm.net.host_link import HostLink
@@ -24,12 +23,12 @@ from fbvm.wire.tap import DATA, TapKind
 
 BUFFER_BYTES = 65_536
 """The host's buffers of each connection: small, so that the TCP window closes soon if the unit grants nothing."""
-_RST_ON_CLOSE = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
+_RST_ON_CLOSE = struct.pack(linger_format(), 1, 0)
 
 
 def _share_port(sock: socket.socket) -> None:
     """Let a port be listened on again while old connections of it linger (elsewhere than on Windows)."""
-    if os.name == "posix":
+    if shares_ports():
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
 
 
@@ -64,8 +63,7 @@ class TcpNetwork(Switchboard):
             keeper = socket.socket(socket.AF_INET, socket.SOCK_STREAM if transport == TCP else socket.SOCK_DGRAM)
             _share_port(keeper)
             keeper.bind((real.host, 0))
-            # Linux lets others listen beside a socket that only keeps the port from being given away.
-            keeps = sys.platform == "linux" and transport == TCP
+            keeps = keeps_ports() and transport == TCP
             self._reserved[transport, endpoint] = Peer(*keeper.getsockname()), keeper if keeps else None
             if not keeps:
                 keeper.close()

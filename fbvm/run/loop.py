@@ -6,12 +6,12 @@ Time is real as soon as one attached network is real.  One thread, one selector,
 from __future__ import annotations
 
 import heapq
-import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from typing import Protocol, cast
 
 from fbvm.base.areas import NEVER
+from fbvm.base.host import monotonic_clock
 from fbvm.engine.clock import Clock
 from fbvm.machine.plc import Plc
 from fbvm.run.host_clock import function_at
@@ -235,10 +235,7 @@ class _RealClock:
         """A clock for Python and machine code that is `behind_ns` behind the time of this loop."""
         monotonic_ns, zero_ns = time.monotonic_ns, self._zero_ns + behind_ns
         function = function_at(time.get_clock_info("monotonic").implementation)
-        number = 0
-        if sys.platform != "win32" and function:
-            number = time.CLOCK_MONOTONIC
-        return Clock(lambda: monotonic_ns() - zero_ns, function, number, zero_ns)
+        return Clock(lambda: monotonic_ns() - zero_ns, function, monotonic_clock() if function else 0, zero_ns)
 
     def reach(self, due_ns: int) -> tuple[int, RunNumbers]:
         zero_ns = self._zero_ns

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shutil
 import sys
 from collections.abc import Iterable, Iterator
 from difflib import unified_diff
@@ -14,7 +12,7 @@ import click
 
 from fbvm.base.data import data_folder
 from fbvm.base.diagnostics import Source, whole_lines
-from fbvm.base.files import SOURCE_BYTES, read_file, reason
+from fbvm.base.files import SOURCE_BYTES, read_file, reason, write_file
 from fbvm.base.types import fold
 from fbvm.check.calls.standard import is_known
 from fbvm.cli.shared import status
@@ -119,16 +117,9 @@ def _encoded(before: str, after: str, data: bytes) -> bytes:
 
 
 def _replace(path: Path, data: bytes) -> None:
-    """Replaces a file at once, by way of a temporary file in the same folder."""
-    target = path.resolve()
-    part = target.with_name(f"{target.name}.{os.getpid()}.part")
+    """Replaces a file at once."""
     with writing(path):
-        try:
-            part.write_bytes(data)
-            shutil.copymode(target, part)
-            os.replace(part, target)
-        finally:
-            part.unlink(missing_ok=True)
+        write_file(path, data)
 
 
 def _difference(source: Source, text: str) -> Iterator[str]:

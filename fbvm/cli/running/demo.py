@@ -7,7 +7,6 @@ what it holds; or pymodbus's (`fbvm peer`), which a client that has nothing to d
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -26,6 +25,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fbvm.base.data import data_folder
+from fbvm.base.host import can_end_others
 from fbvm.cli.running.peer import LISTENING
 from fbvm.cli.shared import status
 from fbvm.cli.shared.run_result import chart_width
@@ -79,7 +79,7 @@ class Server(Protocol):
 
 
 @click.command("demo")
-@click.option("--server", "kind", type=click.Choice(["own", "pymodbus"]), default="own" if os.name == "posix" else "pymodbus",
+@click.option("--server", "kind", type=click.Choice(["own", "pymodbus"]), default="own" if can_end_others() else "pymodbus",
               show_default=True, help="own: another PLC, with the server program for an ETN21.  pymodbus: other people's.")
 def command(kind: str) -> None:
     """Run a client program against a real Modbus TCP server on this computer.

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import signal
 import sys
 from typing import Any
 
 import click
 
+from fbvm.base.host import ending_signals, handling
 from fbvm.cli.shared import status
 from fbvm.wire import registers
 
@@ -40,12 +40,16 @@ def command(port: int, host: str, trace: bool) -> None:
 
 
 async def _serve(host: str, port: int, trace: bool) -> None:
-    from pymodbus.server import ModbusTcpServer
-
     serving = asyncio.current_task()
     assert serving is not None, "a coroutine runs in a task"
-    if sys.platform != "win32":  # where there is no SIGTERM
-        asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, serving.cancel)
+    loop = asyncio.get_running_loop()
+    with handling(ending_signals(), lambda number, frame: loop.call_soon_threadsafe(serving.cancel)):
+        await _listen(host, port, trace)
+
+
+async def _listen(host: str, port: int, trace: bool) -> None:
+    from pymodbus.server import ModbusTcpServer
+
     logging.getLogger("pymodbus").setLevel(logging.CRITICAL)
     server: Any = ModbusTcpServer(device(), address=(host, port), trace_packet=_trace if trace else None)
     if not await server.listen():

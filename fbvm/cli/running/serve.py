@@ -5,8 +5,7 @@ from __future__ import annotations
 import ipaddress
 import signal
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack
 from io import TextIOWrapper
 from pathlib import Path
 from types import FrameType
@@ -16,6 +15,7 @@ import click
 
 from fbvm.base.data import data_folder
 from fbvm.base.files import reason
+from fbvm.base.host import ending_signals, handling, saving_signals
 from fbvm.cli.running.peer import LISTENING
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import OutputError, growing_file, writing
@@ -161,21 +161,14 @@ class Signals:
         self.save = False
 
     def _handle(self, number: int, frame: FrameType | None) -> None:
-        if number in (signal.SIGTERM, signal.SIGINT):
-            self.end = True
-        else:
+        if number in saving_signals():
             self.save = True
+        else:
+            self.end = True
 
-    @contextmanager
-    def installed(self) -> Iterator[None]:
-        """Installs the handlers inside the `with` block."""
-        numbers = [signal.SIGTERM, signal.SIGINT, *([signal.SIGUSR1] if hasattr(signal, "SIGUSR1") else [])]
-        before = {number: signal.signal(number, self._handle) for number in numbers}
-        try:
-            yield
-        finally:
-            for number, call in before.items():
-                signal.signal(number, call)
+    def installed(self) -> AbstractContextManager[None]:
+        """Installs the handlers inside a `with` block."""
+        return handling((signal.SIGINT, *ending_signals(), *saving_signals()), self._handle)
 
 
 def _save(plc: Plc, image: Path | None) -> bool:

@@ -9,7 +9,7 @@ from prompt_toolkit.completion import CompleteEvent, Completer, Completion
 from prompt_toolkit.document import Document
 from prompt_toolkit.history import FileHistory, History, InMemoryHistory
 
-from fbvm.base.data import cache_folder
+from fbvm.base.cache import make_folder
 from fbvm.step.commands import Commands
 
 HISTORY = "step_history"
@@ -44,8 +44,8 @@ def prompt_lines(commands: Commands) -> Iterator[str]:
 def _history() -> History:
     """The lines of earlier sessions, in a file of the cache folder if it can be written."""
     try:
-        cache_folder().mkdir(parents=True, exist_ok=True)
-        (cache_folder() / HISTORY).touch()
+        path = make_folder() / HISTORY
+        path.touch(mode=0o600)
     except OSError:
         return InMemoryHistory()
-    return FileHistory(str(cache_folder() / HISTORY))
+    return FileHistory(str(path))

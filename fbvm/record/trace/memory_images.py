@@ -6,11 +6,11 @@ The words of CPU bus units are left out in both directions: they are the state o
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from fbvm.base.files import IMAGE_BYTES, read_file
+from fbvm.base.host import replace
 from fbvm.base.memory import Memory
 
 OF_UNITS = {"CIO": range(1500, 1900), "D": range(30000, 31600)}  # 25 and 100 words a unit, W421 6-6-2 p111
@@ -36,7 +36,7 @@ def save(memory: Memory, path: Path, counts: Mapping[str, int]) -> None:
     part = _beside(path)
     try:
         part.write_text(f'{{"spaces": {{\n{lines}\n}}}}\n', encoding="utf-8")
-        os.replace(part, path)
+        replace(part, path)
     except OSError:
         part.unlink(missing_ok=True)
         raise

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import platform
-
 from fbvm.base.arithmetic import limits, width
+from fbvm.base.host import is_x86_64
 from fbvm.code.operations import Node
 from fbvm.engine.native.emit.writer import Writer, ir, literal, signed
 from fbvm.engine.ranges import is_float
 
-ONE_STEP = platform.machine() in ("x86_64", "AMD64")
+ONE_STEP = is_x86_64()
 """True if the processor has an instruction that rounds a float and reports what does not fit (CVTSS2SI of x86-64)."""
 
 

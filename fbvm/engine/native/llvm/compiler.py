@@ -5,18 +5,17 @@ The only module that imports llvmlite, and only when something is to be compiled
 from __future__ import annotations
 
 import ctypes
-import sys
 from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.util import find_spec
 from itertools import count
 from typing import Any
 
+from fbvm.base.host import links_in_place, math_library
+
 MATH = {"ln": 1, "log": 1, "exp": 1, "sin": 1, "cos": 1, "tan": 1, "asin": 1, "acos": 1, "atan": 1, "pow": 2, "atan2": 2}
 """Functions of doubles that machine code calls, by their names in the table of operations, and how many arguments they take."""
 _NUMBERS = count(1)
-_LIBRARIES = {"linux": "libm.so.6", "win32": "ucrtbase"}
-"""The library with the functions of C's math.h that Python's `math` calls; on other systems the process has them itself."""
 _NAMES = {"ln": "log", "log": "log10"}
 FAULTS = {
     "-disable-loop-idiom-hashrecognize": (22,),  # 22.1.0: a CRC loop whose counter is used afterwards has a wrong counter
@@ -53,7 +52,7 @@ def llvm() -> Any:
 def _symbols() -> dict[str, int]:
     """The addresses of the functions outside that machine code calls, by the names that modules give them."""
     try:
-        library = ctypes.CDLL(_LIBRARIES.get(sys.platform))
+        library = ctypes.CDLL(math_library())
     except OSError:
         library = ctypes.CDLL(None)
     found = {name: getattr(library, _NAMES.get(name, name)) for name in MATH}
@@ -125,7 +124,7 @@ def assembly(text: str, level: int) -> tuple[str, str]:
 @cache
 def _jit() -> Any:
     """What loads object files.  It places the sections of one close together, as the small code model demands."""
-    return llvm().create_lljit_compiler(_fresh_machine(2), use_jit_link=sys.platform != "win32")
+    return llvm().create_lljit_compiler(_fresh_machine(2), use_jit_link=links_in_place())
 
 
 class Linked:
