@@ -65,8 +65,8 @@ def read_file(path: Path | str, most_bytes: int) -> bytes:
 
 @contextmanager
 def new_file(path: Path) -> Iterator[BinaryIO]:
-    """A file for a `with` block that writes all of `path`: it takes the place of what is there when the block ends, and never does
-    if an exception ends it, Ctrl-C among them.
+    """A file for a `with` block that writes all of `path`.  When the block ends it takes the place of what is there; an exception
+    such as Ctrl-C removes it.
 
     A link keeps leading where it leads, and a file that is there keeps its rights.  Devices and pipes are written directly.
     Raises OSError."""

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from fbvm.base.files import write_file
 from fbvm.testing.coverage import Coverage
 from fbvm.testing.coverage_report import cobertura, table, write_pages
 
@@ -46,5 +47,5 @@ class CoveragePlugin:
         if pages := option("fbvm_cov_html"):
             terminalreporter.line(f"written to {write_pages(self.coverage, root, Path(pages))}")
         if xml := option("fbvm_cov_xml"):
-            Path(xml).write_text(cobertura(self.coverage, root), encoding="utf-8")
+            write_file(Path(xml), cobertura(self.coverage, root))
             terminalreporter.line(f"written to {xml}")

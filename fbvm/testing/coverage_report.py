@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.files import write_file
 from fbvm.syntax.text import read
 from fbvm.testing.coverage import Coverage, FileCoverage
 
@@ -135,14 +136,14 @@ def write_pages(coverage: Coverage, root: Path, folder: Path) -> Path:
     rows = []
     for number, (path, each) in enumerate(sorted(coverage.files.items())):
         name, page = _shown(path, root), f"{number}_{Path(path).stem}.html"
-        (folder / page).write_text(_page(f"{name}: {percent(each.rate())}", _source(path, each)), encoding="utf-8")
+        write_file(folder / page, _page(f"{name}: {percent(each.rate())}", _source(path, each)))
         statements, missed, branches, untaken = _counts(each)
         rows.append(f'<tr><td><a href="{html.escape(page)}">{html.escape(name)}</a><td>{statements}<td>{missed}'
                     f"<td>{branches}<td>{untaken}<td>{percent(each.rate())}")  # fmt: skip
     head = "<tr><th>File<th>Statements<th>missed<th>Branches<th>missed<th>Coverage"
     total = percent(_total(coverage).rate())
     index = folder / "index.html"
-    index.write_text(_page(f"Coverage: {total}", f"<table>{head}{''.join(rows)}</table>"), encoding="utf-8")
+    write_file(index, _page(f"Coverage: {total}", f"<table>{head}{''.join(rows)}</table>"))
     return index
 
 

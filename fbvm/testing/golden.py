@@ -10,6 +10,7 @@ from __future__ import annotations
 from itertools import zip_longest
 from pathlib import Path
 
+from fbvm.base.files import write_file
 from fbvm.record.trace.recorder import Recording
 from fbvm.watch.values import show_time
 
@@ -35,7 +36,7 @@ def check(path: Path, recording: Recording, write: bool) -> None:
     found = golden_text(recording)
     if write:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(found, encoding="utf-8", newline="\n")
+        write_file(path, found)
         return
     if not path.is_file():
         raise AssertionError(f"{path} is not there; look at this run, then write it with {OPTION}:\n\n{found}")

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from fbvm.base.files import write_file
 from fbvm.machine.plc import Plc
 from fbvm.record.trace.history import History
 from fbvm.record.trace.packets import Packet
@@ -61,5 +62,5 @@ def write_page(path: Path, title: str, history: History, subject: Subject, units
     data = page_data(trace, title=title, prefix=subject.prefix, pinned=[place.name for place in asked])
     data["frames"] = frame_rows([row for row in packets if row[0] in trace.scans])
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(page(data), encoding="utf-8")
+    write_file(path, page(data))
     return True

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from fbvm.base.files import write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.sources import report_diagnostics
@@ -33,6 +34,6 @@ def command(files: tuple[Path, ...], document: Path, as_json: bool) -> None:
         report_diagnostics(made.diagnostics, as_json)
     if made.text is not None:
         with writing(document):
-            document.write_text(made.text, encoding="utf-8")
+            write_file(document, made.text)
     if made.errors:
         sys.exit(status.PROGRAM_ERRORS)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from fbvm.base.files import write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.sources import report_diagnostics
@@ -36,7 +37,7 @@ def command(file: Path, folder: Path, force: bool, as_json: bool) -> None:
         for name, text in made.files.items():
             if (folder / name).is_symlink():
                 (folder / name).unlink()  # the file goes into the folder, not where a link leads
-            (folder / name).write_text(text, encoding="utf-8")
+            write_file(folder / name, text)
     for name in made.files if not as_json else ():
         click.echo(str(folder / name))
     if made.errors:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from fbvm.base.files import write_file
 from fbvm.cli.shared.drawings import SVG_WIDTH, print_lines, rung_lines, symbol_addresses
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.run_result import chart_width
@@ -29,7 +30,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
         drawn = [ladder_surface(rung, width or SVG_WIDTH, Sight(None, symbol_addresses(image, rung.body)))
                  for rung in image.rungs]  # fmt: skip
         with writing(svg):
-            svg.write_text(ladder_svg(drawn), encoding="utf-8")
+            write_file(svg, ladder_svg(drawn))
         return
     body = -1
     for rung in image.rungs:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from fbvm.base.files import write_file
 from fbvm.cli.shared.drawings import SVG_WIDTH, print_lines
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.run_result import chart_width
@@ -28,7 +29,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     if svg:
         drawn = [(_head(image, chart), sfc_surface(chart, width or SVG_WIDTH)) for chart in image.charts]
         with writing(svg):
-            svg.write_text(ladder_svg(drawn), encoding="utf-8")
+            write_file(svg, ladder_svg(drawn))
         return
     for chart in image.charts:
         click.echo(_head(image, chart))

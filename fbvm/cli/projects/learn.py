@@ -8,6 +8,7 @@ from pathlib import Path
 
 import click
 
+from fbvm.base.files import write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
 
@@ -77,7 +78,7 @@ def _class(learners: Path, out: Path) -> None:
     with writing(out):
         results = check_class(learners, out)
         page = out / "report.html"
-        page.write_text(report(results, lessons(), out), encoding="utf-8")
+        write_file(page, report(results, lessons(), out))
     if not results:
         raise click.UsageError(f"{learners} holds no folders of learners")
     for line in summary(results, lessons()):

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from fbvm.base.data import data_folder
+from fbvm.base.files import write_file
 from fbvm.cli.shared.files import writing
 
 EXAMPLE = "project"
@@ -42,7 +43,7 @@ def command(name: str) -> None:
         for path in sorted(each for each in source.rglob("*") if each.is_file() and "__pycache__" not in each.parts):
             copy = target / path.relative_to(source)
             copy.parent.mkdir(parents=True, exist_ok=True)
-            copy.write_text(path.read_text(encoding="utf-8").replace(TITLE, title), encoding="utf-8", newline="\n")
+            write_file(copy, path.read_text(encoding="utf-8").replace(TITLE, title))
     click.echo(f"{name}/")
     for file, said in DESCRIPTIONS.items():
         click.echo(f"  {file:<28}{said}")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from io import BytesIO, StringIO
+from io import BytesIO, StringIO, TextIOWrapper
 from pathlib import Path
 
 import click
 
-from fbvm.base.files import TABLE_BYTES, read_file, reason
+from fbvm.base.files import TABLE_BYTES, new_file, read_file, reason, write_file
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.traces import SUFFIX, open_trace, recording_of, scans_option
@@ -29,8 +29,10 @@ Names = Sequence[str]
 
 def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     made = recording_of(trace, names, scans)
-    with path.open("w", encoding="utf-8", newline="") as file:
-        write_csv(made, file)
+    with new_file(path) as file:
+        text = TextIOWrapper(file, encoding="utf-8", newline="")
+        write_csv(made, text)
+        text.detach()
 
 
 def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
@@ -39,23 +41,23 @@ def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
         write_vcd(recording_of(trace, names, scans), text)
     except ModuleNotFoundError:
         raise click.UsageError("VCD needs the package pyvcd: pip install 'fbvm[vcd]'") from None
-    path.write_text(text.getvalue(), encoding="ascii", errors="replace")
+    write_file(path, text.getvalue().encode("ascii", "replace"))
 
 
 def _svg(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     made = recording_of(trace, names, scans)
-    path.write_text(SvgChart(made, packets(trace, made.scans), path.stem).text(), encoding="utf-8")
+    write_file(path, SvgChart(made, packets(trace, made.scans), path.stem).text())
 
 
 def _html(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     recording_of(trace, names, range(trace.scans.stop - 1, trace.scans.stop) if scans is None else scans)
-    path.write_text(page(page_data(trace, names, scans, path.stem)), encoding="utf-8")
+    write_file(path, page(page_data(trace, names, scans, path.stem)))
 
 
 def _pcapng(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     if names:
         raise click.UsageError("a capture holds what passed the network; it takes no names")
-    with path.open("wb") as file:
+    with new_file(path) as file:
         said = ""
         capture = Capture(file, comment=lambda address: said)
         for scan, event in network_events(trace, scans):
@@ -106,4 +108,4 @@ def _to_trace(source: Path, target: Path) -> None:
         raise click.UsageError(f"{source} cannot be read: {reason(error)}") from None
     except (CsvError, UnicodeDecodeError) as error:
         raise click.UsageError(f"{source}: {error}") from None
-    target.write_bytes(made.getvalue())
+    write_file(target, made.getvalue())

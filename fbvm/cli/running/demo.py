@@ -25,6 +25,7 @@ from rich.table import Table
 from rich.text import Text
 
 from fbvm.base.data import data_folder
+from fbvm.base.files import write_file
 from fbvm.base.host import can_end_others
 from fbvm.cli.running.peer import LISTENING
 from fbvm.cli.shared import status
@@ -210,7 +211,7 @@ class OwnServer:
 def own_server() -> Iterator[Server]:
     with tempfile.TemporaryDirectory() as folder:
         image = Path(folder) / "memory.json"
-        image.write_text(json.dumps({"spaces": {"D": list(range(1000, 1125))}}), encoding="utf-8")
+        write_file(image, json.dumps({"spaces": {"D": list(range(1000, 1125))}}))
         with _process("serve", "--port", "0", "--image", str(image)) as (process, port):
             yield OwnServer(port, process, image)
 

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, cast
 import click
 
 from fbvm.base.digits import whole_number
-from fbvm.base.files import reason
+from fbvm.base.files import reason, write_file
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
@@ -128,7 +128,7 @@ def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Se
             writer.close()
         file.seek(0)
         with writing(path):
-            path.write_text(page(page_data(Trace(file), title=path.stem)), encoding="utf-8")
+            write_file(path, page(page_data(Trace(file), title=path.stem)))
 
 
 def statement_lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:
