@@ -1,6 +1,20 @@
-"""`python -m fbvm`: the same as the command `fbvm`."""
+"""The command `fbvm`, and `python -m fbvm`."""
 
-from fbvm.cli.main import main
+from typing import NoReturn
+
+from fbvm.cli.shared.ending import loading, run_process
+
+
+def _verb() -> None:
+    with loading():
+        from fbvm.cli.main import main
+    main()
+
+
+def main() -> NoReturn:
+    """Runs the command line.  Raises SystemExit."""
+    run_process(_verb)
+
 
 if __name__ == "__main__":
     main()

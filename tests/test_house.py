@@ -86,7 +86,7 @@ ONLY_IN = {
     "socket": {"net/tcp.py", "net/udp.py"},
     "selectors": {"net", "base/host.py"},
     "time": {"run", "base/host.py"},
-    "threading": {"engine/native/code.py", "engine/native/llvm/worker.py", "dap"},
+    "threading": {"engine/native/code.py", "engine/native/llvm/worker.py", "dap", "cli/shared/ending.py"},
     "subprocess": {"engine/native/llvm/worker.py", "cli", "campaign", "testing"},
     "llvmlite": {"engine/native/llvm/compiler.py"},
     "concurrent": {"campaign"},

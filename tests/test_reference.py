@@ -70,7 +70,7 @@ def test_each_command_has_a_section_with_each_of_its_options() -> None:
 
 
 def test_each_status_is_said() -> None:
-    assert set(module("command_line").statuses()) == {0, 1, 2, 3, 4, 5, 130, 141}
+    assert set(module("command_line").statuses()) == {0, 1, 2, 3, 4, 5, 130, 141, 143}
 
 
 def test_each_key_of_a_project_file_has_its_meaning() -> None:

@@ -141,6 +141,12 @@ def handling(numbers: Iterable[signal.Signals], handle: Handle) -> Iterator[None
             signal.signal(number, call)
 
 
+def ignore(numbers: Iterable[signal.Signals]) -> None:
+    """Lets some signals have no effect from now on, while the process ends."""
+    for number in numbers:
+        signal.signal(number, signal.SIG_IGN)
+
+
 def can_end_others() -> bool:
     """True if a program can ask another one to end, and not only end it: Windows has no SIGTERM."""
     return sys.platform != "win32"

@@ -1,7 +1,7 @@
 """The command `fbvm` and its verbs.
 
 Exit status: 0 good, 1 a check failed, 2 usage, 3 the program has errors, 4 running stopped, 5 the network could not be
-used, 130 ended by Ctrl-C, 141 nobody reads the output any more.
+used, 130 ended by Ctrl-C, 143 ended by SIGTERM, 141 nobody reads the output any more.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import click
 import fbvm
 from fbvm.base import cache
 from fbvm.base.files import reason
-from fbvm.cli.shared import status
+from fbvm.cli.shared import ending, status
 from fbvm.cli.shared.files import OutputError
 from fbvm.cli.shared.streams import give_up_output, prepare_streams
 
@@ -58,6 +58,13 @@ GROUP_OF = {verb: room for room, (_, verbs) in VERB_GROUPS.items() for verb in v
 class _Verbs(click.Group):
     """Loads the module of a verb when it is called, so that `fbvm check` starts quickly."""
 
+    def make_context(self, *arguments: Any, **options: Any) -> click.Context:
+        """Reads the arguments.  Ctrl-C ends it with status 130."""
+        try:
+            return super().make_context(*arguments, **options)
+        except KeyboardInterrupt:
+            sys.exit(status.INTERRUPTED)
+
     def invoke(self, ctx: click.Context) -> object:
         """Runs the verb.  Ctrl-C ends it with status 130, a reader that has gone with 141, in silence; an output that the host
         refuses with 4 for a file that grows during a run, else with 2."""
@@ -70,13 +77,24 @@ class _Verbs(click.Group):
             give_up_output()
             sys.exit(status.OUTPUT_CLOSED)
         except KeyboardInterrupt:
-            click.echo("interrupted", err=True)
             sys.exit(status.INTERRUPTED)
 
     def main(self, *arguments: Any, **options: Any) -> Any:
-        """Runs the command line and writes what is still in the buffer of the standard output."""
+        """Runs the command line and writes what is still in the buffer of the standard output.
+
+        Signals that ask for the end do what Ctrl-C does, with a sentence and a status of their own."""
         prepare_streams()
         cache.warn_by(lambda sentence: click.echo(sentence, err=True))
+        with ending.heard():
+            try:
+                return self._run(*arguments, **options)
+            except SystemExit as end:
+                if end.code != status.INTERRUPTED:
+                    raise
+                click.echo(ending.sentence(), err=True)
+                sys.exit(ending.exit_status())
+
+    def _run(self, *arguments: Any, **options: Any) -> Any:
         try:
             try:
                 return super().main(*arguments, **options)
@@ -97,7 +115,8 @@ class _Verbs(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         if cmd_name not in GROUP_OF:
             return None
-        command: click.Command = importlib.import_module(f"fbvm.cli.{GROUP_OF[cmd_name]}.{cmd_name}").command
+        with ending.loading():
+            command: click.Command = importlib.import_module(f"fbvm.cli.{GROUP_OF[cmd_name]}.{cmd_name}").command
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -11,6 +11,7 @@ import click
 
 from fbvm.base.host import ending_signals, handling
 from fbvm.cli.shared import status
+from fbvm.cli.shared.ending import loading
 from fbvm.wire import registers
 
 LISTENING = "listening on "
@@ -27,7 +28,8 @@ def command(port: int, host: str, trace: bool) -> None:
     Holding register i holds 1000 + i, input register i 2000 + i, every second coil and every third discrete input is
     ON.  Status 5 if the port cannot be used."""
     try:
-        import pymodbus.server  # noqa: F401
+        with loading():
+            import pymodbus.server  # noqa: F401
     except ImportError:
         raise click.UsageError("pymodbus is missing: pip install 'fbvm[peer]'") from None
     try:

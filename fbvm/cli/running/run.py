@@ -126,9 +126,10 @@ def command(
             plc.attach(unit, network)
         _print_host_endpoints(plc, network, options["mappings"])
         with write_trace(plc, options["trace"], options["depth"], options["selected"], files, libraries), \
-                write_page(plc, options["html"], files, libraries), \
+                write_page(plc, options["html"], files, libraries) as page, \
                 draw_executed_rungs(plc, options["rungs"]), draw_executed_charts(plc, options["charts"]):  # fmt: skip
             result = _run(plc, as_json, **options)
+            page.only_last = result.reason == "interrupted"
         result.print()
         _warn_unused_mappings(plc, network)
         if plc.halted and not as_json:

@@ -17,6 +17,7 @@ from fbvm.base.diagnostics import Source
 from fbvm.base.files import LINE_CHARACTERS, open_file, reason
 from fbvm.cli.shared import status
 from fbvm.cli.shared.e_banks import with_e_banks
+from fbvm.cli.shared.ending import held
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.cli.shared.sources import compile_options, report_diagnostics
 from fbvm.code.compiler import compile_sources
@@ -34,13 +35,13 @@ def start_journal(
     with writing(path):
         file = stack.enter_context(TextIOWrapper(growing_file(path), encoding="utf-8", newline="\n"))
     texts = [read(name, str(name)) for name in files]
-    journal = Journal(file, {
+    journal = held()(Journal)(file, {
         "fbvm": fbvm.__version__, "began_ns": loop.epoch_ns(), "program": program, "chosen": compile_options(),
         "libraries": [str(folder) for folder in libraries], "banks": list(banks),
         "options": dict(options),
         "sources": [[text.name, text.text] for text in texts if isinstance(text, Source)],
     })  # fmt: skip
-    stack.callback(journal.close)
+    stack.callback(held()(journal.close))
     return journal
 
 

@@ -10,6 +10,7 @@ from prompt_toolkit.document import Document
 from prompt_toolkit.history import FileHistory, History, InMemoryHistory
 
 from fbvm.base.cache import make_folder
+from fbvm.cli.shared.ending import by_other_than_ctrl_c
 from fbvm.step.commands import Commands
 
 HISTORY = "step_history"
@@ -29,13 +30,15 @@ class Completions(Completer):
 
 
 def prompt_lines(commands: Commands) -> Iterator[str]:
-    """The lines that a user types, until the end of input.  Ctrl-C discards the line."""
+    """The lines that a user types, until the end of input.  Ctrl-C discards the line; another signal ends it."""
     asking: PromptSession[str] = PromptSession(history=_history(), completer=Completions(commands), complete_while_typing=False)
     while True:
         here = commands.session.here
         try:
             yield asking.prompt(f"{here.scan}:{here.step}> ")
         except KeyboardInterrupt:
+            if by_other_than_ctrl_c():
+                raise
             continue
         except EOFError:
             return

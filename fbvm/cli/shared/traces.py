@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -12,6 +13,7 @@ import click
 
 from fbvm.base.digits import whole_number
 from fbvm.base.files import reason, write_file
+from fbvm.cli.shared.ending import held
 from fbvm.cli.shared.files import growing_file, writing
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
@@ -28,6 +30,8 @@ from fbvm.watch.paths import UnknownPlace
 SUFFIX = ".fbtrace"
 LAST_SCAN = 1 << 62
 """No run has so many scans."""
+INTERRUPTED_SCANS = 400
+"""The scans on the page of a run that was interrupted."""
 
 
 class ScanRange(click.ParamType[range]):
@@ -104,31 +108,48 @@ def write_trace(
         file = growing_file(path)
     with file:
         try:
-            writer = TraceWriter(plc, file, Depth(depth), selected, statement_lines(plc.image, files, libraries))
+            lines = statement_lines(plc.image, files, libraries)
+            with held():
+                writer = TraceWriter(plc, file, Depth(depth), selected, lines)
         except UnknownPlace as error:
             raise click.UsageError(str(error)) from None
         try:
             yield
         finally:
-            writer.close()
+            with held():
+                writer.close()
+
+
+@dataclass
+class PageScans:
+    """The scans that a page holds."""
+
+    only_last: bool = False
+    """True after Ctrl-C: a page of all scans may take long."""
 
 
 @contextmanager
-def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Sequence[Path]) -> Iterator[None]:
-    """Writes the scans of `plc` in the `with` block as one HTML file, if `path` is given."""
+def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Sequence[Path]) -> Iterator[PageScans]:
+    """Writes the scans of `plc` in the `with` block as one HTML file, if `path` is given: all, or those that the block wants."""
+    wanted = PageScans()
     if path is None:
-        yield
+        yield wanted
         return
     with tempfile.TemporaryFile() as temporary:
         file = cast(BinaryIO, temporary)
         writer = TraceWriter(plc, file, Depth.STATEMENTS, (), statement_lines(plc.image, files, libraries))
         try:
-            yield
+            yield wanted
         finally:
             writer.close()
         file.seek(0)
+        trace = Trace(file)
+        last = max(trace.scans.start, trace.scans.stop - INTERRUPTED_SCANS)
+        scans = range(last, trace.scans.stop) if wanted.only_last and last > trace.scans.start else None
+        if scans:
+            click.echo(f"{path} holds scans {last} to {scans[-1]} only: the run was interrupted", err=True)
         with writing(path):
-            write_file(path, page(page_data(Trace(file), title=path.stem)))
+            write_file(path, page(page_data(trace, scans=scans, title=path.stem)))
 
 
 def statement_lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:

@@ -6,12 +6,18 @@ import signal
 import socket
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import click
 import pytest
 from click.testing import CliRunner
+from depth import times
 
+from fbvm.base.data import data_folder
 from fbvm.cli.main import GROUP_OF, main
+from fbvm.cli.shared import ending
 
 needs_signals = pytest.mark.skipif(sys.platform == "win32", reason="no SIGTERM to react to")
 
@@ -42,3 +48,129 @@ def test_ctrl_c_has_its_status_in_each_verb(verb: str, monkeypatch: pytest.Monke
     arguments = [__file__] if verb in ("run", "replay", "check", "list") else []
     result = CliRunner().invoke(main, [verb, *arguments])
     assert (result.exit_code, result.stderr) == (130, "interrupted\n")
+
+
+# --- all verbs, all signals -------------------------------------------------------------------------------------------
+
+FOREVER = ["--for", "100000000s"]
+DEMO = str(data_folder("examples") / "demo.st")
+PEER = ["--map", "192.168.250.1:502=peer"]
+VERBS: dict[str, list[list[str]]] = {
+    "check": [["big.st"]], "fmt": [["big.st", "--check"]], "list": [["big.st"]], "export": [["big.st", "-o", "out.xml"]],
+    "import": [["big.xml", "-o", "sources", "--force"]], "ladder": [[str(data_folder("examples") / "ladder.st")]],
+    "sfc": [[str(data_folder("examples") / "sfc.st")]], "explain": [[]],
+    "run": [[DEMO, *PEER, *FOREVER, "--trace", "r.fbtrace", "--journal", "r.journal", "--pcap", "r.pcapng"],
+            [DEMO, *FOREVER, "--engine", "python", "--html", "r.html"], [DEMO, *FOREVER, "--net", "tcp"],
+            ["big.st", *FOREVER, "--engine", "native", "--no-cache"]],
+    "replay": [["long.journal"]], "step": [[DEMO]], "map": [[]], "serve": [["--port", "0", "--image", "served"]],
+    "peer": [["--port", "0"]], "demo": [[]], "new": [["project", ]], "test": [["tests"]], "learn": [["1"]],
+    "chart": [["long.fbtrace"]], "table": [["long.fbtrace"]], "why": [["long.fbtrace", "Main.Step"]],
+    "convert": [["long.fbtrace", "out.html"], ["long.fbtrace", "out.csv"]],
+}  # fmt: skip
+"""Arguments with which each verb has something to do for a while."""
+GOOD_AT_THE_END = {"serve", "peer"}
+"""Verbs that are ended by a signal always, which is no failure."""
+MOMENTS_S = (0.0, 0.08, 0.25, 0.7)
+"""How long after the process listens to signals one comes."""
+
+
+def prepare(folder: Path) -> None:
+    """Sources, traces, journals and tests that keep verbs busy."""
+    body = "a := a + 1;\nIF a > b THEN b := a / 3; END_IF\n" * 40
+    block = f"FUNCTION_BLOCK B{{0}}\nVAR a, b : DINT; END_VAR\n{body}END_FUNCTION_BLOCK\n"
+    blocks = "".join(block.format(number) for number in range(40))
+    instances = " ".join(f"b{number} : B{number};" for number in range(40))
+    calls = " ".join(f"b{number}();" for number in range(40))
+    (folder / "big.st").write_text(f"{blocks}PROGRAM Main\nVAR {instances} END_VAR\n{calls}\nEND_PROGRAM\n")
+    (folder / "tests").mkdir()
+    (folder / "tests" / "test_long.py").write_text("import time\n\ndef test_long():\n    time.sleep(60)\n")
+    long = ["--journal", str(folder / "long.journal"), "--trace", str(folder / "long.fbtrace"), "--depth", "statements"]
+    assert CliRunner().invoke(main, ["run", DEMO, *PEER, "--scans", "6000", *long]).exit_code == 0
+    assert CliRunner().invoke(main, ["export", str(folder / "big.st"), "-o", str(folder / "big.xml")]).exit_code == 0
+
+
+def listens(process: subprocess.Popen[bytes]) -> bool:
+    """True as soon as a process has a handler of SIGTERM."""
+    try:
+        lines = Path(f"/proc/{process.pid}/status").read_text().splitlines()
+    except OSError:
+        return True
+    caught = next((int(line.split()[1], 16) for line in lines if line.startswith("SigCgt")), 0)
+    return bool(caught >> (signal.SIGTERM - 1) & 1)
+
+
+def ended(folder: Path, arguments: list[str], number: signal.Signals, moment_s: float) -> tuple[int | None, str]:
+    """The status and the messages of a verb that gets a signal; None if it has ended by itself before."""
+    folder.mkdir()
+    for shared in (folder.parent / "shared").iterdir():
+        (folder / shared.name).symlink_to(shared)
+    command = [sys.executable, "-m", "fbvm", *arguments]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=folder, stdin=pipe, stdout=subprocess.DEVNULL, stderr=pipe) as process:
+        assert process.stdin is not None
+        try:
+            if arguments[0] == "step":
+                process.stdin.write(b"run 100000s\n")
+                process.stdin.flush()
+            while process.poll() is None and not listens(process):
+                time.sleep(0.002)
+            try:
+                process.wait(timeout=moment_s)
+            except subprocess.TimeoutExpired:
+                process.send_signal(number)
+            _, said = process.communicate(timeout=30)
+        finally:
+            process.kill()
+    return process.returncode, said.decode()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="asks /proc whether the process listens")
+def test_every_verb_ends_at_every_signal(tmp_path: Path) -> None:
+    """With the status of the signal and a sentence, without a traceback, and with whole files or none."""
+    (tmp_path / "shared").mkdir()
+    prepare(tmp_path / "shared")
+    assert set(VERBS) == set(GROUP_OF)
+    cases = [([verb, *arguments], number, moment_s)
+             for row, (verb, each) in enumerate(VERBS.items()) for column, arguments in enumerate(each)
+             for line, number in enumerate((signal.SIGINT, signal.SIGTERM))
+             for more in range(times(1, len(MOMENTS_S)))
+             for moment_s in [MOMENTS_S[(row + column + 2 * line + more) % len(MOMENTS_S)]]]  # fmt: skip
+    folders = [tmp_path / str(number) for number in range(len(cases))]
+    with ThreadPoolExecutor(3) as pool:
+        results = list(pool.map(lambda folder, case: ended(folder, *case), folders, cases))
+    wrong = []
+    for folder, (arguments, number, moment_s), (status, said) in zip(folders, cases, results, strict=True):
+        words = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
+        by_signal = status == 128 + number and said.splitlines()[-1:] == [words[number]]
+        by_itself = status == 0 and (arguments[0] in GOOD_AT_THE_END or arguments[0] not in ("run", "step", "test"))
+        parts = [path.name for path in folder.iterdir() if ".part" in path.name or path.name == "served.new"]
+        if not (by_signal or by_itself) or "Traceback" in said or "ignored" in said or parts:
+            wrong.append((arguments, number.name, moment_s, status, said, parts))
+        for written, verb in (("r.fbtrace", ["chart", "r.fbtrace"]), ("r.journal", ["replay", "r.journal"])):
+            if (folder / written).exists() and (folder / written).stat().st_size:
+                with pytest.MonkeyPatch.context() as patch:
+                    patch.chdir(folder)
+                    read = CliRunner().invoke(main, verb)
+                if read.exit_code not in (0, 2) or read.exit_code == 2 and "no scans yet" not in read.stderr:
+                    wrong.append((verb, number.name, moment_s, read.exit_code, read.stderr, []))
+    assert wrong == []
+
+
+def test_other_signals_do_what_ctrl_c_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    def terminated(ctx: click.Context) -> None:
+        signal.raise_signal(signal.SIGTERM)
+
+    monkeypatch.setattr(click.Command, "invoke", lambda self, ctx: terminated(ctx))
+    result = CliRunner().invoke(main, ["explain"])
+    assert (result.exit_code, result.stderr) == (143, "terminated\n")
+    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+
+
+def test_what_is_held_is_not_left_half_done() -> None:
+    done = []
+    with pytest.raises(KeyboardInterrupt), ending.held():
+        signal.raise_signal(signal.SIGINT)
+        done.append(1)
+    assert done == [1]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
