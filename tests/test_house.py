@@ -87,7 +87,7 @@ ONLY_IN = {
     "selectors": {"net", "base/host.py"},
     "time": {"run", "base/host.py"},
     "threading": {"engine/native/code.py", "engine/native/llvm/worker.py", "dap", "cli/shared/ending.py"},
-    "subprocess": {"engine/native/llvm/worker.py", "cli", "campaign", "testing"},
+    "subprocess": {"engine/apart.py", "engine/native/llvm/worker.py", "cli", "campaign", "testing"},
     "llvmlite": {"engine/native/llvm/compiler.py"},
     "concurrent": {"campaign"},
     "multiprocessing": {"campaign"},

@@ -141,6 +141,14 @@ def handling(numbers: Iterable[signal.Signals], handle: Handle) -> Iterator[None
             signal.signal(number, call)
 
 
+def interrupt(thread: int) -> None:
+    """Does in the main thread, whose number is `thread`, what Ctrl-C does, also while it waits.  Called by another thread."""
+    if sys.platform == "win32":
+        signal.raise_signal(signal.SIGINT)
+    else:
+        signal.pthread_kill(thread, signal.SIGINT)
+
+
 def ignore(numbers: Iterable[signal.Signals]) -> None:
     """Lets some signals have no effect from now on, while the process ends."""
     for number in numbers:

@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType, TracebackType
 from typing import NoReturn, Protocol
 
-from fbvm.base.host import ending_signals, handling, ignore
+from fbvm.base.host import ending_signals, handling, ignore, interrupt
 
 AGAIN_S = 0.01
 """After this time Ctrl-C comes again that Python could not let through."""
@@ -108,7 +108,7 @@ def run_process(verb: Callable[[], object]) -> NoReturn:
         if not isinstance(args.exc_value, KeyboardInterrupt):
             unraised(args)  # type: ignore[arg-type]
         else:  # it came while something was finalised, where Python drops exceptions
-            threading.Timer(AGAIN_S, signal.raise_signal, [signal.SIGINT]).start()
+            threading.Timer(AGAIN_S, interrupt, [threading.get_ident()]).start()
 
     sys.unraisablehook = unraisable
     try:

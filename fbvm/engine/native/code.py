@@ -14,7 +14,7 @@ from fbvm.engine.native.llvm import cache as native_cache
 from fbvm.engine.native.llvm.cache import Stored, name_of
 from fbvm.engine.native.llvm.compiler import Linked, compile_text
 from fbvm.engine.native.llvm.entry_points import EntryPoint
-from fbvm.engine.native.llvm.worker import worker
+from fbvm.engine.native.llvm.worker import compile_apart, worker
 
 QUICK, FAST = 0, 2
 """Levels of optimisation: without passes over the module, and with all."""
@@ -90,7 +90,7 @@ class Code:
 
     def _made(self, level: int) -> Stored:
         made = self.translation
-        stored = Stored(_facts(made), compile_text(made.quick if level == QUICK else made.text, level))
+        stored = Stored(_facts(made), compile_apart(made.quick if level == QUICK else made.text, level))
         native_cache.write(self._name(level), stored)
         return stored
 

@@ -6,6 +6,7 @@ is in the table of operations (`fbvm.code.operations`)."""
 from __future__ import annotations
 
 import linecache
+import marshal
 import sys
 from collections import deque
 from collections.abc import Callable, Generator
@@ -19,6 +20,7 @@ from weakref import finalize
 from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Body, Image, ProgramRun
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
+from fbvm.engine.apart import run_apart
 from fbvm.engine.bases import fixed_bases
 from fbvm.engine.depths import with_recursion_room
 from fbvm.engine.python.runtime import NO_SITE, Observation, environment
@@ -28,6 +30,8 @@ from fbvm.engine.trap import NO_INSTANCE, Stop, Trap, trap
 _NUMBERS = count(1)
 FRAMES_TO_SPARE = 400
 """Python frames that the callers of an engine, and its own functions, may need besides those of the program."""
+PART_CHARACTERS, LONGEST_HERE = 1 << 18, 1 << 20
+"""The length of text that Python's compiler gets at a time, and of text that it gets in this process: half a second of work."""
 FRAMES_A_LEVEL = 5
 """Python frames that translating takes at most for each level of nested code."""
 
@@ -37,7 +41,7 @@ class Program:
     """The Python code of an image, which engines over any number of memories share."""
 
     source: str
-    code: CodeType
+    parts: tuple[CodeType, ...]
     constants: dict[str, Any] = field(repr=False)
     bases: dict[int, int]
     """Where the instance begins of each body that was written for its only one, by the body's number."""
@@ -58,31 +62,48 @@ def translate(image: Image, observed: bool = False, anywhere: bool = False) -> P
     known = _programs.get(key)
     if known is not None:
         return known
-    name = f"<fbvm {'observed' if observed else 'plain'} {next(_NUMBERS)}>"
+    name = f"fbvm {'observed' if observed else 'plain'} {next(_NUMBERS)}"
     program = with_recursion_room(image, FRAMES_A_LEVEL, partial(_written, image, observed, anywhere, name))
-    source = program.source
-    linecache.cache[name] = (len(source), None, source.splitlines(keepends=True), name)
     _programs[key] = program
-    finalize(image, _forget, key, name)
+    finalize(image, _forget, key)
     return program
 
 
-def _forget(key: tuple[int, bool, bool], name: str) -> None:
-    del _programs[key]
-    linecache.cache.pop(name, None)
+def _forget(key: tuple[int, bool, bool]) -> None:
+    for part in _programs.pop(key).parts:
+        linecache.cache.pop(part.co_filename, None)
 
 
 def _written(image: Image, observed: bool, anywhere: bool, name: str) -> Program:
     bases = {} if anywhere else fixed_bases(image)
     constants: dict[str, Any] = {}
+    texts: list[str] = []
     lines: list[str] = []
-    frames = 0
+    frames = size = 0
     for number in range(len(image.bodies)):
         writer = BodyWriter(image, constants, observed, bases.get(number))
-        lines += [*writer.write(number), ""]
+        body = [*writer.write(number), ""]
+        lines += body
         frames += 1 + len(writer.routines)
-    source = "\n".join(lines)
-    return Program(source, compile(source, name, "exec"), constants, bases, frames)
+        size += sum(map(len, body))
+        if size > PART_CHARACTERS:
+            texts.append("\n".join(lines))
+            lines, size = [], 0
+    texts.append("\n".join(lines))
+    parts = tuple(_compiled(text, f"<{name} {number}>" if number else f"<{name}>") for number, text in enumerate(texts))
+    return Program("\n".join(texts), parts, constants, bases, frames)
+
+
+def _compiled(text: str, name: str) -> CodeType:
+    """The code of a part, whose lines tracebacks find; a long one is compiled in another process, since nothing breaks off
+    Python's compiler."""
+    linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)
+    made = None
+    if len(text) > LONGEST_HERE:
+        made = run_apart(f"import marshal, sys\ntext = sys.stdin.buffer.read().decode()\n"
+                         f"sys.stdout.buffer.write(marshal.dumps(compile(text, {name!r}, 'exec')))", text.encode(), ["-I", "-S"])
+    code: CodeType = marshal.loads(made) if made else compile(text, name, "exec")
+    return code
 
 
 class PythonEngine:
@@ -109,7 +130,8 @@ class PythonEngine:
     def _bind(self, program: Program) -> list[Callable[[int], Any]]:
         """The bodies of a program over this memory."""
         names = environment(self.memory, self.image.objects) | program.constants
-        exec(program.code, names)
+        for part in program.parts:
+            exec(part, names)
         self._names = names
         self.allowance = self._allowance
         for number, function in self.substitutes.items():

@@ -15,7 +15,18 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import IO
 
+from fbvm.engine.apart import DEAF, run_apart
+from fbvm.engine.native.llvm.compiler import compile_text
+
 _SIZE_BYTES = 8
+LONGEST_HERE = {0: 4 << 20, 1: 1 << 20, 2: 1 << 19}
+"""Characters of the text of a module, by level of optimisation, that LLVM compiles in half a second."""
+
+
+def _program(call: str) -> str:
+    """The program of a process that calls a function of this module with the bytes of its standard input and output."""
+    return (f"import sys; sys.path[:] = {sys.path!r}\n"
+            f"from fbvm.engine.native.llvm import worker\nworker.{call.format('sys.stdin.buffer, sys.stdout.buffer')}")
 
 
 def serve(jobs: IO[bytes], answers: IO[bytes]) -> None:
@@ -23,8 +34,6 @@ def serve(jobs: IO[bytes], answers: IO[bytes]) -> None:
 
     A job is the size of a text in eight bytes, and the text of a module; an answer the size of an object file, and the object
     file, which is empty if the compilation failed."""
-    from fbvm.engine.native.llvm.compiler import compile_text
-
     while len(head := jobs.read(_SIZE_BYTES)) == _SIZE_BYTES:
         text = jobs.read(int.from_bytes(head, "little")).decode()
         try:
@@ -33,6 +42,19 @@ def serve(jobs: IO[bytes], answers: IO[bytes]) -> None:
             compiled = b""
         answers.write(len(compiled).to_bytes(_SIZE_BYTES, "little") + compiled)
         answers.flush()
+
+
+def compile_apart(text: str, level: int) -> bytes:
+    """Compiles the text of a module as `compile_text` does, in a process of its own if it is large, so that Ctrl-C ends it."""
+    made = None
+    if len(text) > LONGEST_HERE[level]:
+        made = run_apart(_program(f"serve_one({{}}, {level})"), text.encode())
+    return made or compile_text(text, level)
+
+
+def serve_one(job: IO[bytes], answer: IO[bytes], level: int) -> None:
+    """Runs in the process of `compile_apart`: compiles one module."""
+    answer.write(compile_text(job.read().decode(), level))
 
 
 class Worker:
@@ -80,10 +102,9 @@ class Worker:
     def _started(self) -> subprocess.Popen[bytes]:
         process = self._process  # which `stop` may take away meanwhile
         if process is None or process.poll() is not None or self._owner != os.getpid():
-            program = (f"import sys; sys.path[:] = {sys.path!r}\n"
-                       "from fbvm.engine.native.llvm.worker import serve\nserve(sys.stdin.buffer, sys.stdout.buffer)")
-            process = self._process = subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE,
-                                                       stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+            command = [sys.executable, "-c", DEAF + _program("serve({})")]
+            process = self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                                                       stderr=subprocess.DEVNULL)
             self._owner = os.getpid()
             atexit.register(self.stop)
         return process
