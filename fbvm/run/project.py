@@ -28,6 +28,7 @@ from typing import Any
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.base.dialects import DIALECTS
 from fbvm.base.files import SETTINGS_BYTES
+from fbvm.base.host import foreign_path
 from fbvm.engine.choice.tiers import CHOICES
 from fbvm.machine.backplane import KINDS as UNIT_KINDS
 from fbvm.machine.scan.watch_cycle import LONGEST_NS, SHORTEST_NS, USUAL_NS
@@ -215,6 +216,7 @@ def read_project(path: Path) -> Project | list[Diagnostic]:
         reading.report("P0104", ("plc",), "there is no PLC", "begin one with [plc.NAME] and its sources")
     if not errors(reading.diagnostics):
         _check_units(reading, table["plc"])
+        _check_paths(reading, table["plc"], path.parent)
     if errors(reading.diagnostics):
         return sorted(reading.diagnostics, key=Diagnostic.order)
     run = table["run"] or {name: key.default for name, key in RUN.items()}
@@ -249,6 +251,16 @@ def _check_units(reading: Reading, plcs: Mapping[str, Any]) -> None:
                 path = ("plc", name, "unit", number, key)
                 known = ", ".join(UNIT_KINDS[kind][1])
                 reading.report("P0102", path, f"{key} is no key of a unit of type {kind}", f"it has address, {known}")
+
+
+def _check_paths(reading: Reading, plcs: Mapping[str, Any], folder: Path) -> None:
+    """Complain about paths that only another system takes, such as those with backslashes."""
+    for name, row in plcs.items():
+        for key in ("sources", "libraries"):
+            for written in row[key]:
+                hint = foreign_path(written)
+                if hint and not (folder / written).is_dir() and not (folder / written).is_file():
+                    reading.report("P0103", ("plc", name, key), f"plc.{name}.{key}: {written} is no path on this system", hint)
 
 
 def _plc(name: str, row: Mapping[str, Any], folder: Path) -> PlcRow:

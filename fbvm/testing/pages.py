@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from fbvm.base.files import write_file
+from fbvm.base.host import portable
 from fbvm.machine.plc import Plc
 from fbvm.record.trace.history import History
 from fbvm.record.trace.packets import Packet
@@ -29,8 +30,8 @@ def page_path(root: Path, test: str) -> Path:
 
 
 def file_name(test: str) -> str:
-    """The name of a file about a test, without its suffix."""
-    return re.sub(r"[^\w\-\[\].]+", ".", re.sub(r"\.(py|st)::", ".", test))[:150]
+    """The name of a file about a test, without its suffix, which every system takes."""
+    return portable(re.sub(r"[^\w\-\[\].]+", ".", re.sub(r"\.(py|st)::", ".", test))[:150])
 
 
 def write_page(path: Path, title: str, history: History, subject: Subject, units: Plc, asked: Sequence[Place],

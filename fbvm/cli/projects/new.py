@@ -9,6 +9,7 @@ import click
 
 from fbvm.base.data import data_folder
 from fbvm.base.files import write_file
+from fbvm.base.host import portable
 from fbvm.cli.shared.files import writing
 
 EXAMPLE = "project"
@@ -36,6 +37,8 @@ def command(name: str) -> None:
     title = target.resolve().name
     if not re.fullmatch(r"[\w][\w .-]*", title):
         raise click.UsageError(f"{name!r} cannot be the name of a project; use letters, digits, - and _")
+    if portable(title) != title:
+        raise click.UsageError(f"{name!r} cannot be the name of a project: Windows has no folder of this name")
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise click.UsageError(f"{name} is there already")
     source = data_folder("examples") / EXAMPLE

@@ -15,8 +15,10 @@ ASCII = {
     **dict.fromkeys(map(chr, range(0x2500, 0x2580)), "+"), **dict.fromkeys("─━═╌╴╶╸╺", "-"),
     **dict.fromkeys("│┃║╎╵╷╹╻╽╿├┝┠┣┤┥┨┫╞╟╠╡╢╣", "|"), **dict.fromkeys("↑▲", "^"), **dict.fromkeys("↓▼", "v"),
     **dict.fromkeys("→▶►", ">"), **dict.fromkeys("←◀◄", "<"), "…": ".", "·": ".", "●": "*", "µ": "u",
+    **dict.fromkeys("“”„«»", '"'), **dict.fromkeys("‘’‚′", "'"), **dict.fromkeys("‐‑‒–—−", "-"), "•": "*", "×": "x", "÷": "/",
+    "≤": "<", "≥": ">", "\N{NO-BREAK SPACE}": " ",
 }  # fmt: skip
-"""Characters of drawings, and one that stands for each where an encoding lacks it, so that columns stay."""
+"""Characters of drawings and of comments, and one that stands for each where an encoding lacks it, so that columns stay."""
 
 
 def _in_ascii(error: UnicodeError) -> tuple[str, int]:

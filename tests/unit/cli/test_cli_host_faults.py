@@ -121,7 +121,7 @@ def test_streams_that_are_closed(tmp_path: Path) -> None:
 
 @each_of(("encoding", "verb"), [
     ("cp1252", ("ladder", "ladder.st")), ("ascii", ("ladder", "ladder.st")), ("ascii", ("sfc", "sfc.st")),
-    ("cp437", ("sfc", "sfc.st")),
+    ("cp437", ("sfc", "sfc.st")), ("cp850", ("ladder", "ladder.st")), ("cp850", ("sfc", "sfc.st")), ("cp1252", ("sfc", "sfc.st")),
 ])
 def test_drawings_in_an_encoding_without_boxes(encoding: str, verb: tuple[str, str]) -> None:
     arguments = [verb[0], str(EXAMPLES / verb[1])]
@@ -132,6 +132,17 @@ def test_drawings_in_an_encoding_without_boxes(encoding: str, verb: tuple[str, s
     assert list(map(len, found.output.splitlines())) == list(map(len, expected.splitlines()))
     if encoding == "ascii":
         assert found.output == "".join(ASCII.get(character, character) for character in expected)
+
+
+@each_of(("encoding", "shown"), [
+    ("cp850", 'say "hello" - it\'s 5 - µm ×'), ("cp1252", "say “hello” – it’s 5 - µm ×"),
+    ("ascii", 'say "hello" - it\'s 5 - um x'),
+])
+def test_messages_in_code_pages_of_windows(tmp_path: Path, encoding: str, shown: str) -> None:
+    (tmp_path / "line.st").write_text("PROGRAM Main x := ; // say “hello” – it’s 5 − µm ×\nEND_PROGRAM\n", encoding="utf-8")
+    found = CliRunner(charset=encoding).invoke(main, ["check", str(tmp_path / "line.st")], catch_exceptions=False)
+    assert found.exit_code == 3
+    assert f"// {shown}" in found.output
 
 
 def test_closed_streams_are_replaced(monkeypatch: pytest.MonkeyPatch) -> None:

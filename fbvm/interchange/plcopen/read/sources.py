@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 from fbvm.base.diagnostics import Source
+from fbvm.base.host import is_device
 from fbvm.interchange.plcopen.read.bodies import Bodies
 from fbvm.interchange.plcopen.read.document import Configuration, DataType, Document, Pou, Reading, Resource, Variable, VarList
 from fbvm.interchange.plcopen.read.types import remark
@@ -16,8 +17,6 @@ GLOBALS = "globals"
 TYPES = "types"
 LONGEST_NAME = 60
 """Most characters of the name of a file; file systems take 255 bytes."""
-_DEVICE = re.compile(r"(?i)con|prn|aux|nul|(?:com|lpt)[0-9]")
-"""Names that are no files under Windows, whatever their ending."""
 
 
 def sources(reading: Reading, document: Document) -> dict[str, str]:
@@ -52,7 +51,7 @@ class _Files:
     def add(self, name: str, lines: list[str]) -> None:
         """Puts lines into a file of their own, which is called `name` or like it."""
         name = re.sub(r"[^\w-]", "_", name)[:LONGEST_NAME]
-        if _DEVICE.fullmatch(name):
+        if is_device(name):
             name += "_"
         free, folded = name, name.casefold()
         while free.casefold() in self._taken:
