@@ -208,7 +208,9 @@ def select(selector: selectors.BaseSelector, timeout_s: float) -> list[tuple[sel
 
 def monotonic_clock() -> int:
     """The number of the clock of `time.monotonic_ns` for C's clock_gettime; 0 under Windows, which has none."""
-    return 0 if sys.platform == "win32" else time.CLOCK_MONOTONIC
+    if sys.platform == "win32":
+        return 0
+    return time.CLOCK_MONOTONIC
 
 
 def anonymous_memory(size: int) -> mmap.mmap:
