@@ -64,8 +64,8 @@ class Report:
         value = self.names.read(self._plc.read, signal.place)
         now = f"{signal.label} is {signal.text(value)}"
         change, writer = table.last_change(signal), table.writers.get(signal)
+        first = table.bands[0].scan if table.bands else self._plc.scans
         if change is None:
-            first = table.bands[0].scan if table.bands else self._plc.scans
             now += f" since {'power-on' if first == 0 else f'before scan {first}'}"
         elif change.new != value:
             return f"{now}, written after the last scan"
@@ -77,7 +77,7 @@ class Report:
             if change.site is None and change.instance == "":
                 return f"{now}, written from outside the program"
         if writer is None:
-            return f"{now}; no statement wrote it"
+            return f"{now}; {f'writes are known from scan {first} on' if first else 'no statement wrote it'}"
         last = f", written last in scan {writer.scan}" if change is None or change.scan != writer.scan else ""
         return f"{now}{last}, by {self._by(writer)}"
 

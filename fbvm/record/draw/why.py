@@ -5,6 +5,7 @@ Needs a trace of depth STATEMENTS.  Reads by the conditions around a statement c
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Protocol
@@ -13,6 +14,7 @@ from fbvm.base.memory import Memory, Snapshot, compare
 from fbvm.code.image import Site
 from fbvm.machine.plc import Phase
 from fbvm.record.trace.events import Event, Frame, Read, Statement, Write
+from fbvm.record.trace.format import xor
 from fbvm.record.trace.recorder import Signal
 from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place
@@ -26,7 +28,7 @@ WINDOWS = (100, 2000)
 MOST_FACTS = 32
 """Operands that are kept of a value without a name."""
 LARGEST_BYTES = 4096
-"""A larger write is not followed byte by byte."""
+"""A larger write is kept whole and compressed, not byte by byte."""
 
 
 class Instant(Protocol):
@@ -116,6 +118,8 @@ class _Changes:
     def __init__(self, trace: EventSource, scans: range) -> None:
         self._trace = trace
         self._changes: dict[int, list[tuple[int, Change]]] = {}
+        self._large: list[tuple[range, bytes, Change]] = []
+        """Writes of more than LARGEST_BYTES: the offsets, the bits that changed as compressed bytes, and the change."""
         self._reads: dict[tuple[Frame, int], list[Fact]] = {}
         self._nameless: dict[int, tuple[Fact, ...]] = {}
         """By offset the operands of values without a name: conditions of rungs, variables of functions."""
@@ -160,10 +164,14 @@ class _Changes:
     def _written(self, moment: Instant, event: Write) -> None:
         if self._trace.names.at(event.offset, event.bit if event.bit < 8 else None) is None:
             self._nameless[event.offset] = tuple(_once(self._facts(event.frame, event.site)))[:MOST_FACTS]
-        elif event.old != event.value and len(event.value) <= LARGEST_BYTES:
+        elif event.old != event.value:
             site = self._trace.sites[event.site] if event.site >= 0 else None
             change = Change(moment.scans, moment.now_ns, self.order, site, self._trace.names.instance(event.frame.base),
                             tuple(self._facts(event.frame, event.site)))  # fmt: skip
+            if len(event.value) > LARGEST_BYTES:
+                offsets = range(event.offset, event.offset + len(event.value))
+                self._large.append((offsets, zlib.compress(xor(event.old, event.value), 1), change))
+                return
             for at, (old, new) in enumerate(zip(event.old, event.value, strict=True), event.offset):
                 if old != new:
                     bits = 1 << event.bit if event.bit < 8 else old ^ new
@@ -179,15 +187,25 @@ class _Changes:
 
     def last(self, place: Place, before: int) -> Change | None:
         """The last change of a place before the event with number `before`."""
-        found: Change | None = None
-        for at in range(place.offset, place.offset + max(1, place.type.size)):
-            mask = 0xFF if place.bit is None else 1 << place.bit
+        offsets = range(place.offset, place.offset + max(1, place.type.size))
+        mask = 0xFF if place.bit is None else 1 << place.bit
+        found = self._last_large(offsets, mask, before)
+        for at in offsets:
             for bits, change in reversed(self._changes.get(at, [])):
                 if change.order < before and bits & mask:
                     if found is None or change.order > found.order:
                         found = change
                     break
         return found
+
+    def _last_large(self, offsets: range, mask: int, before: int) -> Change | None:
+        """The last write of more than LARGEST_BYTES that changed bits of `mask` in some bytes."""
+        for written, bits, change in reversed(self._large):
+            if change.order < before and offsets.start < written.stop and written.start < offsets.stop:
+                first, end = max(offsets.start, written.start), min(offsets.stop, written.stop)
+                if any(changed & mask for changed in zlib.decompress(bits)[first - written.start : end - written.start]):
+                    return change
+        return None
 
 
 def why(trace: EventSource, place: Place, scan: int, deepest: int = DEEPEST) -> Cause:
@@ -262,7 +280,8 @@ def _lines(trace: EventSource, cause: Cause, first: str, rest: str) -> Iterator[
 def _since(trace: EventSource, cause: Cause) -> str:
     change = cause.change
     if change is None:
-        return " since the trace begins" if trace.scans.start else " since power-on"
+        start = trace.scans.start
+        return f" since before scan {start}, the first of the trace" if start else " since power-on"
     when = f" since scan {change.scan} ({show_time(change.now_ns).removeprefix('T#')})"
     if change.phase is Phase.REFRESH:
         return f"{when}, by a unit in the I/O refresh"

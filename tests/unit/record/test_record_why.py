@@ -77,7 +77,18 @@ def test_a_trace_that_begins_later_says_so() -> None:
     plc.run(scans=5)
     writer.close()
     trace = Trace(io.BytesIO(file.getvalue()))
-    assert cause_text(trace, ask(trace, "Main.Pump", 24)) == "Main.Pump = TRUE since the trace begins"
+    assert cause_text(trace, ask(trace, "Main.Pump", 24)) == "Main.Pump = TRUE since before scan 20, the first of the trace"
+
+
+def test_a_copy_of_a_large_array_is_a_write_of_its_elements() -> None:
+    plc, file = Plc(image("PROGRAM Main VAR n : DINT; a, b : ARRAY[0..1999] OF DINT; END_VAR\n"
+                          "n := n + 1;\nIF n = 3 THEN b[7] := n; END_IF\na := b;\nEND_PROGRAM")), io.BytesIO()  # fmt: skip
+    writer = TraceWriter(plc, file, Depth.STATEMENTS)
+    plc.run(scans=6)
+    writer.close()
+    trace = Trace(io.BytesIO(file.getvalue()))
+    lines = [cause_text(trace, ask(trace, name, 5, 0)) for name in ("Main.a[7]", "Main.a[8]")]
+    assert lines == ["Main.a[7] = 3 since scan 2 (20ms), by pump.st:4 in Main", "Main.a[8] = 0 since power-on"]
 
 
 def test_a_unit_changes_words_in_the_refresh() -> None:
@@ -235,8 +246,8 @@ def test_a_cause_in_the_first_recorded_scan(first: int, asked: int) -> None:
     assert cause_text(trace, ask(trace, "Main.Copied", first + asked)).splitlines() == [
         f"Main.Copied = 5 {at}, by pump.st:7 in Main",
         f"├ Main.Seen = 5 {at}, by pump.st:4 in Main",
-        f"│ └ if Main.Seen = 0 {'since the trace begins' if first else 'since power-on'}",
-        f"└ if Main.Copied = 0 {'since the trace begins' if first else 'since power-on'}",
+        f"│ └ if Main.Seen = 0 {'since before scan 20, the first of the trace' if first else 'since power-on'}",
+        f"└ if Main.Copied = 0 {'since before scan 20, the first of the trace' if first else 'since power-on'}",
     ]
 
 
@@ -245,13 +256,14 @@ def test_a_cause_before_all_windows_is_found(monkeypatch: pytest.MonkeyPatch) ->
     trace = recorded_from(20, 12)
     for asked in range(12):
         assert cause_text(trace, ask(trace, "Main.Seen", 20 + asked)).splitlines() == [
-            "Main.Seen = 5 since scan 20 (200ms), by pump.st:4 in Main", "└ if Main.Seen = 0 since the trace begins"]
+            "Main.Seen = 5 since scan 20 (200ms), by pump.st:4 in Main",
+            "└ if Main.Seen = 0 since before scan 20, the first of the trace"]
 
 
 @pytest.mark.parametrize("first", [0, 20])
 def test_a_cause_from_outside_in_the_third_scan_and_none_before_the_first(first: int) -> None:
     """What was written before the first recorded scan is there when the trace begins."""
-    trace, begin = recorded_from(first, 105), "since the trace begins" if first else "since power-on"
+    trace, begin = recorded_from(first, 105), "since before scan 20, the first of the trace" if first else "since power-on"
     assert cause_text(trace, ask(trace, "Main.Taken", first + 4)).splitlines() == [
         f"Main.Taken = 7 since scan {first} ({f'{first * 10}ms' if first else '0s'}), by pump.st:10 in Main",
         f"├ Main.Given = 7 {begin}",

@@ -10,6 +10,7 @@ import pytest
 
 from fbvm.net.peers import ModbusPeer
 from fbvm.testing import Rig, Trapped, ns
+from fbvm.testing.report import LOOKED_BACK
 from fbvm.testing.subject import SubjectError, subject
 from fbvm.watch.paths import UnknownPlace
 from fbvm.wire.link import Peer
@@ -307,6 +308,13 @@ def test_what_nobody_wrote_is_said() -> None:
     pump = rig().run("30ms")
     assert pump["Range.Low"] == 0
     assert "Range.Low is 0 since power-on; no statement wrote it" in pump.explain()
+
+
+def test_what_was_written_before_the_kept_scans_is_not_said_to_be_written_by_nobody() -> None:
+    once = rig("Once", "PROGRAM Once VAR Started : BOOL; END_VAR IF NOT Started THEN Started := TRUE; END_IF END_PROGRAM")
+    once.run(scans=LOOKED_BACK + 50)
+    assert once.Started
+    assert "Started is TRUE since before scan 50; writes are known from scan 50 on" in once.explain()
 
 
 def test_an_input_came_from_outside() -> None:
