@@ -17,15 +17,16 @@ from fbvm.record.draw.table import ScanTable
 from fbvm.record.draw.why import cause_text, why
 from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.recorder import signals_at
-from fbvm.step.breakpoints import Breakpoint, parse_breakpoint
+from fbvm.step.breakpoints import Breakpoint, Reached, Watched, any_reached, first_reached, parse_breakpoint
 from fbvm.step.scan_replay import Action
 from fbvm.step.session import Session
 from fbvm.step.session_events import SessionEvents
 from fbvm.step.stop_report import StopReport
-from fbvm.watch.conditions import ConditionError, parse_condition
+from fbvm.watch.conditions import ConditionError, parse_condition, split_condition
 from fbvm.watch.names import is_single
 from fbvm.watch.paths import Place, Span, UnknownPlace
 from fbvm.watch.places import parse_for
+from fbvm.watch.scanner import listed_places
 from fbvm.watch.values import parse_time_ns
 
 LOOK_AHEAD_NS = 60_000_000_000
@@ -59,15 +60,15 @@ COMMANDS = (
     Command("next", "n", "next [N]", "one statement on, blocks at once", True),
     Command("out", "o", "out", "to the end of this block", True),
     Command("scan", "c", "scan [N]", "to the beginning of the next scan, or the Nth from here", True),
-    Command("run", "r", "run [LINE | CONDITION | TIME]", "to a line, until something holds, for a time, or to a breakpoint",
+    Command("run", "r", "run [LINE | CONDITION | TIME]", "to a breakpoint, for a time at most; or to a line or condition",
             True, "place"),
     Command("back", "b", "back [N | scan | FILE:LINE | CONDITION]",
             "one statement back, to the beginning of the scan, or to where it last was so", True, "place"),
     Command("goto", "g", "goto SCAN", "to the beginning of any scan", True),
-    Command("break", "k", "break [LINE | CONDITION]", "a breakpoint for `run` and `back`; without, lists them", takes="line"),
+    Command("break", "k", "break [LINE | CONDITION]", "a breakpoint for `run`; without, lists them", takes="line"),
     Command("unbreak", "", "unbreak [NUMBER]", "takes a breakpoint away, or all"),
     Command("print", "p", "print NAME...", "values of variables, blocks, addresses, ranges", takes="place"),
-    Command("watch", "w", "watch NAME...", "prints these at each stop", takes="place"),
+    Command("watch", "w", "watch NAME... [IF CONDITION]", "prints these at each stop, or where that holds", takes="place"),
     Command("unwatch", "", "unwatch [NAME...]", "no longer", takes="place"),
     Command("write", "", "write NAME = VALUE", "writes once, here; what came later is forgotten", takes="place"),
     Command("force", "f", "force NAME = VALUE", "holds a value from here on", takes="place"),
@@ -95,7 +96,7 @@ class Commands:
 
     def __init__(self, session: Session, report: StopReport, packets: Callable[[], list[Packet]] = list) -> None:
         self.session, self.report = session, report
-        self.watches: list[str] = []
+        self.watches: list[Watched] = []
         self.breakpoints: list[Breakpoint] = []
         self.ended = False
         self._packets = packets
@@ -130,8 +131,9 @@ class Commands:
         yield self.report.place()
         yield from self.report.around()
         yield from self.report.changes()
-        for name in self.watches:
-            yield self.report.value(name)
+        for watched in self.watches:
+            if watched.condition is None or watched.condition.holds(self.session.read):
+                yield self.report.value(watched.name)
 
     # --- moves
 
@@ -153,13 +155,18 @@ class Commands:
         self.session.goto(_count(rest, least=0))
 
     def _run(self, rest: str) -> Iterator[str]:
+        cycle_ns, here = self.session.plc.cycle_ns, self.session.statement
         if re.fullmatch(r"(?:T#)?[\d.]+\s*[a-zA-Z]\w*", rest, re.I):
-            self.session.scan(max(1, -(-parse_time_ns(rest) // self.session.plc.cycle_ns)))
+            scans = max(1, -(-parse_time_ns(rest) // cycle_ns))
+            if self.breakpoints:
+                self.session.run(first_reached(self.breakpoints, here), scans)
+            else:
+                self.session.scan(scans)
             return
         targets = self._targets(rest)
-        scans = max(1, LOOK_AHEAD_NS // self.session.plc.cycle_ns)
-        if not self.session.run(lambda statement: any(each.reached(statement) for each in targets), scans) \
-                and not self.session.trap:  # fmt: skip
+        stop: Reached = partial(any_reached, targets) if rest else first_reached(targets, here)
+        scans = max(1, LOOK_AHEAD_NS // cycle_ns)
+        if not self.session.run(stop, scans) and not self.session.trap:
             yield f"{rest or 'no breakpoint'} was not reached in {scans} scans"
 
     def _back(self, rest: str) -> Iterator[str]:
@@ -170,7 +177,7 @@ class Commands:
                 self.session.back()
         else:
             targets = self._targets(rest)
-            if not self.session.run_back(lambda statement: any(each.reached(statement) for each in targets)):
+            if not self.session.run_back(partial(any_reached, targets)):
                 yield f"{rest} was never reached before"
 
     def _targets(self, rest: str) -> list[Breakpoint]:
@@ -207,14 +214,17 @@ class Commands:
             yield self.report.value(name)
 
     def _watch(self, rest: str) -> Iterator[str]:
-        names = self._names(rest)
+        where, when = split_condition(rest)
+        names = self._names(where)
+        condition = parse_condition(when, self.session.find) if when else None
         for name in names:
             yield self.report.value(name)
-        self.watches += [name for name in names if name not in self.watches]
+        self._unwatch(where)
+        self.watches += [Watched(name, condition) for name in names]
 
     def _unwatch(self, rest: str) -> None:
         gone = [fold(name) for name in self._names(rest)] if rest else None
-        self.watches = [name for name in self.watches if gone is not None and fold(name) not in gone]
+        self.watches = [each for each in self.watches if gone is not None and fold(each.name) not in gone]
 
     def _write(self, rest: str) -> Iterator[str]:
         place, value = self._value(rest)
@@ -261,7 +271,7 @@ class Commands:
     # --- looking
 
     def _table(self, rest: str) -> Iterator[str]:
-        names = self._names(rest) if rest else self.watches
+        names = self._names(rest) if rest else [each.name for each in self.watches]
         if not names:
             raise CommandError("name variables, or watch some")
         signals = [signal for name in names for signal in signals_at(self.session.find(name), {})]
@@ -307,7 +317,8 @@ class Commands:
                 short = f"{command.short:<2}" if command.short else "  "
                 yield f"  {short} {command.usage:<32} {command.help}"
         if not rest:
-            yield "  LINE is 15, pump.st:15 or the name of a POU.  NAME := VALUE writes, too.  An empty line moves again."
+            yield "  LINE is 15, pump.st:15 or the name of a POU, alone or before IF CONDITION.  NAME is a variable, an address"
+            yield "  or a range, D200..D209.  NAME := VALUE writes, too.  An empty line moves again."
 
     def _quit(self, rest: str) -> None:
         self.ended = True
@@ -315,7 +326,7 @@ class Commands:
     @staticmethod
     def _names(rest: str) -> list[str]:
         """The names in an argument, separated by blanks or commas; `CIO 0.00` is one name."""
-        parts = re.findall(r"(?:CIO\s+)?[^\s,\[]+(?:\[[^\]]*\])*(?:[^\s,]*)", rest, re.I)
+        parts = listed_places(rest)
         if not parts:
             raise CommandError("name something")
         return parts

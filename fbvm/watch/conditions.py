@@ -51,6 +51,17 @@ def parse_condition(text: str, find: Find) -> Condition:
     return Condition(text, term, tuple(parser.places))
 
 
+def split_condition(text: str) -> tuple[str, str]:
+    """A place and the condition behind the word IF, "" without one.
+
+    >>> split_condition("pump.st:12 IF Main.n > 5"), split_condition("CIO 0.00")
+    (('pump.st:12', 'Main.n > 5'), ('CIO 0.00', ''))
+    """
+    words = text.split()
+    at = next((number for number, word in enumerate(words) if word.upper() == "IF"), len(words))
+    return " ".join(words[:at]), " ".join(words[at + 1:])
+
+
 class _Parser:
     def __init__(self, text: str, find: Find) -> None:
         self.text = text

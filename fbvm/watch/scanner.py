@@ -27,6 +27,13 @@ _TOKEN = re.compile(
     )""",
     re.I | re.X,
 )
+_PLACE = r"""(?:
+    %?\s*(?:CIO|DM|D|W|H|A|TF|CNF|CF|T|C|E[0-9A-F]\s*[_:])\s*\d+(?:\.\d+)?(?![\w\[^]|\.(?!\.))
+    | %\s*(?:[IQM][XBWDL]?)?\d+(?:\.\d+)?(?!\w)
+    | \d+(?:\.\d+)?(?!\w)
+    | [^\W\d]\w*(?:\s*\[[^\]]*\]|\s*\.\s*%?\w+|\s*\^)*
+)"""
+_LISTED = re.compile(rf"\s*({_PLACE}(?:\s*\.\.\s*{_PLACE})?)\s*(?:,|(?=\s|$))", re.I | re.X)
 _WORDS = frozenset(("AND", "OR", "XOR", "NOT", "MOD", "TRUE", "FALSE"))
 
 
@@ -42,3 +49,20 @@ def tokens(text: str) -> Iterator[tuple[str, str]]:
             kind, word = "word", word.upper()
         yield kind, word
         at = match.end()
+
+
+def listed_places(text: str) -> list[str]:
+    """The names, addresses and ranges of a list, parted by blanks or commas.  Raises ValueError for what is none of these.
+
+    >>> listed_places("Main.Delay CIO 0.00, D200..D209")
+    ['Main.Delay', 'CIO 0.00', 'D200..D209']
+    """
+    found: list[str] = []
+    at = 0
+    while at < len(text.rstrip()):
+        match = _LISTED.match(text, at)
+        if not match:
+            raise ValueError(f"{text[at:].strip()!r} is neither a name nor an address nor a range")
+        found.append(match[1])
+        at = match.end()
+    return found

@@ -9,6 +9,7 @@ import click
 
 from fbvm.cli.running.debug_targets import DebugTarget, ProjectTarget
 from fbvm.cli.shared import status
+from fbvm.cli.shared.e_banks import e_banks_in, with_e_banks
 from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, mapping, setting, time_ns
 from fbvm.cli.shared.project_arguments import project_argument
 from fbvm.cli.shared.prompt import prompt_lines
@@ -28,7 +29,8 @@ from fbvm.watch.places import parse_for
 @click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
               help="Cycle of programs without a TASK, and how often the PLC scans.")
 @click.option("--set", "settings", type=setting, multiple=True, metavar="NAME=VALUE", help="Write before the first scan.")
-@click.option("--watch", "watched", multiple=True, metavar="NAME|ADDRESS", help="Print this at each stop.")
+@click.option("--watch", "watched", multiple=True, metavar="NAME|ADDRESS|FIRST..LAST",
+              help="Print this at each stop; with IF EXPRESSION behind it only where that holds.")
 @click.option("--map", "mappings", type=mapping, multiple=True, metavar="IP:PORT=peer",
               help="Where a Modbus server is, in memory.")
 @click.option("--timing", type=click.Choice(["exact", "real"]), default="exact", show_default=True,
@@ -51,6 +53,7 @@ def command(
         texts = source_texts(debugged.image, debugged.files, debugged.libraries)
     else:
         image = compile_or_exit(files, program, libraries, runnable=True, drawn=True)
+        image = with_e_banks(image, e_banks_in([*watched, *(given.name for given in settings)]))
         debugged = DebugTarget(image, cycle_ns, mappings, timing, seed)
         texts = source_texts(image, {str(path): path for path in files}, libraries)
     session = Session(debugged.make)
@@ -59,9 +62,8 @@ def command(
         for given in settings:
             _write(session, given)
         for text in watched:
-            commands.report.value(text)
-            commands.watches.append(text)
-    except (LookupError, TypeError, ValueError) as error:
+            list(commands.run(f"watch {text}"))
+    except (CommandError, LookupError, TypeError, ValueError) as error:
         raise click.UsageError(str(error)) from None
     for line in commands.stop():
         _print(line)

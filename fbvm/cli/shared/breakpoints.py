@@ -9,6 +9,7 @@ import click
 
 from fbvm.machine.breakpoints import Frame, Halt
 from fbvm.machine.plc import Plc
+from fbvm.watch.conditions import split_condition
 from fbvm.watch.names import Names
 
 
@@ -29,20 +30,13 @@ def breakpoint_options(function: Callable[..., Any]) -> Callable[..., Any]:
 def set_breakpoints(plc: Plc, lines: Sequence[str], watched: Sequence[str], conditions: Sequence[str]) -> None:
     """Sets the breakpoints of the options on a PLC.  Raises ValueError or LookupError for an unknown place."""
     for text in lines:
-        where, when = _split_condition(text)
+        where, when = split_condition(text)
         plc.breakpoints.line(where, when)
     for text in watched:
-        where, when = _split_condition(text)
+        where, when = split_condition(text)
         plc.breakpoints.change(where, when)
     for text in conditions:
         plc.breakpoints.condition(text)
-
-
-def _split_condition(text: str) -> tuple[str, str]:
-    """The place in front of IF, and the condition behind it."""
-    words = text.split()
-    at = next((number for number, word in enumerate(words) if word.upper() == "IF"), len(words))
-    return " ".join(words[:at]), " ".join(words[at + 1:])
 
 
 def halt_lines(plc: Plc, halt: Halt, lines: Mapping[str, Mapping[int, str]]) -> Iterator[str]:

@@ -14,6 +14,7 @@ from fbvm.syntax.ladder.mnemonics import RungText, is_input, read_rungs
 from fbvm.syntax.ladder.operands import OperandError
 from fbvm.syntax.ladder.sequences import Sequences
 from fbvm.syntax.ladder.spans import Spans
+from fbvm.syntax.ladder.stops import with_one_stop, without_stops
 from fbvm.syntax.ladder.symbols import declaration, number
 from fbvm.syntax.st.expressions import Expressions
 from fbvm.syntax.st.lexer import Token
@@ -63,6 +64,7 @@ class LadderLowering:
         context.begin_rung()
         for step, line in enumerate(text.lines):
             context.begin_step(step, line)
+            before = len(context.out)
             try:
                 self._step(line.row)
             except (StepRefused, OperandError) as refusal:
@@ -71,6 +73,9 @@ class LadderLowering:
                 text.damaged = True
                 if is_input(line.row):
                     break
+            made = tuple(context.out[before:])
+            context.out[before:] = without_stops(made) if line.step.start == text.start else \
+                with_one_stop(made, context.temporaries)
         end = text.lines[-1].step.end if text.lines else text.start
         if text.lines and not text.damaged:
             self._finish(text)

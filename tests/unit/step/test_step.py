@@ -166,6 +166,62 @@ def test_run_and_back_to_lines_conditions_and_breakpoints() -> None:
     assert said(commands, "unbreak 1", "break") == ""
 
 
+def test_a_run_for_a_time_ends_at_a_breakpoint() -> None:
+    commands = made()
+    said(commands, "break Main.N = 4", "run 1s")
+    assert (commands.session.here, line_of(commands)) == (Position(3, 1), 14)
+    said(commands, "run 50ms")
+    assert commands.session.here == Position(8, 0)
+    said(commands, "unbreak", "break Twice", "run 10ms")
+    assert (commands.session.here, line_of(commands)) == (Position(8, 2), 4)
+
+
+def test_a_condition_stops_run_where_it_becomes_true() -> None:
+    """As `fbvm run --break-if` does."""
+    commands = made()
+    said(commands, "break Main.N > 2", "run")
+    assert commands.session.here == Position(2, 1)
+    said(commands, "run 1s")
+    assert commands.session.here == Position(102, 0)
+
+
+@each_of("text, scan, line", [
+    ("text.st:14 IF Main.N > 3", 3, 14), ("14 if Main.N > 3", 3, 14), ("Twice IF Main.N = 3", 2, 4),
+    ("Main.N > 3", 3, 14), ("text.st : 14", 0, 14), ("Main . N = 2", 1, 14), ("Main.N > 3 IF Main.N > 5", 5, 14),
+    ("D 200 = 0 AND Main.N = 2", 1, 14),
+])  # fmt: skip
+def test_breakpoints_are_written_as_those_of_run(text: str, scan: int, line: int) -> None:
+    commands = made()
+    said(commands, f"break {text}", "run")
+    assert (commands.session.here.scan, line_of(commands)) == (scan, line)
+
+
+def test_a_time_of_day_in_a_condition_is_no_line() -> None:
+    commands = made("PROGRAM Main VAR t : TOD := TOD#12:29:59; END_VAR t := t + T#1s; END_PROGRAM")
+    said(commands, "break Main.t = TOD#12:30:01", "run")
+    assert commands.session.here == Position(1, 1)
+
+
+@each_of("text, names", [
+    ("D200..D201", ["D200", "D201"]), ("CIO 0.00..CIO 0.02", ["CIO 0.00", "CIO 0.01", "CIO 0.02"]),
+    ("CIO 0 .. CIO 1", ["CIO 0", "CIO 1"]), ("%W5 Main . N", ["W5", "Main.N"]), ("D 200, 0.01", ["D200", "CIO 0.01"]),
+    ("Main.T.Q Main.R", ["Main.T.Q", "Main.R"]), ("W0.14..W1.00", ["W0.14", "W0.15", "W1.00"]),
+])  # fmt: skip
+def test_places_are_written_as_those_of_run(text: str, names: list[str]) -> None:
+    commands = made()
+    assert [row.partition(" = ")[0] for row in said(commands, f"watch {text}").splitlines()] == names
+    assert [row.partition(" = ")[0] for row in said(commands, "scan").splitlines()[-len(names):]] == names
+    said(commands, f"unwatch {text}")
+    assert not commands.watches
+
+
+def test_a_watch_with_a_condition() -> None:
+    commands = made()
+    said(commands, "watch Main.R D200 IF Main.N > 1")
+    assert "Main.R = 0" not in said(commands, "scan")
+    assert said(commands, "scan").endswith("Main.R = 0\nD200 = 0 (16#0000)")
+
+
 def test_the_scan_table_the_cause_and_the_calls() -> None:
     commands = made()
     text = said(commands, "run 5", "scan", "table Main.T.Q")
@@ -251,6 +307,40 @@ def test_where_power_flows_in_rungs() -> None:
         said(commands, "rung 9")
     said(commands, "run 12")
     assert not [row for row in said(commands, "goto 1", "list 10").splitlines() if row.endswith(("ON", "off"))]
+
+
+@pytest.mark.parametrize(("instruction", "lines"), [
+    ("OUT     Motor", 1), ("SET     Motor", 1), ("MOV(021) #5 D200", 1), ("TIM     0 #10", 1), ("DIFU(013) 100.05", 1),
+    ("CNT 1 #3", 1), ("@+(400) D1 D2 D3", 1), ("OUT     Motor", 2), ("MOV(021) #5 *D200", 1), ("KEEP(011) Motor", 1),
+])  # fmt: skip
+def test_a_step_of_a_rung_is_one_stop(instruction: str, lines: int) -> None:
+    """Also with an operand that is computed, with an edge, and under an interlock that inhibits or does not."""
+    conditions = 2 if instruction.startswith(("CNT", "KEEP")) else 1
+    rung = "".join("    LD      Start\n" for _ in range(conditions)) + f"    {instruction}\n" * lines
+    text = ("PROGRAM Main\nVAR Start AT CIO 0.00 : BOOL; Motor AT CIO 100.00 : BOOL; Go AT CIO 0.01 : BOOL; END_VAR\nLADDER\n"
+            f"RUNG 1\n{rung}RUNG 2\n    LD      Go\n    IL(002)\nRUNG 3\n{rung}RUNG 4\n    ILC(003)\nEND_LADDER\nEND_PROGRAM\n")
+    for start, go in ((False, False), (True, False), (True, True)):
+        commands = made(text)
+        said(commands, f"Main.Start = {start}", f"Main.Go = {go}")
+        stops: list[int] = []
+        while commands.session.here.scan == 0:
+            if (site := commands.report.site()) and text.splitlines()[site.line - 1].strip() == instruction:
+                stops.append(site.line)
+            commands.session.step_over()
+        assert len(stops) == len(set(stops)), (stops, start, go)
+        assert len(stops) in ((lines, 2 * lines) if not go else (2 * lines,))
+
+
+def test_a_breakpoint_at_a_coil_stops_a_scan_once() -> None:
+    compilation = compile_text(LADDER)
+    assert compilation.image is not None
+    plc = Plc(compilation.image)
+    plc.breakpoints.line("text.st:10")
+    halts = []
+    for _ in range(4):
+        plc.scan()
+        halts.append(plc.breakpoints.halted is not None)
+    assert (halts, plc.scans) == ([True, False, True, False], 2)
 
 
 CHART = """PROGRAM Main
@@ -348,6 +438,7 @@ def test_a_script_ends_with_what_is_wrong() -> None:
     assert called("expect D8 = 2\nquit\n", "--set", "D7..D8=1,2")[0] == 0
     assert "leave out @1s" in called("", "--set", "D7=1@1s")[1] and called("", "--set", "D7=1@1s")[0] == 2
     assert called("", "--watch", "Nobody")[0] == 2
+    assert "E3_5 = 7 (16#0007)" in called("scan\n", "--set", "E3_5=7", "--watch", "E3_5 IF E3_5 > 0")[1]
 
 
 TWO = """
