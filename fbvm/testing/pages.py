@@ -35,12 +35,12 @@ def file_name(test: str) -> str:
 
 
 def write_page(path: Path, title: str, history: History, subject: Subject, units: Plc, asked: Sequence[Place],
-               packets: Sequence[tuple[int, Packet]] = (), unfinished: bool = False) -> bool:  # fmt: skip
+               packets: Sequence[tuple[int, Packet]] = (), unfinished: bool = False, failure: str = "") -> bool:  # fmt: skip
     """Writes the page of the scans that `history` holds; returns False if there are none.  Raises OSError.
 
     `units` is the PLC whose units describe addresses, `asked` are the variables that the page shows first, `packets` those
     of the network with the numbers of their scans.  `unfinished`: the last scan was interrupted, and the page shows how it
-    would have ended."""
+    would have ended.  `failure` is the text of the failed assertion."""
     scans = range(history.scans.start, history.scans.stop + unfinished)
     if not scans:
         return False
@@ -62,6 +62,7 @@ def write_page(path: Path, title: str, history: History, subject: Subject, units
     trace.described, trace.meanings = descriptions(units), meanings(units)  # the PLC of the replay has no units
     data = page_data(trace, title=title, prefix=subject.prefix, pinned=[place.name for place in asked])
     data["frames"] = frame_rows([row for row in packets if row[0] in trace.scans])
+    data["failure"] = failure
     path.parent.mkdir(parents=True, exist_ok=True)
     write_file(path, page(data))
     return True

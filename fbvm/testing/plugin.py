@@ -11,6 +11,8 @@ Files are looked for beside the test, then in the folders above it, up to that w
 from __future__ import annotations
 
 import ast
+import linecache
+import textwrap
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -212,8 +214,9 @@ def pytest_runtest_makereport(
         _shorten(call.excinfo.value)
     report = yield
     if report.failed and call.when == "call" and call.excinfo is not None:
+        failure = _assertion(call.excinfo, item)
         for rig, lines in _rigs_read(call.excinfo, _rigs(item)):
-            text = "\n\n".join(part for part in (rig.explain(lines), _page(item, rig, lines)) if part)
+            text = "\n\n".join(part for part in (rig.explain(lines), _page(item, rig, lines, failure)) if part)
             if text:
                 report.sections.append((f"fbvm {rig!r}", text))
     return report
@@ -233,10 +236,21 @@ def _shorten(error: BaseException) -> None:
         last.tb_next = None
 
 
-def _page(item: pytest.Item, rig: Rig, lines: tuple[str, range] | None) -> str:
+def _assertion(excinfo: pytest.ExceptionInfo[BaseException], item: pytest.Item) -> str:
+    """The statement of the test that failed, with its place, and the error, as pytest marks them."""
+    own = [entry for entry in excinfo.traceback if Path(entry.path) == item.path] or list(excinfo.traceback)
+    file = Path(own[-1].path)
+    lines = _statement(str(file), own[-1].lineno + 1)
+    place = f"{file.relative_to(item.config.rootpath) if file.is_relative_to(item.config.rootpath) else file}:{lines.start}"
+    source = textwrap.dedent("".join(linecache.getline(str(file), number) for number in lines)).splitlines()
+    error = excinfo.exconly().splitlines()
+    return "\n".join([place, *(f">   {line}" for line in source), *(f"E   {line}" for line in error)])
+
+
+def _page(item: pytest.Item, rig: Rig, lines: tuple[str, range] | None, failure: str) -> str:
     """Writes the page of a rig of a failed test; returns the line of the report that names the page, or ""."""
     number = "" if len(_rigs(item)) == 1 else f".{_rigs(item).index(rig)}"
-    return failure_page(item, number, lambda path: rig.write_page(path, item.nodeid, lines))
+    return failure_page(item, number, lambda path: rig.write_page(path, item.nodeid, lines, failure))
 
 
 def _rigs_read(excinfo: pytest.ExceptionInfo[BaseException], rigs: Sequence[Rig]) -> list[tuple[Rig, tuple[str, range] | None]]:

@@ -358,10 +358,11 @@ class Rig:
             said += "\n\n" + "\n".join(["what passed the network last:", *rows])
         return said
 
-    def write_page(self, path: Path, title: str, lines: tuple[str, range] | None = None) -> bool:
-        """Writes the last scans as one HTML file, which shows the variables that `lines` have read; False without a scan."""
+    def write_page(self, path: Path, title: str, lines: tuple[str, range] | None = None, failure: str = "") -> bool:
+        """Writes the last scans as one HTML file, which shows the variables that `lines` have read, and `failure`, the text of
+        the failed assertion; returns False without a scan."""
         return write_page(path, title, self._history, self.subject, self.plc, self._reads.places(*(lines or ())),
-                          self._packets)
+                          self._packets, failure=failure)
 
 
 def _file(path: str, folders: Sequence[Path]) -> Path:

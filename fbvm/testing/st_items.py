@@ -7,12 +7,13 @@ ASSERT with a FALSE condition ends it.  Blocks are found by the names of their f
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from fbvm.base.diagnostics import Source
+from fbvm.base.diagnostics import Source, errors
 from fbvm.base.types import BOOL, fold
 from fbvm.code.image import Site
 from fbvm.machine.plc import Phase, Plc
@@ -20,11 +21,13 @@ from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace.events import Call, Event, Frame, Read, Statement, Write
 from fbvm.record.trace.history import History, observing
 from fbvm.record.trace.recorder import Signal
+from fbvm.syntax import tree
+from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 from fbvm.testing.pages import write_page
 from fbvm.testing.rig import Trapped
 from fbvm.testing.session import count_coverage, failure_page, library_folders
-from fbvm.testing.subject import LIBRARY, Subject, SubjectError, pous, subject
+from fbvm.testing.subject import LIBRARY, Subject, SubjectError, subject
 from fbvm.testing.warning_plugin import warning_plugin
 from fbvm.watch.names import Names, is_single
 from fbvm.watch.paths import Place
@@ -51,10 +54,12 @@ class StFile(pytest.File):
         source = read(self.path, self.path.name)
         if not isinstance(source, Source):
             raise self.CollectError(source.render())
-        try:
-            programs = [node for node in pous(source) if node.kind == "PROGRAM"]
-        except SubjectError as error:
-            raise self.CollectError(str(error)) from None
+        text, diagnostics = parse(source)
+        programs = [node for node in text.declarations if isinstance(node, tree.Pou) and node.kind == "PROGRAM"]
+        wrong = errors(diagnostics)
+        inside = [each for each in wrong if any(node.start <= each.start <= node.end for node in programs)]
+        if wrong and (len(programs) < 2 or len(inside) < len(wrong)):
+            raise self.CollectError("\n".join(message.render() for message in wrong))
         for node in programs:
             yield StItem.from_parent(self, name=node.name.text, line=source.place(node.start)[0])
 
@@ -72,7 +77,12 @@ class StItem(pytest.Item):
         shelves = [LIBRARY, *library_folders(self.config, self.path), *near]
         warnings = warning_plugin(self.config)
         dialect = self.config.getini("fbvm_dialect")
-        made = self.subject = subject([self.path], self.name, shelves, wanted=warnings.wanted, dialect=dialect)
+        compiled = partial(subject, [self.path], self.name, shelves, wanted=warnings.wanted, dialect=dialect)
+        try:
+            made = compiled()
+        except SubjectError:
+            made = compiled(alone=True)  # what is wrong with other programs is said by their tests
+        self.subject = made
         warnings.add(made)
         plc = Plc(made.image, CYCLE_NS)
         watch = Assertions(plc, made.prefix)
@@ -84,9 +94,9 @@ class StItem(pytest.Item):
             table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])
             history.replay(range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1), table)
             failed.table = table.draw([band for band in table.bands if band.has_changes][-BANDS:]) if failed.values else ""
-            asked = [signal.place for signal, _ in failed.values]
+            asked, said = [signal.place for signal, _ in failed.values], self._assertion(failed)
             failed.page = failure_page(self, "", lambda path: write_page(path, self.nodeid, history, made, plc, asked,
-                                                                    unfinished=True))  # fmt: skip
+                                                                         unfinished=True, failure=said))  # fmt: skip
             raise
         if not watch.asserted:
             raise AssertionError(f"{self.name} ended without one ASSERT")
@@ -94,14 +104,17 @@ class StItem(pytest.Item):
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         error = excinfo.value
         if isinstance(error, AssertFailed) and self.subject:
-            site, name = error.site, error.site.file
-            lines = [f"{name}:{site.line}: in {site.pou}, scan {error.scan} ({show_time(error.now_ns)[2:]})",
-                     f">   {self.subject.line(name, site.line)}",
-                     *(f"E   {signal.label} = {signal.text(value)}" for signal, value in error.values)]  # fmt: skip
-            return "\n".join([*lines, *(part for said in (error.table, error.page) if said for part in ("", said))])
+            return "\n\n".join(part for part in (self._assertion(error), error.table, error.page) if part)
         if isinstance(error, Trapped | AssertionError | SubjectError):
             return str(error)
         return super().repr_failure(excinfo, style)
+
+    def _assertion(self, error: AssertFailed) -> str:
+        """The place and the statement of a failed ASSERT, and the values that its condition had read."""
+        site, name = error.site, error.site.file
+        line = self.subject.line(name, site.line) if self.subject else ""
+        return "\n".join([f"{name}:{site.line}: in {site.pou}, scan {error.scan} ({show_time(error.now_ns)[2:]})", f">   {line}",
+                          *(f"E   {signal.label} = {signal.text(value)}" for signal, value in error.values)])  # fmt: skip
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
         return self.path, self.line - 1, self.name

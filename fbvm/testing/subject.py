@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from itertools import islice
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -39,6 +40,8 @@ UNKNOWN = ("S0201", "S0204", "S0401")
 """Codes of diagnostics about unknown names."""
 MOST_FILES = 300
 """Files in which an unknown name is looked for."""
+MOST_FOLDERS = 300
+"""Folders below the present one in which such files are looked for."""
 _images: dict[tuple[object, ...], Subject] = {}
 
 
@@ -85,13 +88,16 @@ class Subject:
 
 
 def subject(files: Sequence[Path], name: str | None, libraries: Sequence[Path] = (), stubs: Mapping[str, Stub] | None = None,
-            text: str = "", wanted: Wanted = ANY, dialect: str = "standard") -> Subject:  # fmt: skip
+            text: str = "", wanted: Wanted = ANY, dialect: str = "standard", alone: bool = False) -> Subject:  # fmt: skip
     """Compiles the POU `name` of some files, or, without files, of a library; "" is the only POU, None the whole program.
 
     `text` is ST that is compiled with the files, `stubs` are ST or Python functions by the name of a block, `wanted` selects
-    the warnings, `dialect` is the dialect of the compiler.  Raises SubjectError, and ValueError for an unknown dialect."""
+    the warnings, `dialect` is the dialect of the compiler.  With `alone` the files' other programs are left out.  Raises
+    SubjectError, and ValueError for an unknown dialect."""
     __tracebackhide__ = True
     sources = [_read(path) for path in files] + ([Source("test.st", text)] if text else [])
+    if alone and name:
+        sources = [_without_other_programs(source, name) for source in sources]
     stubs = stubs or {}
     written = {fold(stubbed): stub for stubbed, stub in stubs.items() if isinstance(stub, str)}
     texts = tuple((source.name, source.text) for source in sources)
@@ -138,7 +144,8 @@ def _compiled(sources: list[Source], program: str | None, prefix: str, name: str
                            warnings_as_errors=wanted.as_errors)  # fmt: skip
     if made.image is None:
         said = [message.render() for message in made.errors]
-        raise SubjectError("\n".join([*said, *_hints(made.errors, sources, libraries)]))
+        names = dict.fromkeys(each.source.text[each.start : each.end] for each in made.errors if each.code in UNKNOWN)
+        raise SubjectError("\n".join([*said, *_hints(names, sources, libraries)]))
     if not prefix and len(made.image.tasks) == 1 and len(made.image.tasks[0].programs) == 1:
         prefix = f"{made.image.tasks[0].programs[0].name}."
     return Subject(name or prefix.rstrip(".") or "PLC", made.image, prefix,
@@ -146,21 +153,47 @@ def _compiled(sources: list[Source], program: str | None, prefix: str, name: str
                    tuple(each for each in made.diagnostics if not each.source.name.startswith("<")))  # fmt: skip
 
 
-def _hints(wrong: Sequence[Diagnostic], sources: Sequence[Source], libraries: Sequence[Path]) -> Iterator[str]:
-    """Hints for unknown names that are declared in a file of another name, or beside the test."""
-    names = dict.fromkeys(each.source.text[each.start:each.end] for each in wrong if each.code in UNKNOWN)
-    folders = dict.fromkeys(Path(source.name).parent for source in sources)
-    files = [*(file for folder in libraries for file in folder.rglob("*.st")),
-             *(file for folder in folders for file in folder.glob("*.st"))] if names else []  # fmt: skip
+def _hints(names: Iterable[str], sources: Sequence[Source], libraries: Sequence[Path]) -> Iterator[str]:
+    """Hints for unknown names that are declared in a file of another name, beside the test or elsewhere in the project."""
+    files: list[Path] | None = None
     for name in names:
-        declared = re.compile(rf"^[ \t]*(?:FUNCTION_BLOCK|FUNCTION|TYPE)\s+{re.escape(name)}\b", re.I | re.M)
-        for file in files[:MOST_FILES]:
+        declared = re.compile(rf"^[ \t]*(?:FUNCTION_BLOCK|FUNCTION|TYPE)(?:\s+(?:FINAL|ABSTRACT))*\s+{re.escape(name)}\b",
+                              re.I | re.M)  # fmt: skip
+        if files is None:
+            files = list(islice(_files_near(sources, libraries), MOST_FILES))
+        for file in files:
             found = read(file, file.name)
             if isinstance(found, Source) and declared.search(found.text):
                 shown = os.path.relpath(file) if file.is_absolute() and file.is_relative_to(Path.cwd()) else file
                 yield (f"{name} is declared in {shown}; a test finds it in a file of its own name, {name}.st, in src/ or in a "
                        "folder of fbvm_libraries")
                 break
+
+
+def _files_near(sources: Sequence[Source], libraries: Sequence[Path]) -> Iterator[Path]:
+    """Sources in the folders of libraries, beside some sources, and below the present folder."""
+    yield from (file for folder in libraries for file in folder.rglob("*.st"))
+    yield from (file for folder in dict.fromkeys(Path(source.name).parent for source in sources) for file in folder.glob("*.st"))
+    for at, folders, names in islice(os.walk(Path.cwd()), MOST_FOLDERS):
+        folders[:] = sorted(folder for folder in folders if not folder.startswith((".", "_")))
+        yield from (Path(at, name) for name in sorted(names) if name.lower().endswith(".st"))
+
+
+def _without_other_programs(source: Source, name: str) -> Source:
+    """The source with blanks in place of all programs but `name` and those that the rest names; lines keep their numbers."""
+    text, _ = parse(source)
+    programs = [node for node in text.declarations if isinstance(node, tree.Pou) and node.kind == "PROGRAM"]
+    others = [node for node in programs if fold(node.name.text) != fold(name)]
+    rest = _blanked(source.text, others)
+    unused = [node for node in others if not re.search(rf"\b{re.escape(node.name.text)}\b", rest, re.I)]
+    return Source(source.name, _blanked(source.text, unused))
+
+
+def _blanked(text: str, nodes: Iterable[tree.Pou]) -> str:
+    """A text with blanks in place of some POUs."""
+    for node in nodes:
+        text = text[: node.start] + re.sub(r"[^\n]", " ", text[node.start : node.end]) + text[node.end :]
+    return text
 
 
 def _read(path: Path) -> Source:
@@ -186,7 +219,8 @@ def _declared(sources: Sequence[Source], name: str, libraries: Sequence[Path]) -
     found = _in_libraries(name, libraries)
     if found is None:
         there = ", ".join(node.name.text for node, _ in known)
-        raise SubjectError(f"there is no {name}" + (f"; there is {there}" if there else " in any library"))
+        said = f"there is no {name}" + (f"; there is {there}" if there else " in any library")
+        raise SubjectError("\n".join([said, *_hints([name], sources, libraries)]))
     return found
 
 
@@ -239,15 +273,12 @@ def _wrapper(pou: tree.Pou, source: Source) -> str:
 def _stubbed(sources: list[Source], name: str, stub: str, libraries: Sequence[Path]) -> list[Source]:
     """The sources with a stub in place of the POU, or of its body, of a name.  All other lines keep their numbers."""
     node, source = _declared(sources, name, libraries)
-    whole = source.text[node.start : node.end]
     text = stub
     if not _DECLARES.match(stub):
         start, end = _body(node, source)
         text = f"{source.text[node.start : start]}\n{stub}\n{source.text[end : node.end]}"
     text = text.strip().removesuffix(";") + "\n"
-    blank = re.sub(r"[^\n]", " ", whole)
-    kept = [Source(each.name, each.text[: node.start] + blank + each.text[node.end :])
-            if each is source else each for each in sources]  # fmt: skip
+    kept = [Source(each.name, _blanked(each.text, [node])) if each is source else each for each in sources]
     return [*kept, Source(f"<stub of {node.name.text}>", text)]
 
 

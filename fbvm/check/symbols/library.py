@@ -21,6 +21,7 @@ Pins that other tools call otherwise have their other names there too:
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
@@ -185,6 +186,7 @@ class Libraries:
                 if not library.by_dialect or library.name in preferred:
                     self._libraries.setdefault(library.name, library)
         self._files = {name for below in shelves[:len(own)] for library in below for name in library.files}
+        self._block_names: list[str] | None = None
         self.mailboxes: dict[str, Mailbox] = {}
         """What the libraries' units bring, by area."""
         for library in self._libraries.values():
@@ -219,8 +221,11 @@ class Libraries:
         return self._libraries[name].by_dialect
 
     def block_names(self) -> list[str]:
-        """The names under which files are found, as their files are named."""
-        return [path.stem for library in self._libraries.values() for path in library.files.values()]
+        """The names under which files are found, as their files are named, but for a user's file that declares no such name."""
+        if self._block_names is None:
+            self._block_names = [path.stem for library in self._libraries.values() for path in library.files.values()
+                                 if library.shipped or _declares_its_name(path)]
+        return self._block_names
 
     def load(self, name: str, owner: str, report: Report) -> list[tuple[Source, tree.SourceText]]:
         """Trees of the file that `owner` has for `name`, and of its globals; nothing if it is loaded or unknown."""
@@ -241,6 +246,13 @@ class Libraries:
         source, text, diagnostics = known
         report.diagnostics.extend(diagnostics)
         return source, text
+
+
+def _declares_its_name(path: Path) -> bool:
+    """True if a file seems to declare a POU or a type of the file's name."""
+    found = read(path, path.name)
+    declared = rf"(?:\b(?:FUNCTION_BLOCK|FUNCTION|PROGRAM|TYPE|FINAL|ABSTRACT)\s+|^\s*){re.escape(path.stem)}\b"
+    return isinstance(found, Source) and re.search(declared, found.text, re.I | re.M) is not None
 
 
 Parsed = tuple[Source, tree.SourceText, tuple[Diagnostic, ...]]

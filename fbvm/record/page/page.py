@@ -16,15 +16,17 @@ from typing import Any
 
 FOLDER = Path(__file__).parent
 SCRIPTS = ("model.js", "chart.js", "panels.js", "main.js")
-_PLACE = re.compile(r"\{\{(title|style|script|data)\}\}")
+_PLACE = re.compile(r"\{\{(title|failure|style|script|data)\}\}")
 """Where the parts of a page go in `page.html`; what is put in is not searched again."""
 
 
 def page(data: dict[str, Any]) -> str:
-    """The text of the HTML file; `data` is the result of `page_data`."""
+    """The text of the HTML file; `data` is the result of `page_data`, with `failure` also the text of a failed assertion."""
+    failure = html.escape(str(data.get("failure", "")))
     packed = zlib.compress(json.dumps(data, separators=(",", ":")).encode(), 9)
     parts = {
         "title": html.escape(str(data["title"])),
+        "failure": f'<pre id="failure" aria-label="The failed assertion">{failure}</pre>' if failure else "",
         "style": _file("page.css"),
         "script": "\n".join(_file(name) for name in SCRIPTS),
         "data": base64.b64encode(packed).decode("ascii"),

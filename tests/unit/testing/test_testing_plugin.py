@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import html
 import json
 import re
 import zlib
@@ -105,7 +106,11 @@ def test_a_failure_says_where_its_page_is(project: pytest.Pytester) -> None:
     """)
     name = ".fbvm/test_a_failure_says_where_its_page_is.test_wrong.html"
     run(project).stdout.fnmatch_lines([f"every scan, in a browser: {name}"])
-    assert "test_wrong</title>" in (project.path / name).read_text(encoding="utf-8")
+    page = (project.path / name).read_text(encoding="utf-8")
+    assert "test_wrong</title>" in page
+    shown = re.search('<pre id="failure"[^>]*>(.*?)</pre>', page, re.S)
+    assert shown and html.unescape(shown[1]).splitlines()[:3] == [
+        "test_a_failure_says_where_its_page_is.py:3", ">   assert not pump.Running", "E   AssertionError: assert not True"]
 
 
 @pytest.mark.slow
@@ -326,6 +331,42 @@ def test_a_block_in_a_file_of_another_name_is_found_for_the_message(project: pyt
     result.stdout.fnmatch_lines(["Fifo is declared in src/queues.st; a test finds it in a file of its own name, Fifo.st, in *"])
 
 
+NEIGHBOURS = """
+PROGRAM Test_sound VAR n : INT; END_VAR n := n + 1; ASSERT(n = 1); Helper(); END_PROGRAM
+PROGRAM Test_bad VAR n : INT; END_VAR %s END_PROGRAM
+PROGRAM Helper VAR n : INT; END_VAR ASSERT(n = 0); END_PROGRAM
+"""
+
+
+@pytest.mark.parametrize(("text", "said"), first_quick([
+    ("ASSERT(m);", "test_it.st:2:* error S0201: m is not declared"),
+    ("ASSERT(n = ); ASSERT(TRUE);", "test_it.st:2:* error S0101: *"),
+    ("IF n = 0 THEN ASSERT(TRUE);", "test_it.st:2:* error S01*"),
+]), ids=["unknown name", "no expression", "not closed"])  # fmt: skip
+def test_a_bad_program_does_not_fail_its_neighbours(project: pytest.Pytester, text: str, said: str) -> None:
+    """Also one that another program calls."""
+    project.makefile(".st", test_it=NEIGHBOURS % text)
+    result = run(project)
+    result.assert_outcomes(passed=2, failed=1)
+    result.stdout.fnmatch_lines([said, "FAILED test_it.st::Test_bad*"])
+
+
+@pytest.mark.slow
+def test_the_file_of_a_block_is_named_wherever_it_is(project: pytest.Pytester) -> None:
+    """In a folder beside the tests, for a test in ST and in Python, and no suggestion is the name of a file."""
+    project.mkdir("blocks")
+    (project.path / "blocks" / "kilns.st").write_text("FUNCTION_BLOCK Kiln END_FUNCTION_BLOCK", encoding="utf-8")
+    (project.path / "src" / "weirs.st").write_text("FUNCTION_BLOCK Weir END_FUNCTION_BLOCK", encoding="utf-8")
+    project.makefile(".st", test_queue="PROGRAM Test_it VAR q : Kiln; p : Weir; END_VAR q(); ASSERT(TRUE); END_PROGRAM")
+    project.makepyfile("def test_kiln(fb):\n    fb('Kiln')\n")
+    result = run(project)
+    result.assert_outcomes(failed=2)
+    for name, file in (("Kiln", "blocks/kilns.st"), ("Weir", "src/weirs.st")):
+        result.stdout.fnmatch_lines([f"{name} is declared in {file}; a test finds it in a file of its own name, {name}.st, in *"])
+    result.stdout.fnmatch_lines(["E*SubjectError: there is no Kiln in any library", "E*Kiln is declared in blocks/kilns.st; *"])
+    result.stdout.no_fnmatch_line("*did you mean*")
+
+
 @pytest.mark.slow
 def test_a_failed_assert_shows_line_and_values(project: pytest.Pytester) -> None:
     project.makefile(".st", test_pump="""\
@@ -349,6 +390,9 @@ END_PROGRAM
         "every scan, in a browser: .fbvm/*.html",
         "FAILED test_pump.st::Test_wrong*",
     ])  # fmt: skip
+    [page] = (project.path / ".fbvm").glob("*.html")
+    assert "test_pump.st:4: in Test_wrong, scan 8 (80ms)\n&gt;   ASSERT(n &lt; 3 OR NOT P.Running);\nE   n = 8\n" in \
+        page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(("text", "said"), first_quick([
