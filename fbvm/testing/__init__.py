@@ -7,7 +7,7 @@ nanoseconds, as which TIME values are read.
 from __future__ import annotations
 
 from fbvm.testing.rig import Rig, Trapped
+from fbvm.testing.value_types import ns
 from fbvm.testing.values import Values
-from fbvm.watch.values import parse_time_ns as ns
 
 __all__ = ["Rig", "Trapped", "Values", "ns"]

@@ -28,6 +28,7 @@ from fbvm.testing.pages import write_page
 from fbvm.testing.reads import VariableReads
 from fbvm.testing.report import Report
 from fbvm.testing.subject import Stub, Subject, subject
+from fbvm.testing.value_types import for_writing
 from fbvm.testing.values import Values, value_of, write
 from fbvm.units.contract import Unit
 from fbvm.units.etn21.unit import Etn21
@@ -196,9 +197,13 @@ class Rig:
 
     def __setitem__(self, name: str, value: object) -> None:
         __tracebackhide__ = True
+        self._write(self.find(name), value)
+
+    def _write(self, place: Place | Span, value: object) -> None:
+        __tracebackhide__ = True
         self._history.mark_changed()
         try:
-            write(self.plc, self.find(name), value)
+            write(self.plc, place, value)
         except (TypeError, ValueError) as error:
             raise type(error)(self.subject.plain(str(error))) from None
 
@@ -248,7 +253,9 @@ class Rig:
     def at(self, time: str | int, inputs: Mapping[str, object] | None = None, /, **named: object) -> Rig:
         """Schedules a write before the first scan at or after `time`, which counts from power-on."""
         for name, value in {**(inputs or {}), **named}.items():
-            self.find(name)
+            found = self.find(name)
+            if isinstance(found, Place):
+                for_writing(found.type, value, self.subject.plain(found.name))
             self._timed.append((to_ns(time), name, value))
         self._timed.sort(key=lambda row: row[0])
         return self
@@ -309,11 +316,11 @@ class Rig:
 
     def force(self, values: Mapping[str, object] | None = None, /, **named: object) -> Forced:
         """Forces variables until `unforce`, or to the end of a `with` block.  A test that leaves a force fails."""
+        __tracebackhide__ = True
         given = {**(values or {}), **named}
-        self._history.mark_changed()
         for name, value in given.items():
             place = self.find(name)
-            write(self.plc, place, value)
+            self._write(place, value)
             self.plc.force(place.name, self.plc.read(place))
         return Forced(self, list(given))
 

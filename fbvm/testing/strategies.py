@@ -11,6 +11,7 @@ Needs the package hypothesis.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from hypothesis import strategies as st
@@ -27,6 +28,7 @@ from fbvm.base.types import (
     base,
 )
 from fbvm.testing.rig import Rig, to_ns
+from fbvm.testing.value_types import Nanoseconds
 from fbvm.watch.paths import Place
 
 LONGEST_NS = 3_600_000_000_000
@@ -54,9 +56,10 @@ def values(kind: Type) -> st.SearchStrategy[Any]:
     if isinstance(plain, Elementary) and plain.machine in ("f32", "f64"):
         return st.floats(width=32 if plain.machine == "f32" else 64)
     if isinstance(plain, Elementary) and plain.name in DURATIONS:
-        return st.integers(0, LONGEST_NS)
+        return st.integers(0, LONGEST_NS).map(Nanoseconds)
     if isinstance(plain, Elementary):
-        return st.integers(plain.low, plain.high)
+        numbers = st.integers(plain.low, plain.high)
+        return numbers.map(partial(Nanoseconds, kind=plain)) if "ANY_DATE" in plain.families else numbers
     raise TypeError(f"there are no values of {kind.name} to choose from")
 
 
@@ -84,7 +87,7 @@ def delays(longest: str | int = "1s", step: str | int = "10ms") -> st.SearchStra
     """Times in nanoseconds in whole steps, short ones more often."""
     step_ns = to_ns(step)
     most = to_ns(longest) // step_ns
-    return st.one_of(st.integers(0, min(3, most)), st.integers(0, most)).map(lambda count: count * step_ns)
+    return st.one_of(st.integers(0, min(3, most)), st.integers(0, most)).map(lambda count: Nanoseconds(count * step_ns))
 
 
 def courses(rig: Rig, longest: str | int = "1s", most: int = 20, **chosen: st.SearchStrategy[Any]

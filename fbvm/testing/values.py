@@ -7,8 +7,8 @@ from typing import Any
 
 from fbvm.base.types import StructType, base
 from fbvm.machine.plc import Plc
+from fbvm.testing.value_types import as_read, for_writing
 from fbvm.watch.paths import Place, Span, UnknownPlace
-from fbvm.watch.values import Value, parse_value, sort_of
 
 OnRead = Callable[[Place], None]
 """Called with the place of each variable that is read."""
@@ -17,10 +17,8 @@ OnRead = Callable[[Place], None]
 def write(plc: Plc, place: Place | Span, value: object) -> None:
     """Writes a Python value; text is parsed as a literal of the variable's type (`"50ms"`, `"16#FF"`).
 
-    Raises ValueError (out of range) or TypeError (a value of another kind)."""
-    if isinstance(place, Place) and isinstance(value, str) and sort_of(place.type) != "text":
-        value = parse_value(place.type, value, place.name)
-    plc.write(place, value)
+    Raises ValueError (out of range) or TypeError (a value of another kind, or a bare number for a TIME or a date)."""
+    plc.write(place, for_writing(place.type, value, place.name) if isinstance(place, Place) else value)
 
 
 class Values:
@@ -87,10 +85,12 @@ def value_of(plc: Plc, found: Place | Span, read: OnRead, changed: Callable[[], 
         if isinstance(base(found.type), StructType):
             return Values(plc, found, read, changed)
         read(found)
+        return as_read(found.type, plc.read(found))
     return plc.read(found)
 
 
-def as_dict(values: Values) -> Value:
+def as_dict(values: Values) -> dict[str, Any]:
     """All variables of an instance as a dictionary of Python values."""
-    return values._plc.read(values._place)
+    found: dict[str, Any] = as_read(values._place.type, values._plc.read(values._place))
+    return found
 

@@ -115,11 +115,14 @@ def nearest_real(value: float) -> float:
 
 
 def conform(kind: Type, value: object, name: str) -> Value:
-    """A Python value as a place of type `kind` holds it; a REAL is rounded to 32 bits, a member's name becomes its number.
+    """A Python value as a place of type `kind` holds it: a REAL is rounded to 32 bits, a member's name becomes its number, the
+    literal of a TIME or a date its nanoseconds.
 
     Raises ValueError (out of range) or TypeError (another kind of value), with the name of the variable, `name`."""
     low, high = (kind.low, kind.high) if isinstance(kind, SubrangeType) else (None, None)
     plain = base(kind)
+    if isinstance(value, str) and sort_of(plain) in ("time", *DATES):
+        return conform(kind, _literal_of(kind, value, name), name)
     if isinstance(plain, EnumType):
         return _enumerated(plain, value, name)
     if isinstance(plain, StringType):

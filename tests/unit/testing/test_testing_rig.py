@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +57,75 @@ def test_inputs_outputs_and_inner_variables_have_names() -> None:
 def test_text_is_read_for_the_type_of_the_variable() -> None:
     pump = rig().write(Wait="1.5s", Start="TRUE")
     assert (pump.Wait, pump.Start) == (ns("1.5s"), True)
+
+
+BATCH = """
+TYPE Phase : (Idle, Filling := 3, Mixing); Row : STRUCT Phase : Phase; Time : TIME; END_STRUCT END_TYPE
+FUNCTION_BLOCK Batch
+VAR_INPUT MixTime : TIME; Long : LTIME; Day : DATE; Hour : TOD; When : DT; Times : ARRAY[1..2] OF TIME; In_Row : Row; END_VAR
+VAR_OUTPUT State : Phase; Rows : ARRAY[1..2] OF Row; Colour : (Red, Green); END_VAR
+    State := Filling; Rows[2].Phase := Mixing;
+END_FUNCTION_BLOCK
+"""
+
+
+def test_an_enumeration_reads_as_its_member() -> None:
+    batch = rig("Batch", BATCH).scan()
+    assert batch.State == 3 and batch.State == "Filling" and batch.State == "phase#FILLING" and batch.State == "Phase.filling"
+    assert batch.State != 0 and batch.State != "Mixing" and batch.State != "Row#Filling" and batch.State in ("Idle", "Filling")
+    assert (repr(batch.State), str(batch.State), f"{batch.State:02d}") == ("Phase#Filling (3)", "Phase#Filling", "03")
+    assert {3: "three"}[batch.State] == "three" and batch.State + 1 == 4 and isinstance(batch.State, int)
+    assert batch.Rows[1]["Phase"] == "Mixing" and batch.Colour == "Red"
+    assert repr(batch["Rows[2]"]) == "Row {'Phase': Phase#Mixing (4), 'Time': T#0s}"
+    with pytest.raises(AssertionError, match=re.escape("Phase#Filling (3) is no Mixing")):
+        assert batch.State == "Mixing", f"{batch.State!r} is no Mixing"
+    batch.State = batch.Rows[1]["Phase"]
+    assert batch.State == "Mixing"
+    batch.plc.memory.u8[batch.find("State").offset] = 9
+    assert batch.State == 9, "no member"
+
+
+@pytest.mark.parametrize("give", [
+    lambda batch, name, value: batch.scan({name: value}), lambda batch, name, value: batch.write(**{name: value}),
+    lambda batch, name, value: batch.run(scans=1, **{name: value}), lambda batch, name, value: setattr(batch, name, value),
+    lambda batch, name, value: batch.until(lambda rig: True, **{name: value}),
+    lambda batch, name, value: batch.force({name: value}), lambda batch, name, value: batch.__setitem__(name, value),
+    lambda batch, name, value: batch.at("1s", {name: value}),
+], ids=["scan", "write", "run", "attribute", "until", "force", "item", "at"])  # fmt: skip
+def test_a_bare_number_is_no_time(give: Callable[[Rig, str, object], object]) -> None:
+    """As `--set Main.MixTime=2` is refused: it may be meant as seconds."""
+    batch = rig("Batch", BATCH)
+    for name, kind, takes in (("MixTime", "TIME", "a time such as 10ms"), ("Long", "LTIME", "a time such as 10ms"),
+                              ("Day", "DATE", "a date such as D#2024-01-31"),
+                              ("Hour", "TIME_OF_DAY", "a time of day such as TOD#12:30:00"),
+                              ("When", "DATE_AND_TIME", "a date and time such as DT#2024-01-31-12:30:00")):  # fmt: skip
+        with pytest.raises(TypeError, match=re.escape(f"{name} is {kind} and takes {takes}, not 2")):
+            give(batch, name, 2)
+    with pytest.raises(TypeError, match=re.escape("Times[1] is TIME and takes a time such as 10ms, not 2")):
+        give(batch, "Times", ["1s", 2])
+    with pytest.raises(TypeError, match=re.escape("In_Row.Time is TIME and takes a time such as 10ms, not 2")):
+        give(batch, "In_Row", {"time": 2})
+    assert (batch.MixTime, batch.Times) == (0, [0, 0])
+
+
+def test_times_are_written_as_text_as_ns_and_as_they_were_read() -> None:
+    batch = rig("Batch", BATCH).scan(MixTime=2 * ns("1s"), Times=["1s", ns("5ms")], In_Row={"Time": "3s", "Phase": "Mixing"},
+                                     When="DT#2024-01-31-12:30:00", Day="2024-01-31")  # fmt: skip
+    assert (batch.MixTime, batch.Times, batch.In_Row) == (2_000_000_000, [ns("1s"), ns("5ms")], {"Time": ns("3s"), "Phase": 4})
+    batch.Long = batch.MixTime - ns("5ms")
+    assert (repr(batch.Long), repr(batch.When), repr(batch.Day)) == ("T#1s995ms", "DT#2024-01-31-12:30:00", "D#2024-01-31")
+    batch.When = batch.When + ns("1d")
+    assert repr(batch.When) == "DT#2024-02-01-12:30:00" and repr(batch.When - ns("1s")) == "DT#2024-02-01-12:29:59"
+    batch.scan(MixTime=batch.When - batch.When)
+    assert batch.MixTime == 0 and repr(batch.Times) == "[T#1s, T#5ms]"
+
+
+def test_a_plc_takes_literals_of_times_as_its_messages_say() -> None:
+    batch = rig("Batch", BATCH)
+    batch.plc.write("Test.Block.MixTime", "10ms")
+    with pytest.raises(TypeError, match="takes a time such as 10ms, not 5"):
+        batch.plc.write("Test.Block.MixTime", "5")
+    assert batch.MixTime == ns("10ms")
 
 
 def test_addresses_are_names_too() -> None:
