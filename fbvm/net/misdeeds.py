@@ -8,9 +8,11 @@
 from __future__ import annotations
 
 import random
+from collections import deque
 from collections.abc import Callable, Iterable, Sequence
+from weakref import WeakSet
 
-from fbvm.net.peers import Action, Actions, Conversation, Fin, Leave, ModbusPeer, Reset, Say, Station
+from fbvm.net.peers import Action, Actions, Conversation, Fin, Leave, ModbusPeer, Reset, Say, Station, keep
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus_server import ModbusServer
 
@@ -175,15 +177,20 @@ class RudePeer(ModbusPeer):
         super().__init__(server, reply)
         self.greeting, self.on_bytes, self.connections, self.reads = greeting, on_bytes, connections, reads
         self.callers: list[Peer] = []
-        self._conversations: list[_RudeConversation] = []
+        """Who has connected, the last MOST_KEPT."""
+        self._accepted = 0
+        self._conversations: WeakSet[_RudeConversation] = WeakSet()
+        """Those whose connections are still there."""
 
     def accept(self, caller: Peer) -> Conversation | None:
         inner = super().accept(caller)
-        if inner is None or (self.connections is not None and len(self.callers) >= self.connections):
+        if inner is None or (self.connections is not None and self._accepted >= self.connections):
             return None
-        self.callers.append(caller)
-        self._conversations.append(_RudeConversation(self, inner))
-        return self._conversations[-1]
+        self._accepted += 1
+        keep(self.callers, caller)
+        conversation = _RudeConversation(self, inner)
+        self._conversations.add(conversation)
+        return conversation
 
     def reform(self) -> None:
         """Behaves rightly from now on, also on open connections."""
@@ -211,11 +218,11 @@ class _Deaf(Station):
 
 def _previous(kept: int, change: Callable[[bytes, bytes], bytes]) -> Reply:
     """Replies made of the right one and the one `kept` requests before."""
-    said: list[bytes] = []
+    said: deque[bytes] = deque(maxlen=kept + 1)
 
     def reply(frame: bytes) -> Actions:
         said.append(frame)
-        data = change(said[-1 - kept] if len(said) > kept else b"", frame)
+        data = change(said[0] if len(said) > kept else b"", frame)
         return (Say(data),) if data else ()
 
     return reply

@@ -7,10 +7,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 from fbvm.wire.link import Peer
 from fbvm.wire.modbus import Adu, Fault, Splitter
 from fbvm.wire.modbus_server import ModbusServer
+
+MOST_KEPT = 10_000
+"""Frames, callers and ends of connections that a peer keeps, the last ones; a run may go on for days."""
+_T = TypeVar("_T")
+
+
+def keep(rows: list[_T], row: _T) -> None:
+    """Appends to a list of which the last MOST_KEPT rows are kept: the oldest tenth goes at once when there are more."""
+    rows.append(row)
+    if len(rows) > MOST_KEPT:
+        del rows[: MOST_KEPT // 10]
+
 
 # --- actions -------------------------------------------------------------------------------------------------------
 
@@ -113,7 +126,7 @@ class ModbusPeer(Station):
         self.server = server or ModbusServer()
         self.reply = reply
         self.received: list[bytes] = []
-        """Every frame that has arrived, in order, over all connections."""
+        """The frames that have arrived, in order, over all connections: the last MOST_KEPT at most."""
 
     def accept(self, caller: Peer) -> Conversation | None:
         return _ModbusConversation(self)
@@ -128,11 +141,11 @@ class _ModbusConversation(Conversation):
         actions: list[Action] = []
         for found in self._splitter.feed(data):
             if isinstance(found, Fault):
-                self._peer.received.append(found.data)
+                keep(self._peer.received, found.data)
                 if found.fatal:
                     return [*actions, Leave()]
                 continue
-            self._peer.received.append(found.to_bytes())
+            keep(self._peer.received, found.to_bytes())
             pdu = self._peer.server.answer_pdu(found.pdu, found.unit)
             actions += self._peer.reply(Adu(found.transaction, found.unit, pdu).to_bytes())
         return actions
@@ -164,12 +177,14 @@ class ScriptedPeer(Station):
         self.received: list[bytes] = []
         self.callers: list[Peer] = []
         self.log: list[str] = []
-        """"fin" and errno names, as connections end."""
+        """"fin" and errno names, as connections end; of all three lists the last MOST_KEPT rows are kept."""
+        self._accepted = 0
 
     def accept(self, caller: Peer) -> Conversation | None:
-        if self.connections is not None and len(self.callers) >= self.connections:
+        if self.connections is not None and self._accepted >= self.connections:
             return None
-        self.callers.append(caller)
+        self._accepted += 1
+        keep(self.callers, caller)
         return _ScriptedConversation(self)
 
 
@@ -182,15 +197,15 @@ class _ScriptedConversation(Conversation):
         return self._peer.greeting
 
     def received(self, data: bytes, now_ns: int) -> Actions:
-        self._peer.received.append(data)
+        keep(self._peer.received, data)
         if not self._peer.steps:
             return ()
         step = self._peer.steps.pop(0)
         return step(data) if callable(step) else step
 
     def peer_closed(self, now_ns: int) -> Actions:
-        self._peer.log.append("fin")
+        keep(self._peer.log, "fin")
         return self._peer.farewell
 
     def lost(self, error: str, now_ns: int) -> None:
-        self._peer.log.append(error)
+        keep(self._peer.log, error)

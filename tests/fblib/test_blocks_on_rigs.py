@@ -13,6 +13,7 @@ from rows import first_quick
 from fbvm.base.data import data_folder
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.peers import ModbusPeer
+from fbvm.testing import ns
 from fbvm.testing.rig import Rig
 from fbvm.wire.link import Peer
 
@@ -74,7 +75,7 @@ def test_the_blocks_of_the_standard(fb: Fb, row: str) -> None:
 
 def _plain(text: str) -> Any:
     if "#" in text:
-        return int(text.partition("#")[2].removesuffix("ms")) * 1_000_000
+        return ns(text.partition("#")[2])
     return text == "TRUE" if text in ("TRUE", "FALSE") else int(text)
 
 

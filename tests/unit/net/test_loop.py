@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,6 +11,7 @@ from rows import each_of
 
 from fbvm.net.faults import Fault
 from fbvm.net.loop import CONNECT_TIMEOUT_NS, LoopLink, LoopNetwork
+from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS, RudePeer
 from fbvm.net.peers import Action, Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer, Station
 from fbvm.net.stream import RETRANSMIT_LIMIT_NS, WINDOW_BYTES
 from fbvm.wire import modbus
@@ -31,6 +34,7 @@ from fbvm.wire.link import (
     Sent,
 )
 from fbvm.wire.modbus import Adu
+from fbvm.wire.modbus_server import ModbusServer
 from fbvm.wire.tap import TapEvent, TapKind
 
 SERVER = Peer("192.168.250.1", 502)
@@ -449,3 +453,45 @@ def test_nothing_is_told_behind_a_break() -> None:
     told += link.events(10**9)
     kinds = [type(event).__name__ for event in told]
     assert kinds.count("Broken") == 1 and {"PeerClosed", "Received"}.isdisjoint(kinds[kinds.index("Broken"):])
+
+
+# --- what peers keep ----------------------------------------------------------------------------------------------------
+
+
+def test_peers_keep_the_last_frames_callers_and_ends_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run may go on for days."""
+    monkeypatch.setattr("fbvm.net.peers.MOST_KEPT", 50)
+    caller = Peer(UNIT, 49152)
+    rude = RudePeer(reply=MISDEEDS["right, then closed"])
+    frames = [Adu(number, 255, modbus.read(3, 1000, 1)).to_bytes() for number in range(200)]
+    for peer in (ModbusPeer(), rude, ScriptedPeer(connections=200)):
+        for number, frame in enumerate(frames, 1):
+            conversation = peer.accept(caller)
+            assert conversation is not None
+            list(conversation.received(frame, 0))
+            list(conversation.peer_closed(0))
+            conversation.lost("ECONNRESET", 0)
+            assert len(peer.received) <= 50 and peer.received == frames[number - len(peer.received):number]
+        assert len(peer.received) >= 45
+    assert peer.accept(caller) is None, "connections are counted, however many callers are kept"
+    assert isinstance(peer, ScriptedPeer) and max(len(peer.callers), len(peer.log)) <= 50
+    del conversation
+    assert len(rude.callers) <= 50 and len(rude._conversations) == 0
+
+
+def test_a_reply_of_before_needs_no_more_than_that() -> None:
+    peer = RUDE_PEERS["previous reply instead"](ModbusServer())
+    conversation = peer.accept(Peer(UNIT, 49152))
+    assert conversation is not None
+    tracemalloc.start()
+    try:
+        sizes = []
+        for number in range(300):
+            said = list(conversation.received(Adu(number, 255, modbus.read(3, 1000, 100)).to_bytes(), 0))
+            assert [action.data[:2] for action in said if isinstance(action, Say)] == (
+                [(number - 1).to_bytes(2, "big")] if number else [])  # fmt: skip
+            getattr(peer, "received").clear()  # noqa: B009
+            sizes.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert sizes[-1] <= sizes[100] + 16_000, "200 replies are 48,000 bytes"
