@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import sys
+from pathlib import Path
 from typing import Any
 
 import click
@@ -108,6 +109,16 @@ class _Verbs(click.Group):
             said = f"{error.filename} cannot be used" if error.filename else "the output cannot be written"
             click.echo(f"{said}: {reason(error)}", err=True)
             sys.exit(status.USAGE)
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        """The verb of a command line.  Raises UsageError for an unknown one, with a suggestion."""
+        name = args[0]
+        if self.get_command(ctx, name) is None and not name.startswith("-") and not ctx.resilient_parsing:
+            from fbvm.cli.shared.paths import suggestion
+
+            near = suggestion(name, GROUP_OF)
+            ctx.fail(f"There is no command {name!r}" + (f"; run the file by `fbvm run {name}`" if Path(name).exists() else near))
+        return super().resolve_command(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(GROUP_OF)

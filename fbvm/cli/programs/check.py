@@ -13,6 +13,7 @@ import click
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.check.lint.suppression import Wanted
 from fbvm.cli.shared import status
+from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.project_arguments import check_project_options, project_argument
 from fbvm.cli.shared.sources import compile_options, report_diagnostics, source_options
 from fbvm.code.compiler import LONG, compile_files
@@ -23,7 +24,7 @@ PROJECT_OPTIONS = {"no_warn": "--no-warn", "warnings_as_errors": "--warnings-as-
 
 @click.command("check")
 @source_options
-@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=click.Path(exists=True, path_type=Path))
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath())
 @click.option("--no-warn", metavar="CODE", multiple=True,
               help="Do not warn of that, such as S0390, or of `all`; may be repeated, or a list with commas.")
 @click.option("--warnings-as-errors", is_flag=True, help="A warning counts as an error.")

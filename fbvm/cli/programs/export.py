@@ -11,12 +11,13 @@ import click
 from fbvm.base.files import write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.interchange.plcopen.write.exporting import BEGINNING, export_xml
 
 
 @click.command("export")
-@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("files", nargs=-1, required=True, metavar="FILE...", type=SourcePath(dir_okay=False))
 @click.option("-o", "--output", "document", metavar="OUT.xml", required=True, type=click.Path(dir_okay=False, path_type=Path),
               help="The document that is written.")
 @click.option("--json", "as_json", is_flag=True, help="Print messages as one JSON object.")

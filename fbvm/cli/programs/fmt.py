@@ -17,6 +17,7 @@ from fbvm.base.types import fold
 from fbvm.check.calls.standard import is_known
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.sources import show_diagnostic
 from fbvm.syntax.formatter.formatter import formatted
 from fbvm.syntax.formatter.names import Outside
@@ -31,7 +32,7 @@ ENCODINGS = (*MARKS, (b"", "utf-8"), (b"", "cp1252"), (b"", "latin-1"))
 
 @click.command("fmt")
 @click.argument("files", nargs=-1, required=True, metavar="FILE...",
-                type=click.Path(exists=True, allow_dash=True, path_type=Path))
+                type=SourcePath(allow_dash=True))
 @click.option("--check", is_flag=True, help="Write nothing; status 1 if a file would change.")
 @click.option("--diff", is_flag=True, help="Write nothing; show what would change.")
 def command(files: tuple[Path, ...], check: bool, diff: bool) -> None:

@@ -11,12 +11,13 @@ import click
 from fbvm.base.files import write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.sources import report_diagnostics
 from fbvm.interchange.plcopen.read.importing import import_xml
 
 
 @click.command("import")
-@click.argument("file", metavar="FILE.xml", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("file", metavar="FILE.xml", type=ExistingPath(dir_okay=False))
 @click.option("-o", "--output", "folder", metavar="DIR", required=True, type=click.Path(file_okay=False, path_type=Path),
               help="Where the sources go, a POU a file; made if it is not there.")
 @click.option("--force", is_flag=True, help="Write over files that are there.")

@@ -11,6 +11,7 @@ import click
 from fbvm.base.files import write_file
 from fbvm.cli.shared import status
 from fbvm.cli.shared.files import writing
+from fbvm.cli.shared.paths import ExistingPath
 
 FOLDER = "lessons"
 
@@ -21,7 +22,7 @@ FOLDER = "lessons"
 @click.option("--solution", "solved", is_flag=True, help="Show the solution, and why.")
 @click.option("--folder", type=click.Path(file_okay=False, path_type=Path), default=FOLDER, show_default=True,
               help="Where your lessons are.")
-@click.option("--class", "learners", type=click.Path(exists=True, file_okay=False, path_type=Path), metavar="DIR",
+@click.option("--class", "learners", type=ExistingPath(file_okay=False), metavar="DIR",
               help="For teachers: check all lessons in all folders of this folder, one a learner.")
 @click.option("--report", "out", type=click.Path(file_okay=False, path_type=Path), metavar="DIR", default="report",
               show_default=True, help="With --class: where report.html, traces and pages go.")

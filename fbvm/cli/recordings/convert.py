@@ -12,6 +12,7 @@ import click
 from fbvm.base.files import TABLE_BYTES, new_file, read_file, reason, write_file
 from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
+from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.traces import SUFFIX, open_trace, recording_of, scans_option
 from fbvm.record.draw.svg import SvgChart
 from fbvm.record.export.pcapng import Capture
@@ -71,7 +72,7 @@ FORMATS: dict[str, Callable[[Trace, Names, range | None, Path], None]] = {
 
 
 @click.command("convert")
-@click.argument("source", metavar="FROM", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("source", metavar="FROM", type=ExistingPath(dir_okay=False))
 @click.argument("target", metavar="TO", type=click.Path(dir_okay=False, path_type=Path))
 @click.argument("names", nargs=-1, metavar="[NAME|ADDRESS|FIRST..LAST]...")
 @scans_option

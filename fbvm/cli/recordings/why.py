@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.traces import SUFFIX, open_trace
 from fbvm.record.draw.why import DEEPEST, cause_text, why
 from fbvm.record.trace.writer import Depth
@@ -14,7 +15,7 @@ from fbvm.watch.paths import Place
 
 @click.command("why")
 @click.argument("name", metavar="NAME|ADDRESS")
-@click.argument("path", metavar="[TRACE]", required=False, type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("path", metavar="[TRACE]", required=False, type=ExistingPath(dir_okay=False))
 @click.option("--scan", type=click.IntRange(min=0), metavar="N", help="At the end of this scan; the last one if not given.")
 @click.option("--deep", type=click.IntRange(min=0), default=DEEPEST, show_default=True, metavar="N",
               help="Causes of causes to look for.")

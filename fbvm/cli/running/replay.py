@@ -9,6 +9,7 @@ import click
 
 from fbvm.cli.shared import journals
 from fbvm.cli.shared.options import charted_names, show_option
+from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.run_result import RunResult
 from fbvm.net.journal import JournalError
 from fbvm.record.trace.recorder import Recorder
@@ -16,9 +17,9 @@ from fbvm.run.replay import Replay
 
 
 @click.command("replay")
-@click.argument("journal", type=click.Path(exists=True, dir_okay=False, path_type=Path))
+@click.argument("journal", type=ExistingPath(dir_okay=False))
 @click.option("--library", "libraries", multiple=True, metavar="DIR",
-              type=click.Path(exists=True, file_okay=False, path_type=Path),
+              type=ExistingPath(file_okay=False),
               help="Where folders of libraries are now, if the journal's are gone; may be repeated.")
 @click.option("--scans", type=click.IntRange(min=0), metavar="N", help="End after N scans.")
 @click.option("--until", metavar="EXPRESSION", help="End when this holds after a scan: 'Main.done AND D200 > 5'.")

@@ -28,6 +28,7 @@ from fbvm.cli.shared.options import (
     time_ns,
     watch_cycle_option,
 )
+from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.project_arguments import project_argument
 from fbvm.cli.shared.run_result import RunProgress, RunResult
 from fbvm.cli.shared.sources import compile_or_exit, source_options
@@ -49,7 +50,7 @@ from fbvm.watch.places import parse_for
 
 @click.command("run")
 @source_options
-@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=click.Path(exists=True, path_type=Path))
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath())
 @click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
               help="Cycle of programs without a TASK, and how often the PLC scans.")
 @click.option("--scans", type=click.IntRange(min=0), metavar="N", help="End after N scans.")

@@ -11,6 +11,7 @@ from fbvm.cli.running.debug_targets import DebugTarget, ProjectTarget
 from fbvm.cli.shared import status
 from fbvm.cli.shared.e_banks import e_banks_in, with_e_banks
 from fbvm.cli.shared.options import CYCLE_NS, Mapping, Setting, mapping, setting, time_ns
+from fbvm.cli.shared.paths import SourcePath
 from fbvm.cli.shared.project_arguments import project_argument
 from fbvm.cli.shared.prompt import prompt_lines
 from fbvm.cli.shared.sources import compile_or_exit, source_options
@@ -24,7 +25,7 @@ from fbvm.watch.places import parse_for
 @click.command("step", epilog="At the prompt, `help` lists the commands.  A script: printf 'run Main.Done\\nprint D200\\n' | "
                "fbvm step FILE")
 @source_options
-@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=click.Path(exists=True, path_type=Path))
+@click.argument("files", nargs=-1, metavar="[FILE... | PROJECT]", type=SourcePath())
 @click.option("--plc", "name", metavar="NAME", help="Which PLC of a project; the others scan along.")
 @click.option("--cycle", "cycle_ns", type=time_ns, default=CYCLE_NS, metavar="TIME", show_default="10ms",
               help="Cycle of programs without a TASK, and how often the PLC scans.")

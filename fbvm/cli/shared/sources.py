@@ -14,6 +14,7 @@ from fbvm.base import cache
 from fbvm.base.diagnostics import Diagnostic, errors
 from fbvm.base.dialects import DIALECTS
 from fbvm.cli.shared import status
+from fbvm.cli.shared.paths import ExistingPath, SourcePath
 from fbvm.code.compiler import compile_files
 from fbvm.code.image import Image
 
@@ -21,7 +22,7 @@ from fbvm.code.image import Image
 def source_arguments(function: Callable[..., Any]) -> Callable[..., Any]:
     """FILE..., --program, --resource, --dialect, --library and --no-cache, which all verbs on programs share."""
     files = click.argument("files", nargs=-1, required=True, metavar="FILE...",
-                           type=click.Path(exists=True, dir_okay=False, path_type=Path))  # fmt: skip
+                           type=SourcePath(dir_okay=False))  # fmt: skip
     return source_options(files(function))
 
 
@@ -45,7 +46,7 @@ def source_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """--program, --resource, --dialect, --library and --no-cache."""
     for decorate in (
         click.option("--library", "libraries", multiple=True, metavar="DIR",
-                     type=click.Path(exists=True, file_okay=False, path_type=Path),
+                     type=ExistingPath(file_okay=False),
                      help="A folder of libraries of your own, besides those that fbvm brings; may be repeated."),
         click.option("--no-cache", is_flag=True, expose_value=False, callback=_switch_cache_off,
                      help="Compile anew, and keep nothing of it on disk."),

@@ -15,6 +15,7 @@ from fbvm.base.digits import whole_number
 from fbvm.base.files import reason, write_file
 from fbvm.cli.shared.ending import held
 from fbvm.cli.shared.files import growing_file, writing
+from fbvm.cli.shared.paths import ExistingPath
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.record.page.data import page_data
@@ -56,7 +57,7 @@ class ScanRange(click.ParamType[range]):
 
 def trace_argument(function: Callable[..., Any]) -> Callable[..., Any]:
     """TRACE, a file that `fbvm run --trace` wrote."""
-    return click.argument("path", metavar="TRACE", type=click.Path(exists=True, dir_okay=False, path_type=Path))(function)
+    return click.argument("path", metavar="TRACE", type=ExistingPath(dir_okay=False))(function)
 
 
 def scans_option(function: Callable[..., Any]) -> Callable[..., Any]:

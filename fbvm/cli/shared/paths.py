@@ -1,0 +1,89 @@
+"""Types of arguments that name files: a misspelt name gets a suggestion, and a file that is no source is told what it is."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import click
+
+_HEAD_BYTES = 512
+_FORMS = (
+    ((b"fbvmtrc",), "a trace", "`fbvm chart`, `fbvm table` and `fbvm why` look at it"),
+    ((b'{"journal"',), "a journal", "`fbvm replay` does its run again"),
+    ((b"<!doctype html", b"<html"), "a page", "open it in a browser"),
+    ((b"<?xml", b"<project"), "XML", "`fbvm import FILE -o DIR` makes sources of a PLCopen project"),
+    ((b"%pdf", b"pk\x03\x04", b"\x1f\x8b"), "no text", "unpack or export the sources from it"),
+)
+"""How files begin that are no sources, in lower case: what such a file is, and what to do with it."""
+_SUFFIXES = {".html": 2, ".htm": 2, ".xml": 3}
+"""Files that are known by their names, by the row of `_FORMS`."""
+
+
+def suggestion(word: str, known: Iterable[str]) -> str:
+    """`; did you mean run or learn?` for a misspelt word, "" if no known one is like it.
+
+    >>> suggestion("chek", ["check", "chart", "run"])
+    '; did you mean check?'
+    """
+    import difflib  # a command that is spelt right starts without it
+
+    shown = {each.lower(): each for each in known}
+    close = difflib.get_close_matches(word.lower(), list(shown), n=2, cutoff=0.6)
+    return f"; did you mean {' or '.join(shown[each] for each in close)}?" if close else ""
+
+
+class ExistingPath(click.Path):
+    """A path that exists; the message about one that does not names the files that are called alike."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(exists=True, path_type=Path, **options)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path.  Raises BadParameter."""
+        if not os.path.lexists(value) and not (self.allow_dash and str(value) == "-"):
+            what = "File" if not self.dir_okay else "Directory" if not self.file_okay else "Path"
+            self.fail(f"{what} {str(value)!r} does not exist{_alike(Path(value), self.file_okay)}", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+class SourcePath(ExistingPath):
+    """A source, or a folder where one may be given; a file of another kind is refused with what it is and who reads it."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """The path.  Raises BadParameter."""
+        path = super().convert(value, param, ctx)
+        if said := foreign(Path(path)):
+            self.fail(said, param, ctx)
+        return path
+
+
+def foreign(path: Path) -> str:
+    """What a file is that is no source, and what to do with it; "" for all that may be one."""
+    if not path.is_file():
+        return ""
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+    except OSError:
+        return ""
+    start = head.removeprefix(b"\xef\xbb\xbf").lstrip().lower()
+    row = next((row for row in _FORMS if start.startswith(row[0])), None)
+    if row is None and path.suffix.lower() in _SUFFIXES:
+        row = _FORMS[_SUFFIXES[path.suffix.lower()]]
+    return f"{path} is {row[1]} and no source of a program; {row[2].replace('FILE', str(path))}" if row else ""
+
+
+def _alike(path: Path, files: bool) -> str:
+    """The suggestion for a path that does not exist: names like its own in its folder, or its own name with another suffix."""
+    try:
+        there = {entry.name.lower(): entry.name for entry in os.scandir(path.parent) if files or entry.is_dir()}
+    except (OSError, ValueError):
+        return ""
+    import difflib
+
+    wanted = path.name.lower()
+    close = [name for name in there if Path(name).stem == wanted] or difflib.get_close_matches(wanted, there, n=2, cutoff=0.6)
+    return f"; did you mean {' or '.join(str(path.with_name(there[name])) for name in close)}?" if close else ""
