@@ -39,10 +39,11 @@ def bind(scope: Scope, call: tree.Call, pou: Pou, bound: PouCall) -> None:
     for argument in named:
         _named(scope, argument, pou, bound, given)
     empty = {name for name, node in given.items() if isinstance(node, tree.Argument) and node.value is None}
-    missing = [v.name for v in pou.parameters("VAR_IN_OUT") if fold(v.name) not in given.keys() - empty]
+    missing = [v for v in pou.parameters("VAR_IN_OUT") if fold(v.name) not in given.keys() - empty]
     if missing and not pou.has_failed_names:
-        scope.error("S0404", call, f"the in-out {' and '.join(missing)} of {pou.name} is missing",
-                    f"pass a variable: {missing[0]} := ...")
+        names = " and ".join(v.name for v in missing)
+        scope.error("S0404", call, f"the {missing[0].role_of_parameter} {names} of {pou.name} is missing",
+                    f"pass a variable: {missing[0].name} := ...")
 
 
 def _positional(scope: Scope, call: tree.Call, arguments: Sequence[tree.Argument], named: Sequence[tree.Argument], pou: Pou,
@@ -133,11 +134,12 @@ def _pass(scope: Scope, argument: tree.Argument, variable: Variable, bound: PouC
 
 
 def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
-    kind = scope.infer(value)
+    kind, role = scope.infer(value), variable.role_of_parameter
     if kind is None:
         return False
     if not scope.is_variable(value):
-        scope.error("S0407", value, f"the in-out {variable.name} needs a variable, not a value")
+        scope.error("S0407", value, f"the {role} {variable.name} needs a variable, not a value",
+                    "it is read where it lies: assign the value to a variable, and pass that" if variable.by_reference else "")
         return False
     if isinstance(variable.type, AnyType) and holds_block(kind):
         scope.error("S0405", value, f"{variable.name} is {variable.type}, and {kind} is or holds an instance",
@@ -147,14 +149,16 @@ def _in_out(scope: Scope, value: tree.Expr, variable: Variable) -> bool:
     if not same(kind.base if numbers and isinstance(kind, EnumType) else kind, variable.type) and \
             not _long_enough(kind, variable):
         hint = "an in-out takes a variable of exactly its own type"
+        if variable.by_reference:
+            hint = "an input that is read where it lies takes a variable of exactly its own type"
         if isinstance(kind, StringType) and variable.any_length:
             hint = f"an in-out STRING without a length works on {DEFAULT_STRING} characters: " \
                 "pass a variable that has as many, or give both the same length"
-        scope.error("S0405", value, f"the in-out {variable.name} needs {variable.type}, this is {kind}", hint)
+        scope.error("S0405", value, f"the {role} {variable.name} needs {variable.type}, this is {kind}", hint)
         return False
     if isinstance(value, ladder.Words):
         value = value.of
-    return variable.constant or writable(scope, value, f"be passed to the in-out {variable.name}")
+    return variable.constant or writable(scope, value, f"be passed to the {role} {variable.name}")
 
 
 def _long_enough(kind: Type, variable: Variable) -> bool:
@@ -167,4 +171,5 @@ def _long_enough(kind: Type, variable: Variable) -> bool:
 
 
 def _described(variable: Variable) -> str:
-    return {"VAR_INPUT": "an input", "VAR_OUTPUT": "an output", "VAR_IN_OUT": "an in-out"}[variable.kind]
+    kind = "VAR_INPUT" if variable.by_reference else variable.kind
+    return {"VAR_INPUT": "an input", "VAR_OUTPUT": "an output", "VAR_IN_OUT": "an in-out"}[kind]

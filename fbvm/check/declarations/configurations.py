@@ -86,8 +86,8 @@ class Configurations:
         """Report an in-out of a program that nothing is connected to."""
         in_outs = pou.parameters("VAR_IN_OUT")
         if in_outs:
-            name = in_outs[0].name
-            self.report.add("S0404", source, node, f"the in-out {name} of {pou.name} is missing: a task runs the program",
+            name, role = in_outs[0].name, in_outs[0].role_of_parameter
+            self.report.add("S0404", source, node, f"the {role} {name} of {pou.name} is missing: a task runs the program",
                             f"connect a variable: {connection.format(name)}" if connection else
                             "use a VAR_GLOBAL, or connect a variable in a CONFIGURATION")
 
@@ -137,8 +137,9 @@ class Configurations:
             body = self.context.block_of(block.type)
             in_outs = body.parameters("VAR_IN_OUT")
             if in_outs:
-                self.report.add("S0404", source, row.instance, f"the in-out {in_outs[0].name} of {block.name} is missing: "
-                                f"the task {row.task.text} runs it", "let it have inputs and outputs only")
+                self.report.add("S0404", source, row.instance, f"the {in_outs[0].role_of_parameter} {in_outs[0].name} of "
+                                f"{block.name} is missing: the task {row.task.text} runs it",
+                                "let it have inputs and outputs only")
             elif task is not None:
                 task.runs.append(Run(instance, body, block))
                 instance.initial = instance.initial[:flag.offset] + b"\x01" + instance.initial[flag.offset + 1:]

@@ -175,9 +175,9 @@ class _Interface:
         if section.kind != "VAR_INPUT":
             return
         if self.scope.dialect.pragmas_act and passes_places(self.pou.source, section):
-            made.kind = "VAR_IN_OUT"
+            made.kind, made.by_reference = "VAR_IN_OUT", True
         elif isinstance(made.type, AnyType) or is_block(made.type) or self._is_open_input(made):
-            made.kind = "VAR_IN_OUT"
+            made.kind, made.by_reference = "VAR_IN_OUT", True
             made.constant = not isinstance(made.type, AnyType)
 
     def _is_open_input(self, made: Variable) -> bool:
@@ -277,6 +277,8 @@ class _Interface:
             elif variable.constant and not is_constant(section):
                 self._error("S0208", name, f"the VAR_GLOBAL {name.text} is CONSTANT",
                             "write VAR_EXTERNAL CONSTANT")
+            elif is_constant(section) and not variable.constant:
+                self.pou.constant_externals.add(fold(name.text))
             if fold(name.text) in self.pou.variables:
                 self._error("S0202", name, f"{name.text} is declared twice in {self.pou.name}")
             elif variable is not None:

@@ -54,6 +54,15 @@ def _is_writable_member(scope: Scope, expr: tree.Expr, inner: tree.Expr, purpose
 
 def _is_writable_variable(scope: Scope, expr: tree.Expr, variable: Variable, purpose: str) -> bool:
     """True for a variable that is no constant, step or action; else a diagnostic.  Marks the variable as written."""
+    pou = scope.pou
+    if variable.kind == "VAR_GLOBAL" and pou is not None and fold(variable.name) in pou.owner.constant_externals:
+        scope.error("S0501", expr, f"{variable.name} is CONSTANT here and cannot {purpose}",
+                    "write VAR_EXTERNAL without CONSTANT to write the global variable")
+        return False
+    if variable.constant and variable.by_reference:
+        scope.error("S0501", expr, f"{variable.name} is an input that is read where it lies, and cannot {purpose}",
+                    "make it a VAR_IN_OUT", (variable.source, variable.node.start, "declared here"))
+        return False
     if variable.constant:
         scope.error("S0501", expr, f"{variable.name} is CONSTANT and cannot {purpose}", "",
                     (variable.source, variable.node.start, "declared here"))

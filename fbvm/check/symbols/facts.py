@@ -55,6 +55,8 @@ class Variable:
     """True for `AT %I*` that VAR_CONFIG completes: a reference then, which never changes."""
     open_location: str = ""
     """What is written behind AT if `open`: `%I*`, `%QX*`, `%IW1.2.3`."""
+    by_reference: bool = False
+    """True for a VAR_INPUT whose kind is VAR_IN_OUT, since it reads the argument where that lies."""
     any_length: bool = False
     """True for an in-out STRING that is declared without a length."""
     location: Address | None = None
@@ -68,6 +70,11 @@ class Variable:
     object: int | None = None
     """Of a variable that something refers to: the number of its object (see code.operations), or of one that every
     instance has, its position among those.  Known after layout, or when it is referred to."""
+
+    @property
+    def role_of_parameter(self) -> str:
+        """What the declaration makes of a parameter that stands for its argument: an input or an in-out."""
+        return "input" if self.by_reference else "in-out"
 
     @property
     def hexadecimal(self) -> bool:
@@ -106,6 +113,8 @@ class Pou:
     writes_eno: bool = False
     enables_itself: bool = False
     """True if the body writes ENO without declaring it: ENO is TRUE at each start then."""
+    constant_externals: set[str] = field(default_factory=set)
+    """Folded names of global variables that it may only read, by VAR_EXTERNAL CONSTANT, though they are no constants."""
     failed_names: set[str] = field(default_factory=set)
     """Folded names whose declaration has an error: using them is not reported again."""
     inherits: bool = False
