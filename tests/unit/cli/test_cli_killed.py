@@ -1,0 +1,81 @@
+"""A process that is killed at any moment of writing: what it had written by then can be read, and an image is whole."""
+
+from __future__ import annotations
+
+import json
+import random
+import signal
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from depth import times
+
+from fbvm.base.data import data_folder
+from fbvm.cli.main import main
+
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform == "win32", reason="no SIGKILL")]
+DEMO = str(data_folder("examples") / "demo.st")
+PEER = ["--map", "192.168.250.1:502=peer"]
+WITHIN_S = 60
+CLIENTS_WORDS = 30_000
+"""Words of D in front of those that the server's program uses itself."""
+
+
+def killed(command: list[str], grown: Path, size: int) -> int:
+    """Runs a command until a file has so many bytes, and kills it.  Returns the bytes that the file had then."""
+    with subprocess.Popen([sys.executable, "-m", "fbvm", *command], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        until_s = time.monotonic() + WITHIN_S
+        while not grown.exists() or grown.stat().st_size < size:
+            assert process.poll() is None, process.stderr and process.stderr.read()
+            assert time.monotonic() < until_s, f"{grown} does not grow"
+            time.sleep(0.001)
+        process.kill()
+        process.wait(WITHIN_S)
+    assert process.returncode == -signal.SIGKILL
+    return grown.stat().st_size
+
+
+@pytest.mark.parametrize("seed", range(times(2, 25)))
+def test_a_run_that_writes_everything(seed: int, tmp_path: Path) -> None:
+    journal, trace, capture = tmp_path / "run.jsonl", tmp_path / "run.fbt", tmp_path / "run.pcapng"
+    size = random.Random(seed).randrange(1, 60_000)
+    killed(["run", DEMO, *PEER, "--for", "100000000s", "--journal", str(journal), "--trace", str(trace), "--depth", "statements",
+            "--pcap", str(capture)], journal, size)  # fmt: skip
+    replayed = CliRunner().invoke(main, ["replay", str(journal), "--show", "D200"])
+    assert replayed.exit_code == 0, replayed.output
+    if trace.stat().st_size:
+        shown = CliRunner().invoke(main, ["table", str(trace), "D200"])
+        assert shown.exit_code == 0, shown.output
+    content = capture.read_bytes()
+    while len(content) >= 12:
+        kind, length = struct.unpack_from("<II", content)
+        assert kind in (0x0A0D0D0A, 1, 4, 6) and length % 4 == 0
+        if length > len(content):
+            break  # the block that was being written
+        assert struct.unpack_from("<I", content, length - 4)[0] == length
+        content = content[length:]
+
+
+@pytest.mark.parametrize("seed", range(times(2, 25)))
+def test_a_server_that_saves_its_memory(seed: int, tmp_path: Path) -> None:
+    """Each save takes the place of the one before as a whole, so that the image of a killed server is always one of them."""
+    image = tmp_path / "memory.json"
+    image.write_text(json.dumps({"spaces": {"D": [7] * 32768}}), encoding="utf-8")
+    chance = random.Random(seed)
+    with subprocess.Popen([sys.executable, "-m", "fbvm", "serve", "--port", "0", "--image", str(image)],
+                          stdout=subprocess.PIPE, text=True) as process:  # fmt: skip
+        assert process.stdout
+        process.stdout.readline()
+        for _ in range(chance.randrange(1, 20)):
+            process.send_signal(signal.SIGUSR1)
+            time.sleep(chance.random() / 100)
+        process.kill()
+        process.wait(WITHIN_S)
+    words = json.loads(image.read_text(encoding="utf-8"))["spaces"]["D"]
+    assert words[:CLIENTS_WORDS] == [7] * CLIENTS_WORDS
+    assert len(words) == 32768
