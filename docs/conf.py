@@ -17,7 +17,7 @@ project = "fbvm"
 release = version = __version__
 extensions = [
     "myst_parser", "sphinx.ext.autodoc", "sphinx_click", "sphinx_copybutton", "repository_files", "structured_text",
-    "product_pages",
+    "product_pages", "sidebar",
 ]  # fmt: skip
 exclude_patterns = ["_ext"]
 nitpicky = True

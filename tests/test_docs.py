@@ -132,3 +132,5 @@ def test_the_pages_are_built_without_a_warning(tmp_path: Path) -> None:
             elif file and not (page.parent / file).exists():
                 wrong.append(f"{page.relative_to(site)}: {link}")
     assert wrong == []
+    code = (site / "reference" / "diagnostics" / "S0101.html").read_text(encoding="utf-8")
+    assert re.findall(r'current-page"><a [^>]*href="([^"]*)">([^<]*)', code) == [("index.html", "Diagnostics")]

@@ -10,6 +10,10 @@ from fbvm.base.codes import CODES
 from product_pages.markdown import page, structured_text, table
 
 FOLDER = "reference/diagnostics"
+HEAD = """---
+tocdepth: 2
+---"""
+"""The list says itself that the sidebar need not have the pages of all codes, which makes each page of the documentation small."""
 HEADINGS = {"S": "Sources", "P": "Project file and libraries", "X": "PLCopen XML", "R": "Traps: running stopped"}
 OFF = """## Switching it off
 
@@ -25,6 +29,7 @@ def pages() -> dict[str, str]:
 
 def _index() -> str:
     parts = [
+        HEAD,
         "# Diagnostics",
         "Every message has a code, a place and, where there is one, a hint of what to write instead. `fbvm explain S0301` "
         "prints the page of a code in a terminal: a wrong program, the reason, the program that mends it. Every code of a "
