@@ -255,8 +255,12 @@ def _page(item: pytest.Item, rig: Rig, lines: tuple[str, range] | None, failure:
 
 def _rigs_read(excinfo: pytest.ExceptionInfo[BaseException], rigs: Sequence[Rig]) -> list[tuple[Rig, tuple[str, range] | None]]:
     """The rigs whose variables the failed statement has read, with its file and lines; without such rigs, all rigs."""
+    files = {file for rig in rigs for file, _, _ in rig.reads}
     for entry in reversed(excinfo.traceback):
-        file, lines = str(entry.path), _statement(str(entry.path), entry.lineno + 1)
+        file = str(entry.path)
+        if file not in files:
+            continue
+        lines = _statement(file, entry.lineno + 1)
         found = [rig for rig in rigs if any(name == file and line in lines for name, line, _ in rig.reads)]
         if found:
             return [(rig, (file, lines)) for rig in found]
