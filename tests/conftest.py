@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import pytest
 from depth import SWITCH
-from hypothesis import settings
 
 if TYPE_CHECKING:
     from xdist.scheduler import Scheduling
@@ -28,6 +27,7 @@ if sys.dont_write_bytecode:
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     del os.environ["PYTHONDONTWRITEBYTECODE"]
 
+from hypothesis import settings  # noqa: E402  (pytest rewrites its eighty modules, whose bytecode is kept from here on)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
