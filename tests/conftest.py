@@ -27,7 +27,7 @@ if sys.dont_write_bytecode:
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     del os.environ["PYTHONDONTWRITEBYTECODE"]
 
-from hypothesis import settings  # noqa: E402  (pytest rewrites its eighty modules, whose bytecode is kept from here on)
+from hypothesis import settings
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

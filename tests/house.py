@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -10,14 +11,21 @@ from pathlib import Path
 HOUSE = Path(__file__).resolve().parent.parent
 PACKAGE = HOUSE / "fbvm"
 
+
+@cache
+def text_of(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
+
+
 @cache
 def tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+    return ast.parse(text_of(path))
 
 
 MODULES = sorted(PACKAGE.rglob("*.py"))
 
 
+@cache
 def name_of(path: Path) -> str:
     return path.relative_to(PACKAGE).as_posix()
 
@@ -51,12 +59,19 @@ def imports(path: Path) -> list[str]:
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{name_of(path)}: relative import"
             for alias in node.names:
-                place = HOUSE / Path(*(node.module or "").split("."), alias.name)
-                is_module = place.with_suffix(".py").exists() or (place / "__init__.py").exists()
-                found.append(f"{node.module}.{alias.name}" if is_module else node.module or "")
+                name = f"{node.module}.{alias.name}"
+                found.append(name if is_module(name) else node.module or "")
     return found
 
 
+@cache
+def is_module(name: str) -> bool:
+    """True for the dotted name of a module or folder of this repository."""
+    place = HOUSE / name.replace(".", "/")
+    return place.with_suffix(".py").exists() or (place / "__init__.py").exists()
+
+
+@cache
 def dotted(path: Path) -> str:
     """`fbvm.base.types` for fbvm/base/types.py, `fbvm.base` for fbvm/base/__init__.py."""
     return ".".join(("fbvm", *path.relative_to(PACKAGE).with_suffix("").parts)).removesuffix(".__init__")
@@ -89,6 +104,7 @@ def circles(graph: dict[str, set[str]]) -> list[list[str]]:
     return found
 
 
+@cache
 def folder_of(module: str) -> str:
     """`syntax/st` for `fbvm.syntax.st.lexer`, and for `fbvm.syntax.st`, if that is a folder."""
     parts = module.split(".")[1:]
@@ -97,6 +113,7 @@ def folder_of(module: str) -> str:
 
 FUNCTION = (ast.FunctionDef, ast.AsyncFunctionDef)
 DECISIONS = (ast.If, ast.For, ast.While, ast.IfExp, ast.ExceptHandler, ast.match_case)
+WORDS_OF_DECISIONS = re.compile(r"\b(?:if|elif|for|while|except|case|and|or)\b")
 
 
 def functions(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
@@ -114,3 +131,9 @@ def branches(function: ast.AST) -> int:
         if not isinstance(node, FUNCTION):
             todo += ast.iter_child_nodes(node)
     return found
+
+
+def most_branches(function: ast.FunctionDef | ast.AsyncFunctionDef, lines: list[str]) -> int:
+    """At least as many as `branches`, and found without a walk: each decision has a word of its own in the lines of a module."""
+    text = "\n".join(lines[function.lineno - 1 : function.end_lineno])
+    return 1 + sum(1 for _ in WORDS_OF_DECISIONS.finditer(text))

@@ -78,6 +78,7 @@ def test_mutants_of_st() -> None:
     ])
 
 
+@pytest.mark.slow
 def test_every_mutant_of_a_file_differs_from_it_and_compiles() -> None:
     path = Path("fbvm/wire/modbus.py")
     text = (HOUSE / path).read_text(encoding="utf-8")

@@ -117,7 +117,7 @@ class Rig:
     def run_until(self, condition: str, max_s: float = 60) -> float:
         """Seconds that it took; fails if it took more than `max_s`."""
         start_ns = self.plc.now_ns
-        reason = self.plc.run(until=condition, max_ns=start_ns + int(max_s * SECOND_NS))
+        reason = self.plc.run(until=condition, max_ns=int(max_s * SECOND_NS))
         assert reason == "until", f"{condition}: {reason} after {max_s} s"
         return (self.plc.now_ns - start_ns) / SECOND_NS
 

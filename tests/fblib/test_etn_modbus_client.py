@@ -64,7 +64,7 @@ class Rig:
     def until(self, condition: str, max_s: float = 20) -> float:
         """Seconds that it took."""
         start_ns = self.plc.now_ns
-        assert self.plc.run(until=condition, max_ns=start_ns + int(max_s * SECOND_NS)) == "until", condition
+        assert self.plc.run(until=condition, max_ns=int(max_s * SECOND_NS)) == "until", condition
         return (self.plc.now_ns - start_ns) / SECOND_NS
 
     def connect(self) -> Rig:

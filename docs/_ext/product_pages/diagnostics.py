@@ -13,7 +13,7 @@ FOLDER = "reference/diagnostics"
 HEAD = """---
 tocdepth: 2
 ---"""
-"""The list says itself that the sidebar need not have the pages of all codes, which makes each page of the documentation small."""
+"""Leaves the pages of codes out of the sidebar: with over a hundred lines it is most of each page of the documentation."""
 HEADINGS = {"S": "Sources", "P": "Project file and libraries", "X": "PLCopen XML", "R": "Traps: running stopped"}
 OFF = """## Switching it off
 

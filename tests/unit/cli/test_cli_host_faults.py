@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner, Result
-from rows import each_of
+from rows import each_of, first_quick
 
 from fbvm.base.areas import AREAS, SLOTS_OFFSET
 from fbvm.base.memory import Memory
@@ -59,7 +59,7 @@ def fbvm(*arguments: str) -> Result:
     return CliRunner().invoke(main, arguments, catch_exceptions=False)
 
 
-@pytest.mark.parametrize("option", ["--trace", "--journal", "--pcap"])
+@pytest.mark.parametrize("option", first_quick(["--trace", "--journal", "--pcap"]))
 def test_a_disk_that_is_full_during_a_run(disk: Callable[[int], None], option: str) -> None:
     run = ["run", DEMO, *PEER, "--scans", "900", option, "out.file"]
     assert fbvm(*run).exit_code == 0
@@ -89,6 +89,7 @@ def test_nothing_is_written_behind_a_gap(disk: Callable[[int], None]) -> None:
 
 
 @on_posix
+@pytest.mark.slow
 @each_of(("arguments", "status"), [
     (("list", DEMO), 2), (("explain",), 2), (("--help",), 2), (("run", DEMO, "--scans", "2", "--show", "D0", "--json"), 2),
     (("run", DEMO, "--scans", "2", "--html", "/dev/full"), 2), (("convert", "run.fbtrace", "/dev/full"), 2),
@@ -102,6 +103,7 @@ def test_an_output_that_is_full(tmp_path: Path, arguments: tuple[str, ...], stat
 
 
 @on_posix
+@pytest.mark.slow
 def test_a_reader_that_has_gone(tmp_path: Path) -> None:
     read, write = os.pipe()
     os.close(read)
@@ -111,6 +113,7 @@ def test_a_reader_that_has_gone(tmp_path: Path) -> None:
 
 
 @on_posix
+@pytest.mark.slow
 def test_streams_that_are_closed(tmp_path: Path) -> None:
     for closed in ("<&-", ">&-", "2>&-", "<&- >&- 2>&-"):
         done = subprocess.run(f'"{sys.executable}" -m fbvm list "{DEMO}" {closed}', shell=True, capture_output=True, cwd=tmp_path,
@@ -119,10 +122,10 @@ def test_streams_that_are_closed(tmp_path: Path) -> None:
         assert b"Traceback" not in done.stderr
 
 
-@each_of(("encoding", "verb"), [
+@pytest.mark.parametrize(("encoding", "verb"), first_quick([
     ("cp1252", ("ladder", "ladder.st")), ("ascii", ("ladder", "ladder.st")), ("ascii", ("sfc", "sfc.st")),
     ("cp437", ("sfc", "sfc.st")), ("cp850", ("ladder", "ladder.st")), ("cp850", ("sfc", "sfc.st")), ("cp1252", ("sfc", "sfc.st")),
-])
+]))
 def test_drawings_in_an_encoding_without_boxes(encoding: str, verb: tuple[str, str]) -> None:
     arguments = [verb[0], str(EXAMPLES / verb[1])]
     expected = CliRunner().invoke(main, arguments).output

@@ -95,10 +95,21 @@ def chunk(kind: int, packed: bytes, scans: int = 0) -> bytes:
     return struct.pack("<BIIQI", kind, len(packed), zlib.crc32(packed), 0, scans) + packed
 
 
+def many_zeros(size: int, times: int) -> bytes:
+    """`size` * `times` zeros, packed; each `size` of them is the same piece of the format (RFC 1950, 1951)."""
+    engine = zlib.compressobj(9, zlib.DEFLATED, -zlib.MAX_WBITS)
+    piece = engine.compress(bytes(size)) + engine.flush(zlib.Z_FULL_FLUSH)
+    checksum = (size * times % 65521) << 16 | 1
+    return b"\x78\xda" + piece * times + b"\x03\x00" + checksum.to_bytes(4, "big")
+
+
+def test_zeros_are_packed() -> None:
+    assert zlib.decompress(many_zeros(1 << 16, 3)) == bytes(3 << 16)
+
+
 def test_a_trace_that_is_much_larger_when_unpacked(fbvm: Fbvm) -> None:
     assert fbvm("run", "counter.st", "--scans", "3", "--trace", "run.fbtrace").exit_code == 0
-    engine = zlib.compressobj(9)
-    packed = b"".join(engine.compress(bytes(1 << 24)) for _ in range((trace_format.LARGEST_BYTES >> 24) + 1)) + engine.flush()
+    packed = many_zeros(1 << 24, (trace_format.LARGEST_BYTES >> 24) + 1)
     assert len(packed) < 1 << 20
     whole = Path("run.fbtrace").read_bytes()
     for data in (whole + chunk(trace_format.BLOCK, packed, 1), trace_format.MAGIC + chunk(trace_format.HEADER, packed)):
