@@ -29,17 +29,24 @@ if not native.available():
 pytestmark = pytest.mark.slow
 
 LEVELS = (0, 2)
+KEPT: dict[int, native.NativeEngine] = {}
+"""By level the engine of the last `program`, which keeps its machine code for the next run."""
 _python = hand_image.execute
 
 
-def execute(*codes: Block, before: dict[int, bytes] | None = None, budget: int = 100_000) -> Any:
+def execute(*codes: Block, before: dict[int, bytes] | None = None, budget: int = 100_000, program: Image | None = None) -> Any:
     """What `hand_image.execute` does, and the same on machine code, which must agree to the bit."""
-    rig = _python(*codes, before=before, budget=budget)
-    program = hand_image.image(*codes)
-    program = replace(program, tasks=program.tasks[:1])  # the others would make the same bodies once more
+    keep = program is not None
+    program = program or hand_image.image(*codes)
+    rig = _python(before=before, budget=budget, program=program)
+    if len(program.tasks) > 1:
+        program = replace(program, tasks=program.tasks[:1])  # the others would make the same bodies once more
     for level in LEVELS:
         memory = hand_image.power_on(program, before, budget)
-        trap = native.NativeEngine(program, memory, level).run(0)
+        engine = native.NativeEngine(program, memory, level)
+        trap = engine.run(0)
+        if keep:
+            KEPT[level] = engine
         assert repr(trap) == repr(rig.trap), f"level {level}"
         assert bytes(memory.snapshot()) == bytes(rig.memory.snapshot()), f"level {level}"
     return rig

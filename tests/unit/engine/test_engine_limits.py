@@ -5,12 +5,14 @@ from __future__ import annotations
 import linecache
 import sys
 import traceback
+from functools import cache
 
 import pytest
 from hand_image import at, const, execute, image, load, own, power_on, store
 from rows import each_of
 
 from fbvm.base.areas import SLOTS_OFFSET
+from fbvm.code.image import Image
 from fbvm.code.operations import Block, Node
 from fbvm.engine.python.engine import PythonEngine
 
@@ -72,12 +74,18 @@ def test_a_case_in_deep_blocks_reads_its_value_from_outside() -> None:
     assert rig.slot("i16", 0) == 255
 
 
+@cache
+def branches() -> Image:
+    """IF with 2000 branches, of which each compares the same value."""
+    rows = tuple((("eq", "b", "i16", load("i16", 4), const("i16", row)), (store("i16", 0, const("i16", row)),))
+                 for row in range(2000))
+    return image((("if", rows, (store("i16", 0, const("i16", -1)),)),))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("value", [0, 1, 24, 25, 26, 999, 1999, 2500])
 def test_a_long_chain_of_branches(value: int) -> None:
-    rows = tuple((("eq", "b", "i16", load("i16", 4), const("i16", row)), (store("i16", 0, const("i16", row)),))
-                 for row in range(2000))
-    rig = execute((("if", rows, (store("i16", 0, const("i16", -1)),)),), before={4: value.to_bytes(2, "little")})
+    rig = execute(program=branches(), before={4: value.to_bytes(2, "little")})
     assert rig.slot("i16", 0) == (value if value < 2000 else -1)
 
 

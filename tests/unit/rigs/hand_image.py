@@ -89,9 +89,10 @@ def power_on(program: Image, before: dict[int, bytes] | None = None, budget: int
     return memory
 
 
-def execute(*codes: Block, before: dict[int, bytes] | None = None, budget: int = 100_000) -> Rig:
-    """Run the first body of these codes once on the plain and on the observed build, which must agree to the bit."""
-    program = image(*codes)
+def execute(*codes: Block, before: dict[int, bytes] | None = None, budget: int = 100_000, program: Image | None = None) -> Rig:
+    """Run the first body of these codes, or of `program`, once on the plain and on the observed build, which must agree to the
+    bit.  Each engine keeps what it makes of a `program` for the next run."""
+    program = program or image(*codes)
     memory, other = power_on(program, before, budget), power_on(program, before, budget)
     engine = PythonEngine(program, memory)
     trap = engine.run(0)
