@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import re
 from dataclasses import replace
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -67,7 +67,9 @@ PROGRAM_NUMBERS = st.deferred(lambda: st.sampled_from(range(len(corpus()))))
 """Which program of the corpus; it is read by the first test that wants one."""
 
 
+@lru_cache(maxsize=4096)
 def write(text: str) -> str:
+    """The canonical form of a text; several tests want that of each program."""
     written, wrong = formatted(Source("x.st", text))
     assert not wrong
     return written
@@ -122,8 +124,9 @@ def test_every_program_keeps_its_meaning(path: Path) -> None:
         check(text)
 
 
+@lru_cache(maxsize=1)
 def image(text: str) -> object:
-    """What would be executed, without lines and columns; names in charts without their case.
+    """What would be executed, without lines and columns; names in charts without their case.  Most programs are canonical.
 
     Code is compared as text, because NAN is not equal to itself."""
     made = compile_text(text).image
