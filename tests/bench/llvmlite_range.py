@@ -15,8 +15,8 @@ import venv
 from pathlib import Path
 
 HOUSE = Path(__file__).resolve().parents[2]
-TESTS = ("tests/unit/test_native.py", "tests/unit/test_native_subset.py", "tests/unit/test_breakpoints.py",
-         "tests/unit/test_many_scans.py", "tests/unit/test_tiers.py", "tests/property/test_engines_agree.py",
+TESTS = ("tests/unit/engine/test_native.py", "tests/unit/engine/test_native_subset.py", "tests/unit/machine/test_breakpoints.py",
+         "tests/unit/machine/test_many_scans.py", "tests/unit/engine/test_tiers.py", "tests/property/test_engines_agree.py",
          "tests/property/test_texts_agree.py")
 PROGRAMS = 50
 """Programs in ST made at random that are compared besides."""

@@ -73,8 +73,8 @@ def serve(name: str, is_measured: bool) -> None:
     network = TcpNetwork({Peer(unit.address, 502): ("127.0.0.1", 0)})
     used = dict.fromkeys((*PARTS, "scans", "all"), 0)
     if is_measured:
-        found = native_scans._scans
-        native_scans._scans = lambda *shape: tuple(timed(call, used, "logic") for call in found(*shape))  # type: ignore[assignment]
+        found = native_scans._functions
+        native_scans._functions = lambda *shape: tuple(timed(call, used, "logic") for call in found(*shape))  # type: ignore[assignment]
     plc = Plc(compilation.image, engine="native")
     plc.attach(unit, network)
     if is_measured:

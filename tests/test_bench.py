@@ -1,0 +1,188 @@
+"""The scripts of tests/bench still find what they measure: each does a little of its work."""
+
+from __future__ import annotations
+
+import importlib.util
+import io
+import json
+import shutil
+import signal
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, redirect_stdout
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from fbvm.cli.main import main
+from fbvm.engine.native.engine import available
+from fbvm.machine.plc import Plc
+
+HOUSE = Path(__file__).resolve().parent.parent
+BENCH = HOUSE / "tests" / "bench"
+SCRIPTS = sorted(path.stem for path in BENCH.glob("*.py"))
+SMALL = "PROGRAM Main\nVAR n : INT; t : TON; END_VAR\n    n := n + 1;\n    t(IN := n > 3, PT := T#1s);\nEND_PROGRAM\n"
+"""What is measured in place of 5,000 lines."""
+pytestmark = pytest.mark.slow
+needs_machine_code = pytest.mark.skipif(not available(), reason="llvmlite is not installed")
+needs_c = pytest.mark.skipif(shutil.which("cc") is None, reason="no compiler of C is there")
+
+Load = Callable[[str], Any]
+
+
+@pytest.fixture
+def load(monkeypatch: pytest.MonkeyPatch) -> Load:
+    """Imports a script by its name; the search path is as before at the end."""
+
+    def loaded(name: str) -> Any:
+        monkeypatch.setattr(sys, "path", list(sys.path))
+        described = importlib.util.spec_from_file_location(f"bench_{name}", BENCH / f"{name}.py")
+        assert described is not None and described.loader is not None
+        module = importlib.util.module_from_spec(described)
+        described.loader.exec_module(module)
+        return module
+
+    return loaded
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    """The folder of the scripts with a small program in place of the large one."""
+    folder = tmp_path / "bench"
+    shutil.copytree(BENCH, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    (folder / "lines5000.st").write_text(SMALL, encoding="utf-8")
+    return folder
+
+
+def in_process(command: list[str], **options: Any) -> str:
+    """What `python -c TEXT ...` or `python -m fbvm ...` prints."""
+    if command[1:3] == ["-m", "fbvm"]:
+        result = CliRunner().invoke(main, command[3:], catch_exceptions=False)
+        assert result.exit_code == 0, result.output
+        return str(result.output)
+    before, output = (sys.argv, list(sys.path)), io.StringIO()
+    try:
+        sys.argv = ["-c", *command[3:]]
+        with redirect_stdout(output):
+            exec(compile(command[2], "<-c>", "exec"), {"__name__": "__main__"})
+    finally:
+        sys.argv, sys.path[:] = before
+    return output.getvalue()
+
+
+PROCESSES = SimpleNamespace(
+    run=lambda command, **options: SimpleNamespace(stdout=in_process(command), returncode=0), check_output=in_process)
+
+
+def test_every_script_is_tried() -> None:
+    tried = {name.removeprefix("test_the_script_") for name in globals() if name.startswith("test_the_script_")}
+    assert tried | {"mutants"} == set(SCRIPTS)  # test_mutants.py
+
+
+def test_the_script_checking(load: Load) -> None:
+    assert set(load("checking").measured(100)) == {"lines", "parse", "compile", "check", "mib"}
+
+
+@needs_machine_code
+def test_the_script_exchanges(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = load("exchanges")
+    monkeypatch.setattr(script, "ROUNDS", 1)
+    monkeypatch.setattr(script, "ROUND_MS", 30)
+    with ExitStack() as stack:
+        port = stack.enter_context(script.modbus_server())
+        clients = {script.PLAIN: script.pymodbus(stack, port), "pyModbusTCP": script.pymodbus_tcp(stack, port)}
+        for engine in ("native", "python"):
+            clients[engine] = script.Blocks(stack, script.poll(), port, engine, "event", 10)
+        script.compare(clients)
+        assert clients["native"].done and clients["python"].done
+
+
+@needs_machine_code
+def test_the_script_servers(load: Load, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Each server is measured in all of its parts."""
+    script = load("servers")
+    monkeypatch.setattr(signal, "signal", lambda *_: None)
+
+    def some_scans(plc: Plc, **_: Any) -> None:
+        network = plc.units[0].network
+        for _number in range(20):
+            plc.scan(time.monotonic_ns())
+            network.wait(0.0)
+        network.close()
+
+    monkeypatch.setattr(script, "run", some_scans)
+    for name in script.PROGRAMS:
+        with monkeypatch.context() as patch:
+            patch.setattr(script.native_scans, "_functions", script.native_scans._functions)
+            script.serve(name, True)
+        port, used = capsys.readouterr().out.splitlines()
+        assert int(port) > 0
+        told = json.loads(used)
+        assert told["scans"] == 20
+        assert all(told[part] > 0 for part in (*script.PARTS, "all")), (name, told)
+
+
+@needs_machine_code
+def test_the_script_many(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = load("many")
+    monkeypatch.setattr(script, "RUN_MS", 20)
+    for name, pace in (("timer", "cyclic"), ("logic", "event")):
+        script.measure(name, 2, pace, 10)
+
+
+@needs_machine_code
+@needs_c
+def test_the_script_native(load: Load, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = load("native")
+    monkeypatch.setattr(script, "shortest_ns", lambda work, rounds=0: [work(2), 1.0][1])
+    monkeypatch.setattr(script, "PROGRAMS", {"crc": 1_000_000})
+    monkeypatch.setattr(script, "BENCH", small)
+    monkeypatch.setenv("FBVM_CACHE", str(small / "cache"))
+    script.programs()
+    script.large_program()
+    script.calls()
+    script.many()
+    monkeypatch.setattr(script, "STARTS", 1)
+    monkeypatch.setattr(script, "subprocess", PROCESSES)
+    monkeypatch.setattr("fbvm.code.compiler.driver.parse", sys.modules["fbvm.code.compiler.driver"].parse)
+    script.start()
+
+
+def test_the_script_recorder(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = load("recorder")
+    monkeypatch.setattr(script, "MINUTES_10", 50)
+    monkeypatch.setattr(script, "SCANS_OF_A_PAGE", 20)
+    monkeypatch.setattr(script, "PROGRAMS", {"demo": script.PROGRAMS["demo"]})
+    monkeypatch.setattr(script.shutil, "which", lambda name: None)
+    monkeypatch.setattr(sys, "argv", ["recorder.py", "20"])
+    script.main()
+
+
+def test_the_script_run(load: Load, small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = load("run")
+    monkeypatch.setattr(script, "SCANS", 200)
+    monkeypatch.setattr(script, "BENCH", small)
+    monkeypatch.setattr(script, "subprocess", PROCESSES)
+    monkeypatch.setattr(script, "best_s", lambda work, times=1: [work(), 1.0][1])
+    script.compiling()
+    script.scanning()
+    script.starting()
+
+
+def test_the_script_soak(load: Load, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = load("soak")
+    monkeypatch.setattr(script, "PARTS", 1)
+    monkeypatch.setattr(script, "MEMORY_S", 2)
+    monkeypatch.setattr(script, "SOCKETS_S", 1)
+    script.memory()
+    script.sockets()
+
+
+def test_the_script_llvmlite_range(load: Load) -> None:
+    script = load("llvmlite_range")
+    assert all(end.startswith("llvmlite==") for end in script.ends())
+    assert [test for test in script.TESTS if not (HOUSE / test).is_file()] == []
