@@ -11,7 +11,7 @@ from fbvm.record.draw.sfc_recorder import active_steps
 from fbvm.record.draw.sfc_text import ChartState, sfc_text
 from fbvm.record.trace.events import Frame
 from fbvm.step.session import Session
-from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value, show, show_time
 
@@ -90,8 +90,9 @@ class StopReport:
             raise ValueError(f"there is no rung {number}; rungs are {mine[0].number} to {mine[-1].number}")
         for rung in chosen:
             seen = [made for made in self._session.rungs if made.picture is rung and made.base == statement.frame.base]
-            sight = Sight(seen[-1].states, values=self._session.values.of(seen[-1])) if seen and seen[-1].states else Sight()
-            yield from ladder_text(rung, WIDEST_RUNG, sight)
+            is_seen = bool(seen and seen[-1].states)
+            annotations = Annotations(seen[-1].states, values=self._session.values.of(seen[-1])) if is_seen else Annotations()
+            yield from ladder_text(rung, WIDEST_RUNG, annotations)
 
     def chart(self) -> Iterator[str]:
         """The drawing of the chart of this POU with its active steps.  Raises ValueError if the POU is no chart."""

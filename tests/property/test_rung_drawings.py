@@ -13,7 +13,7 @@ from fbvm.syntax.ladder.drawing.box_lines import DOWN, LEFT, RIGHT, UP
 from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Pin, Point, Series, StepText, diagram
 from fbvm.syntax.ladder.drawing.drawing import drawn, rung_surface, rung_text
 from fbvm.syntax.ladder.drawing.steps import steps
-from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.syntax.ladder.mnemonics import read_rungs
 from fbvm.syntax.ladder.text import rung_lines
 
@@ -111,7 +111,7 @@ def read(lines: list[str]) -> tuple[list[StepText], list[str]]:
 def test_what_is_drawn_is_read_back(seed: int, width: int, with_places: bool) -> None:
     said = texts(Maker(Random(seed)).bar())
     places = dict.fromkeys(NAMES[1:2] + NAMES[4:5], "100.00") if with_places else {}
-    lines = rung_surface(said, width, Sight(places=lambda symbol: places.get(symbol, ""))).rows()
+    lines = rung_surface(said, width, Annotations(places=lambda symbol: places.get(symbol, ""))).rows()
     found, again = read(["    " + line for line in lines])
     assert found == said, "\n".join(lines)
     assert [line.removeprefix("    ") for line in again] == lines
@@ -124,7 +124,7 @@ def test_power_in_a_drawing_is_not_read(seed: int, width: int) -> None:
     random = Random(seed)
     said = texts(Maker(random).bar())
     seen = {step: [random.random() < 0.8] for step in range(len(said))}
-    lines = rung_text(said, width, Sight(seen, values=lambda step, operand: "12" if operand[0] in "DQ" else ""))
+    lines = rung_text(said, width, Annotations(seen, values=lambda step, operand: "12" if operand[0] in "DQ" else ""))
     assert read(lines)[0] == said, "\n".join(lines)
 
 

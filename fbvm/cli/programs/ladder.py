@@ -13,7 +13,7 @@ from fbvm.cli.shared.run_result import chart_width
 from fbvm.cli.shared.sources import compile_or_exit, source_arguments
 from fbvm.record.draw.ladder_svg import ladder_svg
 from fbvm.record.draw.ladder_text import ladder_surface
-from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Annotations
 
 
 @click.command("ladder")
@@ -27,7 +27,7 @@ def command(files: tuple[Path, ...], program: str | None, libraries: tuple[Path,
     if not image.rungs:
         raise click.UsageError("there is nothing to draw in these files")
     if svg:
-        drawn = [ladder_surface(rung, width or SVG_WIDTH, Sight(None, symbol_addresses(image, rung.body)))
+        drawn = [ladder_surface(rung, width or SVG_WIDTH, Annotations(None, symbol_addresses(image, rung.body)))
                  for rung in image.rungs]  # fmt: skip
         with writing(svg):
             write_file(svg, ladder_svg(drawn))

@@ -18,7 +18,7 @@ from fbvm.record.draw.rung_values import RungValues
 from fbvm.record.draw.sfc_recorder import ChartRecorder
 from fbvm.record.draw.sfc_text import sfc_text
 from fbvm.record.trace.history import observing
-from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place
 
@@ -54,7 +54,7 @@ def symbol_addresses(image: Image, body: int) -> Callable[[str], str]:
 
 def rung_lines(image: Image, rung: RungPicture, width: int) -> list[str]:
     """The lines of a rung that is not executed, at most `width` columns wide, with addresses of its variables."""
-    return ladder_text(rung, width, Sight(None, symbol_addresses(image, rung.body)))
+    return ladder_text(rung, width, Annotations(None, symbol_addresses(image, rung.body)))
 
 
 def scan_filter(text: str) -> Callable[[int], bool]:
@@ -88,8 +88,8 @@ def draw_executed_rungs(plc: Plc, scans: str | None) -> Iterator[None]:
         if before != (made.scan, made.base):
             before = made.scan, made.base
             click.echo(f"scan {made.scan}, {names.instance(made.base)}")
-        sight = Sight(made.states, symbol_addresses(plc.image, made.picture.body), values.of(made))
-        print_lines(ladder_text(made.picture, chart_width(), sight))
+        annotations = Annotations(made.states, symbol_addresses(plc.image, made.picture.body), values.of(made))
+        print_lines(ladder_text(made.picture, chart_width(), annotations))
 
 
 @contextmanager

@@ -5,20 +5,20 @@ from __future__ import annotations
 from fbvm.code.image import RungPicture
 from fbvm.syntax.ladder.drawing.box_lines import Surface
 from fbvm.syntax.ladder.drawing.drawing import rung_surface
-from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Annotations
 
-AT_REST = Sight()
+AT_REST = Annotations()
 
 
-def ladder_text(picture: RungPicture, width: int = 80, sight: Sight = AT_REST) -> list[str]:
+def ladder_text(picture: RungPicture, width: int = 80, annotations: Annotations = AT_REST) -> list[str]:
     """The lines of a rung."""
-    head, surface = ladder_surface(picture, width, sight)
+    head, surface = ladder_surface(picture, width, annotations)
     return [head, *surface.rows()]
 
 
-def ladder_surface(picture: RungPicture, width: int = 80, sight: Sight = AT_REST) -> tuple[str, Surface]:
+def ladder_surface(picture: RungPicture, width: int = 80, annotations: Annotations = AT_REST) -> tuple[str, Surface]:
     """The headline of a rung and its drawing."""
     head = " ".join(filter(None, (f"RUNG {picture.number}", picture.comment)))
     if not picture.steps:
         return head, Surface()
-    return head, rung_surface([step[1:] for step in picture.steps], width, sight)
+    return head, rung_surface([step[1:] for step in picture.steps], width, annotations)

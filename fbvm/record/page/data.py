@@ -31,7 +31,7 @@ from fbvm.record.trace.reader import Moment, Trace
 from fbvm.record.trace.recorder import Signal, signals_at
 from fbvm.record.trace.signals import chosen_signals
 from fbvm.record.trace.writer import Depth
-from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.watch.paths import UnknownPlace
 
 MOST_ROWS = 200_000
@@ -118,7 +118,7 @@ class Collector:
         """Draws the rungs and charts of a scan; those with the same states share one drawing."""
         for made in self._power.executed:
             key = made.picture.site, *sorted((step, tuple(seen)) for step, seen in made.states.items())
-            self._picture(scan, made.base, key, partial(_rung, made.picture, Sight(made.states)))
+            self._picture(scan, made.base, key, partial(_rung, made.picture, Annotations(made.states)))
         self._power.executed.clear()
         for called in self._chart_recorder.calls:
             key = called.picture.site, tuple(sorted(called.tested.items())), called.active
@@ -195,9 +195,9 @@ class Collector:
         self._whole = now
 
 
-def _rung(picture: RungPicture, sight: Sight) -> list[str]:
+def _rung(picture: RungPicture, annotations: Annotations) -> list[str]:
     """The headline of a rung, and its drawing as SVG."""
-    head, surface = ladder_surface(picture, RUNG_WIDTH, sight)
+    head, surface = ladder_surface(picture, RUNG_WIDTH, annotations)
     return [head, rung_svg(surface)] if picture.steps else [head]
 
 

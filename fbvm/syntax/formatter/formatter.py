@@ -1,8 +1,8 @@
-"""Text to canonical text: `formatted` writes a program as everybody would, and means the same.
+"""Formats source text: `formatted` returns the canonical text of a program, which means the same.
 
-Names are written as they are declared first, words and names of elementary types in capitals; the values of literals,
-comments and pragmas stay as they are.  A line end within a statement is only kept where a comment needs it; up to one
-empty line between statements stays.
+Every name is spelt as where it is declared first; words of the language and names of elementary types are in capitals.
+Literals, comments and pragmas keep their text.  A line end inside a statement is kept only if a comment needs it, an empty
+line between statements only once.
 """
 
 from __future__ import annotations

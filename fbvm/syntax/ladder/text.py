@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fbvm.syntax.ladder.drawing.drawing import ARROW, drawn
 from fbvm.syntax.ladder.drawing.reading import Picture
-from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.syntax.ladder.mnemonics import Line, RungText, Symbol
 
 STEP = "    "
@@ -39,10 +39,10 @@ def _symbol(symbol: Symbol) -> str:
 def _drawing(rung: RungText, picture: Picture) -> list[str]:
     """A drawing anew, with the notes in front of it: as wide as it was, wider if lines would have to go on below that did
     not."""
-    sight = Sight(places=lambda symbol: picture.places.get(symbol, ""))
-    rows = drawn(picture.bar, picture.width, sight).rows()
+    annotations = Annotations(places=lambda symbol: picture.places.get(symbol, ""))
+    rows = drawn(picture.bar, picture.width, annotations).rows()
     if not picture.is_broken and any(ARROW in row for row in rows):
-        rows = drawn(picture.bar, UNLIMITED, sight).rows()
+        rows = drawn(picture.bar, UNLIMITED, annotations).rows()
     return [STEP + text for text in (*(note for _, note in rung.notes), *rows)]
 
 

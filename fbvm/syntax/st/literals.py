@@ -1,7 +1,8 @@
-"""Text of a literal to its value: numbers, strings, times and dates, exactly.
+"""Converts the text of a literal to its exact value: numbers, strings, durations, dates and times of day.
 
-Raises Malformed or OutOfRange with the words for the message; the builders report them.  From 2.1 of the language's
-tables: units d h m s ms us ns in this order, a fraction only in the last; dates of the proleptic Gregorian calendar.
+A text that is no literal raises Malformed, a value that its type cannot hold OutOfRange; the exception's text is the message
+of the diagnostic.  A duration has the units d h m s ms us ns in this order and a fraction in the last one only (IEC 61131-3
+ed. 3 table 8); dates are of the proleptic Gregorian calendar (table 9).
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
-"""Values of elementary types as text, readable as literals, and back: what `to_text` and `from_text` do.
+"""Converts values of elementary types to text and back, for the conversions to and from STRING (`to_text`, `from_text`).
 
-The standard leaves the form to the maker; ours: integers and bit strings decimal, REAL and LREAL the shortest text that
-reads back, times and dates with their short prefix (IEC 61131-3 ed. 3 tables 5, 8, 9)."""
+The text of a value is a literal that reads back as the same value.  The standard leaves its form to the implementer; here
+integers and bit strings are decimal, REAL and LREAL the shortest text with the same value, durations, dates and times of day
+have their short prefix (IEC 61131-3 ed. 3 tables 5, 8, 9)."""
 
 from __future__ import annotations
 

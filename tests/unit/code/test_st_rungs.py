@@ -12,7 +12,7 @@ from fbvm.machine.plc import Plc
 from fbvm.record.draw.ladder_text import ladder_text
 from fbvm.record.draw.power import PowerFlow, RungExecution
 from fbvm.record.trace.history import observing
-from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Annotations
 
 DECLARED = """a, b, c, d, e, f : BOOL; n, m : INT; r : REAL; w : WORD; t : TON; k : CTUD; s : SR; list : ARRAY[0..3] OF BOOL;
     seen : BOOL; edge : R_TRIG;"""
@@ -84,7 +84,7 @@ def test_power_is_what_the_statement_saw() -> None:
     """The second statement changes what the first one read."""
     first, second = executed("a := b AND NOT c; b := FALSE;", {"b": True})
     assert first.states == {0: [True], 1: [True], 2: [True]}
-    assert ladder_text(first.picture, sight=Sight(first.states))[1:] == dedent("""
+    assert ladder_text(first.picture, annotations=Annotations(first.states))[1:] == dedent("""
         ┃   b      c        a   │
         ┣━━┫ ┣━━━━┫/┣━━━━━━( )━━┥
     """).strip("\n").split("\n")

@@ -15,7 +15,7 @@ from fbvm.record.draw.ladder_text import ladder_surface, ladder_text
 from fbvm.record.draw.power import PowerFlow, RungExecution
 from fbvm.record.draw.rung_values import RungValues
 from fbvm.record.trace.history import observing
-from fbvm.syntax.ladder.drawing.widths import Sight
+from fbvm.syntax.ladder.drawing.widths import Annotations
 
 
 def image(rungs: str, declarations: str = "a, b, c, d, e, f : BOOL;") -> Image:
@@ -96,7 +96,8 @@ def test_a_long_rung_goes_on_below() -> None:
 
 def test_addresses_stand_below_and_nothing_collides() -> None:
     here = image("LD Start\nOUT W0.00", "Start AT CIO 0.05 : BOOL;")
-    assert ladder_text(here.rungs[0], sight=Sight(places=lambda name: {"Start": "0.05"}.get(name, "")))[1:] == text("""
+    addresses = Annotations(places=lambda name: {"Start": "0.05"}.get(name, ""))
+    assert ladder_text(here.rungs[0], annotations=addresses)[1:] == text("""
         │ Start         W0.00  │
         ├──┤ ├───────────( )───┤
         │ 0.05                 │
@@ -132,7 +133,7 @@ def executed(rungs: str, on: str, declarations: str = "a, b, c, d, e, f : BOOL;"
 
 def lit(rungs: str, on: str) -> list[str]:
     made = executed(rungs, on)[0]
-    return ladder_text(made.picture, sight=Sight(made.states))[1:]
+    return ladder_text(made.picture, annotations=Annotations(made.states))[1:]
 
 
 def test_power_ends_at_a_contact_that_is_open() -> None:
@@ -148,7 +149,7 @@ def test_power_is_what_was_seen_and_not_what_is_there_at_the_end_of_the_scan() -
     """The contact was closed when the rung was executed; the next rung opens it."""
     first, second = executed("LD a\nOUT b\nLD P_On\nRSET a\n", "a")
     assert first.states == {0: [True], 1: [True]}
-    assert "┫ ┣━━" in ladder_text(first.picture, sight=Sight(first.states))[2]
+    assert "┫ ┣━━" in ladder_text(first.picture, annotations=Annotations(first.states))[2]
     assert second.picture.steps[1][2] == "RSET"
 
 
@@ -172,7 +173,7 @@ def test_power_behind_a_block_is_its_ENO() -> None:
     with observing(plc, power):
         plc.scan()
     made = power.executed[0]
-    assert ladder_text(made.picture, sight=Sight(made.states))[2] == "┣━━┫ ┣━━━┥EN        ENO├──────( )──┤"
+    assert ladder_text(made.picture, annotations=Annotations(made.states))[2] == "┣━━┫ ┣━━━┥EN        ENO├──────( )──┤"
 
 
 def test_values_are_those_that_the_rung_read() -> None:
@@ -185,7 +186,7 @@ def test_values_are_those_that_the_rung_read() -> None:
     with observing(plc, power):
         plc.scan()
     first = power.executed[0]
-    assert ladder_text(first.picture, sight=Sight(first.states, values=values.of(first)))[1:] == text("""
+    assert ladder_text(first.picture, annotations=Annotations(first.states, values=values.of(first)))[1:] == text("""
         ┃ d &5        ┌─ t : CTU ─┐       b   │
         ┣━━┫>┣━━━━━━━━┥EN      ENO┝━━━━━━( )━━┥
         ┃  = 7  n = 3─┤PV         │           │
@@ -196,7 +197,7 @@ def test_values_are_those_that_the_rung_read() -> None:
 def test_a_rung_that_was_passed_over_is_not_there() -> None:
     made = executed("LD a\nJMP 1\nLD b\nOUT c\nJME 1", "b")
     assert [len(one.states) for one in made] == [2, 0, 0]
-    assert "┫" not in "".join(ladder_text(made[1].picture, sight=Sight(made[1].states)))
+    assert "┫" not in "".join(ladder_text(made[1].picture, annotations=Annotations(made[1].states)))
 
 
 def test_each_instance_has_its_own_power() -> None:
@@ -220,7 +221,7 @@ def test_each_instance_has_its_own_power() -> None:
 
 def test_a_picture_is_well_formed_and_shows_power() -> None:
     made = executed("LD= D0 #0\nOUT a", "")[0]
-    root = ElementTree.fromstring(ladder_svg([ladder_surface(made.picture, 60, Sight(made.states))]))
+    root = ElementTree.fromstring(ladder_svg([ladder_surface(made.picture, 60, Annotations(made.states))]))
     kinds = [(part.tag.rpartition("}")[2], part.get("class")) for part in root]
     assert ("path", None) in kinds and ("path", "power") in kinds and ("text", "head") in kinds
     assert "D0 #0" in [part.text for part in root]

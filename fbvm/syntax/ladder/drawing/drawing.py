@@ -8,27 +8,27 @@ from typing import NamedTuple
 from fbvm.syntax.ladder.drawing.box_lines import Surface
 from fbvm.syntax.ladder.drawing.boxes import Shape
 from fbvm.syntax.ladder.drawing.diagram import Box, Coil, Contact, Parallel, Part, Point, Series, StepText, Undrawable, diagram
-from fbvm.syntax.ladder.drawing.widths import LEAD, LINK, SLACK, Sight, Widths
+from fbvm.syntax.ladder.drawing.widths import LEAD, LINK, SLACK, Annotations, Widths
 
 ARROW = "►"
 LEAST = 24
 """Least columns of a rung."""
 STEP = 4
 """Columns by which a rung becomes wider if an element does not fit."""
-AT_REST = Sight()
+AT_REST = Annotations()
 
 
-def rung_text(steps: Sequence[StepText], width: int = 80, sight: Sight = AT_REST) -> list[str]:
+def rung_text(steps: Sequence[StepText], width: int = 80, annotations: Annotations = AT_REST) -> list[str]:
     """The lines of a rung without its headline.
 
     Rungs that have no drawing, as one with an OR behind an output, are shown as their instructions."""
-    return rung_surface(steps, width, sight).rows()
+    return rung_surface(steps, width, annotations).rows()
 
 
-def rung_surface(steps: Sequence[StepText], width: int = 80, sight: Sight = AT_REST) -> Surface:
+def rung_surface(steps: Sequence[StepText], width: int = 80, annotations: Annotations = AT_REST) -> Surface:
     """The drawing of a rung; see `ladder.text`."""
     try:
-        return drawn(diagram(steps), width, sight)
+        return drawn(diagram(steps), width, annotations)
     except Undrawable:
         surface = Surface()
         for row, (prefix, mnemonic, operands) in enumerate(steps):
@@ -36,9 +36,9 @@ def rung_surface(steps: Sequence[StepText], width: int = 80, sight: Sight = AT_R
         return surface
 
 
-def drawn(bar: Point, width: int = 80, sight: Sight = AT_REST) -> Surface:
+def drawn(bar: Point, width: int = 80, annotations: Annotations = AT_REST) -> Surface:
     """The drawing of a diagram.  It is wider than `width` only if a single element is."""
-    widths = Widths(sight)
+    widths = Widths(annotations)
     reach = max(LEAST, widths.reach(bar))
     width = max(LEAST, min(width, reach))
     while True:
@@ -62,7 +62,7 @@ class _Drawing:
 
     def __init__(self, width: int, widths: Widths) -> None:
         self.surface = Surface()
-        self.width, self.widths, self.sight = width, widths, widths.sight
+        self.width, self.widths, self.annotations = width, widths, widths.annotations
         self.need = 0
         """Width in columns that would have been enough for what did not fit."""
         self._start = 0
@@ -71,7 +71,7 @@ class _Drawing:
         self._links = 0
 
     def drawn(self, bar: Point) -> Surface:
-        alive = self.sight.states is not None
+        alive = self.annotations.states is not None
         depth = self._outs(bar, 0, 0, alive, trunk=True)
         while self._left:
             rest = self._left.pop(0)
@@ -84,9 +84,9 @@ class _Drawing:
 
     def _state(self, step: int, which: int = -1) -> bool | None:
         """The state or power at a step; None at rest or if the step was not executed."""
-        if self.sight.states is None:
+        if self.annotations.states is None:
             return None
-        seen = self.sight.states.get(step)
+        seen = self.annotations.states.get(step)
         return bool(seen[which]) if seen else False
 
     # --- branch points and outputs ----------------------------------------------------------------------------------
@@ -160,7 +160,7 @@ class _Drawing:
             self.surface.across(x, at, y + 1, on)
             self.surface.across(at + len(mark) - 1, end, y + 1, on)
             self.surface.symbol(at, y + 1, mark)
-            return y + 2 + self._labels(label, self.sight.places(label), at, len(mark), y)
+            return y + 2 + self._labels(label, self.annotations.places(label), at, len(mark), y)
         made = self.widths.shape(out)
         at = end - made.right - made.wide - 2
         if out.entries or not out.instance:
@@ -173,7 +173,7 @@ class _Drawing:
         and the row behind them all."""
         rows, row = [], max(y + 2, below)
         for path in box.inputs:
-            height, power, line, x = self._series(path, 0, row, self.sight.states is not None or None, until - 1)
+            height, power, line, x = self._series(path, 0, row, self.annotations.states is not None or None, until - 1)
             self.surface.across(x, until, line, bool(power))
             self._take(x + self.width - until + 1)
             rows.append(line - y)

@@ -15,8 +15,8 @@ SLACK = 4
 LEAD = 2
 """Columns of line on either side of a box."""
 States = Mapping[int, Sequence[bool]]
-"""What was seen at the steps of a rung in one execution: of a contact its state, of an output the power that reached
-it, of a block the power into it and out of it."""
+"""By the number of a step, its states in one execution of a rung: of a contact whether it conducted, of an output the power that
+reached it, of a block the power into it and out of it."""
 
 
 def _nothing(symbol: str) -> str:
@@ -27,8 +27,8 @@ def _unseen(step: int, operand: str) -> str:
     return ""
 
 
-class Sight(NamedTuple):
-    """Addresses, values and states to draw with a rung.  Without `states` it is drawn at rest."""
+class Annotations(NamedTuple):
+    """The addresses, values and states that are drawn with a rung.  Without `states` the rung is drawn at rest."""
 
     states: States | None = None
     places: Callable[[str], str] = _nothing
@@ -40,8 +40,8 @@ class Sight(NamedTuple):
 class Widths:
     """The columns of parts of one rung."""
 
-    def __init__(self, sight: Sight) -> None:
-        self.sight = sight
+    def __init__(self, annotations: Annotations) -> None:
+        self.annotations = annotations
         self._parts: dict[int, int] = {}
 
     def reach(self, point: Point) -> int:
@@ -85,15 +85,15 @@ class Widths:
         return 2 + max(mark, (self._label(coil) + mark) // 2)
 
     def shape(self, box: Box) -> Shape:
-        return shape(box, self.sight.values)
+        return shape(box, self.annotations.values)
 
     def below(self, contact: Contact) -> str:
         """The text below a contact: its address, or the values that it compares."""
         if len(contact.operands) == 1:
-            return self.sight.places(contact.operands[0])
-        seen = [value for operand in contact.operands if (value := self.sight.values(contact.step, operand))]
+            return self.annotations.places(contact.operands[0])
+        seen = [value for operand in contact.operands if (value := self.annotations.values(contact.step, operand))]
         return f"= {', '.join(seen)}" if seen else ""
 
     def _label(self, drawn: Contact | Coil) -> int:
-        below = self.below(drawn) if isinstance(drawn, Contact) else self.sight.places(" ".join(drawn.operands))
+        below = self.below(drawn) if isinstance(drawn, Contact) else self.annotations.places(" ".join(drawn.operands))
         return max(len(" ".join(drawn.operands)), len(below))
