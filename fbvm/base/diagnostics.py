@@ -22,10 +22,12 @@ _LONE_CR = re.compile(r"\r(?!\n)")
 
 @dataclass(eq=False)
 class Source:
-    """One source text and its name (relative to its library or project).  Positions in it are character offsets."""
+    """One source text.  A place in it is an offset in characters from 0."""
 
     name: str
+    """The name that messages show, such as a path relative to its library or project."""
     text: str = field(repr=False)
+    """The whole text; a line ends with LF or CR LF."""
     library: str = ""
     """Name of the library that the text belongs to, "" for the user's own."""
 
@@ -34,6 +36,7 @@ class Source:
 
     @cached_property
     def line_starts(self) -> list[int]:
+        """The offset of the first character of each line."""
         starts, at = [0], self.text.find("\n")
         while at >= 0:
             starts.append(at + 1)
@@ -47,7 +50,7 @@ class Source:
         return row + 1, offset - self.line_starts[row] + 1
 
     def line(self, number: int) -> str:
-        """The text of line `number` (from 1) without its end."""
+        """The text of line `number` (from 1) without its end.  Raises IndexError behind the last line."""
         start = self.line_starts[number - 1]
         end = self.line_starts[number] if number < len(self.line_starts) else len(self.text)
         return self.text[start:end].rstrip("\r\n")
@@ -55,15 +58,22 @@ class Source:
 
 @dataclass(frozen=True)
 class Diagnostic:
-    """One message.  `start` and `end` are character offsets in `source`; `related` names a second place."""
+    """One error or warning about a place in a source.  Two diagnostics are equal if code, place and words are."""
 
     code: str
+    """The letter of its kind and four digits, such as "S0301"; `fbvm explain S0301` shows its page."""
     source: Source = field(compare=False)
+    """The source that it is about."""
     start: int
+    """Offset in `source.text`, in characters from 0, of the first character that it is about."""
     end: int
+    """Offset behind the last character that it is about; `start` if it is about a place between two characters."""
     message: str
+    """What is wrong, in one line."""
     hint: str = ""
+    """What to write instead, in one line; "" if nothing is known."""
     related: tuple[Source, int, str] | None = field(default=None, compare=False)
+    """A second place, such as an earlier declaration: its source, its offset in characters, and what is said about it."""
     raised: bool = False
     """True for a warning that counts as an error because of an option."""
     lossless: bool = field(default=False, compare=False)
@@ -76,17 +86,23 @@ class Diagnostic:
 
     @property
     def line(self) -> int:
+        """The line of `start`, counted from 1."""
         return self.source.place(self.start)[0]
 
     @property
     def column(self) -> int:
+        """The column of `start`, in characters counted from 1; a tab is one character."""
         return self.source.place(self.start)[1]
 
     def order(self) -> tuple[str, int, str]:
+        """The key by which diagnostics are sorted: the name of the source, `start`, the code."""
         return self.source.name, self.start, self.code
 
     def as_dict(self) -> dict[str, Any]:
-        """The message as plain data for `--json`."""
+        """The diagnostic as plain data, which `fbvm check --json` prints.
+
+        The keys are code, severity, file, line, column, end_line, end_column, message and hint, with lines and columns from 1;
+        where there is a second place, also related with file, line, column and message."""
         line, column = self.source.place(self.start)
         end_line, end_column = self.source.place(max(self.end, self.start))
         data: dict[str, Any] = {

@@ -158,23 +158,33 @@ class SfcPicture:
 
 @dataclass(frozen=True)
 class Image:
-    """A compiled program.  See `fbvm list` for how one looks."""
+    """A compiled program: plain data without a tree or a file, of which any number of PLCs can be made (`Plc(image)`).
+
+    `fbvm list` prints one; rows of one tuple name rows of another by their number."""
 
     layout: Layout
+    """How many bytes of memory the program needs, and which areas it uses."""
     bodies: tuple[Body, ...]
+    """The operations of each POU that is called, with the size of its instances in bytes."""
     tasks: tuple[TaskRow, ...]
+    """The tasks with their intervals in nanoseconds and the programs that each runs."""
     symbols: dict[str, Field]
     """Programs and global variables by folded name; their offsets count from the start of the buffer.  Members are found through
     their types."""
     initial: tuple[tuple[int, bytes], ...]
-    """Bytes to write at power-on over a buffer of zeros."""
+    """Offsets and the bytes to write there at power-on, over a buffer of zeros."""
     retained: tuple[Retained, ...]
+    """What keeps its value through a warm start."""
     sites: tuple[Site, ...]
+    """The places in sources (file, POU, line, column) that statements and traps name by number."""
     types: dict[str, Type] = field(default_factory=dict)
     """Derived types and blocks by folded name."""
     objects: Objects = field(default_factory=Objects)
+    """The variables that references may point to, with their extents."""
     rungs: tuple[RungPicture, ...] = ()
+    """The rungs of ladder as they are drawn."""
     charts: tuple[SfcPicture, ...] = ()
+    """The sequential function charts as they are drawn."""
 
     @cached_property
     def fingerprint(self) -> str:

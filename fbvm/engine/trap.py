@@ -15,16 +15,16 @@ NO_INSTANCE = -1
 
 @dataclass(frozen=True)
 class Trap:
-    """A program was stopped."""
+    """Why the program of a PLC was stopped in a scan.  Memory has what was stored before."""
 
     code: str
-    """R0101 and so on, as `fbvm explain` explains them."""
+    """The code of a trap, such as "R0101"; `fbvm explain R0101` shows its page."""
     site: Site
-    """The place in the source."""
+    """The statement or expression that was being executed: file, POU, line and column."""
     values: tuple[Any, ...]
-    """The values that caused it, such as index, lower and upper bound."""
+    """The values that caused it, in the order of the message, such as index, lower and upper bound."""
     message: str
-    """All of this in one line."""
+    """Code, values in words and place, in one line."""
     instance: int = NO_INSTANCE
     """Byte of the memory at which the instance begins whose body was executed; NO_INSTANCE in a function."""
 

@@ -46,7 +46,9 @@ class Breakpoint:
     kind: str
     """"line", "change" or "condition"."""
     where: str
+    """The line ("main.st:12"), the variable or address, or the condition."""
     when: str = ""
+    """A further condition, such as "D100 > 5"; "" for none."""
 
     def __str__(self) -> str:
         return self.where + (f" when {self.when}" if self.when else "")
@@ -54,10 +56,10 @@ class Breakpoint:
 
 @dataclass(frozen=True)
 class Frame:
-    """A body in execution."""
+    """The execution of one body in a scan that stands at a breakpoint."""
 
     pou: str
-    """Name of its POU."""
+    """The name of the program, function block or function."""
     base: int
     """Byte of the memory at which its instance begins."""
     site: Site | None
@@ -69,13 +71,13 @@ class Halt:
     """A scan that stands still at a breakpoint."""
 
     scan: int
-    """Its number."""
+    """The number of the scan, counted from 0 since power-on."""
     site: Site | None
     """The statement before or in which it stands; None at the end of a program."""
     reasons: tuple[str, ...]
-    """Why, one line for each of the breakpoints."""
+    """Why it stands, one line for each of `breakpoints`."""
     breakpoints: tuple[Breakpoint, ...]
-    """Those that stopped it."""
+    """The breakpoints that stopped it, in the order in which they were set."""
     frames: tuple[Frame, ...]
     """The bodies in execution, the innermost first."""
 

@@ -374,7 +374,7 @@ class Plc:
             self._power_on(retained(self.memory, self.image))
 
     def cold_start(self) -> None:
-        """As new: all memory at its initial values."""
+        """Power off and on with an empty memory: everything, also what is retained, begins with its initial value."""
         with self._acting("start", "cold"):
             self._power_on([])
 

@@ -14,10 +14,12 @@ from fbvm.watch.values import Value
 
 
 class Mode(Enum):
-    """PROGRAM: units are refreshed, the program stands.  RUN: the program is executed."""
+    """The operating mode of a PLC."""
 
     PROGRAM = "PROGRAM"
+    """Scans refresh the units and execute no program."""
     RUN = "RUN"
+    """Scans execute the program and refresh the units."""
 
 
 RUN = Mode.RUN

@@ -183,16 +183,23 @@ class Project:
     """What a project file says."""
 
     source: Source
+    """The project file, for messages."""
     net: str
+    """"loop" for a network in memory, "tcp" for real connections."""
     seed: int
+    """What decides random delays and faults of a network in memory."""
     for_ns: int | None
+    """How long a run takes in nanoseconds; None for no bound."""
     scans: int | None
+    """How many scans each PLC executes; None for no bound."""
     servers: tuple[tuple[Peer, tuple[str, int] | None], ...]
     """Endpoint of a Modbus server and where it is on the host; None: where its endpoint says."""
     doors: tuple[tuple[Peer, tuple[str, int]], ...]
     """A unit's endpoint and where others reach it on the host."""
     faults: tuple[Fault, ...]
+    """What goes wrong on a network in memory."""
     plcs: tuple[PlcRow, ...]
+    """The PLCs, in the order of the file."""
 
 
 def project_file(path: Path) -> Path | None:

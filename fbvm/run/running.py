@@ -24,8 +24,11 @@ class TimedWrite:
     """A value to be written once, before the first scan at or after `at_ns`."""
 
     where: Place | Span
+    """What is written, as `Plc.find` returns it."""
     value: object
+    """The Python value that `Plc.write` takes for it; for a span of places a list."""
     at_ns: int = 0
+    """The time of the PLC in nanoseconds, as `Plc.now_ns`."""
 
 
 class Running:

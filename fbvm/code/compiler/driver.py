@@ -48,14 +48,22 @@ def _no_progress(stage: str, done: int, known: int) -> None:
 
 @dataclass(frozen=True)
 class Compilation:
-    """The result of compiling sources: the image, None if there are errors, and all diagnostics in the order of their places."""
+    """The result of compiling sources.
+
+    >>> from fbvm import compile_text
+    >>> made = compile_text("PROGRAM Main VAR n : INT; END_VAR n := m; END_PROGRAM")
+    >>> made.image, [error.code for error in made.errors]
+    (None, ['S0201'])
+    """
 
     image: Image | None
+    """The compiled program; None if there are errors."""
     diagnostics: list[Diagnostic]
+    """All errors and warnings, sorted by the name of their source, then by their place in it."""
 
     @property
     def errors(self) -> list[Diagnostic]:
-        """The diagnostics that are errors."""
+        """The diagnostics whose `severity` is "error", in the order of `diagnostics`; empty if there is an image."""
         return errors(self.diagnostics)
 
 

@@ -14,10 +14,12 @@ from fbvm.interchange.plcopen.read.sources import sources
 
 @dataclass(frozen=True)
 class Imported:
-    """The result of an import: source texts by file name, and diagnostics in the order of the document."""
+    """The result of an import."""
 
     files: dict[str, str]
+    """Source texts by file name, one for each POU, data type and list of globals; what was not understood is a comment."""
     diagnostics: list[Diagnostic]
+    """Errors and warnings about the document, in the order of their places in it."""
 
     @property
     def errors(self) -> list[Diagnostic]:

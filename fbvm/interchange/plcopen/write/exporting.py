@@ -25,10 +25,12 @@ _NAME = re.compile(r"[^\W\d]\w*")
 
 @dataclass(frozen=True)
 class Exported:
-    """A document, None if the sources cannot be read, and messages in order of place."""
+    """The result of an export."""
 
     text: str | None
+    """The PLCopen XML document; None if a source cannot be read."""
     diagnostics: list[Diagnostic]
+    """Errors and warnings about the sources, in the order of their places."""
 
     @property
     def errors(self) -> list[Diagnostic]:
