@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,7 +47,8 @@ def files(text: str) -> set[str]:
 
 
 class Copy:
-    """A copy of what the product consists of, in which recipes are followed."""
+    """A copy of what the product consists of, in which recipes are followed.  `restore` undoes all of them; bytecode and what
+    fbvm keeps in its cache stay for the next recipe."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -54,6 +56,30 @@ class Copy:
             shutil.copytree(HOUSE / part, folder / part, ignore=shutil.ignore_patterns("__pycache__"))
         for part in ("tests", "docs"):
             (folder / part).symlink_to(HOUSE / part)
+        self._states = self._found()
+
+    def _found(self) -> dict[Path, tuple[int, int]]:
+        """Size and time of every file but bytecode and the cache of fbvm."""
+        found = {}
+        for top, folders, names in os.walk(self.folder):
+            folders[:] = [name for name in folders if name not in ("__pycache__", "cache")]
+            for name in names:
+                stat = (path := Path(top, name)).stat()
+                found[path] = stat.st_size, stat.st_mtime_ns
+        return found
+
+    def restore(self) -> None:
+        """Make every file what it was."""
+        found = self._found()
+        for path in found.keys() - self._states.keys():
+            path.unlink()
+        for path, state in self._states.items():
+            if found.get(path) != state:
+                shutil.copy2(HOUSE / path.relative_to(self.folder), path)
+        for top, _, _ in os.walk(self.folder, topdown=False):
+            if not os.listdir(top):
+                os.rmdir(top)
+        assert self._found() == self._states
 
     def follow(self, recipe: str) -> None:
         """Do what a recipe says; its tests are done in a folder of their own, since those of the repository stay as they are."""
@@ -124,9 +150,16 @@ test_house.test_every_module_says_what_it_is_for()
         return self.python("-c", program)
 
 
+@pytest.fixture(scope="module")
+def only_copy(tmp_path_factory: pytest.TempPathFactory) -> Copy:
+    return Copy(tmp_path_factory.mktemp("recipes") / "copy")
+
+
 @pytest.fixture
-def copy(tmp_path: Path) -> Copy:
-    return Copy(tmp_path / "copy")
+def copy(only_copy: Copy) -> Iterator[Copy]:
+    """The copy, to which nothing has been done."""
+    yield only_copy
+    only_copy.restore()
 
 
 def test_every_file_that_is_named_is_there() -> None:
