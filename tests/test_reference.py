@@ -141,8 +141,9 @@ def test_each_assumption_is_listed_with_its_place() -> None:
     assert text.count("\n- ") == count > 50
 
 
-def test_a_file_is_written_only_if_it_changed(tmp_path: Path) -> None:
+def test_a_file_is_written_only_if_it_changed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     product_pages = importlib.import_module("product_pages")
+    monkeypatch.setattr(product_pages, "pages", pages)
     product_pages.write(tmp_path)
     path = tmp_path / "reference" / "memory.md"
     before = path.stat().st_mtime_ns
@@ -166,10 +167,13 @@ def test_links_of_a_file_lead_where_they_led() -> None:
         "[port](port.md#slots), [license](../../../LICENSE), [web](https://example.org)")  # fmt: skip
 
 
-EXPLAINED = [path for path in sorted((HOUSE / "docs").rglob("*.md")) if ">>>" in path.read_text(encoding="utf-8")]
+LONG = {"time"}
+"""Pages that take half a second."""
+EXPLAINED = [pytest.param(path, id=path.stem, marks=[pytest.mark.slow] * (path.stem in LONG))
+             for path in sorted((HOUSE / "docs").rglob("*.md")) if ">>>" in path.read_text(encoding="utf-8")]  # fmt: skip
 
 
-@pytest.mark.parametrize("path", EXPLAINED, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", EXPLAINED)
 def test_what_a_page_shows_in_python_happens(path: Path) -> None:
     assert doctest.testfile(str(path), module_relative=False).failed == 0
 

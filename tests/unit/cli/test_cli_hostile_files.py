@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from rows import each_of
+from rows import each_of, first_quick
 
 from fbvm.base import files
 from fbvm.cli.main import main
@@ -107,9 +107,12 @@ def test_zeros_are_packed() -> None:
     assert zlib.decompress(many_zeros(1 << 16, 3)) == bytes(3 << 16)
 
 
-def test_a_trace_that_is_much_larger_when_unpacked(fbvm: Fbvm) -> None:
+@pytest.mark.parametrize("largest", first_quick([1 << 22, trace_format.LARGEST_BYTES]))
+def test_a_trace_that_is_much_larger_when_unpacked(fbvm: Fbvm, largest: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trace_format, "LARGEST_BYTES", largest)
+    monkeypatch.setattr(trace_format, "LARGEST_HEADER_BYTES", min(largest, trace_format.LARGEST_HEADER_BYTES))
     assert fbvm("run", "counter.st", "--scans", "3", "--trace", "run.fbtrace").exit_code == 0
-    packed = many_zeros(1 << 24, (trace_format.LARGEST_BYTES >> 24) + 1)
+    packed = many_zeros(1 << 22, (largest >> 22) + 1)
     assert len(packed) < 1 << 20
     whole = Path("run.fbtrace").read_bytes()
     for data in (whole + chunk(trace_format.BLOCK, packed, 1), trace_format.MAGIC + chunk(trace_format.HEADER, packed)):
