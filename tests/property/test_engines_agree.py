@@ -5,9 +5,10 @@ at both levels as well."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
+from functools import wraps
+from typing import Any, NamedTuple
 
 import hand_image
 import lang_check
@@ -34,6 +35,48 @@ KEPT: dict[int, native.NativeEngine] = {}
 _python = hand_image.execute
 
 
+class Ran(NamedTuple):
+    """What the Python engine has made of one code: the trap as text, and the memory."""
+
+    code: Block
+    before: dict[int, bytes] | None
+    budget: int
+    trap: str
+    memory: bytes
+
+
+TOGETHER = 50
+"""Codes of one image: most of the time for a small module of machine code is the module's, not the code's."""
+waiting: list[Ran] = []
+"""What machine code has still to do as well."""
+
+
+def execute_later(*codes: Block, before: dict[int, bytes] | None = None, budget: int = 100_000) -> Any:
+    """What `hand_image.execute` does; `compare_waiting` does the same on machine code."""
+    [code] = codes
+    rig = _python(code, before=before, budget=budget)
+    waiting.append(Ran(code, before, budget, repr(rig.trap), bytes(rig.memory.snapshot())))
+    return rig
+
+
+def compare_waiting() -> None:
+    """Each code that waits is the body of one program; all programs have their instance at the same place, as one has alone."""
+    while waiting:
+        runs, waiting[:TOGETHER] = waiting[:TOGETHER], []
+        made = hand_image.image(*(ran.code for ran in runs))
+        offset = made.tasks[0].programs[0].offset
+        tasks = tuple(replace(task, programs=(replace(task.programs[0], offset=offset),)) for task in made.tasks)
+        program = replace(made, tasks=tasks, layout=hand_image.image(()).layout)
+        for level in LEVELS:
+            kept = native.NativeEngine(program, hand_image.power_on(program), level)  # machine code stays while an engine has it
+            for number, ran in enumerate(runs):
+                memory = hand_image.power_on(program, ran.before, ran.budget)
+                trap = native.NativeEngine(program, memory, level).run(number)
+                assert repr(trap) == ran.trap, f"level {level}: {ran.code}"
+                assert bytes(memory.snapshot()) == ran.memory, f"level {level}: {ran.code}"
+            del kept
+
+
 def execute(*codes: Block, before: dict[int, bytes] | None = None, budget: int = 100_000, program: Image | None = None) -> Any:
     """What `hand_image.execute` does, and the same on machine code, which must agree to the bit."""
     keep = program is not None
@@ -54,8 +97,10 @@ def execute(*codes: Block, before: dict[int, bytes] | None = None, budget: int =
 
 @pytest.fixture(autouse=True)
 def _every_engine(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    for module in (hand_image, expressions, limits, statements):
+    for module in (limits, statements):
         monkeypatch.setattr(module, "execute", execute)
+    for module in (hand_image, expressions):
+        monkeypatch.setattr(module, "execute", execute_later)
     cache.switch(False)  # thousands of images that nobody runs again
     yield
     cache.switch(True)
@@ -65,7 +110,17 @@ def _again(module: Any) -> None:
     """Take over the tests of a module that execute images."""
     for name, test in vars(module).items():
         if name.startswith("test_") and callable(test):
-            globals()[f"{name}_on_every_engine"] = test
+            globals()[f"{name}_on_every_engine"] = on_every_engine(test)
+
+
+def on_every_engine(test: Callable[..., None]) -> Callable[..., None]:
+    @wraps(test)
+    def both(**fixtures: Any) -> None:
+        waiting.clear()
+        test(**fixtures)
+        compare_waiting()
+
+    return both
 
 
 for _module in (expressions, limits, statements):
