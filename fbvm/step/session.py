@@ -19,7 +19,7 @@ from fbvm.record.draw.power import RungExecution
 from fbvm.record.draw.rung_values import RungValues
 from fbvm.record.draw.sfc_recorder import ChartCall
 from fbvm.record.trace.events import Statement
-from fbvm.record.trace.history import observing
+from fbvm.record.trace.observing import observing
 from fbvm.record.trace.recorder import HEXADECIMAL_AREAS, Signal
 from fbvm.step.scan_replay import END, Action, ActionInjector, MomentListener, PastMoment, ScanReplay, Stop, depth
 from fbvm.watch import places
