@@ -10,6 +10,7 @@ from fbvm.base.areas import BUDGET
 from fbvm.base.memory import changes
 from fbvm.engine.choice.tiers import python_of
 from fbvm.machine.plc import Plc
+from fbvm.machine.state import State
 from fbvm.record.recording.chunks import Chunk, ScanInputs, UnitKeyframe
 from fbvm.record.recording.replay import Replay
 from fbvm.record.trace.observing import Listener, observing
@@ -121,7 +122,9 @@ class PlcRecording:
     @property
     def scans(self) -> range:
         """The scans that can be executed again, without one that has begun and not ended."""
-        return range(self._chunks[0].first, self._chunks[-1].times.end) if self._chunks else range(0)
+        if not self._chunks:
+            return range(0)
+        return range(self._chunks[0].first, min(self._chunks[-1].times.end, self._plc.scans))  # it may have gone back
 
     @property
     def begun(self) -> range:
@@ -139,6 +142,13 @@ class PlcRecording:
         again.advance(scan)
         again.leave()
         return again.plc
+
+    def states(self, scans: range) -> Iterator[State]:
+        """The states before some recorded scans, or behind the last one, in order; without what was written before each."""
+        again = Replay(self, scans.start)
+        for scan in scans:
+            again.advance(scan)
+            yield again.plc.snapshot()
 
     def follow(self, listener: Listener, scans: range) -> None:
         """Executes recorded scans again and reports their phases and events to `listener`."""

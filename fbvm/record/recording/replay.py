@@ -112,6 +112,7 @@ class Replay:
         self.plc = Plc(source.image, source.cycle_ns, budget=chunk.budget, engine=self._engine)
         self._links: list[RecordedLink] = []
         self._refreshes: list[RecordedRefresh] = []
+        self._loaded: Chunk | None = None
         self._results: deque[tuple[int, bytes]] = deque()
         for body in recorded.substituted:
             python_of(self.plc.engine).substitute(body, self._play_back)
@@ -123,20 +124,25 @@ class Replay:
         while plc.scans < scan:
             if (most := self._regular(scan)) < 2 or not plc.scan_many(most):
                 self.scan()
+        self._enter()
         plc.cycle_ns = self._recorded.plc.cycle_ns
 
     def scan(self) -> None:
         """Executes one scan with its inputs."""
+        self._enter()
         plc, number = self.plc, self.plc.scans
-        chunk = self._recorded.chunk(number)
-        if chunk.first == number and not chunk.follows:
-            self._load(chunk)
         inputs = self._recorded.inputs(number)
         if inputs and inputs.scan == number:
             self._apply(inputs)
         plc.scan(self._recorded.now_ns(number))
         self._results.clear()
         plc.engine.allowance = WHOLE_BUDGET
+
+    def _enter(self) -> None:
+        """Puts the PLC into the state of the keyframe before the next scan, if the scan before does not lead to that."""
+        chunk = self._recorded.chunk(self.plc.scans)
+        if chunk is not self._loaded and chunk.first == self.plc.scans and not chunk.follows:
+            self._load(chunk)
 
     def leave(self) -> None:
         """Takes the units off, so that the PLC goes on alone."""
@@ -157,7 +163,7 @@ class Replay:
 
     def _load(self, chunk: Chunk) -> None:
         """Puts the PLC into the state of a keyframe."""
-        plc = self.plc
+        plc, self._loaded = self.plc, chunk
         tap = self._links[0].tap if self._links else None
         self._links = [RecordedLink(frame.unit.address, tap) for frame in chunk.units]
         self._refreshes, units = [], list[Unit]()
