@@ -26,7 +26,7 @@ from fbvm.machine.scan.tasks import TaskSchedule, too_short_intervals
 from fbvm.machine.scan.values import NamedValues
 from fbvm.machine.scan.watch_cycle import WatchCycle
 from fbvm.machine.scan_times import Lateness, ScanTimes
-from fbvm.machine.state import RUN, Mode, Phase, State, Stopped, state_after
+from fbvm.machine.state import RUN, Mode, Phase, State, Stopped
 from fbvm.net.journal import Journal
 from fbvm.units.contract import Unit
 from fbvm.watch import places
@@ -94,7 +94,6 @@ class Plc(NamedValues):
         self.trap: Trap | None = None
         self._mode = RUN
         self._first = True
-        self._past: deque[State] = deque(maxlen=0)
         self._due: deque[int] = deque()
         self.breakpoints = Breakpoints(self)
         self._schedule = TaskSchedule(image.tasks, lambda path: self.read(path) is True)
@@ -182,11 +181,9 @@ class Plc(NamedValues):
         self._tell()
 
     def _tell(self) -> None:
-        """Called at the end of each scan: keeps its state for `at`, tells recorder and watchers."""
+        """Called at the end of each scan: tells recorder and watchers."""
         if self._recorder:
             self._recorder.after(1, self.now_ns)
-        if self._past.maxlen:
-            self._past.append(self.snapshot())
         for watcher in self.watchers:
             watcher(self)
 
@@ -270,7 +267,7 @@ class Plc(NamedValues):
         """Up to `most` scans in virtual time without coming back from machine code, while no unit has anything to do.
 
         Returns False if there was none: if somebody has to be told between scans, use `scan`."""
-        if self.watchers or self._past.maxlen:
+        if self.watchers:
             return False
         if self.breakpoints.armed:
             done, self.trap = self._many_stoppable(most)
@@ -291,8 +288,7 @@ class Plc(NamedValues):
         `clock` is read before each scan; `now_ns` is what it told last.  Returns the times of the scans.  Returns [] without a
         scan if somebody has a part in them or has to be told between them: use `scan`."""
         times: list[int] = []
-        looked_at = self.watchers or self._past.maxlen or self._recorder
-        if looked_at or self.trap or not (path := self._fast_path()):
+        if self.watchers or self._recorder or self.trap or not (path := self._fast_path()):
             return times
         try:
             self.trap = self.watch_cycle.judged(path.burst(times, most, now_ns, clock, self.budget))
@@ -413,20 +409,6 @@ class Plc(NamedValues):
 
     def fork(self) -> Plc:
         """A second PLC in the same state, without units, watchers and connections, whether or not this one has them."""
-        return self._twin(self.snapshot())
-
-    def _twin(self, state: State) -> Plc:
-        """A second PLC with the same program, in a state of this one."""
         twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self.engine_choice)
-        twin.restore(state)
+        twin.restore(self.snapshot())
         return twin
-
-    def remember(self, scans: int) -> None:
-        """Keeps the states at the end of the last so many scans from now on, for `at`."""
-        self._past = deque(self._past, maxlen=scans)
-
-    def at(self, scan: int) -> Plc:
-        """A second PLC as this one was at the end of a scan, without units: to be read, or run again with other inputs.
-
-        Raises ValueError if `remember` did not keep that scan."""
-        return self._twin(state_after(scan, self._past))
