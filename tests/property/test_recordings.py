@@ -119,6 +119,8 @@ def test_what_a_recording_says_of_a_scan_is_what_an_observed_run_said(seed: int,
         assert recorded.scans == range(plant.plcs[name].scans)
         recorded.follow(again, recorded.scans)
         assert again.rows == rows, name
+        if not rows:  # each of its scans has trapped
+            continue
         number = plant.random.randrange(len(rows))
         one = WatchedRun()
         recorded.follow(one, range(rows[number][0], rows[number][0] + 1))
