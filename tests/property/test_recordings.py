@@ -56,8 +56,10 @@ class Plant:
         self.plcs["master"].attach(Noc(address=MASTER), self.network)
 
     def run(self) -> None:
-        """Rounds of scans of all PLCs; between them something is done from outside now and then."""
+        """Rounds of scans of all PLCs, at one time those that share the network; between them something is done from outside now
+        and then."""
         for _ in range(ROUNDS):
+            more_ns = self.random.choice((0, 0, 0, 1_000_000))
             for name, plc in self.plcs.items():
                 if self.random.random() < 0.15:
                     self.happen(plc)
@@ -66,7 +68,7 @@ class Plant:
                 if name == "alone":
                     plc.run(scans=self.random.choice((1, 1, 30)))
                 else:
-                    plc.scan(plc.elapsed_ns + self.random.choice((0, 0, 0, 1_000_000)) if plc.scans else None)
+                    plc.scan(plc.elapsed_ns + more_ns if plc.scans else None)
 
     def happen(self, plc: Plc) -> None:
         """Something is done to a PLC from outside."""
