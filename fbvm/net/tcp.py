@@ -1,6 +1,6 @@
 """The host's own network: units talk to real devices and programs over real TCP and UDP, and nothing ever blocks.
 
-One selector serves all links; sockets are handled in `events` and `submit` of a link.  No module but this and `net.udp` uses sockets.
+One selector serves all links; sockets are handled in `events` and `submit` of a link, here and in `net.udp` only.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from fbvm.net.udp import BUFFER_BYTES, HostChannel, SocketLink, UdpPort, share_p
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import DATA, TapKind
 
+MAX_HELD = 128
+"""Callers that are held for a unit's endpoint; further ones are reset."""
 _RST_ON_CLOSE = struct.pack(linger_format(), 1, 0)
 
 
@@ -27,14 +29,24 @@ class TcpNetwork(Switchboard):
     """Real connections.  `address_map` maps endpoints of the program to hosts and ports (see `AddressMap`).
 
     A unit without a row listens on the host's address `bind`, on the port of its request.  Host names of the map are
-    resolved here, once.  Raises OSError for a name that cannot be resolved."""
+    resolved here, once.  With `backlog` the host keeps a port open on which a unit has listened: who calls while none of the
+    unit's sockets waits is let in as soon as one does.  Without, such a caller is refused, as by the unit; only those wait that
+    the host has accepted in the same moment as the caller who took the last socket.
+
+    Raises OSError for a name that cannot be resolved."""
 
     virtual_time = False
 
-    def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1") -> None:
+    def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1", *,
+                 backlog: bool = False) -> None:  # fmt: skip
         rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
         super().__init__(AddressMap(rows, bind))
+        self.backlog = backlog
         self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
+        self._kept: dict[Peer, socket.socket] = {}
+        """With a backlog: sockets of the host on which callers of a unit's endpoint wait for its next listener."""
+        self.held: dict[Peer, list[tuple[socket.socket, Peer]]] = {}
+        """Callers of a unit's endpoint whom the host has accepted beside the one that took its last listener."""
 
     def attach(self, address: str) -> TcpLink:
         """The link of a new unit.  Raises ValueError if the address is in use."""
@@ -60,9 +72,24 @@ class TcpNetwork(Switchboard):
                 keeper.close()
         return self._reserved[transport, endpoint][0]
 
+    def keep(self, endpoint: Peer, sock: socket.socket) -> bool:
+        """Keeps the listening socket of a unit's endpoint until its next listener opens; False without a backlog."""
+        if self.backlog:
+            self._kept[endpoint] = sock
+        return self.backlog
+
+    def take_kept(self, endpoint: Peer) -> socket.socket | None:
+        """The listening socket that was kept for a unit's endpoint, if there is one."""
+        return self._kept.pop(endpoint, None)
+
     def close(self) -> None:
         """Closes all connections and sockets."""
         super().close()
+        while self._kept:
+            self._kept.popitem()[1].close()
+        while self.held:
+            for conn, _ in self.held.popitem()[1]:
+                conn.close()
         for _, keeper in self._reserved.values():
             if keeper:
                 keeper.close()
@@ -71,6 +98,8 @@ class TcpNetwork(Switchboard):
 
 class TcpLink(SocketLink):
     """The link of one unit of a `TcpNetwork`."""
+
+    network: TcpNetwork
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
         channel = self.channels[request.channel] = _KINDS[type(request)](self, request)
@@ -91,23 +120,45 @@ class _Listener(HostChannel):
 
     Several listeners may share a port: one has the host's socket, the lowest-numbered takes the connection (assumed)."""
 
-    def __init__(self, link: SocketLink, request: Listen) -> None:
+    link: TcpLink
+    _has_caller = False
+
+    def __init__(self, link: TcpLink, request: Listen) -> None:
         super().__init__(link, request)
         self._request = request
 
     def open(self, now_ns: int) -> None:
         if not any(listener.sock for listener in self._listeners()):
-            sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
-            sock.listen()
+            self.sock = sock = self.link.network.take_kept(self.local)
+            if sock is None:
+                sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
+                sock.listen()
             self.network.watch(sock, READ, self)
+        for conn, real in self.link.network.held.pop(self.local, ()):
+            self._let_in(conn, real, now_ns)
 
     def end(self) -> None:
         heir = next(iter(self._listeners()), None)
-        if self.sock and heir:
-            self.network.watch(self.sock, 0, self)
-            heir.sock, self.sock = self.sock, None
-            self.network.watch(heir.sock, READ, heir)
+        sock, self.sock = self.sock, None
+        if sock:
+            self.network.watch(sock, 0, self)
+        if sock and heir:
+            heir.sock = sock
+            self.network.watch(sock, READ, heir)
+        elif sock and not self.link.network.keep(self.local, sock):
+            if self._has_caller:
+                self._hold(sock)
+            sock.close()
         super().end()
+
+    def _hold(self, sock: socket.socket) -> None:
+        """Holds the callers that the host has accepted beside the one who takes the last listener; the others would be reset
+        when the socket is closed, and this is the last moment before that."""
+        held = self.link.network.held.setdefault(self.local, [])
+        with suppress(OSError):
+            while len(held) < MAX_HELD:
+                conn, name = sock.accept()
+                held.append((conn, Peer(*name)))
 
     def ready(self, ready: int, now_ns: int) -> None:
         for _ in range(MAX_CALLERS):
@@ -119,23 +170,44 @@ class _Listener(HostChannel):
                 if not isinstance(error, BlockingIOError | ConnectionAbortedError):
                     self.failed(errno_name(error))
                 return
-            remote = self.network.inward(TCP, Peer(*name))
-            listener = next((listener for listener in self._listeners() if fits(listener._request.remote, remote)), None)
-            if listener:
-                del listener.link.channels[listener.channel]
-                listener.end()
-                request = Connect(listener.channel, remote, listener.local.port, listener._request.keep_alive)
-                connection = listener.link.channels[listener.channel] = _Connection(listener.link, request)
-                connection.granted = listener.granted
-                connection.accept(conn, now_ns)
-            else:
-                with suppress(OSError), conn:
-                    conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+            self._let_in(conn, Peer(*name), now_ns)
+
+    def _let_in(self, conn: socket.socket, real: Peer, now_ns: int) -> None:
+        """Gives a caller that the host has accepted to the first listener that it fits; resets a stranger.  If no listener is
+        left, the caller waits for the next one."""
+        network, listeners = self.link.network, self._listeners()
+        remote = network.inward(TCP, real)
+        if not listeners:
+            network.held.setdefault(self.local, []).append((conn, real))
+        elif _has_left(conn):
+            conn.close()
+        elif listener := next((listener for listener in listeners if fits(listener._request.remote, remote)), None):
+            listener._has_caller = True
+            del listener.link.channels[listener.channel]
+            listener.end()
+            request = Connect(listener.channel, remote, listener.local.port, listener._request.keep_alive)
+            connection = listener.link.channels[listener.channel] = _Connection(listener.link, request)
+            connection.granted = listener.granted
+            connection.accept(conn, now_ns)
+        else:
+            with suppress(OSError), conn:
+                conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
 
     def _listeners(self) -> list[_Listener]:
         """The listeners on the same port, by number."""
         there = (channel for _, channel in sorted(self.link.channels.items()))
         return [listener for listener in there if isinstance(listener, _Listener) and listener.local == self.local]
+
+
+def _has_left(conn: socket.socket) -> bool:
+    """True if a caller has ended the connection before anybody took it, and has said nothing."""
+    conn.setblocking(False)
+    try:
+        return not conn.recv(1, socket.MSG_PEEK)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
 
 
 class _Connection(HostChannel):
