@@ -18,6 +18,7 @@ from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.net.loop import LoopLink, LoopNetwork
+from fbvm.net.loop_channels import Connection
 from fbvm.units.contract import Unit
 from fbvm.units.etn21.unit import Etn21
 from fbvm.units.port.noc import Noc
@@ -42,23 +43,24 @@ class Kind:
     address: str
     functions: tuple[int, ...]
     registers: str
-    most_clients: int
+    has_idle_time: bool
+    """Whether it leaves a client that asks nothing for a minute."""
 
 
 KINDS = {
     "etn_modbus": Kind(
         "PROGRAM Main VAR Server : ETN_Modbus_Server; END_VAR Server(Sockets := {clients}); END_PROGRAM",
         lambda timing, seed: Etn21(0, "192.168.250.1", timing=timing, seed=seed), "192.168.250.1",
-        (1, 2, 3, 4, 5, 6, 8, 16), "D0..D199", 8),
+        (1, 2, 3, 4, 5, 6, 8, 16), "D0..D199", True),
     "mbp_mstr": Kind(
         "PROGRAM Main VAR Server : MSTR_Server; END_VAR Server(Sessions := {clients}); END_PROGRAM",
-        lambda timing, seed: Noc(7, "192.168.250.1"), "192.168.250.1", (3, 6, 16, 23), "%MW1..%MW200", 8),
+        lambda timing, seed: Noc(7, "192.168.250.1"), "192.168.250.1", (3, 6, 16, 23), "%MW1..%MW200", True),
     "mb_tcp_server": Kind(
         "PROGRAM Main VAR Server : MB_TCP_SERVER; Config : TCP_CONNECTCONFIG; Coils : ARRAY[0..99] OF BOOL;"
         " Inputs : ARRAY[0..9] OF BYTE; Holding, Registers : ARRAY[0..199] OF WORD; END_VAR"
         " Server(DISCONNECT := FALSE, CONNECT := Config, COIL_DATAAREA := Coils, DISCRETE_DATAAREA := Inputs,"
         " HOLDING_REG_DATAAREA := Holding, INPUT_REG_DATAAREA := Registers); END_PROGRAM",
-        lambda timing, seed: Tianxing("192.168.250.1"), "192.168.250.1", (1, 2, 3, 4, 5, 6, 15, 16), "Main.Holding", 1),
+        lambda timing, seed: Tianxing("192.168.250.1"), "192.168.250.1", (1, 2, 3, 4, 5, 6, 15, 16), "Main.Holding", False),
 }  # fmt: skip
 
 
@@ -161,6 +163,12 @@ class Caller:
         self.reads = True
         self._submit(Grant(1, ROOM))
 
+    def finish(self) -> None:
+        """Sends FIN and goes on receiving, which a unit never does."""
+        end = self.link.channels[1]
+        assert isinstance(end, Connection) and end._end
+        end._end.finish(self.rig.plc.elapsed_ns)
+
     def hang_up(self, reset: bool = False) -> None:
         """Closes the connection, by RST or by FIN."""
         self.is_open = False
@@ -197,7 +205,7 @@ class Caller:
         for request, reply in zip(self.asked, replies, strict=False):
             assert isinstance(reply, Adu), reply
             assert (reply.transaction, reply.unit) == (request.transaction, request.unit), "a reply to somebody else"
-            assert reply.pdu[0] & 0x7F == request.pdu[0], "a reply to something else"
+            assert reply.pdu[0] | 0x80 == request.pdu[0] | 0x80, "a reply to something else"
         assert len(replies) <= len(self.asked), replies[len(self.asked) :]
         if rest := splitter.pending:
             assert len(replies) < len(self.asked), rest
