@@ -18,7 +18,7 @@ from fbvm.machine.plc import Mode, Plc
 from fbvm.net.faults import Fault
 from fbvm.net.loop import LoopNetwork
 from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS
-from fbvm.net.peers import Action, ModbusPeer, Say, Station
+from fbvm.net.peers import Action, Fin, ModbusPeer, Say, ScriptedPeer, Station
 from fbvm.record.draw.chart import chart
 from fbvm.units.etn21.unit import Etn21
 from fbvm.units.etn21.unit import Fault as UnitFault
@@ -334,6 +334,18 @@ def test_the_connection_is_opened_again_when_the_server_has_closed_it() -> None:
     rig.ask("03 00 00 00 01")
     rig.peer.reply = lambda frame: [Say(frame)]
     assert rig.connect().ask("03 00 00 00 01") == "03 02 00 00"
+
+
+@pytest.mark.parametrize(("port", "end"), [(0, "fin"), (502, "ECONNRESET")])
+def test_a_server_that_half_closes_gets_fin(port: int, end: str) -> None:
+    """RST only where the unit would keep a fixed port for a minute."""
+    peer = ScriptedPeer([Say(bytes.fromhex("0001 0000 0005 FF 03 02 1234")), Fin()], farewell=())
+    rig = Rig(peer)
+    rig.plc.write("Main.Client.Local_Port", port)
+    rig.connect()
+    assert rig.ask(READ) == "03 02 12 34"
+    rig.scan(10)
+    assert peer.log == [end]
 
 
 def test_connect_false_closes() -> None:
