@@ -134,8 +134,10 @@ class _Listener(HostChannel):
                 sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
                 sock.listen()
             self.network.watch(sock, READ, self)
-        for conn, real in self.link.network.held.pop(self.local, ()):
-            self._let_in(conn, real, now_ns)
+        if waiting := self.link.network.held.pop(self.local, []):
+            while waiting and self._listeners():
+                self._let_in(*waiting.pop(0), now_ns, has_waited=True)
+            self.link.network.held[self.local] = waiting + self.link.network.held.get(self.local, [])
 
     def end(self) -> None:
         heir = next(iter(self._listeners()), None)
@@ -170,16 +172,14 @@ class _Listener(HostChannel):
                 if not isinstance(error, BlockingIOError | ConnectionAbortedError):
                     self.failed(errno_name(error))
                 return
-            self._let_in(conn, Peer(*name), now_ns)
+            self._let_in(conn, Peer(*name), now_ns, has_waited=self.link.network.backlog)
 
-    def _let_in(self, conn: socket.socket, real: Peer, now_ns: int) -> None:
-        """Gives a caller that the host has accepted to the first listener that it fits; resets a stranger.  If no listener is
-        left, the caller waits for the next one."""
+    def _let_in(self, conn: socket.socket, real: Peer, now_ns: int, has_waited: bool) -> None:
+        """Gives a caller that the host has accepted to the first listener that it fits; resets a stranger.  Who `has_waited` may
+        have left in the meantime."""
         network, listeners = self.link.network, self._listeners()
         remote = network.inward(TCP, real)
-        if not listeners:
-            network.held.setdefault(self.local, []).append((conn, real))
-        elif _has_left(conn):
+        if has_waited and _has_left(conn):
             conn.close()
         elif listener := next((listener for listener in listeners if fits(listener._request.remote, remote)), None):
             listener._has_caller = True
