@@ -1,6 +1,6 @@
 """The host's own network: units talk to real devices and programs over real TCP and UDP, and nothing ever blocks.
 
-One selector serves all links; sockets are handled in `events` and `submit` of a link.  No other module uses sockets.
+One selector serves all links; sockets are handled in `events` and `submit` of a link, here and in `net.udp` only.
 """
 
 from __future__ import annotations
@@ -8,42 +8,45 @@ from __future__ import annotations
 import errno
 import socket
 import struct
-from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
-from fbvm.base.host import keeps_ports, linger_format, shares_ports
+from fbvm.base.host import keeps_ports, linger_format
 from fbvm.net.addresses import AddressMap, dotted, fits, impossible
-from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, undeliverable
-from fbvm.net.host_link import HostLink
-from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, UDP, WRITE, Switchboard, Watcher, errno_name
+from fbvm.net.channels import SEND_BUFFER_BYTES
+from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, WRITE, Switchboard, errno_name
+from fbvm.net.udp import BUFFER_BYTES, HostChannel, SocketLink, UdpPort, share_port
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import DATA, TapKind
 
-BUFFER_BYTES = 65_536
-"""The host's buffers of each connection: small, so that the TCP window closes soon if the unit grants nothing."""
+MAX_HELD = 128
+"""Callers that are held for a unit's endpoint; further ones are reset."""
 _RST_ON_CLOSE = struct.pack(linger_format(), 1, 0)
-
-
-def _share_port(sock: socket.socket) -> None:
-    """Let a port be listened on again while old connections of it linger (elsewhere than on Windows)."""
-    if shares_ports():
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
 
 
 class TcpNetwork(Switchboard):
     """Real connections.  `address_map` maps endpoints of the program to hosts and ports (see `AddressMap`).
 
     A unit without a row listens on the host's address `bind`, on the port of its request.  Host names of the map are
-    resolved here, once.  Raises OSError for a name that cannot be resolved."""
+    resolved here, once.  With `backlog` the host keeps a port open on which a unit has listened: who calls while none of the
+    unit's sockets waits is let in as soon as one does.  Without, such a caller is refused, as by the unit; only those wait that
+    the host has accepted in the same moment as the caller who took the last socket.
+
+    Raises OSError for a name that cannot be resolved."""
 
     virtual_time = False
 
-    def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1") -> None:
+    def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1", *,
+                 backlog: bool = False) -> None:  # fmt: skip
         rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
         super().__init__(AddressMap(rows, bind))
+        self.backlog = backlog
         self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
+        self._kept: dict[Peer, socket.socket] = {}
+        """With a backlog: sockets of the host on which callers of a unit's endpoint wait for its next listener."""
+        self.held: dict[Peer, list[tuple[socket.socket, Peer]]] = {}
+        """Callers of a unit's endpoint whom the host has accepted beside the one that took its last listener."""
 
     def attach(self, address: str) -> TcpLink:
         """The link of a new unit.  Raises ValueError if the address is in use."""
@@ -61,7 +64,7 @@ class TcpNetwork(Switchboard):
             return real
         if (transport, endpoint) not in self._reserved:
             keeper = socket.socket(socket.AF_INET, socket.SOCK_STREAM if transport == TCP else socket.SOCK_DGRAM)
-            _share_port(keeper)
+            share_port(keeper)
             keeper.bind((real.host, 0))
             keeps = keeps_ports() and transport == TCP
             self._reserved[transport, endpoint] = Peer(*keeper.getsockname()), keeper if keeps else None
@@ -69,21 +72,34 @@ class TcpNetwork(Switchboard):
                 keeper.close()
         return self._reserved[transport, endpoint][0]
 
+    def keep(self, endpoint: Peer, sock: socket.socket) -> bool:
+        """Keeps the listening socket of a unit's endpoint until its next listener opens; False without a backlog."""
+        if self.backlog:
+            self._kept[endpoint] = sock
+        return self.backlog
+
+    def take_kept(self, endpoint: Peer) -> socket.socket | None:
+        """The listening socket that was kept for a unit's endpoint, if there is one."""
+        return self._kept.pop(endpoint, None)
+
     def close(self) -> None:
         """Closes all connections and sockets."""
         super().close()
+        while self._kept:
+            self._kept.popitem()[1].close()
+        while self.held:
+            for conn, _ in self.held.popitem()[1]:
+                conn.close()
         for _, keeper in self._reserved.values():
             if keeper:
                 keeper.close()
         self._reserved.clear()
 
 
-class TcpLink(HostLink):
+class TcpLink(SocketLink):
     """The link of one unit of a `TcpNetwork`."""
 
-    def __init__(self, network: TcpNetwork, address: str) -> None:
-        super().__init__(network, address)
-        self.network = network
+    network: TcpNetwork
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
         channel = self.channels[request.channel] = _KINDS[type(request)](self, request)
@@ -99,59 +115,13 @@ class TcpLink(HostLink):
 # --- channels ------------------------------------------------------------------------------------------------------
 
 
-class _HostChannel(Channel, Watcher):
-    """A channel that has a socket of the host."""
-
-    link: TcpLink
-    sock: socket.socket | None = None
-    transport = TCP
-    real = ANYBODY
-    """The endpoint of the host at which peers reach the channel."""
-
-    def __init__(self, link: TcpLink, request: Connect | Listen | Bind) -> None:
-        super().__init__(link, request.channel)
-        self.network = link.network
-        self.local = Peer(link.address, request.local_port)
-        """The unit's endpoint, as the program sees it."""
-
-    @abstractmethod
-    def open(self, now_ns: int) -> None:
-        """Opens the channel.  Raises OSError."""
-
-    def end(self) -> None:
-        """Closes the socket."""
-        self.link.waiting.pop(self, None)
-        if self.sock:
-            if self.transport == TCP:  # a datagram may still be under way, and the port stays this unit's
-                self.network.own(TCP, self.real, None)
-            self.network.watch(self.sock, 0, self)
-            self.sock.close()
-            self.sock = None
-
-    def failed(self, error: str) -> None:
-        super().failed(error)
-        self.end()
-
-    def close(self, reset: bool, now_ns: int) -> None:
-        self.end()
-
-    def make(self, kind: int, bind: Peer | None) -> socket.socket:
-        """A socket that never blocks.  Raises OSError."""
-        self.sock = sock = socket.socket(socket.AF_INET, kind)
-        sock.setblocking(False)
-        if kind == socket.SOCK_STREAM:
-            _share_port(sock)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
-        if bind:
-            sock.bind((bind.host, bind.port))
-        return sock
-
-
-class _Listener(_HostChannel):
+class _Listener(HostChannel):
     """Listens for one connection from a peer that fits; other connections are reset.
 
     Several listeners may share a port: one has the host's socket, the lowest-numbered takes the connection (assumed)."""
+
+    link: TcpLink
+    _has_caller = False
 
     def __init__(self, link: TcpLink, request: Listen) -> None:
         super().__init__(link, request)
@@ -159,17 +129,38 @@ class _Listener(_HostChannel):
 
     def open(self, now_ns: int) -> None:
         if not any(listener.sock for listener in self._listeners()):
-            sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
-            sock.listen()
+            self.sock = sock = self.link.network.take_kept(self.local)
+            if sock is None:
+                sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
+                sock.listen()
             self.network.watch(sock, READ, self)
+        if waiting := self.link.network.held.pop(self.local, []):
+            while waiting and self._listeners():
+                self._let_in(*waiting.pop(0), now_ns, has_waited=True)
+            self.link.network.held[self.local] = waiting + self.link.network.held.get(self.local, [])
 
     def end(self) -> None:
         heir = next(iter(self._listeners()), None)
-        if self.sock and heir:
-            self.network.watch(self.sock, 0, self)
-            heir.sock, self.sock = self.sock, None
-            self.network.watch(heir.sock, READ, heir)
+        sock, self.sock = self.sock, None
+        if sock:
+            self.network.watch(sock, 0, self)
+        if sock and heir:
+            heir.sock = sock
+            self.network.watch(sock, READ, heir)
+        elif sock and not self.link.network.keep(self.local, sock):
+            if self._has_caller:
+                self._hold(sock)
+            sock.close()
         super().end()
+
+    def _hold(self, sock: socket.socket) -> None:
+        """Holds the callers that the host has accepted beside the one who takes the last listener; the others would be reset
+        when the socket is closed, and this is the last moment before that."""
+        held = self.link.network.held.setdefault(self.local, [])
+        with suppress(OSError):
+            while len(held) < MAX_HELD:
+                conn, name = sock.accept()
+                held.append((conn, Peer(*name)))
 
     def ready(self, ready: int, now_ns: int) -> None:
         for _ in range(MAX_CALLERS):
@@ -181,18 +172,26 @@ class _Listener(_HostChannel):
                 if not isinstance(error, BlockingIOError | ConnectionAbortedError):
                     self.failed(errno_name(error))
                 return
-            remote = self.network.inward(TCP, Peer(*name))
-            listener = next((listener for listener in self._listeners() if fits(listener._request.remote, remote)), None)
-            if listener:
-                del listener.link.channels[listener.channel]
-                listener.end()
-                request = Connect(listener.channel, remote, listener.local.port, listener._request.keep_alive)
-                connection = listener.link.channels[listener.channel] = _Connection(listener.link, request)
-                connection.granted = listener.granted
-                connection.accept(conn, now_ns)
-            else:
-                with suppress(OSError), conn:
-                    conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+            self._let_in(conn, Peer(*name), now_ns, has_waited=self.link.network.backlog)
+
+    def _let_in(self, conn: socket.socket, real: Peer, now_ns: int, has_waited: bool) -> None:
+        """Gives a caller that the host has accepted to the first listener that it fits; resets a stranger.  Who `has_waited` may
+        have left in the meantime."""
+        network, listeners = self.link.network, self._listeners()
+        remote = network.inward(TCP, real)
+        if has_waited and _has_left(conn):
+            conn.close()
+        elif listener := next((listener for listener in listeners if fits(listener._request.remote, remote)), None):
+            listener._has_caller = True
+            del listener.link.channels[listener.channel]
+            listener.end()
+            request = Connect(listener.channel, remote, listener.local.port, listener._request.keep_alive)
+            connection = listener.link.channels[listener.channel] = _Connection(listener.link, request)
+            connection.granted = listener.granted
+            connection.accept(conn, now_ns)
+        else:
+            with suppress(OSError), conn:
+                conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
 
     def _listeners(self) -> list[_Listener]:
         """The listeners on the same port, by number."""
@@ -200,7 +199,18 @@ class _Listener(_HostChannel):
         return [listener for listener in there if isinstance(listener, _Listener) and listener.local == self.local]
 
 
-class _Connection(_HostChannel):
+def _has_left(conn: socket.socket) -> bool:
+    """True if a caller has ended the connection before anybody took it, and has said nothing."""
+    conn.setblocking(False)
+    try:
+        return not conn.recv(1, socket.MSG_PEEK)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
+
+
+class _Connection(HostChannel):
     """A TCP connection, open once it is `_connected`.
 
     An `_orphan` has been closed by its unit: it sends its data, then FIN, and waits for the peer's FIN."""
@@ -208,7 +218,7 @@ class _Connection(_HostChannel):
     _connected = _orphan = _stalled = _fin_sent = _fin_seen = False
     _taken = 0
 
-    def __init__(self, link: TcpLink, request: Connect) -> None:
+    def __init__(self, link: SocketLink, request: Connect) -> None:
         super().__init__(link, request)
         self.remote = request.remote
         self._keep_alive = request.keep_alive
@@ -406,43 +416,4 @@ class _Connection(_HostChannel):
             self.network.tell(now_ns, what, self.local, self.remote, out, data)
 
 
-class _UdpPort(_HostChannel):
-    """A UDP port.  Datagrams are handed over whole and need no grant; the unit drops those that it has no room for."""
-
-    transport = UDP
-
-    def open(self, now_ns: int) -> None:
-        sock = self.make(socket.SOCK_DGRAM, self.network.host_endpoint(self.local, UDP))
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        self.real = Peer(*sock.getsockname())
-        self.local = Peer(self.local.host, self.local.port or self.real.port)
-        self.network.own(UDP, self.real, self.local)
-        self.network.watch(sock, READ, self)
-        self.link.pending.append(Opened(self.channel, self.local.port, ANYBODY))
-
-    def ready(self, ready: int, now_ns: int) -> None:
-        for _ in range(MAX_DATAGRAMS):
-            try:
-                data, name = self.sock.recvfrom(BUFFER_BYTES) if self.sock else (b"", ("", 0))
-            except OSError:
-                return
-            remote = self.network.inward(UDP, Peer(*name))
-            self.network.tell(now_ns, TapKind.UDP, self.local, remote, False, data)
-            self.link.pending.append(Received(self.channel, data, remote))
-
-    def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
-        if refusal := undeliverable(remote, data):
-            return refusal
-        try:
-            if self.sock:
-                self.sock.sendto(data, dotted(self.network.outward(remote, UDP)))
-        except BlockingIOError:
-            return "ENOBUFS"
-        except OSError as error:
-            return errno_name(error)
-        self.network.tell(now_ns, TapKind.UDP, self.local, remote, True, data)
-        self.link.pending.append(Sent(self.channel, len(data)))
-        return ""
-
-
-_KINDS: dict[type, Callable[..., _HostChannel]] = {Connect: _Connection, Listen: _Listener, Bind: _UdpPort}
+_KINDS: dict[type, Callable[..., HostChannel]] = {Connect: _Connection, Listen: _Listener, Bind: UdpPort}

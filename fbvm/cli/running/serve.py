@@ -45,6 +45,8 @@ SERVED = {"CIO": 5801, "D": 32768}
               help="Address of this computer to listen on; 0.0.0.0 is all.")
 @click.option("--port", type=click.IntRange(0, 65535), default=1502, show_default=True, help="0: any free port.")
 @click.option("--sockets", type=click.IntRange(1, 8), default=1, show_default=True, help="Clients at once.")
+@click.option("--backlog/--no-backlog", default=True, show_default=True,
+              help="Hold callers until a socket is free, where a unit refuses them.")
 @click.option("--read-only", is_flag=True, help="Refuse everything that writes.")
 @click.option("--fn0f", is_flag=True, help="Serve 0F, write multiple coils, too.")
 @click.option("--full-dm", is_flag=True, help="Let 10, write multiple registers, begin anywhere in D.")
@@ -55,8 +57,8 @@ SERVED = {"CIO": 5801, "D": 32768}
 @click.option("--log", type=click.Path(dir_okay=False, allow_dash=True, path_type=Path), metavar="FILE",
               help="Write who asked what, a JSON object a line; - is the terminal.")
 def command(
-    bind: str, port: int, sockets: int, read_only: bool, fn0f: bool, full_dm: bool, idle_ns: int | None, watch_ns: int,
-    image: Path | None, log: Path | None,
+    bind: str, port: int, sockets: int, backlog: bool, read_only: bool, fn0f: bool, full_dm: bool, idle_ns: int | None,
+    watch_ns: int, image: Path | None, log: Path | None,
 ) -> None:  # fmt: skip
     """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM.
 
@@ -69,7 +71,7 @@ def command(
         stack.enter_context(signals.installed())
         plc = _plc(settings, image)
         plc.watch_cycle.time_ns = watch_ns
-        network = _network(bind, port)
+        network = _network(bind, port, backlog)
         stack.callback(network.close)
         if log:
             network.tap = RequestLog(_opened(stack, log), loop.epoch_ns(), lambda: plc.scans).tap
@@ -115,11 +117,11 @@ def _opened(stack: ExitStack, log: Path) -> IO[str]:
         return stack.enter_context(TextIOWrapper(growing_file(log, "ab"), encoding="utf-8"))
 
 
-def _network(bind: str, port: int) -> TcpNetwork:
+def _network(bind: str, port: int, backlog: bool) -> TcpNetwork:
     try:
         if not ipaddress.ip_address(bind).is_loopback:
             click.echo(f"Other computers can reach {bind} and write this PLC's memory.", err=True)
-        network = TcpNetwork({ENDPOINT: (bind, port)})
+        network = TcpNetwork({ENDPOINT: (bind, port)}, backlog=backlog)
         network.host_endpoint(ENDPOINT)
     except ValueError:
         raise click.UsageError(f"--bind {bind} is not an IP address") from None
