@@ -1,9 +1,8 @@
-"""The price of recording, by depth: python tests/bench/recorder.py [SCANS].  Processor time a scan, and bytes a scan on disk;
-prints, and gates nothing.
+"""The price of looking inside scans: python tests/bench/recorder.py [SCANS].
 
-The limit is the scan without a recorder: as machine code, where only ends of scans are written down, and as the observed
-build in Python, where every write or statement is; what is above is looking at values and packing what changed.  `auto` has
-the way to machine code in it, which few scans do not pay for."""
+One program of 100 lines (programs/lines100.st), 10,000 scans of 10 ms unless another number is given.  Prints each figure
+beside its limit, in processor time, with the ratios that the limits speak of; gates nothing.  The scan is timed without a
+recorder, the best of some runs; what recording adds is a recorded run less a plain one."""
 
 from __future__ import annotations
 
@@ -12,91 +11,113 @@ import shutil
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
 HOUSE = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(HOUSE))
 
-from fbvm.cli.running.demo import SIGNALS  # noqa: E402
 from fbvm.code.compiler import compile_files  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
-from fbvm.machine.plc import Plc  # noqa: E402
-from fbvm.net.loop import LoopNetwork  # noqa: E402
-from fbvm.net.peers import ModbusPeer  # noqa: E402
+from fbvm.machine.plc import Phase, Plc  # noqa: E402
 from fbvm.record.page.data import page_data  # noqa: E402
 from fbvm.record.page.page import page  # noqa: E402
+from fbvm.record.trace.events import Event  # noqa: E402
+from fbvm.record.trace.history import History, observing  # noqa: E402
 from fbvm.record.trace.reader import Trace  # noqa: E402
-from fbvm.record.trace.recorder import Recorder  # noqa: E402
 from fbvm.record.trace.writer import Depth, TraceWriter  # noqa: E402
-from fbvm.units.etn21.unit import Etn21  # noqa: E402
-from fbvm.wire.link import Peer  # noqa: E402
 
-HERE = Path(__file__).parent
-PROGRAMS = {"demo": HOUSE / "examples" / "demo.st", "100 rungs": HERE / "programs" / "logic.st",
-            "PID": HERE / "programs" / "pid.st"}  # fmt: skip
-SCANS_OF_A_PAGE = 10_000
-MINUTES_10 = 60_000
-"""Scans of ten minutes at 10 ms."""
+PROGRAM = Path(__file__).parent / "programs" / "lines100.st"
+SCANS = 10_000
+WARM = 100
+"""Scans before the clock starts."""
+NATIVE_SCANS, PYTHON_SCANS, OBSERVED_SCANS, TIMES = 20_000, 500, 100, 5
+LEAST_SCANS = 200
 
 
-def plc_of(image: Image, engine: str = "auto") -> Plc:
-    plc = Plc(image, engine=engine)
-    network = LoopNetwork()
-    network.place(Peer("192.168.250.1", 502), ModbusPeer())
-    plc.attach(Etn21(0, "192.168.250.21"), network)
-    return plc
+class Listener:
+    """Receives each event, and counts."""
+
+    events = 0
+
+    def phase(self, plc: Plc, phase: Phase) -> None:
+        """Does nothing."""
+
+    def event(self, plc: Plc, event: Event) -> None:
+        """Counts."""
+        self.events += 1
 
 
-def seconds(plc: Plc, scans: int) -> float:
+def seconds(work: Callable[[], object]) -> float:
+    """Processor time."""
     start = time.process_time()
-    plc.run(scans=scans)
+    work()
     return time.process_time() - start
 
 
-def row(name: str, what: str, scans: int, taken: float, size_bytes: int = 0) -> None:
-    size = f"{size_bytes / scans:10.1f} bytes/scan" if size_bytes else ""
-    print(f"{name:10} {what:24} {taken / scans * 1e6:9.1f} us/scan {size}")
+def scan_us(plc: Plc, scans: int) -> float:
+    """Microseconds a scan, the best of some runs."""
+    plc.run(scans=WARM)
+    return min(seconds(lambda: plc.run(scans=scans)) for _ in range(TIMES)) / scans * 1e6
 
 
-def bench(name: str, image: Image, scans: int) -> None:
-    for engine in ("python", "auto"):
-        row(name, f"off ({engine})", scans, seconds(plc_of(image, engine), scans))
-    if name == "demo":
-        plc = plc_of(image)
-        Recorder(plc, SIGNALS)
-        row(name, "recorder of 12 signals", scans, seconds(plc, scans))
-    for depth, patterns in ((Depth.SCANS, ()), (Depth.SCANS, ("D200..D299",)), (Depth.WRITES, ()), (Depth.STATEMENTS, ())):
-        plc, file = plc_of(image), io.BytesIO()
-        writer = TraceWriter(plc, file, depth, patterns)
-        taken = seconds(plc, scans)
-        writer.close()
-        row(name, f"{depth.value}{' of 100 words' if patterns else ''}", scans, taken, writer.size_bytes)
+def row(what: str, ours: str, limit: str = "") -> None:
+    print(f"{what:<58} {ours:>16}   {limit}", flush=True)
 
 
-def ten_minutes(image: Image) -> None:
-    plc, file = plc_of(image), io.BytesIO()
-    writer = TraceWriter(plc, file)
-    taken = seconds(plc, MINUTES_10)
-    writer.close()
-    print(f"\n10 virtual minutes of the demo, recorded at scan depth: {taken:.1f} s, {writer.size_bytes / 1024:.0f} KiB")
-    start = time.process_time()
-    moment = Trace(io.BytesIO(file.getvalue())).at(MINUTES_10 - 1)
-    print(f"the last scan found and read: {(time.process_time() - start) * 1e3:.1f} ms, scan {moment.scans}")
+def scans_of_each_build(image: Image) -> None:
+    native = scan_us(Plc(image, engine="native"), NATIVE_SCANS)
+    python = scan_us(Plc(image, engine="python"), PYTHON_SCANS)
+    observed = scan_us(Plc(image, observed=True), OBSERVED_SCANS)
+    row("a scan, native", f"{native:.2f} us")
+    row("a scan, python", f"{python:.1f} us")
+    row("a scan, observed", f"{observed:.1f} us")
+    row("  observed / python", f"{observed / python:.1f}", "<= 4")
+    plc, told = Plc(image, engine="python"), Listener()
+    with observing(plc, told):
+        listened = scan_us(plc, OBSERVED_SCANS)
+    row("a scan with a listener that is told every event", f"{listened:.1f} us")
+    row("  events a scan; listener / python", f"{told.events / plc.scans:.0f}; {listened / python:.1f}")
 
 
-def opening(image: Image) -> None:
-    """The page of 10,000 scans: written, and opened by a browser where playwright and one are there."""
-    plc, file = plc_of(image), io.BytesIO()
-    writer = TraceWriter(plc, file)
-    plc.run(scans=SCANS_OF_A_PAGE)
-    writer.close()
-    start = time.process_time()
-    text = page(page_data(Trace(io.BytesIO(file.getvalue())), title="demo"))
-    print(f"\npage of {SCANS_OF_A_PAGE} scans: made in {time.process_time() - start:.1f} s, {len(text) / 1024:.0f} KiB")
+def recorded(image: Image, scans: int) -> None:
+    plain = seconds(lambda: Plc(image).run(scans=scans))
+    share = scans / SCANS
+    for depth in Depth:
+        plc, file = Plc(image), io.BytesIO()
+        writer = TraceWriter(plc, file, depth)
+        taken = seconds(lambda plc=plc: plc.run(scans=scans)) + seconds(writer.close)
+        row(f"added by recording {scans} scans, depth {depth.value}", f"{taken - plain:.2f} s", f"<= {0.3 * share:.2g} s")
+        row("  size", f"{writer.size_bytes / 1e6:.2f} MB", f"<= {1 + 20e-6 * scans:.2f} MB")
+        text = ""
+
+        def make(file: io.BytesIO = file) -> None:
+            nonlocal text
+            text = page(page_data(Trace(io.BytesIO(file.getvalue())), title="lines100"))
+
+        row("  a page of it, made in", f"{seconds(make):.1f} s", f"<= {2 * share:.2g} s")
+        row("  a page of it, size", f"{len(text) / 1e6:.2f} MB", f"<= {3 * share:.2g} MB")
+        opening(text)
+
+
+def shown(image: Image, scans: int) -> None:
+    """One scan in the middle of a run, done again with a listener that is told every event."""
+    plc = Plc(image)
+    history = History(plc, keep=scans)
+    for _ in range(scans):
+        history.before_scan()
+        plc.scan()
+    middle = scans // 2
+    taken = seconds(lambda: history.replay(range(middle, middle + 1), Listener()))
+    row("a scan shown at statement depth", f"{taken * 1e3:.1f} ms", "<= 50 ms")
+
+
+def opening(text: str) -> None:
+    """A page, opened by a browser where playwright and one are there."""
     program = shutil.which("chromium") or shutil.which("google-chrome")
     if program is None or find_spec("playwright") is None:
-        print("opening it was not measured: needs playwright and chromium")
+        row("  a page of it, opens in", "not measured", "<= 1 s, needs playwright and chromium")
         return
     from playwright.sync_api import sync_playwright
 
@@ -104,30 +125,26 @@ def opening(image: Image) -> None:
         path = Path(folder) / "run.html"
         path.write_text(text, encoding="utf-8")
         browser = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])
-        for name, viewport in (("desktop", {"width": 1300, "height": 850}), ("phone", {"width": 390, "height": 800})):
-            shown = browser.new_page(viewport=viewport)
-            begun = time.monotonic()
-            shown.goto(path.as_uri())
-            shown.wait_for_function("document.getElementById('where').textContent.startsWith('scan')")
-            opened = time.monotonic()
-            for _ in range(100):
-                shown.keyboard.press("ArrowRight")
-            shown.wait_for_function("document.getElementById('where').textContent.startsWith('scan 100,')")
-            step_ms = (time.monotonic() - opened) * 10
-            print(f"opened ({name}) in {(opened - begun) * 1e3:.0f} ms; a step of the cursor {step_ms:.1f} ms")
+        there = browser.new_page(viewport={"width": 1300, "height": 850})
+        begun = time.monotonic()
+        there.goto(path.as_uri())
+        there.wait_for_function("document.getElementById('where').textContent.startsWith('scan')")
+        opened = time.monotonic()
+        for _ in range(100):
+            there.keyboard.press("ArrowRight")
+        there.wait_for_function("document.getElementById('where').textContent.startsWith('scan 100,')")
+        row("  a page of it, opens in", f"{opened - begun:.2f} s", "<= 1 s")
+        row("  a step of its cursor", f"{(time.monotonic() - opened) * 10:.1f} ms")
         browser.close()
 
 
 def main() -> None:
-    scans = int(sys.argv[1]) if len(sys.argv) > 1 else 2000
-    for name, path in PROGRAMS.items():
-        image = compile_files([path], runnable=True).image
-        assert image is not None, name
-        bench(name, image, scans)
-        if name == "demo":
-            ten_minutes(image)
-            opening(image)
-            print()
+    scans = max(LEAST_SCANS, int(sys.argv[1])) if len(sys.argv) > 1 else SCANS
+    image = compile_files([PROGRAM], runnable=True).image
+    assert image is not None
+    scans_of_each_build(image)
+    shown(image, LEAST_SCANS)
+    recorded(image, scans)
 
 
 if __name__ == "__main__":
