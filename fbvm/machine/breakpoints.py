@@ -16,7 +16,7 @@ from fbvm.code.image import Image, Site
 from fbvm.code.shapes import statements
 from fbvm.engine.choice.stoppable import STATEMENTS, StoppableEngine
 from fbvm.engine.choice.tiers import Engine, choice_of, substitutes_of
-from fbvm.engine.python.runtime import NO_SITE
+from fbvm.engine.observation import NO_SITE
 from fbvm.engine.stops import LineStop, StopTable, Test, Watchpoint
 from fbvm.engine.trap import Trap
 from fbvm.watch.changes import changed

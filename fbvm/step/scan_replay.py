@@ -64,7 +64,7 @@ class ScanReplay:
 
     def __init__(self, plc: Plc) -> None:
         self.plc = Plc(plc.image, plc.cycle_ns, budget=plc.budget)
-        self.plc.engine = ObservedEngine(plc.image, self.plc.memory, self._event, self.plc.engine)
+        self._engine = self.plc.engine = ObservedEngine(plc.image, self.plc.memory, self._event, self.plc.engine)
         self.plc.phases.append(self._phase)
         self.statement: Statement | None = None
         self.count = 0
@@ -89,6 +89,7 @@ class ScanReplay:
         self.power = PowerFlow(self.plc.image.rungs, lambda scan: True, self.values.keep)
         self.chart_recorder = ChartRecorder(self.plc.image.charts, lambda scan: True)
         self._stop, self._actions, self._listener = stop, actions, listener
+        self._engine.stands_still = any(actions)  # they change the memory in the middle of the scan
         if self.plc.trap:
             return False
         for action in actions.get(0, ()):

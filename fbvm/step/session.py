@@ -260,7 +260,7 @@ class Session:
         for action in actions.get(0, ()):
             action(plc)
         if any(actions):
-            with observing(plc, ActionInjector(actions)):
+            with observing(plc, ActionInjector(actions), stands_still=True):
                 plc.scan()
             self._recorded.changed()
         else:

@@ -18,8 +18,8 @@ from fbvm.engine.native import engine as native
 from fbvm.engine.native.code import code_of
 from fbvm.engine.native.scans.code import ClockWordTable
 from fbvm.engine.native.scans.scans import ScheduledTask
+from fbvm.engine.observation import NO_SITE, Observation
 from fbvm.engine.python.engine import PythonEngine
-from fbvm.engine.python.runtime import NO_SITE, Observation
 from fbvm.engine.stops import STOPPED, State, StopTable
 from fbvm.engine.trap import Trap
 

@@ -1,30 +1,33 @@
 """The Python engine, the reference: translates an Image into Python source over the flat memory and runs that.
 
-It needs nothing but Python, and its observed build can stop at every statement, read and write.  It decides no meaning: that
-is in the table of operations (`fbvm.code.operations`)."""
+It needs nothing but Python, and tells every statement, read and write to whoever wants that.  It decides no meaning: that is in
+the table of operations (`fbvm.code.operations`)."""
 
 from __future__ import annotations
 
 import linecache
 import marshal
 import sys
-from collections import deque
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
+from enum import Enum
 from functools import partial
 from itertools import count
 from types import CodeType
 from typing import Any
 from weakref import finalize
 
-from fbvm.base.memory import WHOLE_BYTES, Memory
-from fbvm.code.image import Body, Image, ProgramRun
+from fbvm.base.memory import Memory
+from fbvm.code.image import Image, ProgramRun
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.apart import run_apart
 from fbvm.engine.bases import fixed_bases
 from fbvm.engine.depths import with_recursion_room
-from fbvm.engine.python.runtime import NO_SITE, Observation, environment
+from fbvm.engine.observation import NO_SITE, Observation
+from fbvm.engine.python.logged import ENDLESS, MOST_ENTRIES, Full, Log, LoggedWriter, Row
+from fbvm.engine.python.runtime import environment
 from fbvm.engine.python.statements import BodyWriter, function_name
+from fbvm.engine.python.stepped import SteppedWriter, reporting
 from fbvm.engine.trap import NO_INSTANCE, Stop, Trap, trap
 
 _NUMBERS = count(1)
@@ -36,10 +39,20 @@ FRAMES_A_LEVEL = 5
 """Python frames that translating takes at most for each level of nested code."""
 
 
+class Build(Enum):
+    """What code says of itself while it runs: nothing; each observation, at which it waits; a log, out of which observations are
+    made afterwards."""
+
+    PLAIN = "plain"
+    STEPPED = "stepped"
+    LOGGED = "logged"
+
+
 @dataclass(frozen=True, eq=False)
 class Program:
     """The Python code of an image, which engines over any number of memories share."""
 
+    build: Build
     source: str
     parts: tuple[CodeType, ...]
     constants: dict[str, Any] = field(repr=False)
@@ -47,41 +60,45 @@ class Program:
     """Where the instance begins of each body that was written for its only one, by the body's number."""
     frames: int
     """Python frames that a run takes at most: every body once (there is no recursion), and every part outlined."""
+    table: tuple[Row, ...]
+    """What the numbers in the log mean; empty for other builds."""
 
 
-_programs: dict[tuple[int, bool, bool], Program] = {}
-"""The programs of images that are still in use, by image, `observed` and `anywhere`."""
+_programs: dict[tuple[int, Build, bool], Program] = {}
+"""The programs of images that are still in use, by image, build and `anywhere`."""
 
 
-def translate(image: Image, observed: bool = False, anywhere: bool = False) -> Program:
+def translate(image: Image, build: Build = Build.PLAIN, anywhere: bool = False) -> Program:
     """The Python code of an image; the same object as long as the image is in use.
 
-    `observed` is the build that yields observations.  Bodies with one instance are written for that instance, unless `anywhere`
-    is True."""
-    key = id(image), observed, anywhere
+    Bodies with one instance are written for that instance, unless `anywhere` is True."""
+    key = id(image), build, anywhere
     known = _programs.get(key)
     if known is not None:
         return known
-    name = f"fbvm {'observed' if observed else 'plain'} {next(_NUMBERS)}"
-    program = with_recursion_room(image, FRAMES_A_LEVEL, partial(_written, image, observed, anywhere, name))
+    name = f"fbvm {build.value} {next(_NUMBERS)}"
+    program = with_recursion_room(image, FRAMES_A_LEVEL, partial(_written, image, build, anywhere, name))
     _programs[key] = program
     finalize(image, _forget, key)
     return program
 
 
-def _forget(key: tuple[int, bool, bool]) -> None:
+def _forget(key: tuple[int, Build, bool]) -> None:
     for part in _programs.pop(key).parts:
         linecache.cache.pop(part.co_filename, None)
 
 
-def _written(image: Image, observed: bool, anywhere: bool, name: str) -> Program:
+def _written(image: Image, build: Build, anywhere: bool, name: str) -> Program:
     bases = {} if anywhere else fixed_bases(image)
     constants: dict[str, Any] = {}
+    table: list[Row] = []
     texts: list[str] = []
     lines: list[str] = []
     frames = size = 0
     for number in range(len(image.bodies)):
-        writer = BodyWriter(image, constants, observed, bases.get(number))
+        base = bases.get(number)
+        writer = LoggedWriter(image, constants, base, table) if build is Build.LOGGED else \
+            SteppedWriter(image, constants, base) if build is Build.STEPPED else BodyWriter(image, constants, base)  # fmt: skip
         body = [*writer.write(number), ""]
         lines += body
         frames += 1 + len(writer.routines)
@@ -91,7 +108,7 @@ def _written(image: Image, observed: bool, anywhere: bool, name: str) -> Program
             lines, size = [], 0
     texts.append("\n".join(lines))
     parts = tuple(_compiled(text, f"<{name} {number}>" if number else f"<{name}>") for number, text in enumerate(texts))
-    return Program("\n".join(texts), parts, constants, bases, frames)
+    return Program(build, "\n".join(texts), parts, constants, bases, frames, tuple(table))
 
 
 def _compiled(text: str, name: str) -> CodeType:
@@ -123,20 +140,27 @@ class PythonEngine:
         self.substitutes: dict[int, Callable[[int], None]] = {}
         self._numbers = {function_name(number, body): number for number, body in enumerate(image.bodies)}
         self._allowance = WHOLE_BUDGET
-        self._program = translate(image, observed)
+        self._spaces: list[dict[str, Any]] = []
+        """The names of generated code, of each build that is bound."""
+        self._program = translate(image, Build.LOGGED if observed else Build.PLAIN)
+        self._log = Log(memory, self._program.table) if observed else None
         self._bodies = self._bind(self._program)
+        self._standing: list[Callable[[int], Any]] | None = None
+        """The bodies of the build that stands still, made for the first who steps."""
         self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in image.tasks]
 
     def _bind(self, program: Program) -> list[Callable[[int], Any]]:
         """The bodies of a program over this memory."""
-        names = environment(self.memory, self.image.objects) | program.constants
+        log = self._log if program.build is Build.LOGGED else None
+        names = environment(self.memory, self.image.objects) | program.constants | (log.names if log else {})
         for part in program.parts:
             exec(part, names)
-        self._names = names
+        self._spaces.append(names)
         self.allowance = self._allowance
         for number, function in self.substitutes.items():
             body = self.image.bodies[number]
-            names[function_name(number, body)] = _reporting(function, body) if self.observed else function
+            names[function_name(number, body)] = log.reporting(function, body) if log else \
+                reporting(function, body) if program.build is Build.STEPPED else function  # fmt: skip
         sys.setrecursionlimit(max(sys.getrecursionlimit(), program.frames + FRAMES_TO_SPARE))
         return [names[function_name(number, body)] for number, body in enumerate(self.image.bodies)]
 
@@ -146,7 +170,8 @@ class PythonEngine:
         `function` is called with the byte of the memory at which the instance begins.  An observed run sees one write of the
         whole instance."""
         self.substitutes[body] = function
-        self._bodies = self._bind(self._program)
+        self._spaces.clear()
+        self._bodies, self._standing = self._bind(self._program), None
         self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in self.image.tasks]
 
     @property
@@ -162,29 +187,32 @@ class PythonEngine:
     @allowance.setter
     def allowance(self, allowance: Allowance) -> None:
         self._allowance = allowance
-        self._names["least"], self._names["ask"] = allowance.least, partial(_ask, self._names, allowance)
+        for names in self._spaces:
+            names["least"], names["ask"] = allowance.least, partial(_ask, names, allowance)
 
     def run(self, task_index: int) -> Trap | None:
-        """Executes the programs of a task in their order, in an observed build without stopping.
-
-        Returns the trap that ended them, if any."""
+        """Executes the programs of a task in their order, and tells nobody.  Returns the trap that ended them, if any."""
         return self._run(self._tasks[task_index])
 
     def call(self, body: int, base: int = 0) -> Trap | None:
         """Executes one body for the instance that begins at byte `base`.  Returns the trap that ended it, if any."""
-        bodies = self._bodies
-        if self._program.bases.get(body, base) != base:
-            bodies = self._bind(translate(self.image, self.observed, anywhere=True))
-        return self._run([(bodies[body], base)])
+        program = self._program
+        if program.bases.get(body, base) == base:
+            return self._run([(self._bodies[body], base)])
+        try:
+            return self._run([(self._bind(translate(self.image, program.build, anywhere=True))[body], base)])
+        finally:
+            self._spaces.pop()
 
     def _run(self, calls: list[tuple[Callable[[int], Any], int]]) -> Trap | None:
         try:
             for body, base in calls:
-                steps = body(base)
-                if steps is not None:
-                    deque(steps, 0)
+                body(base)
         except Stop as stop:
             return trap(self.image, stop.code, stop.site, stop.values, self._instance_of(stop))
+        finally:
+            if self._log:
+                self._log.entries.clear()
         return None
 
     def _instance_of(self, stop: Stop) -> int:
@@ -200,16 +228,61 @@ class PythonEngine:
     def observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
         """Executes a task step by step: a generator of observations, which returns what `run` returns.
 
-        Raises ValueError for a plain build, which has no observations."""
-        if not self.observed:
+        The run stands still at each observation, where the memory may be changed.  Raises ValueError for a plain build, which
+        has no observations."""
+        if self._log is None:
             raise ValueError("a plain build has no observations")
-        return self._steps(self.image.tasks[task_index].programs)
+        if self._standing is None:
+            self._standing = self._bind(translate(self.image, Build.STEPPED))
+        return self._steps(self.image.tasks[task_index].programs, self._standing)
 
-    def _steps(self, programs: tuple[ProgramRun, ...]) -> Generator[Observation, None, Trap | None]:
+    def observations(self, task_index: int) -> Generator[Observation, None, Trap | None]:
+        """Executes a task, and tells its observations afterwards: the generator yields and returns what that of `observe` does.
+
+        At each of them the memory is as it was at that moment, but for the system page; whoever changes it changes nothing in
+        the run.  Faster than `observe`.  An exception of a substitute comes after the observations before.  Raises ValueError
+        for a plain build."""
+        if self._log is None:
+            raise ValueError("a plain build has no observations")
+        return self._told(self._log, task_index)
+
+    def _told(self, log: Log, task_index: int) -> Generator[Observation, None, Trap | None]:
+        found: Trap | None = None
+        failure: Exception | None = None
+        programs, memory = self.image.tasks[task_index].programs, self.memory.u8
+        before = bytes(memory)
+        log.most = ENDLESS if self.substitutes else MOST_ENTRIES
+        try:
+            for run in programs:
+                log.begin(run.body, run.offset)
+                self._bodies[run.body](run.offset)
+                log.end()
+        except Full:
+            memory[:] = before
+            return (yield from self.observe(task_index))
+        except Stop as stop:
+            found = trap(self.image, stop.code, stop.site, stop.values, self._instance_of(stop))
+        except Exception as error:
+            failure = error
+        finally:
+            log.most = 0
+        after = bytes(memory)
+        memory[:] = before
+        try:
+            yield from log.observations()
+        finally:
+            log.entries.clear()
+        memory[:] = after
+        if failure:
+            raise failure
+        return found
+
+    def _steps(self, programs: tuple[ProgramRun, ...],
+               bodies: list[Callable[[int], Any]]) -> Generator[Observation, None, Trap | None]:  # fmt: skip
         try:
             for run in programs:
                 yield Observation("call", NO_SITE, (run.body, run.offset))
-                yield from self._bodies[run.body](run.offset)
+                yield from bodies[run.body](run.offset)
                 yield Observation("return", NO_SITE, (run.body, run.offset))
         except Stop as stop:
             return trap(self.image, stop.code, stop.site, stop.values, self._instance_of(stop))
@@ -224,13 +297,3 @@ def _ask(names: dict[str, Any], allowance: Allowance, left: int, site: int) -> N
         if left >= least:
             return
     raise Stop("R0104", site)
-
-
-def _reporting(function: Callable[[int], None], body: Body) -> Callable[[int], Generator[Observation, None, None]]:
-    """A substitute as an observed body."""
-
-    def steps(base: int) -> Generator[Observation, None, None]:
-        function(base)
-        yield Observation("write", NO_SITE, (("", body.instance_size), base, WHOLE_BYTES))
-
-    return steps

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from fbvm.base import arithmetic, strings
 from fbvm.base.arithmetic import Undefined
@@ -23,25 +23,11 @@ from fbvm.code.operations import (
     OFFSET_MASK,
     OFFSET_SHIFT,
 )
+from fbvm.engine.observation import Observation
 from fbvm.engine.trap import Stop
 from fbvm.syntax.st import texts
 
 T = TypeVar("T")
-NO_SITE = -1
-"""In place of a site: no statement is the cause."""
-
-
-class Observation(NamedTuple):
-    """What an observed run reports.
-
-    `kind` and `site` are those of the operation `observe`; `detail` is evaluated: (type, byte of the memory, bit) for read and
-    write, (element, BOOL) for contact.  Two more kinds report that a body begins ("call") and has ended ("return"): `site` is
-    the statement that calls, NO_SITE for a program, and `detail` (number of the body, byte at which its instance begins).
-    After a trap no "return" is reported."""
-
-    kind: str
-    site: int
-    detail: Any
 
 
 def stop(code: str, site: int, *values: Any) -> Any:

@@ -1,7 +1,8 @@
 """Statements of code as lines of Python: one row of EMITTERS an operation, and the function that a body becomes.
 
-`p3_Main(b1)` is the body of number 3 for the instance at byte b1.  In the observed build bodies are generators.  Loops
-and blocks nested deeper than Python allows become functions inside the body; what leaves them is a return code."""
+`p3_Main(b1)` is the body of number 3 for the instance at byte b1.  Loops and blocks nested deeper than Python allows become
+functions inside the body; what leaves them is a return code.  Builds that tell observations are subclasses of the writer of
+the plain build (`stepped`, `logged`)."""
 
 from __future__ import annotations
 
@@ -10,12 +11,11 @@ from collections.abc import Callable
 from typing import Any
 
 from fbvm.base.areas import BUDGET, DUE
-from fbvm.base.memory import WHOLE_BYTES
 from fbvm.code.image import Body, Image
 from fbvm.code.operations import SIZES, TEXT_UNITS, Address, Block, Node
 from fbvm.engine.case_tables import case_table
+from fbvm.engine.observation import NO_SITE
 from fbvm.engine.python.expressions import ROWS, flag_operands, view
-from fbvm.engine.python.runtime import NO_SITE
 from fbvm.engine.python.writer import Expressions, bare, plus
 from fbvm.engine.ranges import may_trap
 
@@ -37,11 +37,13 @@ def function_name(number: int, body: Body) -> str:
 
 
 class BodyWriter(Expressions):
-    """Writes one body.  `tail` is the tail of the innermost loop of the current function, None outside of any."""
+    """Writes one body of the plain build, which drops observations.
 
-    def __init__(self, image: Image, constants: dict[str, Any], observed: bool, base: int | None) -> None:
+    `tail` is the tail of the innermost loop of the current function, None outside of any."""
+
+    def __init__(self, image: Image, constants: dict[str, Any], base: int | None) -> None:
         super().__init__(ROWS, constants, base)
-        self.image, self.observed = image, observed
+        self.image = image
         self.out: list[str] = []
         self.indent = 1
         self.loops = 0
@@ -57,23 +59,48 @@ class BodyWriter(Expressions):
         """The lines of the Python function of the body of that number."""
         body = self.image.bodies[number]
         self.block(body.code)
+        self.flush()
         lines = [f"def {function_name(number, body)}(b1):"]
         lines += [f"    b{size} = b1 >> {size.bit_length() - 1}" for size in (2, 4, 8) if size in self.bases]
         if self.shared:
             lines.append("    " + "".join(f"t{number} = " for number in sorted(self.shared)) + "None")
         for routine in self.routines:
             lines += ["    " + line for line in routine]
-        return lines + self._ended(self.out)
+        return lines + self.ended(self.out)
 
-    def _ended(self, lines: list[str]) -> list[str]:
-        """The lines of a function: one at least, and in the observed build those of a generator."""
-        if self.observed:
-            return [*lines, "    yield from ()"]
+    # --- what other builds do otherwise
+
+    def ended(self, lines: list[str]) -> list[str]:
+        """The lines of a function, one at least."""
         return [*lines, "    pass"] if _empty(lines) else lines
+
+    def calling(self, call: str) -> str:
+        """Python that calls a function which is made of a block."""
+        return call
+
+    def call_body(self, pou: int, address: Address | None, place: str) -> None:
+        """Writes the call of the body of number `pou`, whose instance begins at `address`; `place` is Python for that byte."""
+        self.line(f"{self.function(pou)}({place})")
+
+    def observe(self, kind: str, site: int, detail: Any) -> None:
+        """Writes an observation."""
+
+    def begin_pass(self) -> None:
+        """Writes what is done at the beginning of each pass of a loop."""
+
+    def flush(self) -> None:
+        """Writes what must stand in front of the next line, or at the end of a block."""
+
+    def function(self, pou: int) -> str:
+        """The name of the function of a body."""
+        return function_name(pou, self.image.bodies[pou])
 
     # --- lines and blocks
 
     def line(self, text: str) -> None:
+        self.out.append("    " * self.indent + text)
+
+    def comment(self, text: str) -> None:
         self.out.append("    " * self.indent + text)
 
     def block(self, block: Block) -> None:
@@ -88,22 +115,25 @@ class BodyWriter(Expressions):
             self.outline(write)
         else:
             write()
+        self.flush()
         if _empty(self.out[before:]):
             self.line("pass")
         self.indent -= 1
 
     def outline(self, write: Callable[[], None]) -> None:
         """What `write` writes as a function inside the body, and its call."""
+        self.flush()
         outer = (self.out, self.indent, self.loops, self.tail, self.outlined, self.leaves, self.assigned)
         self.out, self.indent, self.loops, self.tail = [], 1, 0, None
         self.outlined, self.leaves, self.assigned = True, set(), set()
         write()
+        self.flush()
         name, lines, leaves, assigned = self.name("o"), self.out, self.leaves, self.assigned
         self.out, self.indent, self.loops, self.tail, self.outlined, self.leaves, self.assigned = outer
         self.shared |= assigned
         shared = [f"    nonlocal {', '.join(f't{number}' for number in sorted(assigned))}"] if assigned else []
-        self.routines.append([f"def {name}():", *shared, *self._ended(lines)])
-        call = f"yield from {name}()" if self.observed else f"{name}()"
+        self.routines.append([f"def {name}():", *shared, *self.ended(lines)])
+        call = self.calling(f"{name}()")
         if not leaves:
             self.line(call)
             return
@@ -267,6 +297,7 @@ def _loop(w: BodyWriter, head: Block, body: Block, tail: Block) -> None:
 
     def inside() -> None:
         w.tail = tail
+        w.begin_pass()
         w.block(head + body)
         w.tail = ()
         w.block(tail)
@@ -301,18 +332,7 @@ def _return(w: BodyWriter) -> None:
 
 
 def _call(w: BodyWriter, pou: int, address: Address | None) -> None:
-    body = w.image.bodies[pou]
-    place = bare(w.place(address, max(1, body.instance_size))) if address else "0"
-    if not w.observed:
-        w.line(f"{function_name(pou, body)}({place})")
-        return
-    if not place.isdigit():
-        name = w.name("v")
-        w.line(f"{name} = {place}")
-        place = name
-    w.line(f"yield Observation('call', {w.site}, ({pou}, {place}))")
-    w.line(f"yield from {function_name(pou, body)}({place})")
-    w.line(f"yield Observation('return', {w.site}, ({pou}, {place}))")
+    w.call_body(pou, address, bare(w.place(address, max(1, w.image.bodies[pou].instance_size))) if address else "0")
 
 
 def _charge(w: BodyWriter, count: int, site: int) -> None:
@@ -337,24 +357,9 @@ def _observe(w: BodyWriter, kind: str, site: int, detail: Any) -> None:
         w.site = site
     if kind == "statement" and w.image.sites[site].line != w._line:
         w._line = w.image.sites[site].line
-        w.line(f"# {w.image.sites[site]}".replace("\n", " ").replace("\r", " "))
-    if w.observed:
-        shown = _DETAILS[kind](w, detail) if kind in _DETAILS else repr(detail)
-        w.line(f"yield Observation({kind!r}, {site}, {shown})")
+        w.comment(f"# {w.image.sites[site]}".replace("\n", " ").replace("\r", " "))
+    w.observe(kind, site, detail)
 
-
-def _contact(w: BodyWriter, detail: tuple[Any, Node]) -> str:
-    return f"({detail[0]!r}, {bare(w.value(detail[1]))})"
-
-
-def _access(w: BodyWriter, detail: tuple[Any, Address, int]) -> str:
-    kind, address, bit = detail
-    if kind == "b" and isinstance(address[0], tuple) and bit == WHOLE_BYTES:
-        return f"('b', {bare(w.place(address, 1))}, {bare(w.value(address[0][1]))} & {WHOLE_BYTES})"
-    return f"({kind!r}, {bare(w.place(address, 1))}, {bit})"
-
-
-_DETAILS: dict[str, Callable[[BodyWriter, Any], str]] = {"contact": _contact, "read": _access, "write": _access}
 
 EMITTERS: dict[str, Callable[..., None]] = {
     "store": _store, "store_raw": _store_raw, "store_bit": _store_bit, "store_flag": _store_flag,

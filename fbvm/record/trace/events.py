@@ -6,18 +6,18 @@ keeps none.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import dataclass
 from mmap import mmap
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Image
 from fbvm.code.operations import detail_size
 from fbvm.engine.allowance import Allowance
 from fbvm.engine.choice.tiers import substitutes_of
+from fbvm.engine.observation import NO_SITE, Observation
 from fbvm.engine.python.engine import PythonEngine
-from fbvm.engine.python.runtime import NO_SITE, Observation
 from fbvm.engine.trap import Trap
 from fbvm.wire.tap import TapEvent
 
@@ -101,22 +101,25 @@ Event: TypeAlias = Call | Return | Statement | Read | Write | Contact | NetworkE
 class ObservedEngine:
     """An engine that calls `report` for every event of a task.
 
-    `program` is the engine that it replaces, whose substitutes of bodies it takes over."""
+    `program` is the engine that it replaces, whose substitutes of bodies it takes over.  With `stands_still` the run waits at
+    each event, so that `report` may change the memory; without, it is over before its first event is reported, which takes
+    a fraction of the time, and the memory is brought back to each moment (but for the system page)."""
 
     machine = None
     """There is no machine code."""
 
-    def __init__(self, image: Image, memory: Memory, report: Callable[[Event], None], program: object = None) -> None:
+    def __init__(self, image: Image, memory: Memory, report: Callable[[Event], None], program: object = None,
+                 stands_still: bool = False) -> None:  # fmt: skip
         self.memory = memory
         self.report = report
         self.program = program
+        self.stands_still = stands_still
         self._engine = PythonEngine(image, memory, observed=True)
         known = program._engine if isinstance(program, ObservedEngine) else program
         for body, function in substitutes_of(known).items():
             self._engine.substitute(body, function)
-        self._shadow = bytearray(memory.size)
-        self._frame, self._generated_depth = OUTSIDE, 0
-        """The current frame, and the depth of calls inside a call that no statement of the source has made."""
+        self._shadow = mmap(-1, memory.size)  # whose slices are bytes
+        self._trap: Trap | None = None
 
     @property
     def allowance(self) -> Allowance:
@@ -129,69 +132,67 @@ class ObservedEngine:
 
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of one task once and reports their events; returns the trap that ended them, if any."""
-        observations, report, to_event = self._observe(task_index), self.report, self._event
-        while True:
-            try:
-                event = to_event(next(observations))
-            except StopIteration as end:
-                trap: Trap | None = end.value
-                return trap
-            if event is not None:
-                report(event)
-
-    def steps(self, task_index: int) -> Generator[Event, None, Trap | None]:
-        """Executes a task once; yields each event, and execution waits until the next one is asked for."""
-        observations = self._observe(task_index)
-        while True:
-            try:
-                seen = next(observations)
-            except StopIteration as end:
-                trap: Trap | None = end.value
-                return trap
-            event = self._event(seen)
-            if event is not None:
-                yield event
-
-    def _observe(self, task_index: int) -> Generator[Observation, None, Trap | None]:
         self._shadow[:] = self.memory.u8
-        self._frame, self._generated_depth = OUTSIDE, 0
-        return self._engine.observe(task_index)
+        self._report_all(self._observations(task_index))
+        return self._trap
 
-    def _event(self, seen: Observation) -> Event | None:
-        """The event of an observation of the Python engine; keeps the current frame.
+    def _observations(self, task_index: int) -> Generator[Observation, None, None]:
+        """The observations of a task; keeps the trap that ended it."""
+        engine = self._engine
+        self._trap = yield from (engine.observe if self.stands_still else engine.observations)(task_index)
 
-        None for a statement inside a call that the compiler has added, such as one at the beginning of rungs."""
-        kind, site, detail = seen
-        frame = self._frame
-        if kind == "statement" or kind == "rung":
-            return None if self._generated_depth else Statement(site, frame, kind == "rung")
-        if kind == "read" or kind == "write":
-            form, offset, bit = detail
-            size = detail_size(form)
-            value = value_at(self.memory.map, offset, size, bit)
+    def _report_all(self, observations: Iterable[Observation]) -> None:
+        """Reports the events of observations, but not statements inside a call that the compiler has added, such as one at the
+        beginning of rungs."""
+        report, shadow, buffer, frame = self.report, self._shadow, self.memory.map, OUTSIDE
+        made = tuple.__new__  # a third of the time of calling the class
+        generated_depth = 0
+        for kind, site, detail in observations:
             if kind == "read":
-                return Read(site, frame, offset, bit, value)
-            old = value_at(self._shadow, offset, size, bit)
-            if old != value:
-                self._shadow[offset : offset + size] = self.memory.map[offset : offset + size]
-            return Write(site, frame, offset, bit, old, value)
-        if kind == "call":
-            body, base = detail
-            self._frame = Frame(body, base, site, frame)
-            self._generated_depth += bool(self._generated_depth) or frame is not OUTSIDE and site == NO_SITE
-            return Call(self._frame)
-        if kind == "return":
-            assert frame.caller is not None
-            self._frame = frame.caller
-            self._generated_depth -= bool(self._generated_depth)
-            return Return(frame)
-        return Contact(site, frame, *detail)
+                form, offset, bit = detail
+                value = buffer[offset : offset + _SIZES[form]] if bit == WHOLE_BYTES else value_at(buffer, offset, 1, bit)
+                report(made(Read, (site, frame, offset, bit, value)))
+            elif kind == "write":
+                form, offset, bit = detail
+                end = offset + _SIZES[form]
+                old, value = shadow[offset:end], buffer[offset:end]
+                if bit != WHOLE_BYTES:
+                    old, value = value_at(shadow, offset, 1, bit), value_at(buffer, offset, 1, bit)
+                if old != value:
+                    shadow[offset:end] = buffer[offset:end]
+                report(made(Write, (site, frame, offset, bit, old, value)))
+            elif kind == "statement" or kind == "rung":
+                if not generated_depth:
+                    report(made(Statement, (site, frame, kind == "rung")))
+            elif kind == "call":
+                generated_depth += bool(generated_depth) or frame is not OUTSIDE and site == NO_SITE
+                body, base = detail
+                frame = Frame(body, base, site, frame)
+                report(Call(frame))
+            elif kind == "return":
+                ended, caller = frame, frame.caller
+                assert caller is not None
+                frame = caller
+                generated_depth -= bool(generated_depth)
+                report(Return(ended))
+            else:
+                report(Contact(site, frame, *detail))
 
 
-def value_at(buffer: bytes | bytearray | mmap, offset: int, size: int, bit: int = WHOLE_BYTES) -> bytes:
+class _Sizes(dict[Any, int]):
+    """By the type in a detail the number of bytes."""
+
+    def __missing__(self, form: Any) -> int:
+        self[form] = size = detail_size(form)
+        return size
+
+
+_SIZES = _Sizes()
+
+
+def value_at(buffer: bytes | mmap, offset: int, size: int, bit: int = WHOLE_BYTES) -> bytes:
     """The bytes of a value; of a bit, one byte 0 or 1."""
     if bit != WHOLE_BYTES:
         return bytes((buffer[offset] >> bit & 1,))
-    value = buffer[offset : offset + size]
-    return bytes(value) if isinstance(value, bytearray) else value
+    return buffer[offset : offset + size]
 

@@ -22,13 +22,17 @@ class Listener(Protocol):
 
 
 @contextmanager
-def observing(plc: Plc, listener: Listener) -> Iterator[None]:
-    """Reports the events of all scans of `plc` to `listener` inside the `with` block."""
+def observing(plc: Plc, listener: Listener, stands_still: bool = False) -> Iterator[None]:
+    """Reports the events of all scans of `plc` to `listener` inside the `with` block.
+
+    At each event the memory of `plc` is as it was at that moment.  A listener that changes the memory says `stands_still`:
+    the scan then waits for it at each event."""
     program = plc.engine
     report = partial(listener.event, plc)
     if isinstance(program, ObservedEngine):
         report = partial(_both, program.report, report)
-    plc.engine = ObservedEngine(plc.image, plc.memory, report, program)
+        stands_still = stands_still or program.stands_still
+    plc.engine = ObservedEngine(plc.image, plc.memory, report, program, stands_still)
     plc.phases.append(listener.phase)
     try:
         yield

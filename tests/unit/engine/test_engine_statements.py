@@ -12,8 +12,8 @@ from statement_rows import OBSERVED, PROGRAMS, add, reference
 from fbvm.base.areas import BUDGET, DUE, NEVER, SLOTS_OFFSET
 from fbvm.base.memory import STRUCTS
 from fbvm.code.operations import STATEMENTS, Block, Node
+from fbvm.engine.observation import Observation
 from fbvm.engine.python.engine import PythonEngine
-from fbvm.engine.python.runtime import Observation
 
 INSTANCE = SLOTS_OFFSET + 4096
 """Where the instance of the first body lies."""
