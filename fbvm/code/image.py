@@ -185,6 +185,8 @@ class Image:
     """The rungs of ladder as they are drawn."""
     charts: tuple[SfcPicture, ...] = ()
     """The sequential function charts as they are drawn."""
+    counters: int = 0
+    """Counters beside the memory that its code counts in; see `fbvm.engine.counted`."""
 
     @cached_property
     def fingerprint(self) -> str:

@@ -153,6 +153,7 @@ charge     | count site             |        | R0104       | takes count from th
 due        | a                      |        |             | notes time a (ns) if it is earlier than what is noted
 stop       | code site              |        | code        | traps
 observe    | kind site detail       |        |             | statement, rung, contact, read or write; a plain build drops it
+count      | number                 |        |             | adds 1 to a counter beside the memory; the compiler makes none
 """
 
 

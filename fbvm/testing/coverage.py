@@ -12,9 +12,8 @@ from typing import Any
 
 from fbvm.base.data import data_folder
 from fbvm.code.image import Site
-from fbvm.machine.plc import Phase, Plc
+from fbvm.machine.counting import Counting
 from fbvm.record.trace.branches import Branch, branches, statements
-from fbvm.record.trace.events import Event, Frame, Return, Statement
 from fbvm.testing.subject import LIBRARY, Subject
 
 Position = tuple[int, int]
@@ -73,9 +72,11 @@ class Coverage:
     def __init__(self) -> None:
         self.files: dict[str, FileCoverage] = {}
 
-    def listener(self, subject: Subject) -> Counter:
-        """A listener that counts one run of a program."""
-        return Counter(self, subject)
+    def add_run(self, subject: Subject, counts: Counting | None = None) -> None:
+        """Adds what a run of a program has executed; without counts all of its statements and branches, with 0."""
+        rows = _Rows(self, subject)
+        if counts:
+            rows.add(counts)
 
     def add(self, other: Coverage) -> None:
         """Adds the counts of another process."""
@@ -99,15 +100,14 @@ class Coverage:
         return made
 
 
-class Counter:
-    """A listener that counts the executions of one PLC."""
+class _Rows:
+    """Where the counts of the counters of a program go; all of them are 0 as long as nothing has run."""
 
     def __init__(self, coverage: Coverage, subject: Subject) -> None:
         image = subject.image
         self._statements: dict[int, tuple[FileCoverage, Position]] = {}
         self._branches: dict[int, tuple[FileCoverage, Position, Branch]] = {}
         self._sites = image.sites
-        self._open: dict[Frame, int] = {}
         paths = {name: _path(name, subject) for name in {site.file for site in image.sites}}
         for number in statements(image):
             site = image.sites[number]
@@ -123,29 +123,16 @@ class Counter:
                 for way in (*(_spot(self._sites[way]) for way in branch.targets), *([SKIPPED] if branch.may_skip else [])):
                     ways.setdefault(way, 0)
 
-    def phase(self, plc: Plc, phase: Phase) -> None:
-        self._open.clear()
-
-    def event(self, plc: Plc, event: Event) -> None:
-        if isinstance(event, Statement):
-            self._decide(event.frame, event.site)
-            if event.site in self._statements:
-                each, spot = self._statements[event.site]
-                each.statements[spot] += 1
-            if event.site in self._branches:
-                self._open[event.frame] = event.site
-        elif isinstance(event, Return):
-            self._decide(event.frame, -1)
-
-    def _decide(self, frame: Frame, site: int) -> None:
-        """Counts the branch of the last IF or CASE of a body: to the statement `site`, or to none."""
-        chose = self._open.pop(frame, None)
-        if chose is None:
-            return
-        each, spot, branch = self._branches[chose]
-        way = _spot(self._sites[site]) if site in branch.targets else SKIPPED
-        if way in each.branches[spot]:
-            each.branches[spot][way] += 1
+    def add(self, counts: Counting) -> None:
+        """Adds the counts of a run."""
+        executed, skipped = counts.executed(), counts.skipped()
+        for site, (each, spot) in self._statements.items():
+            each.statements[spot] += executed[site]
+        for site, (each, spot, branch) in self._branches.items():
+            for target in branch.targets:
+                each.branches[spot][_spot(self._sites[target])] += executed[target]
+            if branch.may_skip:  # what a jump is made of stands at the statement behind it, and is no branch of that
+                each.branches[spot][SKIPPED] += (executed if site in branch.targets else skipped).get(site, 0)
 
 
 def _spot(site: Site) -> Position:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
+    from fbvm.machine.counting import Counting
     from fbvm.machine.plc import Plc
     from fbvm.testing.coverage_plugin import CoveragePlugin
     from fbvm.testing.subject import Subject
@@ -37,14 +38,23 @@ def library_folders(config: pytest.Config, path: Path) -> list[Path]:
 @contextmanager
 def count_coverage(config: pytest.Config, plc: Plc, subject: Subject) -> Iterator[None]:
     """Counts the statements that `plc` executes inside the `with` block, if the session measures coverage."""
-    counting: CoveragePlugin | None = config.pluginmanager.get_plugin("fbvm_coverage")
-    if counting is None:
+    if not config.pluginmanager.has_plugin("fbvm_coverage"):
         yield
         return
-    from fbvm.record.trace.observing import observing
+    from fbvm.machine.counting import counting
 
-    with observing(plc, counting.coverage.listener(subject)):
-        yield
+    with counting(plc) as counts:
+        try:
+            yield
+        finally:
+            add_coverage(config, subject, counts)
+
+
+def add_coverage(config: pytest.Config, subject: Subject, counts: Counting) -> None:
+    """Adds what a run of a program has executed to the coverage of the session, if it measures some."""
+    plugin: CoveragePlugin | None = config.pluginmanager.get_plugin("fbvm_coverage")
+    if plugin:
+        plugin.coverage.add_run(subject, counts)
 
 
 def failure_page(item: pytest.Item, suffix: str, write: Callable[[Path], bool]) -> str:

@@ -16,9 +16,12 @@ import pytest
 from fbvm.base.diagnostics import Source, errors
 from fbvm.base.types import BOOL, fold
 from fbvm.code.image import Site
+from fbvm.engine.observation import NO_SITE
+from fbvm.machine.counting import Counting, counting
 from fbvm.machine.plc import Phase, Plc
 from fbvm.record.draw.table import ScanTable
 from fbvm.record.recording.recording import Recording
+from fbvm.record.trace.branches import statements
 from fbvm.record.trace.events import Call, Event, Frame, Read, Statement, Write
 from fbvm.record.trace.observing import observing
 from fbvm.record.trace.recorder import Signal
@@ -27,7 +30,7 @@ from fbvm.syntax.parser import parse
 from fbvm.syntax.text import read
 from fbvm.testing.pages import write_page
 from fbvm.testing.rig import Trapped
-from fbvm.testing.session import count_coverage, failure_page, library_folders
+from fbvm.testing.session import add_coverage, failure_page, library_folders
 from fbvm.testing.subject import LIBRARY, Subject, SubjectError, subject
 from fbvm.testing.warning_plugin import warning_plugin
 from fbvm.watch.names import Names, is_single
@@ -37,6 +40,7 @@ from fbvm.watch.values import Value, show_time
 CYCLE_NS = 10_000_000
 LIMIT_NS = 60_000_000_000
 BANDS, LOOKED_BACK = 4, 100
+ASSERT = fold("ASSERT")
 
 
 class AssertFailed(AssertionError):
@@ -89,8 +93,11 @@ class StItem(pytest.Item):
         watch = Assertions(plc, made.prefix)
         recorded = Recording().add(self.name, plc)
         try:
-            with count_coverage(self.config, plc, made), observing(plc, watch):
-                _run(plc, f"{made.prefix}Done")
+            with counting(plc) as counts:
+                try:
+                    _run(plc, watch, counts, f"{made.prefix}Done")
+                finally:
+                    add_coverage(self.config, made, counts)
         except AssertFailed as failed:
             table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])
             recorded.follow(table, range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1))
@@ -98,7 +105,7 @@ class StItem(pytest.Item):
             asked, said = [signal.place for signal, _ in failed.values], self._assertion(failed)
             failed.page = failure_page(self, "", lambda path: write_page(path, self.nodeid, recorded, made, asked, said))
             raise
-        if not watch.asserted:
+        if not counts.executed().get(watch.called):
             raise AssertionError(f"{self.name} ended without one ASSERT")
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
@@ -120,14 +127,25 @@ class StItem(pytest.Item):
         return self.path, self.line - 1, self.name
 
 
-def _run(plc: Plc, done: str) -> None:
-    """Executes one scan, or, for a program with Done, scans until Done is TRUE."""
+def _run(plc: Plc, watch: Assertions, counts: Counting, done: str) -> None:
+    """Executes one scan, or, for a program with Done, scans until Done is TRUE.
+
+    A scan in which an ASSERT has failed is done again, for `watch` to see."""
     program = plc.find(done.rpartition(".")[0])
     assert isinstance(program, Place)
     field = program.type.member("Done")  # type: ignore[attr-defined]
     waits = field is not None and field.type is BOOL
+    failures, before = counts.counters_at(watch.failing), counts.read()
     while True:
+        state = plc.snapshot()
         trap = plc.scan()
+        after = counts.read()
+        if any(after[number] for number in failures):
+            plc.restore(state)
+            counts.back_to(before)
+            with observing(plc, watch, stands_still=True):  # what stands behind the ASSERT is not executed
+                plc.scan()
+        before = after
         if trap:
             raise Trapped(trap)
         if not waits or plc.read(done):
@@ -140,10 +158,12 @@ class Assertions:
     """A listener that raises AssertFailed at the first ASSERT whose condition is FALSE."""
 
     def __init__(self, plc: Plc, prefix: str) -> None:
-        self.asserted = 0
         self._prefix = prefix
+        inside = [number for number in statements(plc.image) if fold(plc.image.sites[number].pou) == ASSERT]
+        self.called, self.failing = inside or (NO_SITE, NO_SITE)
+        """The sites of its IF, and of its RETURN, which is executed if the condition is FALSE."""
         self.names = Names.of(plc.image, plc.memory.areas)
-        self._bodies = {number for number, body in enumerate(plc.image.bodies) if fold(body.name) == "ASSERT"}
+        self._bodies = {number for number, body in enumerate(plc.image.bodies) if fold(body.name) == ASSERT}
         self._reads: dict[Frame, list[Place]] = {}
         self._seen: dict[Place, None] = {}
         self._last: Write | None = None
@@ -161,7 +181,6 @@ class Assertions:
         elif isinstance(event, Write):
             self._last = event
         elif isinstance(event, Call) and event.frame.body in self._bodies:
-            self.asserted += 1
             assert self._last is not None and event.frame.caller is not None
             if self._last.value == b"\0":
                 self._fail(plc, event.frame)

@@ -20,11 +20,13 @@ sys.path.insert(0, str(HOUSE))
 
 from fbvm.code.compiler import compile_files  # noqa: E402
 from fbvm.code.image import Image  # noqa: E402
+from fbvm.machine.counting import counting  # noqa: E402
 from fbvm.machine.plc import Phase, Plc  # noqa: E402
 from fbvm.record.page.data import page_data  # noqa: E402
 from fbvm.record.page.page import page  # noqa: E402
+from fbvm.record.recording.recording import Recording  # noqa: E402
 from fbvm.record.trace.events import Event  # noqa: E402
-from fbvm.record.trace.history import History, observing  # noqa: E402
+from fbvm.record.trace.observing import observing  # noqa: E402
 from fbvm.record.trace.reader import Trace  # noqa: E402
 from fbvm.record.trace.writer import Depth, TraceWriter  # noqa: E402
 
@@ -62,6 +64,12 @@ def scan_us(plc: Plc, scans: int) -> float:
     return min(seconds(lambda: plc.run(scans=scans)) for _ in range(TIMES)) / scans * 1e6
 
 
+def scan_counted_us(image: Image, engine: str) -> float:
+    plc = Plc(image, engine=engine)
+    with counting(plc):
+        return scan_us(plc, NATIVE_SCANS if engine == "native" else PYTHON_SCANS)
+
+
 def row(what: str, ours: str, limit: str = "") -> None:
     print(f"{what:<58} {ours:>16}   {limit}", flush=True)
 
@@ -74,6 +82,10 @@ def scans_of_each_build(image: Image) -> None:
     row("a scan, python", f"{python:.1f} us")
     row("a scan, observed", f"{observed:.1f} us")
     row("  observed / python", f"{observed / python:.1f}", "<= 4")
+    counted_native, counted_python = (scan_counted_us(image, engine) for engine in ("native", "python"))
+    row("a scan that counts statements and ways, native", f"{counted_native:.2f} us")
+    row("  counted / native", f"{counted_native / native:.2f}", "<= 1.3")
+    row("  counted / python, both in Python", f"{counted_python / python:.2f}")
     plc, told = Plc(image, engine="python"), Listener()
     with observing(plc, told):
         listened = scan_us(plc, OBSERVED_SCANS)
@@ -104,12 +116,10 @@ def recorded(image: Image, scans: int) -> None:
 def shown(image: Image, scans: int) -> None:
     """One scan in the middle of a run, done again with a listener that is told every event."""
     plc = Plc(image)
-    history = History(plc, keep=scans)
-    for _ in range(scans):
-        history.before_scan()
-        plc.scan()
+    recorded = Recording().add("lines100", plc)
+    plc.run(scans=scans)
     middle = scans // 2
-    taken = seconds(lambda: history.replay(range(middle, middle + 1), Listener()))
+    taken = seconds(lambda: recorded.follow(Listener(), range(middle, middle + 1)))
     row("a scan shown at statement depth", f"{taken * 1e3:.1f} ms", "<= 50 ms")
 
 

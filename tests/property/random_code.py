@@ -35,6 +35,7 @@ ROWS = {form: 16 * number for number, form in enumerate((*FORMS, "ref"))}
 TEXT_AT, TEXT_CAPACITY = 1024, 30
 ARRAY_AT, ARRAY_LAST = 1536, 15
 INSTANCE_BYTES = 512
+COUNTERS = 12
 EDGES = (0, 1, -1, 2, 7, 127, 128, -128, 255, 32767, -32768, 65535, 2**31 - 1, -(2**31), 2**32 - 1, 2**63 - 1, -(2**63))
 REALS = (0.0, -0.0, 1.0, -1.5, 0.1, 2.5, 1e10, -1e-10, 1e38, 3.4e38, 1e-45, 255.5, -128.5, 32767.5, math.inf, -math.inf, math.nan)
 LETTERS = (b"", b"a", b"AB", b"12", b"-7", b"1.5", b"TRUE", b"xyzxyz", b"T#1s", b"\xe4$ ", b"INT#5", b"0123456789")
@@ -57,7 +58,20 @@ class Maker:
             self.body = number
             self.temporaries, self.count = [], 0
             made.append((("charge", 1, 1), *self.block(3)))
-        return made
+        return [self.counting(code) for code in made]
+
+    def counting(self, block: Block) -> Block:
+        """The same block with counters behind its statements, and in front of most of its branches."""
+        out: list[Node] = [("count", self.random.randrange(COUNTERS))] * (self.random.random() < 0.7)
+        for node in block:
+            if node[0] == "if":
+                node = ("if", tuple((c, self.counting(inner)) for c, inner in node[1]), self.counting(node[2]))
+            elif node[0] == "case":
+                node = (*node[:3], tuple((labels, self.counting(inner)) for labels, inner in node[3]), self.counting(node[4]))
+            elif node[0] == "loop":
+                node = ("loop", *(self.counting(inner) for inner in node[1:]))
+            out += [node, *[("count", self.random.randrange(COUNTERS))] * (self.random.random() < 0.5)]
+        return tuple(out)
 
     def pick(self, items: Any) -> Any:
         return self.random.choice(tuple(items))
@@ -388,21 +402,21 @@ ENGINES = {
 """What executes an image over a memory, by name; the first one is the reference."""
 
 
-def run(program: Image, memory: Memory, name: str, scans: int = 3) -> list[tuple[str, bytes]]:
-    """Trap and memory after each scan of the first task."""
+def run(program: Image, memory: Memory, name: str, scans: int = 3) -> list[tuple[str, bytes, list[int]]]:
+    """Trap, memory and counters after each scan of the first task."""
     engine = ENGINES[name](program, memory)
     seen = []
     for _ in range(scans):
         trap = engine.run(0)
-        seen.append((repr(trap), bytes(memory.snapshot())))
+        seen.append((repr(trap), bytes(memory.snapshot()), list(engine.counts)))
     return seen
 
 
 def differing(random: Random) -> tuple[str, list[Block]] | None:
     """Make a program and run it everywhere: the name of an engine that differs, and the code; None if they agree."""
-    program = image(*(codes := Maker(random, 3).program()), size=1024)
+    program = image(*(codes := Maker(random, 3).program()), size=1024, counters=COUNTERS)
     content = before(random)
-    wanted: list[tuple[str, bytes]] = []
+    wanted: list[tuple[str, bytes, list[int]]] = []
     for name in ENGINES:
         seen = run(program, power_on(program, content, 3000), name)
         wanted = wanted or seen

@@ -9,7 +9,7 @@ from depth import times
 from hand_image import image
 from lang_corpus import programs
 from observing import first_difference
-from random_code import Maker
+from random_code import COUNTERS, Maker
 from rows import go_through
 from st_programs import made
 from st_text import text_of
@@ -66,4 +66,4 @@ def _watched_inside(random: Random, node: Node) -> Node:
 def test_code_made_at_random(seed: int) -> None:
     random = Random(seed)
     codes = [watched(random, code) for code in Maker(random, 3).program()]
-    assert first_difference(image(*codes, size=1024), budget=3000) == ""
+    assert first_difference(image(*codes, size=1024, counters=COUNTERS), budget=3000) == ""

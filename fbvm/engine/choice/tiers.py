@@ -7,7 +7,7 @@ statement by statement stays in Python.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
 from fbvm.base.areas import BUDGET
@@ -85,6 +85,25 @@ def substitutes_of(engine: object) -> Mapping[int, Callable[[int], None]]:
     return engine.substitutes if isinstance(engine, PythonEngine | TieredEngine) else {}
 
 
+def counts_of(engine: object) -> list[int]:
+    """How often each counter of the engine's image was reached; [] for an engine that somebody looks into."""
+    return list(engine.counts) if isinstance(engine, PythonEngine | TieredEngine | NativeEngine) else []
+
+
+def add_counts(engine: object, counts: Sequence[int]) -> None:
+    """Adds to the counters of an engine what another engine has counted in its place."""
+    while isinstance(engine, TieredEngine):
+        engine = engine.first
+    if isinstance(engine, PythonEngine | NativeEngine):
+        for number, count in enumerate(counts):
+            engine.counted[number] += count
+
+
+def image_of(engine: object, plain: Image) -> Image:
+    """The image that an engine runs, which may be one with counters; `plain` for an engine that has none."""
+    return engine.image if isinstance(engine, PythonEngine | NativeEngine | TieredEngine) else plain
+
+
 def python_of(engine: object) -> PythonEngine:
     """The Python engine inside an engine.  As soon as it has substitutes, the run stays in Python.
 
@@ -100,7 +119,7 @@ class TieredEngine:
     """An engine that begins in Python and goes over to fast machine code; a large program begins as quick machine code."""
 
     def __init__(self, image: Image, memory: Memory) -> None:
-        self._image, self._memory = image, memory
+        self.image, self._memory = image, memory
         self._python: PythonEngine | None = None
         self._code = code_of(image)
         self._budget = memory.views["i64"]
@@ -108,13 +127,14 @@ class TieredEngine:
         self._asked = False
         self._allowance = WHOLE_BUDGET
         self._fast: NativeEngine | None = None
-        self._engine: Engine = NativeEngine(image, memory, level=0) if len(image.sites) >= LARGE_PROGRAM else self.python
+        self.first = NativeEngine(image, memory, level=0) if len(image.sites) >= LARGE_PROGRAM else self.python
+        self._engine: Engine = self.first
 
     @property
     def python(self) -> PythonEngine:
         """The Python engine, made when first needed: a large program may never need it."""
         if self._python is None:
-            self._python = PythonEngine(self._image, self._memory)
+            self._python = PythonEngine(self.image, self._memory)
             self._python.allowance = self._allowance
         return self._python
 
@@ -127,6 +147,12 @@ class TieredEngine:
     def machine(self) -> NativeEngine | None:
         """Fast machine code, once it runs and as long as nothing stands in place of bodies."""
         return None if self._python and self._python.substitutes else self._fast
+
+    @property
+    def counts(self) -> list[int]:
+        """How often each counter of the image was reached, on all tiers together."""
+        tiers = {id(engine): engine for engine in (self._python, self.first, self._fast) if engine}.values()
+        return [sum(counts) for counts in zip(*(engine.counts for engine in tiers), strict=True)]
 
     @property
     def native(self) -> bool:
@@ -164,5 +190,5 @@ class TieredEngine:
     def _change(self) -> None:
         """Goes over to fast machine code if that is ready."""
         if self._code.ready and not self.substitutes:
-            self._engine = self._fast = NativeEngine(self._image, self._memory, level=2)
+            self._engine = self._fast = NativeEngine(self.image, self._memory, level=2)
             self._fast.allowance = self._allowance

@@ -31,6 +31,7 @@ class Code:
         self.image, self.stops = image, stops
         self.points: tuple[Point, ...] = ()
         self.kept_bytes, self.context_bytes = 0, 0
+        self.counting: list[object] = []
         self._tasks = [f"task{number}" for number in range(len(image.tasks))]
         self._linked: dict[int, Linked] = {}
         self._waiting = False
@@ -105,6 +106,7 @@ class Code:
                 self.points = tuple((code, site, tuple((kind, value) for kind, value in shown))
                                     for code, site, shown in facts["points"])
                 self.kept_bytes, self.context_bytes = facts["context"]
+                self.counting = facts["counting"]
             self._linked[level] = linked
 
     def level_of(self, level: int | None) -> int:
@@ -124,7 +126,8 @@ class Code:
 
 
 def _facts(made: Translation) -> dict[str, object]:
-    return {"points": made.points, "context": [made.kept_bytes, made.context_bytes], "parts": parts_of(made.routines)}
+    return {"points": made.points, "context": [made.kept_bytes, made.context_bytes], "counting": made.counting,
+            "parts": parts_of(made.routines)}
 
 
 _codes: WeakValueDictionary[tuple[int, bool], Code] = WeakValueDictionary()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from operator import add
 from weakref import finalize
 
 from fbvm.base.areas import BUDGET, NOW
@@ -15,6 +16,7 @@ from fbvm.code.image import Image
 from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
 from fbvm.engine.native.code import Code, code_of
 from fbvm.engine.native.emit.context import Context
+from fbvm.engine.native.emit.counting import Counts
 from fbvm.engine.native.emit.writer import Unsupported
 from fbvm.engine.native.llvm import compiler as native_compiler
 from fbvm.engine.native.llvm.entry_points import EntryPoint, entry
@@ -48,6 +50,9 @@ class NativeEngine:
         self._context = Context(self._code.kept_bytes, self._code.context_bytes, memory.size,
                                 0 if stops is None else stops.at)
         self._allowance = WHOLE_BUDGET
+        self._counts = Counts(image.counters, self._context.at, self._code.counting) if image.counters else None
+        self.counted = [0] * image.counters
+        """What another engine has counted in place of this one."""
         self._stops = stops  # which stays while machine code looks into it
         self._place = (ctypes.c_char * memory.size).from_buffer(memory.map)  # which stays while this does
         self._memory_at = ctypes.addressof(self._place)
@@ -87,6 +92,11 @@ class NativeEngine:
         self._allowance = allowance
         self._context.allow(allowance)
 
+    @property
+    def counts(self) -> list[int]:
+        """How often each counter of the image was reached."""
+        return list(map(add, self._counts.read(), self.counted)) if self._counts else []
+
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of a task in their order.  Returns the trap that ended them, if any."""
         point = self._calls[task_index]()
@@ -122,6 +132,8 @@ class NativeEngine:
     def trap_at(self, number: int) -> Trap:
         """The trap for a point that machine code has returned, with the values that it left in the context."""
         code, site, shown = self._code.points[number - 1]
+        if self._counts:
+            self._counts.settle()
         if code == STOPPED:
             return PAUSE
         return trap(self.image, code, site, tuple(self._context.values(shown)), self._context.instance(shown))

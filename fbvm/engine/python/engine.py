@@ -137,6 +137,7 @@ class PythonEngine:
         if memory.size < image.layout.size:
             raise ValueError(f"the image needs {image.layout.size} bytes of memory, here are {memory.size}")
         self.image, self.memory, self.observed = image, memory, observed
+        self.counted = [0] * image.counters
         self.substitutes: dict[int, Callable[[int], None]] = {}
         self._numbers = {function_name(number, body): number for number, body in enumerate(image.bodies)}
         self._allowance = WHOLE_BUDGET
@@ -153,6 +154,7 @@ class PythonEngine:
         """The bodies of a program over this memory."""
         log = self._log if program.build is Build.LOGGED else None
         names = environment(self.memory, self.image.objects) | program.constants | (log.names if log else {})
+        names["counts"] = self.counted
         for part in program.parts:
             exec(part, names)
         self._spaces.append(names)
@@ -173,6 +175,11 @@ class PythonEngine:
         self._spaces.clear()
         self._bodies, self._standing = self._bind(self._program), None
         self._tasks = [[(self._bodies[run.body], run.offset) for run in task.programs] for task in self.image.tasks]
+
+    @property
+    def counts(self) -> list[int]:
+        """How often each counter of the image was reached."""
+        return list(self.counted)
 
     @property
     def source(self) -> str:

@@ -345,6 +345,10 @@ def _due(w: BodyWriter, a: Node) -> None:
     w.line(f"if {first} < i64[{DUE // 8}]: i64[{DUE // 8}] = {time}")
 
 
+def _count(w: BodyWriter, number: int) -> None:
+    w.line(f"counts[{number}] += 1")
+
+
 def _stop(w: BodyWriter, code: str, site: int) -> None:
     w.line(f"stop({code!r}, {site})")
 
@@ -366,6 +370,6 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
     "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
     "charge": _charge, "due": _due, "stop": _stop,
-    "observe": _observe,
+    "observe": _observe, "count": _count,
 }
 """How each statement is written: called with the operands of its row."""

@@ -15,7 +15,7 @@ from fbvm.base.memory import WHOLE_BYTES, Memory
 from fbvm.code.image import Image
 from fbvm.code.operations import detail_size
 from fbvm.engine.allowance import Allowance
-from fbvm.engine.choice.tiers import substitutes_of
+from fbvm.engine.choice.tiers import add_counts, image_of, substitutes_of
 from fbvm.engine.observation import NO_SITE, Observation
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.trap import Trap
@@ -114,8 +114,9 @@ class ObservedEngine:
         self.report = report
         self.program = program
         self.stands_still = stands_still
-        self._engine = PythonEngine(image, memory, observed=True)
-        known = program._engine if isinstance(program, ObservedEngine) else program
+        known: object = program._engine if isinstance(program, ObservedEngine) else program
+        self._counter: object = program._counter if isinstance(program, ObservedEngine) else program
+        self._engine: PythonEngine = PythonEngine(image_of(known, image), memory, observed=True)
         for body, function in substitutes_of(known).items():
             self._engine.substitute(body, function)
         self._shadow = mmap(-1, memory.size)  # whose slices are bytes
@@ -133,7 +134,12 @@ class ObservedEngine:
     def run(self, task_index: int) -> Trap | None:
         """Executes the programs of one task once and reports their events; returns the trap that ended them, if any."""
         self._shadow[:] = self.memory.u8
-        self._report_all(self._observations(task_index))
+        try:
+            self._report_all(self._observations(task_index))
+        finally:
+            if self._engine.counted:
+                add_counts(self._counter, self._engine.counted)
+                self._engine.counted[:] = [0] * len(self._engine.counted)
         return self._trap
 
     def _observations(self, task_index: int) -> Generator[Observation, None, None]:

@@ -9,6 +9,7 @@ from fbvm.base.areas import BUDGET, DUE, NEVER, NOW, SLOTS_OFFSET
 from fbvm.base.memory import Memory
 from fbvm.code.image import Body, Image, Layout, ProgramRun, Site, TaskRow
 from fbvm.code.operations import EXPRESSIONS, STATEMENTS, Block, Node
+from fbvm.code.shapes import statements
 from fbvm.engine.python.engine import PythonEngine
 from fbvm.engine.trap import Trap
 
@@ -42,13 +43,14 @@ def store(machine: str, offset: int, value: Node) -> Node:
     return "store", machine, at(offset), value
 
 
-def image(*codes: Block, size: int = 64) -> Image:
+def image(*codes: Block, size: int = 64, counters: int = 2) -> Image:
     """One body for each code, each the body of one program instance in one task; instances lie behind the slots."""
     bodies = tuple(Body(f"Body{n}", "PROGRAM", code, size) for n, code in enumerate(codes))
     runs = tuple(ProgramRun(body.name, n, SLOTS_OFFSET + SLOTS_BYTES + n * size) for n, body in enumerate(bodies))
     tasks = tuple(TaskRow(f"Task{n}", n, 0, "", (run,)) for n, run in enumerate(runs))
     sites = tuple(Site("Main.st", "Main", line, 5) for line in range(40))
-    return Image(Layout(SLOTS_BYTES + size * len(codes)), bodies, tasks, {}, (), (), sites)
+    return Image(Layout(SLOTS_BYTES + size * len(codes)), bodies, tasks, {}, (), (), sites,
+                 counters=counters if any(node[0] == "count" for code in codes for node in statements(code)) else 0)
 
 
 def operations_in(item: Any) -> set[str]:

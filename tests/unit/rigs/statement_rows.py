@@ -109,6 +109,7 @@ PROGRAMS: list[tuple[str, Block, dict[int, bytes], Any]] = [
     ("charge too much", (store("u8", 0, const("u8", 1)), ("charge", 1001, 3), store("u8", 0, const("u8", 2))), {},
      "R0104"),
     ("stop", (("stop", "R0109", 3),), {}, "R0109"),
+    ("count", (("count", 0), store("u8", 0, const("u8", 1)), ("count", 1)), {}, b"\1"),
     ("empty", (), {}, b"\0"),
     ("address before value",
      (("store", "i16", behind(load("ref", 40)), ("div", "i16", const("i16", 1), load("i16", 0), 3)),), {}, "R0110"),

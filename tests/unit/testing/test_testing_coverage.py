@@ -11,9 +11,9 @@ from rows import each_of
 from test_testing_plugin import run
 
 from fbvm.code.compiler import compile_text
+from fbvm.machine.counting import counting
 from fbvm.machine.plc import Plc
 from fbvm.record.trace.branches import branches, statements
-from fbvm.record.trace.observing import observing
 from fbvm.testing.coverage import SKIPPED, Coverage, FileCoverage
 from fbvm.testing.coverage_report import cobertura, percent, table, write_pages
 from fbvm.testing.subject import subject
@@ -60,10 +60,11 @@ def counted(file: Path, *which: int) -> Coverage:
     coverage = Coverage()
     what = subject([file], "")
     plc = Plc(what.image)
-    with observing(plc, coverage.listener(what)):
+    with counting(plc) as counts:
         for value in which:
             plc.write("Test.Block.Which", value)
             plc.scan()
+    coverage.add_run(what, counts)
     return coverage
 
 
@@ -94,11 +95,14 @@ def test_rungs_that_were_jumped_over_are_missing(tmp_path: Path) -> None:
     file.write_text(f"PROGRAM Main\nLADDER\n{rungs}END_LADDER\nEND_PROGRAM\n", encoding="utf-8")
     coverage, what = Coverage(), subject([file], "")
     plc = Plc(what.image)
-    with observing(plc, coverage.listener(what)):
+    with counting(plc) as counts:
         plc.scan()
-        assert only(coverage).missing == [6]
+    coverage.add_run(what, counts)
+    assert only(coverage).missing == [6]
+    with counting(plc) as counts:
         plc.write("W0.00", True)
         plc.scan()
+    coverage.add_run(what, counts)
     assert only(coverage).missing == []
 
 
@@ -122,7 +126,7 @@ def test_libraries_that_come_with_fbvm_are_not_counted(tmp_path: Path) -> None:
 
 def counted_of(path: Path) -> Coverage:
     coverage = Coverage()
-    coverage.listener(subject([path], ""))
+    coverage.add_run(subject([path], ""))
     return coverage
 
 
@@ -133,7 +137,7 @@ def test_libraries_of_the_project_are(tmp_path: Path) -> None:
     path = tmp_path / "user.st"
     path.write_text("FUNCTION_BLOCK User VAR h : Helper; END_VAR h(); END_FUNCTION_BLOCK", encoding="utf-8")
     coverage = Coverage()
-    coverage.listener(subject([path], "", [tmp_path / "lib"]))
+    coverage.add_run(subject([path], "", [tmp_path / "lib"]))
     assert set(coverage.files) == {str(path), str(helper)}
 
 
@@ -230,6 +234,15 @@ def test_a_report_at_the_end(pytester: pytest.Pytester) -> None:
     result.stdout.fnmatch_lines(["Name*", "src/Choose.st*9*1*6*1*87%*16->18, 18", "test_choose.st*2*100%", "TOTAL*"])
     assert (pytester.path / "pages" / "index.html").is_file()
     assert 'filename="src/Choose.st"' in (pytester.path / "cov.xml").read_text()
+
+
+@pytest.mark.slow
+def test_what_stands_behind_a_failed_assert_was_not_executed(pytester: pytest.Pytester) -> None:
+    pytester.makeini("[pytest]\n")
+    pytester.makefile(".st", test_one="PROGRAM Test VAR n : INT; END_VAR\nn := 1;\nASSERT(n = 2);\nn := 3;\nEND_PROGRAM")
+    result = run(pytester, "--fbvm-cov")
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(["test_one.st*3*1*67%*4"])
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from fbvm.engine.native.emit.alias_scopes import METADATA, AliasScopes, resolved
 from fbvm.engine.native.emit.call_graph import call_graph, heights, instance_places
 from fbvm.engine.native.emit.context import Point
 from fbvm.engine.native.emit.conversions import ONE_STEP
+from fbvm.engine.native.emit.counting import Counting
 from fbvm.engine.native.emit.expressions import VALUES
 from fbvm.engine.native.emit.object_bounds import objects
 from fbvm.engine.native.emit.statements import EMITTERS
@@ -73,6 +74,8 @@ class Translation:
     """Bytes of the context in front of its fields."""
     context_bytes: int
     """Bytes of the context from its fields on."""
+    counting: list[object]
+    """Facts about its counters (`Counting.facts`), none for code that counts nothing."""
     routines: tuple[str, ...]
     """Names of the library's routines that it calls."""
 
@@ -101,12 +104,16 @@ def _translated(image: Image, stops: bool) -> Translation:
     graph = call_graph(image)
     module = Module(image, fixed_bases(image), instance_places(image, graph), heights(graph), [], {}, set(),
                     stops)
+    if image.counters:
+        counting = module.counting = Counting(image)
+        counting.offset = module.room(counting.bytes)
     bodies = [_body(module, number) for number in module.heights]
     tasks = [_task(module, number) for number in range(len(image.tasks))]
     routines = [declaration(name) for name in sorted(module.routines)]
     text = "\n".join([*definitions(module.constants), objects(image.objects), *bodies, *tasks, *routines, *_declarations(), ASK,
                       ATTRIBUTES, METADATA, *[GUARD] * stops])
     return Translation(text, tuple(module.regions), tuple(module.points), -(-module.kept_bytes // 16) * 16, module.scratch_end,
+                       module.counting.facts if module.counting else [],
                        tuple(sorted(module.routines)))
 
 

@@ -223,6 +223,11 @@ def _stop(w: Writer, code: str, site: int) -> None:
     w.trap(code, site)
 
 
+def _count(w: Writer, number: int) -> None:
+    assert w.counting, "an image says how many counters it has"
+    w.counting.count(number)
+
+
 def _observe(w: Writer, kind: str, site: int, detail: Any) -> None:
     """What a run can stop at; a plain build has none."""
     observe(w, kind, site)
@@ -233,6 +238,6 @@ EMITTERS: dict[str, Callable[..., None]] = {
     "store_text": _store_text, "copy": _copy, "fill": _fill, "reverse": _reverse, "let": _let,
     "if": _if, "case": _case, "loop": _loop, "exit": _exit, "next": _next, "return": _return, "call": _call,
     "charge": charge, "due": _due, "stop": _stop,
-    "observe": _observe,
+    "observe": _observe, "count": _count,
 }
 """How each statement is written: called with the operands of its row."""

@@ -20,6 +20,7 @@ from fbvm.code.operations import BUFFER_OBJECT, OBJECT_SHIFT, OFFSET_MASK, OFFSE
 from fbvm.engine.native.emit.alias_scopes import SYSTEM, AliasScopes
 from fbvm.engine.native.emit.call_graph import Range
 from fbvm.engine.native.emit.context import FIELDS, INSTANCE, SCRATCH, Point, Shown
+from fbvm.engine.native.emit.counting import BodyCounting, Counting
 from fbvm.engine.ranges import is_float, value_range
 from fbvm.engine.trap import NO_INSTANCE
 
@@ -101,6 +102,8 @@ class Module:
     routines: set[str]
     stops: bool = False
     """Whether its runs can be stopped at observations."""
+    counting: Counting | None = None
+    """The counters, if its code counts."""
     kept_bytes: int = 0
     scratch_end: int = SCRATCH
     regions: list[AliasScopes] = field(default_factory=list)
@@ -134,6 +137,7 @@ class Writer:
         self.regions = AliasScopes(module.instances[number], self.base, module.regions[-1].next if module.regions else 0)
         module.regions.append(self.regions)
         self.lines: list[str] = []
+        self.counting = BodyCounting(module.counting, self) if module.counting else None
         self.cold: list[str] = []
         self.here = "entry"
         """Label of the block that is being written."""
@@ -188,14 +192,21 @@ class Writer:
 
     def write(self, block: Block) -> None:
         """Writes the statements of a block, up to the first that leaves it."""
-        stops = self.module.stops
+        stops, counting = self.module.stops, self.counting
+        around = counting.begin_block() if counting else None
         for position, node in enumerate(block, 1):
             if self.dead:
-                return
+                break
             if node[0] == "observe" and (not stops or _is_seen_later(node, block[position] if position < len(block) else None)):
                 continue
             self.next_scratch = SCRATCH
+            if counting:
+                counting.begin(node)
             self.statements[node[0]](self, *node[1:])
+            if counting:
+                counting.end(node)
+        if counting and around:
+            counting.end_block(around)
 
     @contextmanager
     def aside(self, label: str) -> Iterator[None]:
@@ -301,6 +312,13 @@ class Writer:
 
     def passing_on(self) -> str:
         """The label of the block that returns what a called body returned, which stands in the budget."""
+        if self.counting:
+            label = self.label("x")
+            with self.aside(label):
+                self.counting.note_position()
+                self.give_back()
+            self.dead = False
+            return label
         if not self.passes_on:
             self.passes_on = True
             with self.aside("passing_on"):
@@ -310,6 +328,8 @@ class Writer:
 
     def end(self, code: str, site: int, shown: tuple[Any, ...] = ()) -> None:
         """Writes the end of the run at a new point.  `shown` is that of `trap_if`."""
+        if self.counting:
+            self.counting.note_position()
         kinds: list[Shown] = []
         place = 0
         for kind, *operands in shown:
