@@ -6,25 +6,22 @@ one time in the order in which it was scheduled.  The answer to a request never 
 
 from __future__ import annotations
 
-import heapq
-import random
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 
 from fbvm.net.addresses import fits, impossible
-from fbvm.net.faults import NO_FAULT, Fault, find
+from fbvm.net.faults import Fault
 from fbvm.net.loop_channels import Connection, Listener, MemoryLink, UdpPort
 from fbvm.net.peers import Action, Actions, Conversation, Fin, Leave, Reset, Say, Station, Wake
 from fbvm.net.stream import End
+from fbvm.net.wires import CONNECT_TIMEOUT_NS, Wires
 from fbvm.wire.link import Bind, Connect, Event, Failed, Listen, Peer, Request
 from fbvm.wire.tap import Tap, TapEvent, TapKind
 
-CONNECT_TIMEOUT_NS = 75_000_000_000
-"""The time after which an open to a silent host fails, as in BSD stacks.  The unit's own limit is not known: assumed."""
 FIRST_EPHEMERAL_PORT, LAST_PORT = 49_152, 65_535
 
 
-class LoopNetwork:
+class LoopNetwork(Wires):
     """The network in memory.
 
     `seed` starts its random numbers, `latency_ns` is the latency in each direction, `faults` is a list of rows that may be
@@ -33,13 +30,8 @@ class LoopNetwork:
     virtual_time = True
 
     def __init__(self, seed: int = 0, *, latency_ns: int = 0, faults: Iterable[Fault] = ()) -> None:
-        self.faults = list(faults)
+        super().__init__(seed, latency_ns, faults)
         self.tap: Tap | None = None
-        self.now_ns = 0
-        self._latency_ns = latency_ns
-        self._dice = random.Random(seed)
-        self._due: list[tuple[int, int, Callable[[int], None]]] = []
-        self._count = 0
         self._links: dict[str, LoopLink] = {}
         self._stations: dict[Peer, Station] = {}
 
@@ -58,54 +50,17 @@ class LoopNetwork:
         """Removes the peer at an endpoint.  Its open connections stay."""
         self._stations.pop(endpoint, None)
 
-    def next_due_ns(self) -> int | None:
-        """The time at which the next scheduled event is due, up to which a run may skip; None if there is none."""
-        return self._due[0][0] if self._due else None
-
     def close(self) -> None:
         """Discards all connections and data."""
         self._due.clear()
         self._links.clear()
         self._stations.clear()
 
-    def run(self, now_ns: int) -> None:
-        """Does everything that is due until `now_ns`.  Links call this; a test may."""
-        while self._due and self._due[0][0] <= now_ns:
-            due_ns, _, call = heapq.heappop(self._due)
-            self.now_ns = max(self.now_ns, due_ns)
-            call(self.now_ns)
-        self.now_ns = max(self.now_ns, now_ns)
-
-    # What a connection needs (stream.Carrier).
-
-    def at(self, due_ns: int, call: Callable[[int], None]) -> None:
-        """Schedules a call at `due_ns`."""
-        self._count += 1
-        heapq.heappush(self._due, (due_ns, self._count, call))
-
-    def fault(self, one: Peer, other: Peer) -> Fault:
-        """The fault between two endpoints that is in force now; the scan is that of `one`, if a unit, else of `other`."""
-        if not self.faults:
-            return NO_FAULT
+    def scan_of(self, one: Peer, other: Peer) -> int:
         link = self._links.get(one.host) or self._links.get(other.host)
-        return find(self.faults, one, other, link.scan if link else 0, self.now_ns)
-
-    def latency_ns(self, fault: Fault) -> int:
-        """The latency in one direction, with jitter."""
-        latency_ns = self._latency_ns if fault.latency_ns is None else fault.latency_ns
-        return latency_ns + (self._dice.randint(0, fault.jitter_ns) if fault.jitter_ns else 0)
-
-    def cut(self, fault: Fault, data: bytes) -> list[bytes]:
-        """The pieces in which data arrive."""
-        return list(fault.pieces(data, self._dice))
-
-    def tell(self, end: End, what: TapKind, out: bool, data: bytes = b"") -> None:
-        """Reports an event at an end to the tap, if the end is a unit's."""
-        if end.unit is not None:
-            self.tell_unit(end.unit, what, end.local, end.remote, out, data)
+        return link.scan if link else 0
 
     def tell_unit(self, unit: str, what: TapKind, local: Peer, remote: Peer, out: bool, data: bytes = b"") -> None:
-        """Reports an event at a unit to the tap."""
         if self.tap:
             self.tap(self.now_ns, unit, TapEvent(what, local, remote, out, data, remote.host in self._links))
 
@@ -146,9 +101,7 @@ class LoopNetwork:
         self._schedule_datagram(sender, receiver, data)
 
     def _schedule_datagram(self, sender: Peer, receiver: Peer, data: bytes) -> None:
-        fault = self.fault(sender, receiver)
-        if not fault.silent:
-            self.at(self.now_ns + self.latency_ns(fault), partial(self._deliver, sender, receiver, data))
+        self.pass_datagram(sender, receiver, data, partial(self._deliver, sender, receiver))
 
     def _deliver(self, sender: Peer, receiver: Peer, data: bytes, now_ns: int) -> None:
         everybody = receiver.host.endswith(".255")

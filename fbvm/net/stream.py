@@ -73,7 +73,8 @@ class End:
         self._in_flight: deque[tuple[int, int, TapKind, bytes]] = deque()
         self._in_flight_bytes = 0
         self._last_arrival_ns = 0
-        self._fin_asked = self._fin_sent = False
+        self._fin_asked = self._fin_sent = self._severed = False
+        self._passed_bytes = 0
 
     @property
     def gone(self) -> bool:
@@ -152,7 +153,11 @@ class End:
             self._transmit(TapKind.FIN, b"", now_ns)
 
     def _transmit(self, what: TapKind, data: bytes, now_ns: int) -> None:
+        if self._severed:
+            return
         fault = self.carrier.fault(self.local, self.remote)
+        if fault.reset_after_bytes:
+            data = self._sever(fault.reset_after_bytes, data)
         gap_ns = fault.gap_ns if fault.segment_bytes and what is TapKind.DATA else 0
         arrival_ns = max(now_ns + self.carrier.latency_ns(fault), self._last_arrival_ns + gap_ns)
         if fault.join_ns and what is TapKind.DATA:
@@ -162,6 +167,15 @@ class End:
         self._in_flight.append((arrival_ns, now_ns, what, data))
         self.carrier.at(arrival_ns, self._deliver_due)
         self.carrier.tell(self, what, True, data)
+        if self._severed:
+            self.carrier.at(arrival_ns, self.reset_both)
+
+    def _sever(self, after_bytes: int, data: bytes) -> bytes:
+        """The part of `data` that passes before the connection breaks; counts bytes since the fault is in force."""
+        left = max(0, after_bytes - self._passed_bytes - self.other._passed_bytes)
+        self._severed = self.other._severed = len(data) >= left
+        self._passed_bytes += len(data[:left])
+        return data[:left]
 
     def _deliver_due(self, now_ns: int) -> None:
         while self._in_flight and self._in_flight[0][0] <= now_ns:

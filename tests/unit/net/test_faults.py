@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 
+import pytest
 from rows import each_of
 
-from fbvm.net.faults import KINDS, Fault, random_faults
+from fbvm.net.faults import KINDS, NAMED, Fault, fault, random_faults
 from fbvm.net.loop import LoopLink, LoopNetwork
-from fbvm.net.peers import ModbusPeer
+from fbvm.net.peers import ModbusPeer, Say, ScriptedPeer
 from fbvm.wire import modbus
-from fbvm.wire.link import Broken, Connect, Event, Failed, Grant, Opened, Peer, Received, Send, Sent
+from fbvm.wire.link import Broken, Close, Connect, Event, Failed, Grant, Opened, Peer, Received, Send, Sent
 from fbvm.wire.modbus import Adu
 from fbvm.wire.tap import TapKind
 
@@ -118,6 +119,53 @@ def test_joined_segments_come_together() -> None:
     for _ in range(3):
         line.scan(Send(1, REQUEST))
     assert line.arrivals(20) == [(5, 39)]
+
+
+def test_lost_parts_are_seeded() -> None:
+    def received(seed: int) -> bytes:
+        line = Line(Fault(lose_percent=30, segment_bytes=1, gap_ns=0), seed=seed)
+        line.network.place(SERVER, ScriptedPeer(greeting=[Say(bytes(range(200)))]))
+        line.scan(Connect(1, SERVER), Grant(1, 4096))
+        return b"".join(event.data for _ in range(3) for event in line.scan() if isinstance(event, Received))
+
+    assert received(1) == received(1) != received(2)
+    assert 100 < len(received(1)) < 180
+    assert list(received(1)) == sorted(received(1))
+
+
+def test_a_part_may_be_lost_and_may_come_twice() -> None:
+    lost = Line(Fault(lose_percent=100))
+    lost.open()
+    lost.scan(Send(1, REQUEST))
+    assert lost.arrivals(20) == []
+    doubled = Line(Fault(duplicate_percent=100))
+    doubled.open()
+    doubled.scan(Send(1, REQUEST))
+    assert sum(size for _, size in doubled.arrivals(5)) == 4 * 13, "the request came twice, and each reply"
+
+
+def test_a_connection_breaks_in_the_middle_of_a_reply() -> None:
+    line = Line(Fault(reset_after_bytes=len(REQUEST) + 5))
+    for _ in range(2):  # every new connection begins to count anew
+        line.scan(Connect(1, SERVER), Grant(1, 4096))
+        assert isinstance(line.scan()[0], Opened)
+        line.scan(Send(1, REQUEST))
+        told = [event for _ in range(3) for event in line.scan()]
+        assert [type(event) for event in told] == [Sent, Received, Broken]
+        assert told[1:] == [Received(1, told[1].data[:5]), Broken(1, "ECONNRESET")]  # type: ignore[union-attr]
+        line.scan(Close(1))
+        line.scan()
+
+
+def test_a_kind_needs_what_it_is_about() -> None:
+    assert fault("slow", latency_ns=MS) == Fault(latency_ns=MS)
+    assert fault("silent", until_scan=3) == Fault(silent=True, until_scan=3)
+    for name, kind in NAMED.items():
+        if kind.needed:
+            with pytest.raises(ValueError, match=f"{name} needs {kind.needed[0]}"):
+                fault(name)
+    with pytest.raises(ValueError, match="none of slow"):
+        fault("odd")
 
 
 def test_two_plcs_have_scans_of_their_own() -> None:

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from rows import each_of
 
 from fbvm.net.faults import Fault
-from fbvm.net.loop import CONNECT_TIMEOUT_NS, LoopLink, LoopNetwork
+from fbvm.net.loop import LoopLink, LoopNetwork
 from fbvm.net.misdeeds import MISDEEDS, RUDE_PEERS, RudePeer
 from fbvm.net.peers import Action, Fin, Leave, ModbusPeer, Reset, Say, ScriptedPeer, Station
 from fbvm.net.stream import RETRANSMIT_LIMIT_NS, WINDOW_BYTES
+from fbvm.net.wires import CONNECT_TIMEOUT_NS
 from fbvm.wire import modbus
 from fbvm.wire.link import (
     Bind,
