@@ -1,6 +1,6 @@
 """The host's own network: units talk to real devices and programs over real TCP and UDP, and nothing ever blocks.
 
-One selector serves all links; sockets are handled in `events` and `submit` of a link.  No other module uses sockets.
+One selector serves all links; sockets are handled in `events` and `submit` of a link.  No module but this and `net.udp` uses sockets.
 """
 
 from __future__ import annotations
@@ -8,28 +8,19 @@ from __future__ import annotations
 import errno
 import socket
 import struct
-from abc import abstractmethod
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 
-from fbvm.base.host import keeps_ports, linger_format, shares_ports
+from fbvm.base.host import keeps_ports, linger_format
 from fbvm.net.addresses import AddressMap, dotted, fits, impossible
-from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, SEND_BUFFER_BYTES, Channel, undeliverable
-from fbvm.net.host_link import HostLink
-from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, UDP, WRITE, Switchboard, Watcher, errno_name
+from fbvm.net.channels import SEND_BUFFER_BYTES
+from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, WRITE, Switchboard, errno_name
+from fbvm.net.udp import BUFFER_BYTES, HostChannel, SocketLink, UdpPort, share_port
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import DATA, TapKind
 
-BUFFER_BYTES = 65_536
-"""The host's buffers of each connection: small, so that the TCP window closes soon if the unit grants nothing."""
 _RST_ON_CLOSE = struct.pack(linger_format(), 1, 0)
-
-
-def _share_port(sock: socket.socket) -> None:
-    """Let a port be listened on again while old connections of it linger (elsewhere than on Windows)."""
-    if shares_ports():
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
 
 
 class TcpNetwork(Switchboard):
@@ -61,7 +52,7 @@ class TcpNetwork(Switchboard):
             return real
         if (transport, endpoint) not in self._reserved:
             keeper = socket.socket(socket.AF_INET, socket.SOCK_STREAM if transport == TCP else socket.SOCK_DGRAM)
-            _share_port(keeper)
+            share_port(keeper)
             keeper.bind((real.host, 0))
             keeps = keeps_ports() and transport == TCP
             self._reserved[transport, endpoint] = Peer(*keeper.getsockname()), keeper if keeps else None
@@ -78,12 +69,8 @@ class TcpNetwork(Switchboard):
         self._reserved.clear()
 
 
-class TcpLink(HostLink):
+class TcpLink(SocketLink):
     """The link of one unit of a `TcpNetwork`."""
-
-    def __init__(self, network: TcpNetwork, address: str) -> None:
-        super().__init__(network, address)
-        self.network = network
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
         channel = self.channels[request.channel] = _KINDS[type(request)](self, request)
@@ -99,61 +86,12 @@ class TcpLink(HostLink):
 # --- channels ------------------------------------------------------------------------------------------------------
 
 
-class _HostChannel(Channel, Watcher):
-    """A channel that has a socket of the host."""
-
-    link: TcpLink
-    sock: socket.socket | None = None
-    transport = TCP
-    real = ANYBODY
-    """The endpoint of the host at which peers reach the channel."""
-
-    def __init__(self, link: TcpLink, request: Connect | Listen | Bind) -> None:
-        super().__init__(link, request.channel)
-        self.network = link.network
-        self.local = Peer(link.address, request.local_port)
-        """The unit's endpoint, as the program sees it."""
-
-    @abstractmethod
-    def open(self, now_ns: int) -> None:
-        """Opens the channel.  Raises OSError."""
-
-    def end(self) -> None:
-        """Closes the socket."""
-        self.link.waiting.pop(self, None)
-        if self.sock:
-            if self.transport == TCP:  # a datagram may still be under way, and the port stays this unit's
-                self.network.own(TCP, self.real, None)
-            self.network.watch(self.sock, 0, self)
-            self.sock.close()
-            self.sock = None
-
-    def failed(self, error: str) -> None:
-        super().failed(error)
-        self.end()
-
-    def close(self, reset: bool, now_ns: int) -> None:
-        self.end()
-
-    def make(self, kind: int, bind: Peer | None) -> socket.socket:
-        """A socket that never blocks.  Raises OSError."""
-        self.sock = sock = socket.socket(socket.AF_INET, kind)
-        sock.setblocking(False)
-        if kind == socket.SOCK_STREAM:
-            _share_port(sock)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
-        if bind:
-            sock.bind((bind.host, bind.port))
-        return sock
-
-
-class _Listener(_HostChannel):
+class _Listener(HostChannel):
     """Listens for one connection from a peer that fits; other connections are reset.
 
     Several listeners may share a port: one has the host's socket, the lowest-numbered takes the connection (assumed)."""
 
-    def __init__(self, link: TcpLink, request: Listen) -> None:
+    def __init__(self, link: SocketLink, request: Listen) -> None:
         super().__init__(link, request)
         self._request = request
 
@@ -200,7 +138,7 @@ class _Listener(_HostChannel):
         return [listener for listener in there if isinstance(listener, _Listener) and listener.local == self.local]
 
 
-class _Connection(_HostChannel):
+class _Connection(HostChannel):
     """A TCP connection, open once it is `_connected`.
 
     An `_orphan` has been closed by its unit: it sends its data, then FIN, and waits for the peer's FIN."""
@@ -208,7 +146,7 @@ class _Connection(_HostChannel):
     _connected = _orphan = _stalled = _fin_sent = _fin_seen = False
     _taken = 0
 
-    def __init__(self, link: TcpLink, request: Connect) -> None:
+    def __init__(self, link: SocketLink, request: Connect) -> None:
         super().__init__(link, request)
         self.remote = request.remote
         self._keep_alive = request.keep_alive
@@ -406,43 +344,4 @@ class _Connection(_HostChannel):
             self.network.tell(now_ns, what, self.local, self.remote, out, data)
 
 
-class _UdpPort(_HostChannel):
-    """A UDP port.  Datagrams are handed over whole and need no grant; the unit drops those that it has no room for."""
-
-    transport = UDP
-
-    def open(self, now_ns: int) -> None:
-        sock = self.make(socket.SOCK_DGRAM, self.network.host_endpoint(self.local, UDP))
-        sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        self.real = Peer(*sock.getsockname())
-        self.local = Peer(self.local.host, self.local.port or self.real.port)
-        self.network.own(UDP, self.real, self.local)
-        self.network.watch(sock, READ, self)
-        self.link.pending.append(Opened(self.channel, self.local.port, ANYBODY))
-
-    def ready(self, ready: int, now_ns: int) -> None:
-        for _ in range(MAX_DATAGRAMS):
-            try:
-                data, name = self.sock.recvfrom(BUFFER_BYTES) if self.sock else (b"", ("", 0))
-            except OSError:
-                return
-            remote = self.network.inward(UDP, Peer(*name))
-            self.network.tell(now_ns, TapKind.UDP, self.local, remote, False, data)
-            self.link.pending.append(Received(self.channel, data, remote))
-
-    def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
-        if refusal := undeliverable(remote, data):
-            return refusal
-        try:
-            if self.sock:
-                self.sock.sendto(data, dotted(self.network.outward(remote, UDP)))
-        except BlockingIOError:
-            return "ENOBUFS"
-        except OSError as error:
-            return errno_name(error)
-        self.network.tell(now_ns, TapKind.UDP, self.local, remote, True, data)
-        self.link.pending.append(Sent(self.channel, len(data)))
-        return ""
-
-
-_KINDS: dict[type, Callable[..., _HostChannel]] = {Connect: _Connection, Listen: _Listener, Bind: _UdpPort}
+_KINDS: dict[type, Callable[..., HostChannel]] = {Connect: _Connection, Listen: _Listener, Bind: UdpPort}

@@ -1,0 +1,119 @@
+"""The channels of the host: what each with a socket has in common, and a UDP port."""
+
+from __future__ import annotations
+
+import socket
+from abc import abstractmethod
+
+from fbvm.base.host import shares_ports
+from fbvm.net.addresses import dotted
+from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, Channel, undeliverable
+from fbvm.net.host_link import HostLink
+from fbvm.net.switchboard import READ, TCP, UDP, Switchboard, Watcher, errno_name
+from fbvm.wire.link import Bind, Connect, Listen, Opened, Peer, Received, Sent
+from fbvm.wire.tap import TapKind
+
+BUFFER_BYTES = 65_536
+"""The host's buffers of each connection: small, so that the TCP window closes soon if the unit grants nothing."""
+
+
+def share_port(sock: socket.socket) -> None:
+    """Let a port be listened on again while old connections of it linger (elsewhere than on Windows)."""
+    if shares_ports():
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+
+
+class SocketLink(HostLink):
+    """The link of one unit whose channels have sockets."""
+
+    def __init__(self, network: Switchboard, address: str) -> None:
+        super().__init__(network, address)
+        self.network = network
+
+
+class HostChannel(Channel, Watcher):
+    """A channel that has a socket of the host."""
+
+    link: SocketLink
+    sock: socket.socket | None = None
+    transport = TCP
+    real = ANYBODY
+    """The endpoint of the host at which peers reach the channel."""
+
+    def __init__(self, link: SocketLink, request: Connect | Listen | Bind) -> None:
+        super().__init__(link, request.channel)
+        self.network = link.network
+        self.local = Peer(link.address, request.local_port)
+        """The unit's endpoint, as the program sees it."""
+
+    @abstractmethod
+    def open(self, now_ns: int) -> None:
+        """Opens the channel.  Raises OSError."""
+
+    def end(self) -> None:
+        """Closes the socket."""
+        self.link.waiting.pop(self, None)
+        if self.sock:
+            if self.transport == TCP:  # a datagram may still be under way, and the port stays this unit's
+                self.network.own(TCP, self.real, None)
+            self.network.watch(self.sock, 0, self)
+            self.sock.close()
+            self.sock = None
+
+    def failed(self, error: str) -> None:
+        super().failed(error)
+        self.end()
+
+    def close(self, reset: bool, now_ns: int) -> None:
+        self.end()
+
+    def make(self, kind: int, bind: Peer | None) -> socket.socket:
+        """A socket that never blocks.  Raises OSError."""
+        self.sock = sock = socket.socket(socket.AF_INET, kind)
+        sock.setblocking(False)
+        if kind == socket.SOCK_STREAM:
+            share_port(sock)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER_BYTES)
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, BUFFER_BYTES)
+        if bind:
+            sock.bind((bind.host, bind.port))
+        return sock
+
+
+class UdpPort(HostChannel):
+    """A UDP port.  Datagrams are handed over whole and need no grant; the unit drops those that it has no room for."""
+
+    transport = UDP
+
+    def open(self, now_ns: int) -> None:
+        sock = self.make(socket.SOCK_DGRAM, self.network.host_endpoint(self.local, UDP))
+        sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        self.real = Peer(*sock.getsockname())
+        self.local = Peer(self.local.host, self.local.port or self.real.port)
+        self.network.own(UDP, self.real, self.local)
+        self.network.watch(sock, READ, self)
+        self.link.pending.append(Opened(self.channel, self.local.port, ANYBODY))
+
+    def ready(self, ready: int, now_ns: int) -> None:
+        for _ in range(MAX_DATAGRAMS):
+            try:
+                data, name = self.sock.recvfrom(BUFFER_BYTES) if self.sock else (b"", ("", 0))
+            except OSError:
+                return
+            remote = self.network.inward(UDP, Peer(*name))
+            self.network.tell(now_ns, TapKind.UDP, self.local, remote, False, data)
+            self.link.pending.append(Received(self.channel, data, remote))
+
+    def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
+        if refusal := undeliverable(remote, data):
+            return refusal
+        try:
+            if self.sock:
+                self.sock.sendto(data, dotted(self.network.outward(remote, UDP)))
+        except BlockingIOError:
+            return "ENOBUFS"
+        except OSError as error:
+            return errno_name(error)
+        self.network.tell(now_ns, TapKind.UDP, self.local, remote, True, data)
+        self.link.pending.append(Sent(self.channel, len(data)))
+        return ""
