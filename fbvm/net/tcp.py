@@ -1,6 +1,6 @@
 """The host's own network: units talk to real devices and programs over real TCP and UDP, and nothing ever blocks.
 
-One selector serves all links; sockets are handled in `events` and `submit` of a link.  No module but this and `net.udp` uses sockets.
+One selector serves all links; sockets are handled in `events` and `submit` of a link, here and in `net.udp` only.
 """
 
 from __future__ import annotations
@@ -9,12 +9,15 @@ import errno
 import socket
 import struct
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 
 from fbvm.base.host import keeps_ports, linger_format
 from fbvm.net.addresses import AddressMap, dotted, fits, impossible
 from fbvm.net.channels import SEND_BUFFER_BYTES
+from fbvm.net.faults import Fault
+from fbvm.net.host_link import HostLink
+from fbvm.net.relays import Relays
 from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, WRITE, Switchboard, errno_name
 from fbvm.net.udp import BUFFER_BYTES, HostChannel, SocketLink, UdpPort, share_port
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
@@ -27,13 +30,15 @@ class TcpNetwork(Switchboard):
     """Real connections.  `address_map` maps endpoints of the program to hosts and ports (see `AddressMap`).
 
     A unit without a row listens on the host's address `bind`, on the port of its request.  Host names of the map are
-    resolved here, once.  Raises OSError for a name that cannot be resolved."""
+    resolved here, once.  `faults` are rows of `net.faults`, `seed` starts their random numbers.  Raises OSError for a name that
+    cannot be resolved."""
 
     virtual_time = False
 
-    def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1") -> None:
+    def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1", *, seed: int = 0,
+                 faults: Iterable[Fault] = ()) -> None:  # fmt: skip
         rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
-        super().__init__(AddressMap(rows, bind))
+        super().__init__(AddressMap(rows, bind), seed, faults)
         self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
 
     def attach(self, address: str) -> TcpLink:
@@ -42,6 +47,9 @@ class TcpNetwork(Switchboard):
             raise ValueError(f"{address} is attached already")
         link = self.links[address] = TcpLink(self, address)
         return link
+
+    def link_behind(self, address: str) -> HostLink:
+        return _LinkBehind(self, address)
 
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
         """The endpoint of the host for a unit's own endpoint, also before the unit listens.
@@ -73,6 +81,10 @@ class TcpLink(SocketLink):
     """The link of one unit of a `TcpNetwork`."""
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
+        if isinstance(request, Connect) and self._is_under_faults(request):
+            self.network.relays.open(self, request, now_ns)
+            self.is_quiet = False
+            return
         channel = self.channels[request.channel] = _KINDS[type(request)](self, request)
         self.is_quiet = False
         try:
@@ -81,6 +93,22 @@ class TcpLink(SocketLink):
             channel.open(now_ns)
         except OSError as error:
             channel.failed(errno_name(error))
+
+    def _is_under_faults(self, request: Connect) -> bool:
+        relays, local = self.network.relays, Peer(self.address, request.local_port)
+        return bool(relays.faults) and self.is_seen and not self.network.closed and relays.concern(local, request.remote)
+
+
+class _LinkBehind(TcpLink):
+    """The link of connections of the host behind those of a unit, which the relays ask for events."""
+
+    is_seen = False
+
+    def events(self, now_ns: int) -> Sequence[Event]:
+        for there in list(self.waiting):
+            there.fetch(now_ns)
+        events, self.pending = self.pending, []
+        return events
 
 
 # --- channels ------------------------------------------------------------------------------------------------------
@@ -121,7 +149,7 @@ class _Listener(HostChannel):
                 return
             remote = self.network.inward(TCP, Peer(*name))
             listener = next((listener for listener in self._listeners() if fits(listener._request.remote, remote)), None)
-            if listener:
+            if listener and not self.network.relays.refuse(self.local, remote):
                 del listener.link.channels[listener.channel]
                 listener.end()
                 request = Connect(listener.channel, remote, listener.local.port, listener._request.keep_alive)
@@ -131,6 +159,25 @@ class _Listener(HostChannel):
             else:
                 with suppress(OSError), conn:
                     conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+
+    def meet_faults(self, relays: Relays, now_ns: int) -> None:
+        """A fault that refuses every caller shuts the host's socket; a silent one leaves callers waiting in the host."""
+        listeners = self._listeners()
+        if listeners[0] is not self:
+            return
+        fault = relays.door(self.local)
+        holder = next((listener for listener in listeners if listener.sock), None)
+        if fault.error and holder and holder.sock and not fault.silent:
+            self.network.watch(holder.sock, 0, holder)
+            holder.sock.close()
+            holder.sock = None
+        elif holder and holder.sock:
+            self.network.watch(holder.sock, 0 if fault.silent else READ, holder)
+        elif not fault.error:
+            try:
+                self.open(now_ns)
+            except OSError as error:
+                self.failed(errno_name(error))
 
     def _listeners(self) -> list[_Listener]:
         """The listeners on the same port, by number."""
@@ -143,7 +190,7 @@ class _Connection(HostChannel):
 
     An `_orphan` has been closed by its unit: it sends its data, then FIN, and waits for the peer's FIN."""
 
-    _connected = _orphan = _stalled = _fin_sent = _fin_seen = False
+    _connected = _active = _orphan = _stalled = _fin_sent = _fin_seen = False
     _taken = 0
 
     def __init__(self, link: SocketLink, request: Connect) -> None:
@@ -153,6 +200,7 @@ class _Connection(HostChannel):
         self._outbox: deque[bytes] = deque()
 
     def open(self, now_ns: int) -> None:
+        self._active = True
         error = impossible(self.local, self.remote)
         if error:
             raise OSError(getattr(errno, error), error)
@@ -264,6 +312,11 @@ class _Connection(HostChannel):
                 self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
             self.end()
 
+    def meet_faults(self, relays: Relays, now_ns: int) -> None:
+        # Between two units of this network the faults are at the side that has opened.
+        if self._connected and relays.concern(self.local, self.remote) and (self._active or not relays.is_unit(self.remote)):
+            relays.take_over(self, self.local, self.remote, len(self._outbox), self._fin_seen)
+
     def _receive(self, sock: socket.socket, now_ns: int) -> None:
         wanted = min(self.granted, BUFFER_BYTES)
         try:
@@ -340,8 +393,7 @@ class _Connection(HostChannel):
             self.link.pending.append(event)
 
     def _tap(self, now_ns: int, what: TapKind, out: bool, data: bytes = b"") -> None:
-        if self.network.tap:
-            self.network.tell(now_ns, what, self.local, self.remote, out, data)
+        self.tell(now_ns, what, self.remote, out, data)
 
 
 _KINDS: dict[type, Callable[..., HostChannel]] = {Connect: _Connection, Listen: _Listener, Bind: UdpPort}

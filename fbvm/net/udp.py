@@ -9,6 +9,7 @@ from fbvm.base.host import shares_ports
 from fbvm.net.addresses import dotted
 from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, Channel, undeliverable
 from fbvm.net.host_link import HostLink
+from fbvm.net.relays import FaultyChannel, Relays
 from fbvm.net.switchboard import READ, TCP, UDP, Switchboard, Watcher, errno_name
 from fbvm.wire.link import Bind, Connect, Listen, Opened, Peer, Received, Sent
 from fbvm.wire.tap import TapKind
@@ -26,12 +27,15 @@ def share_port(sock: socket.socket) -> None:
 class SocketLink(HostLink):
     """The link of one unit whose channels have sockets."""
 
+    is_seen = True
+    """True for the link of a unit, False for one behind it (see `net.relays`)."""
+
     def __init__(self, network: Switchboard, address: str) -> None:
         super().__init__(network, address)
         self.network = network
 
 
-class HostChannel(Channel, Watcher):
+class HostChannel(Channel, Watcher, FaultyChannel):
     """A channel that has a socket of the host."""
 
     link: SocketLink
@@ -67,6 +71,11 @@ class HostChannel(Channel, Watcher):
     def close(self, reset: bool, now_ns: int) -> None:
         self.end()
 
+    def tell(self, now_ns: int, what: TapKind, remote: Peer, out: bool, data: bytes = b"") -> None:
+        """Reports an event to the tap; under faults the unit's side is reported instead."""
+        if self.network.tap and self.link.is_seen:
+            self.network.tell(now_ns, what, self.local, remote, out, data)
+
     def make(self, kind: int, bind: Peer | None) -> socket.socket:
         """A socket that never blocks.  Raises OSError."""
         self.sock = sock = socket.socket(socket.AF_INET, kind)
@@ -101,7 +110,7 @@ class UdpPort(HostChannel):
             except OSError:
                 return
             remote = self.network.inward(UDP, Peer(*name))
-            self.network.tell(now_ns, TapKind.UDP, self.local, remote, False, data)
+            self.tell(now_ns, TapKind.UDP, remote, False, data)
             self.link.pending.append(Received(self.channel, data, remote))
 
     def send_to(self, remote: Peer, data: bytes, now_ns: int) -> str:
@@ -114,6 +123,10 @@ class UdpPort(HostChannel):
             return "ENOBUFS"
         except OSError as error:
             return errno_name(error)
-        self.network.tell(now_ns, TapKind.UDP, self.local, remote, True, data)
+        self.tell(now_ns, TapKind.UDP, remote, True, data)
         self.link.pending.append(Sent(self.channel, len(data)))
         return ""
+
+    def meet_faults(self, relays: Relays, now_ns: int) -> None:
+        if relays.faults:
+            relays.take_over_port(self, self.local)
