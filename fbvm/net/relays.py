@@ -150,7 +150,8 @@ class Relay:
             case PeerClosed():
                 self._end.finish(now_ns)
             case Broken():
-                self.closed = True
+                if not self.closed:
+                    self._close([], True, now_ns)
                 self._end.reset(now_ns)
             case Sent() | Failed() if self._owed and self._connection:
                 self._owed -= 1
@@ -410,6 +411,11 @@ class Relays(Wires):
                 del self.carried[number]
         self._before_refresh = False
         return [link for link in self._links.values() if link.pending or link.waiting]
+
+    @property
+    def channels_behind(self) -> int:
+        """How many channels of the host the relays hold."""
+        return sum(len(behind.channels) for behind in self._behind.values())
 
     def until_due_s(self) -> float | None:
         """How many seconds after the last `serve` something is due; None if nothing is."""

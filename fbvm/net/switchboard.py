@@ -17,6 +17,7 @@ from fbvm.base import host
 from fbvm.net.addresses import AddressMap
 from fbvm.net.faults import Fault
 from fbvm.net.host_link import HostLink
+from fbvm.net.notices import NoticeKind, Notices
 from fbvm.net.relays import Relays
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import Tap, TapEvent, TapKind
@@ -85,6 +86,8 @@ class Switchboard(ABC):
         self.links: dict[str, HostLink] = {}
         self.relays = Relays(self.links, self.link_behind, self.tell, seed, faults)
         """The connections that are under faults."""
+        self.notices = Notices()
+        """Set `notices.tell` to be told what no program is told."""
         self._selector = selectors.DefaultSelector()
         self._number = host.selector_number(self._selector)
         self.watched = 0
@@ -101,6 +104,13 @@ class Switchboard(ABC):
     @abstractmethod
     def host_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
         """The endpoint of the host for a unit's own endpoint."""
+
+    def listening_endpoint(self, endpoint: Peer, transport: str = TCP) -> Peer:
+        """The endpoint of the host for a unit that wants to listen.  Raises OSError if it may not."""
+        if not self.map.is_mapped(endpoint):
+            self.notices.note(NoticeKind.NOT_MAPPED, endpoint, self.map.local(endpoint))
+            raise OSError(errno.EACCES, "not mapped")
+        return self.host_endpoint(endpoint, transport)
 
     @abstractmethod
     def link_behind(self, address: str) -> HostLink:

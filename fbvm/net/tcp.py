@@ -13,10 +13,11 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 
 from fbvm.base.host import keeps_ports, linger_format
-from fbvm.net.addresses import AddressMap, dotted, fits, impossible
+from fbvm.net.addresses import AddressMap, dotted, fits, impossible, why_unusable
 from fbvm.net.channels import SEND_BUFFER_BYTES
 from fbvm.net.faults import Fault
 from fbvm.net.host_link import HostLink
+from fbvm.net.notices import NoticeKind
 from fbvm.net.relays import Relays
 from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, WRITE, Switchboard, errno_name
 from fbvm.net.udp import BUFFER_BYTES, HostChannel, SocketLink, UdpPort, share_port
@@ -29,16 +30,16 @@ _RST_ON_CLOSE = struct.pack(linger_format(), 1, 0)
 class TcpNetwork(Switchboard):
     """Real connections.  `address_map` maps endpoints of the program to hosts and ports (see `AddressMap`).
 
-    A unit without a row listens on the host's address `bind`, on the port of its request.  Host names of the map are
-    resolved here, once.  `faults` are rows of `net.faults`, `seed` starts their random numbers.  Raises OSError for a name that
-    cannot be resolved."""
+    A unit without a row listens on the host's address `bind`, on the port of its request if that is 1024 or above; the first
+    one listens at `door`, if that is given.  Host names of the map are resolved here, once.  `faults` are rows of `net.faults`,
+    `seed` starts their random numbers.  Raises OSError for a name that cannot be resolved."""
 
     virtual_time = False
 
-    def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1", *, seed: int = 0,
-                 faults: Iterable[Fault] = ()) -> None:  # fmt: skip
+    def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1", *,
+                 door: Peer | None = None, seed: int = 0, faults: Iterable[Fault] = ()) -> None:  # fmt: skip
         rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
-        super().__init__(AddressMap(rows, bind), seed, faults)
+        super().__init__(AddressMap(rows, bind, door), seed, faults)
         self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
 
     def attach(self, address: str) -> TcpLink:
@@ -67,6 +68,34 @@ class TcpNetwork(Switchboard):
             if not keeps:
                 keeper.close()
         return self._reserved[transport, endpoint][0]
+
+    def try_doors(self, endpoints: Iterable[Peer]) -> dict[Peer, Peer]:
+        """Tries whether units will be able to listen on their endpoints; returns where on the host each is.
+
+        Raises OSError with a message that names endpoint and port: for an endpoint of no unit, for two on one port, and for a
+        port that the host does not give."""
+        found: dict[Peer, Peer] = {}
+        for endpoint in endpoints:
+            if endpoint.host not in self.links:
+                there = ", ".join(sorted(self.links)) or "none"
+                raise OSError(f"{endpoint} cannot be used: no unit has the address {endpoint.host}; units: {there}")
+            self.try_door(self.map.local(endpoint))
+            real = self.host_endpoint(endpoint)
+            for other, its in found.items():
+                if its.port == real.port and ("0.0.0.0" in (its.host, real.host) or its.host == real.host):
+                    raise OSError(f"{real} cannot be used for {endpoint}: it is the door of {other}")
+            found[endpoint] = real
+        return found
+
+    def try_door(self, real: Peer) -> None:
+        """Tries whether a unit will be able to listen at an endpoint of the host.  Raises OSError that names it."""
+        try:
+            with socket.socket() as sock:
+                share_port(sock)
+                sock.bind(dotted(real))
+                sock.listen()
+        except OSError as error:
+            raise OSError(error.errno, f"{real} cannot be used: {why_unusable(error)}") from None
 
     def close(self) -> None:
         """Closes all connections and sockets."""
@@ -125,9 +154,15 @@ class _Listener(HostChannel):
 
     def open(self, now_ns: int) -> None:
         if not any(listener.sock for listener in self._listeners()):
-            sock = self.make(socket.SOCK_STREAM, self.network.host_endpoint(self.local))
-            sock.listen()
+            real = self.network.listening_endpoint(self.local)
+            try:
+                sock = self.make(socket.SOCK_STREAM, real)
+                sock.listen()
+            except OSError as error:
+                self.network.notices.note(NoticeKind.UNUSABLE, self.local, real, why_unusable(error))
+                raise
             self.network.watch(sock, READ, self)
+            self.network.notices.note(NoticeKind.LISTENING, self.local, real)
 
     def end(self) -> None:
         heir = next(iter(self._listeners()), None)
@@ -157,6 +192,7 @@ class _Listener(HostChannel):
                 connection.granted = listener.granted
                 connection.accept(conn, now_ns)
             else:
+                self.network.notices.note(NoticeKind.TURNED_AWAY, self.local, Peer(*name))
                 with suppress(OSError), conn:
                     conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
 
@@ -232,6 +268,7 @@ class _Connection(HostChannel):
             sock.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, self._keep_alive)
 
     def _refused(self, code: int, now_ns: int) -> None:
+        self.network.notices.note(NoticeKind.UNREACHED, self.remote, self.network.outward(self.remote), errno_name(code))
         if code == errno.ECONNREFUSED:
             self._tap(now_ns, TapKind.RST, False)
         self.failed(errno_name(code))

@@ -95,7 +95,7 @@ class UdpPort(HostChannel):
     transport = UDP
 
     def open(self, now_ns: int) -> None:
-        sock = self.make(socket.SOCK_DGRAM, self.network.host_endpoint(self.local, UDP))
+        sock = self.make(socket.SOCK_DGRAM, self.network.listening_endpoint(self.local, UDP))
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
         self.real = Peer(*sock.getsockname())
         self.local = Peer(self.local.host, self.local.port or self.real.port)

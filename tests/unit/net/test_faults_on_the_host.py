@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import struct
 import time
 from collections.abc import Iterator
 
@@ -176,6 +177,18 @@ def test_a_connection_dies_in_long_silence(host: Host) -> None:
         device.recv(1)
     host.scan(Close(1))
     assert host.scan() == [Closed(1)]
+
+
+def test_nothing_is_kept_of_a_connection_that_the_peer_has_reset(host: Host) -> None:
+    host.network.faults.append(fault("slow", latency_ns=10 * MS))
+    device = host.open()
+    assert host.network.relays.channels_behind == 1
+    device.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    device.close()
+    assert host.until(Broken) == [Broken(1, "ECONNRESET")]
+    host.scan(Close(1))
+    host.settle(3)
+    assert (host.network.relays.channels_behind, host.network.relays.carried) == (0, {})
 
 
 def test_nobody_answers_an_open_in_silence(host: Host) -> None:
@@ -413,4 +426,5 @@ def test_after_each_kind_all_is_well(kind: str) -> None:
     host.device.sendall(b"reply")
     assert data_of(host.until(Received)) == b"reply"
     assert kind in ("silent", "unreachable") or host.network.relays.carried == {}
+    assert host.network.relays.channels_behind <= (kind in ("silent", "unreachable"))
     host.close()
