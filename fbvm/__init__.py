@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from fbvm.record.draw.chart import chart as chart
     from fbvm.record.draw.chart import draw as draw
     from fbvm.record.export.pcapng import Capture as Capture
+    from fbvm.record.recording.recording import Recording as Recording
     from fbvm.record.trace.reader import Trace as Trace
     from fbvm.record.trace.recorder import Recorder as Recorder
     from fbvm.record.trace.writer import Depth as Depth
@@ -66,6 +67,7 @@ _HOMES = {
     "interchange.plcopen.read.importing": ("Imported", "import_xml"),
     "record.draw.chart": ("chart", "draw"),
     "record.export.pcapng": ("Capture",),
+    "record.recording.recording": ("Recording",),
     "record.trace.reader": ("Trace",),
     "record.trace.recorder": ("Recorder",),
     "record.trace.writer": ("Depth", "TraceWriter"),

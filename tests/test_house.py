@@ -59,7 +59,7 @@ ORDERS = {
     "engine": ("", "python", "native/llvm", "native/library", "native/emit", "native/scans", "native", "choice"),
     "units": ("", "etn21", "port"),
     "machine": ("scan", "fast", ""),
-    "record": ("trace", "draw", "export", "page"),
+    "record": ("trace", "recording", "draw", "export", "page"),
     "cli": ("shared", "programs", "running", "recordings", "projects", ""),
 }
 """The folders of a room, the lowest first; "" is the room itself.  A folder imports from those before it."""

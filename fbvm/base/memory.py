@@ -132,6 +132,14 @@ def compare(a: Snapshot, b: Snapshot) -> list[tuple[int, int]]:
     return runs
 
 
+def changes(old: bytes, new: bytes) -> list[tuple[int, bytes]]:
+    """What has changed between two contents of a memory: (offset, new bytes) of each run of bytes, from low to high."""
+    runs: list[tuple[int, int]] = []
+    for at in range(0, len(old), PAGE_BYTES):
+        _differences(old[at:at + PAGE_BYTES], new[at:at + PAGE_BYTES], at, runs)
+    return [(at, new[at:at + size]) for at, size in runs]
+
+
 def _differences(left: bytes, right: bytes, at: int, runs: list[tuple[int, int]]) -> None:
     """Append the runs of one piece: halves that are equal are not looked at byte by byte."""
     if left == right:

@@ -19,17 +19,17 @@ from fbvm.machine.breakpoints import Breakpoints, Halt
 from fbvm.machine.fast.paths import FastPath, FastPaths
 from fbvm.machine.goal import Goal
 from fbvm.machine.scan.clock_words import CLOCK_WORDS, ClockWords
+from fbvm.machine.scan.inputs import InputRecorder
 from fbvm.machine.scan.refresh import Attached, IORefresh
 from fbvm.machine.scan.start import Kept, retained, start, write
 from fbvm.machine.scan.tasks import TaskSchedule, too_short_intervals
+from fbvm.machine.scan.values import NamedValues
 from fbvm.machine.scan.watch_cycle import WatchCycle
 from fbvm.machine.scan_times import Lateness, ScanTimes
-from fbvm.machine.state import RUN, Mode, Phase, State, Stopped, state_after
+from fbvm.machine.state import RUN, Mode, Phase, State, Stopped
 from fbvm.net.journal import Journal
 from fbvm.units.contract import Unit
 from fbvm.watch import places
-from fbvm.watch.paths import Place, Span, find, find_place
-from fbvm.watch.values import Value
 from fbvm.wire.link import Network
 
 __all__ = ["STEP_BUDGET", "Mode", "Phase", "Plc", "State", "Stopped"]
@@ -37,7 +37,7 @@ STEP_BUDGET = 2_000_000
 """Statements that one scan may execute before the watchdog ends it."""
 
 
-class Plc:
+class Plc(NamedValues):
     """One PLC with a compiled program, in RUN mode at time 0, before its first scan.
 
     `cycle_ns` is how far a scan advances virtual time; `budget` how many statements a scan may execute; `observed` runs the
@@ -68,11 +68,11 @@ class Plc:
     ) -> None:
         if cycle_ns <= 0:
             raise ValueError(f"a cycle takes time; {cycle_ns} ns is not possible")
-        self.image = image
+        super().__init__(image, Memory(image.layout.size, image.layout.areas), journal)
         self.cycle_ns = cycle_ns
         self.budget = budget
-        self.memory = Memory(image.layout.size, image.layout.areas)
-        self._choice = engine
+        self.engine_choice = engine
+        """What was asked for: "auto", "python" or "native"."""
         self.engine: Engine = engine_for(image, self.memory, engine, observed)
         self._system = self.memory.views["i64"]
         self._clock_words = ClockWords(self.memory)
@@ -94,16 +94,13 @@ class Plc:
         self.trap: Trap | None = None
         self._mode = RUN
         self._first = True
-        self._forces: dict[Place, Value] = {}
-        self._found: dict[str, Place | Span] = {}
-        self._past: deque[State] = deque(maxlen=0)
         self._due: deque[int] = deque()
         self.breakpoints = Breakpoints(self)
         self._schedule = TaskSchedule(image.tasks, lambda path: self.read(path) is True)
         self._io = IORefresh(self.units, self.memory)
         self._fast_paths = FastPaths(self._io, self._schedule)
         write(self.memory, image.initial)
-        self._journal = journal
+        self._recorder: InputRecorder | None = None
         if journal:
             journal.begin(image.fingerprint, cycle_ns, budget, self.memory)
 
@@ -119,6 +116,8 @@ class Plc:
             raise Stopped(self.trap)
         if not self.breakpoints.halted:
             now_ns = self._time(now_ns)
+            if self._recorder:
+                self._recorder.before(now_ns)
             if path := self._fast_path():
                 self.now_ns = now_ns
                 self.trap = self.watch_cycle.judged(path.once(now_ns, self.budget))
@@ -126,6 +125,8 @@ class Plc:
                 self._tell()
                 return self.trap
             self._begin(now_ns)
+        elif self._recorder:
+            self._recorder.changed()
         if self._mode is RUN:
             self.trap = self.watch_cycle.judged(self._execute())
             if self.halted:
@@ -137,12 +138,23 @@ class Plc:
         self._end()
         return self.trap
 
+    @property
+    def is_recorded(self) -> bool:
+        """True if somebody is told the inputs."""
+        return self._recorder is not None
+
+    def record_inputs(self, recorder: InputRecorder | None) -> None:
+        """Tells `recorder` every input from now on, None ends that.  Fast paths stay possible but for bursts."""
+        self._recorder = self._io.recorder = recorder
+
     def _fast_path(self) -> FastPath | None:
         """The fast path of the next scan; None if the scan has to be a plain one because somebody has a part in it."""
         machine = self.engine.machine
         if machine is None or self._first or self._forces or self.phases or self._journal or self._mode is not RUN:
             return None
-        return None if self.breakpoints.armed else self._fast_paths.path(machine)
+        if self.breakpoints.armed or (self._recorder and self._recorder.wants_plain_scans):
+            return None
+        return self._fast_paths.path(machine)
 
     def _begin(self, now_ns: int) -> None:
         """The part of a plain scan before its program: time, forces, tasks that are due."""
@@ -154,7 +166,7 @@ class Plc:
                 places.write_all(self.memory, self._forces)
             if self.phases:
                 self._over(Phase.INPUTS)
-            self._due.extend(self._schedule.due(now_ns))
+            self._due = deque(self._schedule.due(now_ns))  # nothing is left of a scan that a listener has interrupted
 
     def _end(self) -> None:
         """The part of a plain scan behind its program: the I/O refresh, and counting the scan."""
@@ -169,9 +181,9 @@ class Plc:
         self._tell()
 
     def _tell(self) -> None:
-        """Called at the end of each scan: keeps its state for `at`, calls the watchers."""
-        if self._past.maxlen:
-            self._past.append(self.snapshot())
+        """Called at the end of each scan: tells recorder and watchers."""
+        if self._recorder:
+            self._recorder.after(1, self.now_ns)
         for watcher in self.watchers:
             watcher(self)
 
@@ -255,7 +267,7 @@ class Plc:
         """Up to `most` scans in virtual time without coming back from machine code, while no unit has anything to do.
 
         Returns False if there was none: if somebody has to be told between scans, use `scan`."""
-        if self.watchers or self._past.maxlen:
+        if self.watchers:
             return False
         if self.breakpoints.armed:
             done, self.trap = self._many_stoppable(most)
@@ -263,8 +275,11 @@ class Plc:
             done, self.trap = path.many(most, self.now_ns, self.cycle_ns, self.budget, STEP_BUDGET)
         else:
             return False
+        first_ns = self.now_ns + self.cycle_ns
         self.scans += done
         self.now_ns += done * self.cycle_ns
+        if self._recorder:
+            self._recorder.after(done, first_ns, self.cycle_ns)
         return done > 0
 
     def scan_at_once(self, most: int, now_ns: int, clock: Clock) -> list[int]:
@@ -273,7 +288,7 @@ class Plc:
         `clock` is read before each scan; `now_ns` is what it told last.  Returns the times of the scans.  Returns [] without a
         scan if somebody has a part in them or has to be told between them: use `scan`."""
         times: list[int] = []
-        if self.watchers or self._past.maxlen or self.trap or not (path := self._fast_path()):
+        if self.watchers or self._recorder or self.trap or not (path := self._fast_path()):
             return times
         try:
             self.trap = self.watch_cycle.judged(path.burst(times, most, now_ns, clock, self.budget))
@@ -290,55 +305,10 @@ class Plc:
         if outside or not tasks or self._first or self._mode is not RUN or self.halted:
             return 0, None
         self._system[BUDGET // 8] = self.budget
+        if self._recorder:
+            self._recorder.before(self.now_ns + self.cycle_ns)
         stoppable = self.breakpoints.stoppable(self.engine)
         return stoppable.run_many(tasks, most, self.cycle_ns, CLOCK_WORDS, spend=STEP_BUDGET)
-
-    # --- values -------------------------------------------------------------------------------------------------------
-
-    def find(self, text: str) -> Place | Span:
-        """The place or span of places that `text` names.  Raises UnknownPlace."""
-        found = self._found.get(text)
-        if found is None:
-            found = self._found[text] = find(self.image.symbols, self.memory.areas, text)
-        return found
-
-    def read(self, where: str | Place | Span) -> Value:
-        """The value of a variable, address or range.  Raises UnknownPlace."""
-        found = self.find(where) if isinstance(where, str) else where
-        if isinstance(found, Span):
-            return [places.read(self.memory, place) for place in found.places]
-        return places.read(self.memory, found)
-
-    def write(self, where: str | Place | Span, value: object) -> None:
-        """Writes a variable, an address, or a range (a list).  Raises UnknownPlace, ValueError (range), TypeError."""
-        found = self.find(where) if isinstance(where, str) else where
-        if self._journal:
-            self._journal.remark(f"{found.name} := {value!r}")
-        if isinstance(found, Place):
-            places.write(self.memory, found, value)
-            return
-        if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(found.places):
-            raise ValueError(f"{found.name} takes a list of {len(found.places)} values")
-        for place, item in zip(found.places, value, strict=True):
-            places.write(self.memory, place, item)
-
-    def force(self, where: str, value: object) -> None:
-        """Holds a variable or an address at `value` before and after the program, until `unforce`."""
-        place = find_place(self.image.symbols, self.memory.areas, where)
-        places.write(self.memory, place, value)
-        self._forces[place] = places.read(self.memory, place)
-
-    def unforce(self, where: str | None = None) -> None:
-        """Ends a force, or all forces; the value stays until somebody writes it."""
-        if where is None:
-            self._forces.clear()
-        else:
-            self._forces.pop(find_place(self.image.symbols, self.memory.areas, where), None)
-
-    @property
-    def forces(self) -> dict[str, Value]:
-        """What is forced, by name."""
-        return {place.name: value for place, value in self._forces.items()}
 
     # --- units --------------------------------------------------------------------------------------------------------
 
@@ -348,7 +318,7 @@ class Plc:
             raise ValueError(f"{unit.name} is on the backplane already")
         attached = Attached(unit, network.attach(unit.address), network)
         if attached.own:
-            attached.own.run_on(self._choice)
+            attached.own.run_on(self.engine_choice)
         with self._acting("unit", self._journal.unit(unit) if self._journal else None):
             self.units.append(attached)
             attached.link.submit(unit.reset(self.memory), self.now_ns)
@@ -379,7 +349,9 @@ class Plc:
             self._power_on([])
 
     def _acting(self, what: str, value: object) -> AbstractContextManager[None]:
-        """Lets the journal know of something that is done between scans."""
+        """Lets journal and recorder know of something that is done between scans."""
+        if self._recorder:
+            self._recorder.changed()
         return self._journal.acting(what, value) if self._journal else nullcontext()
 
     def _power_on(self, kept: Kept) -> None:
@@ -416,6 +388,13 @@ class Plc:
             raise ValueError("a PLC with units attached cannot go back: their connections do not travel in time")
         if self._journal:
             raise ValueError("a PLC that writes a journal cannot go back: fork it")
+        self.resume(state)
+
+    def resume(self, state: State, units: Sequence[Attached] = ()) -> None:
+        """Goes on from a state with these units, which are in the state that belongs to it, and with their links."""
+        if self._recorder:
+            self._recorder.changed()
+        self.units[:] = units
         self.memory.restore(state.memory)
         self.now_ns, self.scans, self.trap = state.now_ns, state.scans, state.trap
         self._mode, self._first, self._forces = state.mode, state.first, dict(state.forces)
@@ -430,20 +409,6 @@ class Plc:
 
     def fork(self) -> Plc:
         """A second PLC in the same state, without units, watchers and connections, whether or not this one has them."""
-        return self._twin(self.snapshot())
-
-    def _twin(self, state: State) -> Plc:
-        """A second PLC with the same program, in a state of this one."""
-        twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self._choice)
-        twin.restore(state)
+        twin = Plc(self.image, self.cycle_ns, budget=self.budget, engine=self.engine_choice)
+        twin.restore(self.snapshot())
         return twin
-
-    def remember(self, scans: int) -> None:
-        """Keeps the states at the end of the last so many scans from now on, for `at`."""
-        self._past = deque(self._past, maxlen=scans)
-
-    def at(self, scan: int) -> Plc:
-        """A second PLC as this one was at the end of a scan, without units: to be read, or run again with other inputs.
-
-        Raises ValueError if `remember` did not keep that scan."""
-        return self._twin(state_after(scan, self._past))

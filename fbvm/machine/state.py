@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -45,15 +44,6 @@ class State:
     mode: Mode
     first: bool
     trap: Trap | None
-
-
-def state_after(scan: int, states: Sequence[State]) -> State:
-    """The state at the end of a scan.  Raises ValueError if `states`, the oldest first, do not have it."""
-    for state in reversed(states):
-        if state.scans == scan + 1:
-            return state
-    held = f"scans {states[0].scans - 1} to {states[-1].scans - 1} are" if states else "none is"
-    raise ValueError(f"scan {scan} is not remembered; {held}: see Plc.remember")
 
 
 class Stopped(RuntimeError):

@@ -79,6 +79,21 @@ def _other_transaction(frame: bytes) -> bytes:
     return bytes((frame[0] ^ 0x80,)) + frame[1:]
 
 
+def _next_reply(frame: bytes) -> bytes:
+    """A reply to the request after this one, which nobody has sent, with other data."""
+    transaction = int.from_bytes(frame[:2], "big") + 1 & 0xFFFF
+    return transaction.to_bytes(2, "big") + frame[2:9] + bytes(byte ^ 0xFF for byte in frame[9:])
+
+
+def _next_exception(frame: bytes) -> bytes:
+    return _next_reply(frame)[:4] + bytes((0, 3, frame[6], frame[7] | 0x80, 0x02))
+
+
+def _fewer_data(pdu: bytes) -> bytes:
+    """Two bytes less, counted where there is a byte count."""
+    return pdu[:1] + bytes((max(pdu[1] - 2, 0),)) + pdu[2:-2] if pdu[0] <= 0x04 else pdu[:-2]
+
+
 def _byte_by_byte(frame: bytes) -> Actions:
     return [Say(frame[at : at + 1], at * PIECE_GAP_NS) for at in range(len(frame))]
 
@@ -99,6 +114,10 @@ MISDEEDS: dict[str, Reply] = {
     "a wrong one last": lambda frame: (Say(frame + _other_transaction(frame)),),
     "garbage behind": lambda frame: (Say(frame + GARBAGE),),
     "a byte behind": lambda frame: (Say(frame + b"\0"),),
+    "a frame begun behind": lambda frame: (Say(frame + _next_reply(frame)[:-2]),),
+    "the next reply, too": lambda frame: (Say(frame + _next_reply(frame)),),
+    "the next reply soon": lambda frame: (Say(frame), Say(_next_reply(frame), PIECE_GAP_NS)),
+    "the next exception, too": lambda frame: (Say(frame + _next_exception(frame)),),
     "flood behind": lambda frame: (Say(frame + _other_transaction(frame) * (FLOOD_BYTES // len(frame))),),
     "right, then fin": lambda frame: (Say(frame), Fin()),
     "right, then closed": lambda frame: (Say(frame), Leave()),
@@ -112,6 +131,7 @@ MISDEEDS: dict[str, Reply] = {
     "wrong content": _changed(8),
     "one byte short": _pdu(lambda pdu: pdu[:-1]),
     "two bytes more": _pdu(_more_data),
+    "fewer data": _pdu(_fewer_data),
     "function only": _pdu(lambda pdu: pdu[:1]),
     "exception 00": _exception(0x00),
     "illegal function": _exception(0x01),

@@ -21,7 +21,7 @@ class NoticeKind(Enum):
     UNREACHED = "unreached"
     """Nobody has answered a unit at `real`."""
     FULL = "full"
-    """A caller, `real`, has taken the last of the unit's sockets that waited; others are refused until one waits again."""
+    """A caller waits at `real` for one of the unit's sockets, which are all in use."""
     TURNED_AWAY = "turned away"
     """A caller, `real`, was reset since no socket of the unit waited for it."""
 
@@ -37,7 +37,7 @@ class Notice:
 
 
 Noticed = Callable[[Notice], None]
-EACH_TIME = {NoticeKind.TURNED_AWAY}
+EACH_TIME = {NoticeKind.TURNED_AWAY, NoticeKind.FULL}
 """Kinds of which every notice is told; of others only the first for each endpoint."""
 
 

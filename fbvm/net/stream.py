@@ -112,9 +112,13 @@ class End:
         self._push(now_ns)
 
     def leave(self, now_ns: int) -> None:
-        """Closes both directions: sends FIN, and answers further data by RST."""
+        """Closes both directions: sends FIN, and answers further data by RST.  Data that its owner has not taken are thrown
+        away, so that those which had no room behind them arrive, too."""
         self.owner = None
         self.finish(now_ns)
+        if self.inbox:
+            self.inbox.clear()
+            self.other._push(now_ns)
 
     def reset(self, now_ns: int) -> None:
         """Closes the connection by RST."""

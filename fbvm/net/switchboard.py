@@ -10,7 +10,7 @@ import select
 import selectors
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Protocol
 
 from fbvm.base import host
@@ -96,6 +96,7 @@ class Switchboard(ABC):
         """The sockets that were ready in the last `wait`."""
         self._own: dict[tuple[str, Peer], Peer] = {}
         self._orphans: deque[tuple[int, Orphan]] = deque()
+        self._calls: deque[tuple[int, Callable[[], None]]] = deque()
         self.links_pending: set[HostLink] = set()
         """Links that may have pending events although none of their sockets is ready."""
         self.closed = False
@@ -111,6 +112,28 @@ class Switchboard(ABC):
             self.notices.note(NoticeKind.NOT_MAPPED, endpoint, self.map.local(endpoint))
             raise OSError(errno.EACCES, "not mapped")
         return self.host_endpoint(endpoint, transport)
+
+    def try_doors(self, endpoints: Iterable[Peer]) -> dict[Peer, Peer]:
+        """Tries whether units will be able to listen on their endpoints; returns where on the host each is.
+
+        Raises OSError with a message that names endpoint and port: for an endpoint of no unit, for two on one port, and for a
+        port that the host does not give."""
+        found: dict[Peer, Peer] = {}
+        for endpoint in endpoints:
+            if endpoint.host not in self.links:
+                there = ", ".join(sorted(self.links)) or "none"
+                raise OSError(f"{endpoint} cannot be used: no unit has the address {endpoint.host}; units: {there}")
+            self.try_door(self.map.local(endpoint))
+            real = self.host_endpoint(endpoint)
+            for other, its in found.items():
+                if its.port == real.port and ("0.0.0.0" in (its.host, real.host) or its.host == real.host):
+                    raise OSError(f"{real} cannot be used for {endpoint}: it is the door of {other}")
+            found[endpoint] = real
+        return found
+
+    @abstractmethod
+    def try_door(self, real: Peer) -> None:
+        """Tries whether a unit will be able to listen at an endpoint of the host.  Raises OSError that names it."""
 
     @abstractmethod
     def link_behind(self, address: str) -> HostLink:
@@ -183,6 +206,8 @@ class Switchboard(ABC):
             woken.append(link)
         while self._orphans and (self._orphans[0][1].sock is None or self._orphans[0][0] <= now_ns):
             self._orphans.popleft()[1].give_up(now_ns)
+        while self._calls and self._calls[0][0] <= now_ns:
+            self._calls.popleft()[1]()
         if under_faults:
             woken += self._serve_relays(now_ns)
         return woken
@@ -232,6 +257,10 @@ class Switchboard(ABC):
         self._orphans.append((now_ns + ORPHAN_LIMIT_NS, orphan))
         if len(self._orphans) > MAX_ORPHANS:
             self._orphans.popleft()[1].give_up(now_ns)
+
+    def call_at(self, due_ns: int, call: Callable[[], None]) -> None:
+        """Calls a function in the first `serve` at or after `due_ns`; calls have to be due in the order of their making."""
+        self._calls.append((due_ns, call))
 
     def own(self, transport: str, real: Peer, endpoint: Peer | None) -> None:
         """Notes which endpoint of a unit an endpoint of the host belongs to; None removes the note."""

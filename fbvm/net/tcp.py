@@ -7,12 +7,10 @@ from __future__ import annotations
 
 import errno
 import socket
-import struct
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 
-from fbvm.base.host import keeps_ports, linger_format
 from fbvm.net.addresses import AddressMap, dotted, fits, impossible, why_unusable
 from fbvm.net.channels import SEND_BUFFER_BYTES
 from fbvm.net.faults import Fault
@@ -20,26 +18,32 @@ from fbvm.net.host_link import HostLink
 from fbvm.net.notices import NoticeKind
 from fbvm.net.relays import Relays
 from fbvm.net.switchboard import MAX_CALLERS, READ, TCP, WRITE, Switchboard, errno_name
-from fbvm.net.udp import BUFFER_BYTES, HostChannel, SocketLink, UdpPort, share_port
+from fbvm.net.udp import BUFFER_BYTES, HostChannel, SocketLink, UdpPort, has_left, reserve, reset_on_close, try_to_listen
+from fbvm.net.waiting import MAX_HELD, WaitingCallers
 from fbvm.wire.link import Bind, Broken, Connect, Event, Failed, Listen, Opened, Peer, PeerClosed, Received, Sent
 from fbvm.wire.tap import DATA, TapKind
-
-_RST_ON_CLOSE = struct.pack(linger_format(), 1, 0)
 
 
 class TcpNetwork(Switchboard):
     """Real connections.  `address_map` maps endpoints of the program to hosts and ports (see `AddressMap`).
 
     A unit without a row listens on the host's address `bind`, on the port of its request if that is 1024 or above; the first
-    one listens at `door`, if that is given.  Host names of the map are resolved here, once.  `faults` are rows of `net.faults`,
-    `seed` starts their random numbers.  Raises OSError for a name that cannot be resolved."""
+    one listens at `door`, if that is given.  Host names of the map are resolved here, once.
+
+    With `backlog` the host keeps a port open on which a unit has listened: who calls while none of the unit's sockets waits is
+    let in as soon as one does.  Without, such a caller is refused, as by the unit; only those wait that the host has accepted
+    in the same moment as the caller who took the last socket.  `faults` are rows of `net.faults`, `seed` starts their random
+    numbers.  Raises OSError for a name that cannot be resolved."""
 
     virtual_time = False
 
     def __init__(self, address_map: Mapping[Peer, tuple[str, int]] | None = None, bind: str = "127.0.0.1", *,
-                 door: Peer | None = None, seed: int = 0, faults: Iterable[Fault] = ()) -> None:  # fmt: skip
+                 door: Peer | None = None, backlog: bool = False, seed: int = 0,
+                 faults: Iterable[Fault] = ()) -> None:  # fmt: skip
         rows = {said: Peer(socket.gethostbyname(host), port) for said, (host, port) in (address_map or {}).items()}
         super().__init__(AddressMap(rows, bind, door), seed, faults)
+        self.waiting: WaitingCallers[socket.socket] = WaitingCallers(self, backlog)
+        """Callers for whom no socket of their unit is free."""
         self._reserved: dict[tuple[str, Peer], tuple[Peer, socket.socket | None]] = {}
 
     def attach(self, address: str) -> TcpLink:
@@ -60,46 +64,16 @@ class TcpNetwork(Switchboard):
         if real.port:
             return real
         if (transport, endpoint) not in self._reserved:
-            keeper = socket.socket(socket.AF_INET, socket.SOCK_STREAM if transport == TCP else socket.SOCK_DGRAM)
-            share_port(keeper)
-            keeper.bind((real.host, 0))
-            keeps = keeps_ports() and transport == TCP
-            self._reserved[transport, endpoint] = Peer(*keeper.getsockname()), keeper if keeps else None
-            if not keeps:
-                keeper.close()
+            self._reserved[transport, endpoint] = reserve(real.host, transport)
         return self._reserved[transport, endpoint][0]
 
-    def try_doors(self, endpoints: Iterable[Peer]) -> dict[Peer, Peer]:
-        """Tries whether units will be able to listen on their endpoints; returns where on the host each is.
-
-        Raises OSError with a message that names endpoint and port: for an endpoint of no unit, for two on one port, and for a
-        port that the host does not give."""
-        found: dict[Peer, Peer] = {}
-        for endpoint in endpoints:
-            if endpoint.host not in self.links:
-                there = ", ".join(sorted(self.links)) or "none"
-                raise OSError(f"{endpoint} cannot be used: no unit has the address {endpoint.host}; units: {there}")
-            self.try_door(self.map.local(endpoint))
-            real = self.host_endpoint(endpoint)
-            for other, its in found.items():
-                if its.port == real.port and ("0.0.0.0" in (its.host, real.host) or its.host == real.host):
-                    raise OSError(f"{real} cannot be used for {endpoint}: it is the door of {other}")
-            found[endpoint] = real
-        return found
-
     def try_door(self, real: Peer) -> None:
-        """Tries whether a unit will be able to listen at an endpoint of the host.  Raises OSError that names it."""
-        try:
-            with socket.socket() as sock:
-                share_port(sock)
-                sock.bind(dotted(real))
-                sock.listen()
-        except OSError as error:
-            raise OSError(error.errno, f"{real} cannot be used: {why_unusable(error)}") from None
+        try_to_listen(real)
 
     def close(self) -> None:
         """Closes all connections and sockets."""
         super().close()
+        self.waiting.close()
         for _, keeper in self._reserved.values():
             if keeper:
                 keeper.close()
@@ -108,6 +82,8 @@ class TcpNetwork(Switchboard):
 
 class TcpLink(SocketLink):
     """The link of one unit of a `TcpNetwork`."""
+
+    network: TcpNetwork
 
     def open(self, request: Connect | Listen | Bind, now_ns: int) -> None:
         if isinstance(request, Connect) and self._is_under_faults(request):
@@ -148,29 +124,58 @@ class _Listener(HostChannel):
 
     Several listeners may share a port: one has the host's socket, the lowest-numbered takes the connection (assumed)."""
 
-    def __init__(self, link: SocketLink, request: Listen) -> None:
+    link: TcpLink
+    _has_caller = False
+
+    def __init__(self, link: TcpLink, request: Listen) -> None:
         super().__init__(link, request)
         self._request = request
 
     def open(self, now_ns: int) -> None:
         if not any(listener.sock for listener in self._listeners()):
-            real = self.network.listening_endpoint(self.local)
-            try:
-                sock = self.make(socket.SOCK_STREAM, real)
-                sock.listen()
-            except OSError as error:
-                self.network.notices.note(NoticeKind.UNUSABLE, self.local, real, why_unusable(error))
-                raise
+            self.sock = sock = self.link.network.waiting.take(self.local)
+            if sock is None:
+                sock = self._listen()
             self.network.watch(sock, READ, self)
-            self.network.notices.note(NoticeKind.LISTENING, self.local, real)
+        if waiting := self.link.network.waiting.held.pop(self.local, []):
+            while waiting and self._listeners():
+                self._let_in(*waiting.pop(0), now_ns, has_waited=True)
+            self.link.network.waiting.held[self.local] = waiting + self.link.network.waiting.held.get(self.local, [])
+
+    def _listen(self) -> socket.socket:
+        """The host's socket for this endpoint.  Raises OSError."""
+        real = self.network.listening_endpoint(self.local)
+        try:
+            sock = self.make(socket.SOCK_STREAM, real)
+            sock.listen()
+        except OSError as error:
+            self.network.notices.note(NoticeKind.UNUSABLE, self.local, real, why_unusable(error))
+            raise
+        self.network.notices.note(NoticeKind.LISTENING, self.local, real)
+        return sock
 
     def end(self) -> None:
         heir = next(iter(self._listeners()), None)
-        if self.sock and heir:
-            self.network.watch(self.sock, 0, self)
-            heir.sock, self.sock = self.sock, None
-            self.network.watch(heir.sock, READ, heir)
+        sock, self.sock = self.sock, None
+        if sock:
+            self.network.watch(sock, 0, self)
+        if sock and heir:
+            heir.sock = sock
+            self.network.watch(sock, READ, heir)
+        elif sock and not self.link.network.waiting.keep(self.link, self.local, sock):
+            if self._has_caller:
+                self._hold(sock)
+            sock.close()
         super().end()
+
+    def _hold(self, sock: socket.socket) -> None:
+        """Holds the callers that the host has accepted beside the one who takes the last listener; the others would be reset
+        when the socket is closed, and this is the last moment before that."""
+        held = self.link.network.waiting.held.setdefault(self.local, [])
+        with suppress(OSError):
+            while len(held) < MAX_HELD:
+                conn, name = sock.accept()
+                held.append((conn, Peer(*name)))
 
     def ready(self, ready: int, now_ns: int) -> None:
         for _ in range(MAX_CALLERS):
@@ -182,19 +187,29 @@ class _Listener(HostChannel):
                 if not isinstance(error, BlockingIOError | ConnectionAbortedError):
                     self.failed(errno_name(error))
                 return
-            remote = self.network.inward(TCP, Peer(*name))
-            listener = next((listener for listener in self._listeners() if fits(listener._request.remote, remote)), None)
-            if listener and not self.network.relays.refuse(self.local, remote):
-                del listener.link.channels[listener.channel]
-                listener.end()
-                request = Connect(listener.channel, remote, listener.local.port, listener._request.keep_alive)
-                connection = listener.link.channels[listener.channel] = _Connection(listener.link, request)
-                connection.granted = listener.granted
-                connection.accept(conn, now_ns)
-            else:
-                self.network.notices.note(NoticeKind.TURNED_AWAY, self.local, Peer(*name))
-                with suppress(OSError), conn:
-                    conn.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+            self._let_in(conn, Peer(*name), now_ns, has_waited=self.link.network.waiting.keeps)
+
+    def _let_in(self, conn: socket.socket, real: Peer, now_ns: int, has_waited: bool) -> None:
+        """Gives a caller that the host has accepted to the first listener that it fits; resets a stranger.  Who `has_waited` may
+        have left in the meantime."""
+        network, listeners = self.link.network, self._listeners()
+        remote = network.inward(TCP, real)
+        if has_waited and has_left(conn):
+            conn.close()
+        elif (listener := next((listener for listener in listeners if fits(listener._request.remote, remote)), None)) and not (
+            network.relays.refuse(self.local, remote)
+        ):
+            listener._has_caller = True
+            del listener.link.channels[listener.channel]
+            listener.end()
+            request = Connect(listener.channel, remote, listener.local.port, listener._request.keep_alive)
+            connection = listener.link.channels[listener.channel] = _Connection(listener.link, request)
+            connection.granted = listener.granted
+            connection.accept(conn, now_ns)
+        else:
+            network.notices.note(NoticeKind.TURNED_AWAY, self.local, real)
+            with suppress(OSError), conn:
+                reset_on_close(conn)
 
     def meet_faults(self, relays: Relays, now_ns: int) -> None:
         """A fault that refuses every caller shuts the host's socket; a silent one leaves callers waiting in the host."""
@@ -346,11 +361,10 @@ class _Connection(HostChannel):
         if self.sock:
             self._tap(now_ns, TapKind.RST, True)
             with suppress(OSError):
-                self.sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+                reset_on_close(self.sock)
             self.end()
 
     def meet_faults(self, relays: Relays, now_ns: int) -> None:
-        # Between two units of this network the faults are at the side that has opened.
         if self._connected and relays.concern(self.local, self.remote) and (self._active or not relays.is_unit(self.remote)):
             relays.take_over(self, self.local, self.remote, len(self._outbox), self._fin_seen)
 

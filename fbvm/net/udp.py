@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import socket
+import struct
 from abc import abstractmethod
 
-from fbvm.base.host import shares_ports
-from fbvm.net.addresses import dotted
+from fbvm.base.host import keeps_ports, linger_format, shares_ports
+from fbvm.net.addresses import dotted, why_unusable
 from fbvm.net.channels import ANYBODY, MAX_DATAGRAMS, Channel, undeliverable
 from fbvm.net.host_link import HostLink
 from fbvm.net.relays import FaultyChannel, Relays
@@ -16,12 +17,52 @@ from fbvm.wire.tap import TapKind
 
 BUFFER_BYTES = 65_536
 """The host's buffers of each connection: small, so that the TCP window closes soon if the unit grants nothing."""
+_RST_ON_CLOSE = struct.pack(linger_format(), 1, 0)
 
 
 def share_port(sock: socket.socket) -> None:
     """Let a port be listened on again while old connections of it linger (elsewhere than on Windows)."""
     if shares_ports():
         sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+
+
+def try_to_listen(real: Peer) -> None:
+    """Listens at an endpoint of the host for a moment.  Raises OSError that names the endpoint and says why not."""
+    try:
+        with socket.socket() as sock:
+            share_port(sock)
+            sock.bind(dotted(real))
+            sock.listen()
+    except OSError as error:
+        raise OSError(error.errno, f"{real} cannot be used: {why_unusable(error)}") from None
+
+
+def reserve(host: str, transport: str) -> tuple[Peer, socket.socket | None]:
+    """A port of the host that the system chooses, and the socket that keeps it where others may listen beside it."""
+    keeper = socket.socket(socket.AF_INET, socket.SOCK_STREAM if transport == TCP else socket.SOCK_DGRAM)
+    share_port(keeper)
+    keeper.bind((host, 0))
+    real = Peer(*keeper.getsockname())
+    if keeps_ports() and transport == TCP:
+        return real, keeper
+    keeper.close()
+    return real, None
+
+
+def reset_on_close(sock: socket.socket) -> None:
+    """Lets a connection end by RST when it is closed.  Raises OSError."""
+    sock.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _RST_ON_CLOSE)
+
+
+def has_left(conn: socket.socket) -> bool:
+    """True if a caller has ended the connection before anybody took it, and has said nothing."""
+    conn.setblocking(False)
+    try:
+        return not conn.recv(1, socket.MSG_PEEK)
+    except BlockingIOError:
+        return False
+    except OSError:
+        return True
 
 
 class SocketLink(HostLink):

@@ -1,14 +1,14 @@
 """A stepping session: the position in the program, steps forwards and backwards, and changes from outside.
 
-Every scan is executed once on the live PLC, which has units and a network, and the state before the scan is kept.  A
-position inside a scan is reached by executing that scan again (`ScanReplay`).  A change from outside is kept with its
-position.  A change in the past discards all later scans: a new PLC executes everything up to there, in virtual time.
+Every scan is executed once on the live PLC, which has units and a network, and is recorded.  A position inside a scan is
+reached by executing that scan again (`ScanReplay`) from the state before it, which the recording gives.  A change from outside
+is kept with its position.  A change in the past discards all later scans: a new PLC executes everything up to there, in virtual
+time.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 
@@ -18,8 +18,9 @@ from fbvm.machine.plc import Phase, Plc, State
 from fbvm.record.draw.power import RungExecution
 from fbvm.record.draw.rung_values import RungValues
 from fbvm.record.draw.sfc_recorder import ChartCall
+from fbvm.record.recording.recording import Recording
 from fbvm.record.trace.events import Statement
-from fbvm.record.trace.history import observing
+from fbvm.record.trace.observing import observing
 from fbvm.record.trace.recorder import HEXADECIMAL_AREAS, Signal
 from fbvm.step.scan_replay import END, Action, ActionInjector, MomentListener, PastMoment, ScanReplay, Stop, depth
 from fbvm.watch import places
@@ -27,8 +28,8 @@ from fbvm.watch.names import Names
 from fbvm.watch.paths import Place, Span
 from fbvm.watch.values import Value
 
-KEPT, EVERY = 2000, 100
-"""The states of the last KEPT scans are kept, and of older scans every EVERYth."""
+NEAR = 32
+"""The states before so many scans on either side of the one that is looked at are kept."""
 QUIET_AREAS = frozenset(("A", "CF"))
 """Areas that the machine changes in each scan, such as clock pulses."""
 
@@ -59,7 +60,11 @@ class Session:
         self._make = make
         self._live = make()
         self._actions: dict[Position, list[Action]] = {}
-        self._states: dict[int, State] = {0: self._live.snapshot()}
+        self._recorded = Recording().add("live", self._live)
+        self._changed: dict[int, State] = {}
+        """Of scans with changes from outside before them the state before those."""
+        self._near: dict[int, State] = {}
+        """States before scans near the one that was looked at last."""
         self._replay = ScanReplay(self._live)
         self.names = Names.of(self._live.image, self._live.memory.areas)
         self.here = Position()
@@ -146,8 +151,7 @@ class Session:
 
     def goto(self, scan: int) -> None:
         """Goes to the beginning of any scan, earlier or later, or to a trap before it."""
-        while self._live.scans < scan and not self._live.trap:
-            self._advance()
+        self._advance_to(scan)
         if self._live.trap and scan >= self._live.scans:
             self._go_to(self._live.scans - 1, END)
         else:
@@ -163,7 +167,6 @@ class Session:
         Returns False if there is none; the position is then the beginning of the scan after them, or a trap."""
         after, start = self.here.step, self.here.scan
         for scan in range(start, start + scans):
-            self._ensure_state(scan)
             if self._stop_at(scan, partial(_behind, after, stop)):
                 return True
             ended = self._replay.count > after or scan > start
@@ -218,7 +221,7 @@ class Session:
         `action` is called again whenever this position is executed again."""
         action(self.plc)
         self._actions = {position: actions for position, actions in self._actions.items() if position <= self.here}
-        self._states = {scan: state for scan, state in self._states.items() if scan <= self.here.scan}
+        self._changed = {scan: state for scan, state in self._changed.items() if scan <= self.here.scan}
         if self._live.scans > self.here.scan:
             self._rebuild(self.here.scan)
         self._actions.setdefault(self.here, []).append(action)
@@ -232,50 +235,67 @@ class Session:
             self._play(scan, partial(_reached, last), listener)
             if scan < here.scan:
                 now_ns = self.now_ns
-                self._ensure_state(scan + 1)
-                self.plc.restore(self._states[scan + 1])
+                self.plc.restore(self._state(scan + 1))
                 listener.phase(PastMoment(self.plc, scan, now_ns), Phase.REFRESH)
         self._go_to(here.scan, here.step)
 
     # --- scans
 
-    def _advance(self) -> None:
-        """Executes one scan of the live PLC."""
+    def _advance_to(self, scan: int) -> None:
+        """Executes scans of the live PLC up to the one before `scan`, or to a trap."""
+        plc = self._live
+        while plc.scans < scan and not plc.trap:
+            with_actions = [position.scan for position in self._actions if position.scan >= plc.scans]
+            first = min([*with_actions, scan])
+            if first > plc.scans:
+                plc.run(scans=first - plc.scans)
+            else:
+                self._scan_with_actions()
+
+    def _scan_with_actions(self) -> None:
+        """Executes one scan of the live PLC with changes from outside before it or inside."""
         plc = self._live
         actions = self._actions_in(plc.scans)
+        self._changed[plc.scans] = plc.snapshot()
         for action in actions.get(0, ()):
             action(plc)
-        with observing(plc, ActionInjector(actions)) if any(actions) else nullcontext():
+        if any(actions):
+            with observing(plc, ActionInjector(actions)):
+                plc.scan()
+            self._recorded.changed()
+        else:
             plc.scan()
-        self._states[plc.scans] = plc.snapshot()
-        if (old := plc.scans - KEPT) > 0 and old % EVERY:
-            self._states.pop(old, None)
 
     def _rebuild(self, scan: int) -> None:
         """Puts the live PLC before a scan: by its state if it has no units and no watchers, else as a new PLC."""
-        state = self._states.get(scan)
-        if not self._live.units and not self._live.watchers and state is not None:
-            self._live.restore(state)
-            return
-        self._live = self._make()
-        while self._live.scans < scan:
-            self._advance()
+        if not self._live.units and not self._live.watchers and scan >= self._recorded.scans.start:
+            self._live.restore(self._state(scan))
+        else:
+            self._live = self._make()
+            self._recorded = Recording().add("live", self._live)
+            self._advance_to(scan)
+        self._near.clear()
 
-    def _ensure_state(self, scan: int) -> None:
-        """Makes sure that the state before a scan is in `_states`."""
-        while self._live.scans < scan and not self._live.trap:
-            self._advance()
-        if scan not in self._states:
-            ahead, kept = self._live, dict(self._states)
+    def _state(self, scan: int) -> State:
+        """The state before a scan, without the changes from outside that were made there."""
+        self._advance_to(scan)
+        held = self._recorded.scans
+        if scan < held.start:
             self._rebuild(scan)
-            self._live, self._states = ahead, {**self._states, **kept}
+        if scan in self._changed:
+            return self._changed[scan]
+        if scan >= self._live.scans:
+            return self._live.snapshot()
+        if scan not in self._near:
+            near = range(max(held.start, scan - NEAR), min(self._live.scans, scan + NEAR))
+            self._near = {state.scans: state for state in self._recorded.states(near)}
+        return self._near[scan]
 
     def _actions_in(self, scan: int) -> Mapping[int, list[Action]]:
         return {position.step: actions for position, actions in self._actions.items() if position.scan == scan}
 
     def _play(self, scan: int, stop: Stop, listener: MomentListener | None = None) -> bool:
-        self._ensure_state(scan)
-        return self._replay.play(self._states[scan], self._actions_in(scan), stop, listener)
+        return self._replay.play(self._state(scan), self._actions_in(scan), stop, listener)
 
     def _go_to(self, scan: int, step: int) -> None:
         self._stop_at(scan, partial(_reached, step))

@@ -11,7 +11,7 @@ from itertools import zip_longest
 from pathlib import Path
 
 from fbvm.base.files import write_file
-from fbvm.record.trace.recorder import Recording
+from fbvm.record.trace.recorder import Waveforms
 from fbvm.watch.values import show_time
 
 OPTION = "--fbvm-golden"
@@ -19,21 +19,21 @@ MOST_DIFFERENCES = 5
 """Lines that a difference shows of one variable."""
 
 
-def golden_text(recording: Recording) -> str:
-    """The text of a recording: of each variable the scans at whose end it had a new value."""
-    lines = [f"scans {recording.first} to {recording.scans.stop - 1}"]
-    for track in recording.tracks:
+def golden_text(waveforms: Waveforms) -> str:
+    """The text of waveforms: of each variable the scans at whose end it had a new value."""
+    lines = [f"scans {waveforms.first} to {waveforms.scans.stop - 1}"]
+    for track in waveforms.tracks:
         lines += ["", track.signal.label]
         for scan, value in track.changes:
-            when = show_time(recording.times_ns[scan - recording.first]).removeprefix("T#")
+            when = show_time(waveforms.times_ns[scan - waveforms.first]).removeprefix("T#")
             lines.append(f"  scan {scan:<6} {when:<9} {track.signal.text(value)}")
     return "\n".join(lines) + "\n"
 
 
-def check(path: Path, recording: Recording, write: bool) -> None:
+def check(path: Path, waveforms: Waveforms, write: bool) -> None:
     """Raises AssertionError with the difference if a run is not as the file says; with `write`, writes the file."""
     __tracebackhide__ = True
-    found = golden_text(recording)
+    found = golden_text(waveforms)
     if write:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_file(path, found)

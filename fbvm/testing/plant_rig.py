@@ -13,6 +13,7 @@ from pathlib import Path
 
 from fbvm.base.diagnostics import Diagnostic, Source, errors
 from fbvm.net.loop import LoopNetwork
+from fbvm.record.recording.recording import Recording
 from fbvm.run.plant import Kind, Plant
 from fbvm.run.project import FILE, Project, read_project
 from fbvm.syntax.text import read
@@ -41,6 +42,7 @@ class PlantRig:
         assert isinstance(self._plant.network, LoopNetwork)
         self.network = self._plant.network
         self.rigs: dict[str, Rig] = {}
+        self._recording = Recording()
         for kind in self._plant.kinds:
             self._add(kind)
 
@@ -51,7 +53,8 @@ class PlantRig:
             image = run.plc.image
             programs = [program for task in image.tasks for program in task.programs]
             prefix = f"{programs[0].name}." if len(programs) == 1 else ""
-            rig = Rig(Subject(name, image, prefix, sources, kind.row.libraries), plc=run.plc, network=self.network)
+            rig = Rig(Subject(name, image, prefix, sources, kind.row.libraries), plc=run.plc, network=self.network,
+                      recording=self._recording)
             for row in kind.row.sets:
                 rig.at(row.at_ns, {row.name: row.value})
             self.rigs[name] = rig

@@ -15,6 +15,7 @@ import linecache
 import textwrap
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from contextlib import ExitStack
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -133,24 +134,21 @@ def network() -> Iterator[LoopNetwork]:
 
 
 @pytest.fixture
-def trace(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[Tracer]:
-    """Records a rig: `run = trace(pump)`, then `run.chart("Start", "Running")`, `run.table(...)`, `run.why("Running")`.
+def trace(tmp_path: Path, request: pytest.FixtureRequest) -> Tracer:
+    """Looks back at a rig: `run = trace(pump)`, then `run.chart("Start", "Running")`, `run.table(...)`, `run.why("Running")`.
 
     `run.golden("golden/start.txt", "Running")` compares it with a file beside the test, which `--fbvm-golden` writes.
 
-    `trace(pump, "Delay.*", depth="scans")` keeps less; `run.path` is the file, for `fbvm chart` and `fbvm why`."""
+    `run.path` is a file of it, for `fbvm chart` and `fbvm why`; `trace(pump, "Delay.*", depth="scans")` writes less into it."""
     from fbvm.testing.recorded import Recorded
 
-    made: list[Recorded] = []
+    numbers = count()
 
     def record(rig: Rig, *patterns: str, depth: str = "statements") -> Recorded:
-        path, anew = tmp_path / f"run{len(made)}.fbtrace", request.config.getoption("fbvm_golden")
-        made.append(Recorded(rig, path, patterns, depth, request.path.parent, anew))
-        return made[-1]
+        path, anew = tmp_path / f"run{next(numbers)}.fbtrace", request.config.getoption("fbvm_golden")
+        return Recorded(rig, path, patterns, depth, request.path.parent, anew)
 
-    yield record
-    for recorded in made:
-        recorded.close()
+    return record
 
 
 def _rigs(node: pytest.Item) -> list[Rig]:
@@ -188,7 +186,8 @@ def _instrument(request: pytest.FixtureRequest, rig: Rig) -> None:
 
         Path(folder).mkdir(parents=True, exist_ok=True)
         name = f"{file_name(request.node.nodeid)}.{_rigs(request.node).index(rig)}.fbtrace"
-        attached.callback(Recorded(rig, Path(folder) / name).close)
+        recorded = Recorded(rig, Path(folder) / name)
+        attached.callback(lambda: recorded.path)
     request.addfinalizer(attached.close)
 
 

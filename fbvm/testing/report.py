@@ -5,7 +5,7 @@ from __future__ import annotations
 from fbvm.base.types import StructType
 from fbvm.machine.plc import Phase, Plc
 from fbvm.record.draw.table import LastWrite, ScanTable
-from fbvm.record.trace.history import History
+from fbvm.record.recording.recording import PlcRecording
 from fbvm.record.trace.recorder import Signal
 from fbvm.testing.reads import VariableReads
 from fbvm.testing.subject import Subject
@@ -23,8 +23,8 @@ MOST_COLUMNS = 8
 class Report:
     """Writes reports about one PLC."""
 
-    def __init__(self, plc: Plc, subject: Subject, history: History, reads: VariableReads) -> None:
-        self._plc, self._subject, self._history, self._reads = plc, subject, history, reads
+    def __init__(self, plc: Plc, subject: Subject, recorded: PlcRecording, reads: VariableReads) -> None:
+        self._plc, self._subject, self._recorded, self._reads = plc, subject, recorded, reads
         self.names = Names.of(plc.image, plc.memory.areas)
 
     def names_in(self, prefix: str) -> list[str]:
@@ -56,7 +56,7 @@ class Report:
     def _again(self, signals: list[Signal], scans: int) -> ScanTable:
         table = ScanTable(self._plc.image.sites, self.names, signals)
         end = self._plc.scans
-        self._history.replay(range(max(0, end - scans), end), table)
+        self._recorded.follow(table, range(max(0, end - scans), end))
         return table
 
     def _last_change(self, table: ScanTable, signal: Signal) -> str:

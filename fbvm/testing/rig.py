@@ -21,7 +21,7 @@ from fbvm.engine.trap import Trap
 from fbvm.machine.plc import Mode, Plc
 from fbvm.net.loop import LoopNetwork
 from fbvm.record.draw.chart import Chart, draw
-from fbvm.record.trace.history import History
+from fbvm.record.recording.recording import PlcRecording, Recording
 from fbvm.record.trace.packets import Dissector, Packet, add_tap
 from fbvm.record.trace.recorder import Recorder
 from fbvm.testing.pages import write_page
@@ -94,7 +94,7 @@ class Rig:
     plc: Plc
     subject: Subject
     network: LoopNetwork
-    _history: History
+    _recorded: PlcRecording
     _reads: VariableReads
     _timed: list[tuple[int, str, object]]
     _report: Report
@@ -102,16 +102,16 @@ class Rig:
 
     def __init__(self, what: Subject, cycle: str | int = "10ms", *, stubs: Mapping[str, Stub] | None = None,
                  units: Sequence[Unit] = (), etn21: str = "", network: LoopNetwork | None = None,
-                 plc: Plc | None = None) -> None:  # fmt: skip
+                 plc: Plc | None = None, recording: Recording | None = None) -> None:  # fmt: skip
         set_ = object.__setattr__
         plc = plc or Plc(what.image, to_ns(cycle))
         set_(self, "plc", plc)
         set_(self, "subject", what)
-        set_(self, "_history", History(plc))
+        set_(self, "_recorded", (recording or Recording()).add(what.name, plc))
         set_(self, "_reads", VariableReads())
         set_(self, "_timed", [])
         set_(self, "network", network or LoopNetwork())
-        set_(self, "_report", Report(plc, what, self._history, self._reads))
+        set_(self, "_report", Report(plc, what, self._recorded, self._reads))
         for name, stub in (stubs or {}).items():
             if callable(stub):
                 self._stub(name, stub)
@@ -158,9 +158,9 @@ class Rig:
         def run(base: int) -> None:
             place = self.plc.find(self._report.names.instance(base))
             assert isinstance(place, Place)
-            stub(Values(self.plc, place, lambda place: None, lambda: None))
+            stub(Values(self.plc, place, lambda place: None))
 
-        self._history.substitute(numbers[0], run)
+        self._recorded.substitute(numbers[0], run)
 
     def __repr__(self) -> str:
         return f"<{self.subject.name}, {self.plc.scans} scans, {show_time(self.plc.elapsed_ns)[2:]}>"
@@ -187,7 +187,7 @@ class Rig:
             raise AttributeError(str(error)) from None
 
     def __getitem__(self, name: str) -> Any:
-        return value_of(self.plc, self.find(name), self._reads.add, self._history.mark_changed)
+        return value_of(self.plc, self.find(name), self._reads.add)
 
     def __setattr__(self, name: str, value: object) -> None:
         try:
@@ -201,7 +201,6 @@ class Rig:
 
     def _write(self, place: Place | Span, value: object) -> None:
         __tracebackhide__ = True
-        self._history.mark_changed()
         try:
             write(self.plc, place, value)
         except (TypeError, ValueError) as error:
@@ -278,7 +277,6 @@ class Rig:
             _, name, value = self._timed.pop(0)
             self[name] = value
         self._reads.clear()
-        self._history.before_scan()
         trap = self.plc.scan()
         if trap:
             raise Trapped(trap, trap.told(Names.of(self.plc.image, self.plc.memory.areas).instance))
@@ -297,20 +295,17 @@ class Rig:
 
     def power_on(self) -> Rig:
         """Switches power off and on; retained variables keep their values."""
-        self._history.mark_changed()
         self.plc.warm_start()
         return self
 
     def cold_start(self) -> Rig:
         """Switches power on as for a new PLC: all variables have their initial values."""
-        self._history.mark_changed()
         self.plc.cold_start()
         return self
 
     def mode(self, mode: str) -> Rig:
         """Sets the operating mode.  "PROGRAM": units are refreshed, the program is not executed; "RUN" after it clears variables
         that are not retained."""
-        self._history.mark_changed()
         self.plc.mode = Mode(mode.upper())
         return self
 
@@ -326,7 +321,6 @@ class Rig:
 
     def unforce(self, *names: str) -> Rig:
         """Ends forces, all of them if none is named."""
-        self._history.mark_changed()
         for name in names:
             self.plc.unforce(self.find(name).name)
         if not names:
@@ -368,8 +362,7 @@ class Rig:
     def write_page(self, path: Path, title: str, lines: tuple[str, range] | None = None, failure: str = "") -> bool:
         """Writes the last scans as one HTML file, which shows the variables that `lines` have read, and `failure`, the text of
         the failed assertion; returns False without a scan."""
-        return write_page(path, title, self._history, self.subject, self.plc, self._reads.places(*(lines or ())),
-                          self._packets, failure=failure)
+        return write_page(path, title, self._recorded, self.subject, self._reads.places(*(lines or ())), failure)
 
 
 def _file(path: str, folders: Sequence[Path]) -> Path:

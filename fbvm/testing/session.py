@@ -41,7 +41,7 @@ def count_coverage(config: pytest.Config, plc: Plc, subject: Subject) -> Iterato
     if counting is None:
         yield
         return
-    from fbvm.record.trace.history import observing
+    from fbvm.record.trace.observing import observing
 
     with observing(plc, counting.coverage.listener(subject)):
         yield

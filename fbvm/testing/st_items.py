@@ -18,8 +18,9 @@ from fbvm.base.types import BOOL, fold
 from fbvm.code.image import Site
 from fbvm.machine.plc import Phase, Plc
 from fbvm.record.draw.table import ScanTable
+from fbvm.record.recording.recording import Recording
 from fbvm.record.trace.events import Call, Event, Frame, Read, Statement, Write
-from fbvm.record.trace.history import History, observing
+from fbvm.record.trace.observing import observing
 from fbvm.record.trace.recorder import Signal
 from fbvm.syntax import tree
 from fbvm.syntax.parser import parse
@@ -86,17 +87,16 @@ class StItem(pytest.Item):
         warnings.add(made)
         plc = Plc(made.image, CYCLE_NS)
         watch = Assertions(plc, made.prefix)
-        history = History(plc)
+        recorded = Recording().add(self.name, plc)
         try:
             with count_coverage(self.config, plc, made), observing(plc, watch):
-                _run(plc, history, f"{made.prefix}Done")
+                _run(plc, f"{made.prefix}Done")
         except AssertFailed as failed:
             table = ScanTable(plc.image.sites, watch.names, [signal for signal, _ in failed.values])
-            history.replay(range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1), table)
+            recorded.follow(table, range(max(0, failed.scan - LOOKED_BACK), failed.scan + 1))
             failed.table = table.draw([band for band in table.bands if band.has_changes][-BANDS:]) if failed.values else ""
             asked, said = [signal.place for signal, _ in failed.values], self._assertion(failed)
-            failed.page = failure_page(self, "", lambda path: write_page(path, self.nodeid, history, made, plc, asked,
-                                                                         unfinished=True, failure=said))  # fmt: skip
+            failed.page = failure_page(self, "", lambda path: write_page(path, self.nodeid, recorded, made, asked, said))
             raise
         if not watch.asserted:
             raise AssertionError(f"{self.name} ended without one ASSERT")
@@ -120,14 +120,13 @@ class StItem(pytest.Item):
         return self.path, self.line - 1, self.name
 
 
-def _run(plc: Plc, history: History, done: str) -> None:
+def _run(plc: Plc, done: str) -> None:
     """Executes one scan, or, for a program with Done, scans until Done is TRUE."""
     program = plc.find(done.rpartition(".")[0])
     assert isinstance(program, Place)
     field = program.type.member("Done")  # type: ignore[attr-defined]
     waits = field is not None and field.type is BOOL
     while True:
-        history.before_scan()
         trap = plc.scan()
         if trap:
             raise Trapped(trap)

@@ -26,18 +26,16 @@ class Values:
 
     A variable whose name is no attribute in Python is `values["name"]`."""
 
-    __slots__ = ("_changed", "_place", "_plc", "_read")
+    __slots__ = ("_place", "_plc", "_read")
     _place: Place
     _plc: Plc
     _read: OnRead
-    _changed: Callable[[], None]
 
-    def __init__(self, plc: Plc, place: Place, read: OnRead, changed: Callable[[], None]) -> None:
+    def __init__(self, plc: Plc, place: Place, read: OnRead) -> None:
         set_ = object.__setattr__
         set_(self, "_plc", plc)
         set_(self, "_place", place)
         set_(self, "_read", read)
-        set_(self, "_changed", changed)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("__"):
@@ -54,10 +52,9 @@ class Values:
             raise AttributeError(str(error)) from None
 
     def __getitem__(self, path: str) -> Any:
-        return value_of(self._plc, self._find(path), self._read, self._changed)
+        return value_of(self._plc, self._find(path), self._read)
 
     def __setitem__(self, path: str, value: object) -> None:
-        self._changed()
         write(self._plc, self._find(path), value)
 
     def __dir__(self) -> list[str]:
@@ -79,11 +76,11 @@ class Values:
         return found
 
 
-def value_of(plc: Plc, found: Place | Span, read: OnRead, changed: Callable[[], None]) -> Any:
+def value_of(plc: Plc, found: Place | Span, read: OnRead) -> Any:
     """The value at a place; of a structure or instance, its variables."""
     if isinstance(found, Place):
         if isinstance(base(found.type), StructType):
-            return Values(plc, found, read, changed)
+            return Values(plc, found, read)
         read(found)
         return as_read(found.type, plc.read(found))
     return plc.read(found)

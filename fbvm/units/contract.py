@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
+from fbvm.base.memory import Snapshot
 from fbvm.processor.contract import Contract
 from fbvm.wire.link import Event, Request
 
@@ -139,6 +140,31 @@ class Unit(Protocol):
 
     def reset(self, memory: AreaMemory) -> list[Request]:
         """Power on or unit restart: words to their initial state; returns what closes connections left open."""
+
+
+@dataclass(frozen=True)
+class UnitState:
+    """All that a unit knows at one moment, beside its arguments: the memory of its processor, None if that is not switched on,
+    and what it keeps elsewhere."""
+
+    memory: Snapshot | None
+    other: tuple[Any, ...]
+
+
+@runtime_checkable
+class ResumableUnit(Unit, Protocol):
+    """A unit that can go on from a state it was in, so that a recording of its PLC needs only what the network told it."""
+
+    @property
+    def times_set(self) -> int:
+        """How often something has been set on it that is in `settings`."""
+
+    @property
+    def state(self) -> UnitState:
+        """Its state between two scans.  Pages of memory that did not change are shared with the state before."""
+
+    def resume(self, state: UnitState, memory: AreaMemory) -> None:
+        """Goes on from a state of a unit with the same arguments, in a PLC with this memory."""
 
 
 @runtime_checkable

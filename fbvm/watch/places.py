@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from fbvm.base.memory import STRUCTS, WHOLE_BYTES, Memory
@@ -46,6 +46,24 @@ def write_all(memory: Memory, values: Mapping[Place, object]) -> None:
     """Writes each value to its place, as `write` does."""
     for place, value in values.items():
         write(memory, place, value)
+
+
+def read_found(memory: Memory, found: Place | Span) -> Value:
+    """The value at a place, or the list of values in a span of places."""
+    return [read(memory, place) for place in found.places] if isinstance(found, Span) else read(memory, found)
+
+
+def write_found(memory: Memory, found: Place | Span, value: object) -> None:
+    """Writes a value to a place, or a list of values to a span of places.
+
+    Raises as `write`, and ValueError for a list of another length."""
+    if isinstance(found, Place):
+        write(memory, found, value)
+        return
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(found.places):
+        raise ValueError(f"{found.name} takes a list of {len(found.places)} values")
+    for place, item in zip(found.places, value, strict=True):
+        write(memory, place, item)
 
 
 def dereferenced(memory: Memory, place: Place) -> Place | None:

@@ -22,6 +22,7 @@ from real_station import black_hole, closed_port, real
 
 import fbvm.net.switchboard
 import fbvm.net.tcp
+import fbvm.net.udp
 from fbvm.code.compiler import compile_text
 from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
@@ -219,7 +220,8 @@ class Guard:
         forbidden = {name: never(name) for name in ("connect", "sendall", "makefile", "settimeout")}
         counted = type("Counted", (socket.socket,), {name: guarded(name) for name in self.CALLS} | forbidden)
         names = {**vars(socket), "socket": counted, "gethostbyname": never("gethostbyname")}
-        monkeypatch.setattr(fbvm.net.tcp, "socket", SimpleNamespace(**names))
+        for module in (fbvm.net.tcp, fbvm.net.udp):
+            monkeypatch.setattr(module, "socket", SimpleNamespace(**names))
         monkeypatch.setattr(fbvm.net.switchboard, "select", SimpleNamespace(select=self._waiting))
 
     def _waiting(self, *arguments: Any) -> Any:

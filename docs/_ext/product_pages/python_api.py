@@ -21,7 +21,7 @@ SUBJECTS = {
     "Run": ("Plc", "Mode", "Trap", "Stopped", "UnknownPlace"),
     "Units": ("Etn21", "Noc", "Tianxing"),
     "Networks and peers": ("LoopNetwork", "TcpNetwork", "Peer", "ModbusPeer", "ModbusServer"),
-    "Look": ("chart", "draw", "Recorder", "TraceWriter", "Depth", "Trace", "Capture"),
+    "Look": ("chart", "draw", "Recorder", "Recording", "TraceWriter", "Depth", "Trace", "Capture"),
     "Journals": ("Journal", "JournalError", "open_journal", "Replay"),
     "PLCopen XML": ("import_xml", "Imported", "export_xml", "Exported"),
 }

@@ -14,7 +14,7 @@ from fbvm.cli.shared.files import writing
 from fbvm.cli.shared.options import split_names
 from fbvm.cli.shared.paths import ExistingPath
 from fbvm.cli.shared.terminal import named
-from fbvm.cli.shared.traces import SUFFIX, open_trace, recording_of, scans_option
+from fbvm.cli.shared.traces import SUFFIX, open_trace, scans_option, waveforms_of
 from fbvm.record.draw.svg import SvgChart
 from fbvm.record.export.pcapng import Capture
 from fbvm.record.export.vcd import write_vcd
@@ -30,7 +30,7 @@ Names = Sequence[str]
 
 
 def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
-    made = recording_of(trace, names, scans)
+    made = waveforms_of(trace, names, scans)
     with new_file(path) as file:
         text = TextIOWrapper(file, encoding="utf-8", newline="")
         write_csv(made, text)
@@ -40,19 +40,19 @@ def _csv(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
 def _vcd(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
     text = StringIO()
     try:
-        write_vcd(recording_of(trace, names, scans), text)
+        write_vcd(waveforms_of(trace, names, scans), text)
     except ModuleNotFoundError:
         raise click.UsageError("VCD needs the package pyvcd: pip install 'fbvm[vcd]'") from None
     write_file(path, text.getvalue().encode("ascii", "replace"))
 
 
 def _svg(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
-    made = recording_of(trace, names, scans)
+    made = waveforms_of(trace, names, scans)
     write_file(path, SvgChart(made, packets(trace, made.scans), path.stem).text())
 
 
 def _html(trace: Trace, names: Names, scans: range | None, path: Path) -> None:
-    recording_of(trace, names, range(trace.scans.stop - 1, trace.scans.stop) if scans is None else scans)
+    waveforms_of(trace, names, range(trace.scans.stop - 1, trace.scans.stop) if scans is None else scans)
     write_file(path, page(page_data(trace, names, scans, path.stem)))
 
 

@@ -51,6 +51,8 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
 @bind_option
 @click.option("--port", type=click.IntRange(0, 65535), default=1502, show_default=True, help="0: any free port.")
 @click.option("--sockets", type=click.IntRange(1, 8), default=1, show_default=True, help="Clients at once.")
+@click.option("--backlog/--no-backlog", default=True, show_default=True,
+              help="Hold callers until a socket is free, where a unit refuses them.")
 @click.option("--read-only", is_flag=True, help="Refuse everything that writes.")
 @click.option("--fn0f", is_flag=True, help="Serve 0F, write multiple coils, too.")
 @click.option("--full-dm", is_flag=True, help="Let 10, write multiple registers, begin anywhere in D.")
@@ -63,7 +65,7 @@ HOW_TO_MAP = "the first port of the program is the one of --port; `fbvm run --ma
               help="Write who asked what, a JSON object a line; - is the terminal.")
 def command(
     files: tuple[Path, ...], program: str | None, libraries: tuple[Path, ...], bind: str, port: int, image: Path | None,
-    log: Path | None, watch_ns: int, **settings: int | None,
+    log: Path | None, watch_ns: int, backlog: bool, **settings: int | None,
 ) -> None:  # fmt: skip
     """Serve the memory of a PLC by Modbus TCP until Ctrl-C or SIGTERM; with FILEs run that program instead, and let others
     reach the first port at which it waits.
@@ -76,7 +78,7 @@ def command(
         plc.watch_cycle.time_ns = watch_ns
         if image:
             _load(plc, image)
-        network = _network(bind, port)
+        network = _network(bind, port, backlog)
         stack.callback(network.close)
         if log:
             network.tap = RequestLog(_opened(stack, log), loop.epoch_ns(), lambda: plc.scans).tap
@@ -141,11 +143,11 @@ def _opened(stack: ExitStack, log: Path) -> IO[str]:
         return stack.enter_context(TextIOWrapper(growing_file(log, "ab"), encoding="utf-8"))
 
 
-def _network(bind: str, port: int) -> TcpNetwork:
+def _network(bind: str, port: int, backlog: bool) -> TcpNetwork:
     """The network; its first door is at `bind` and `port`.  Ends with status 5 if that cannot be used."""
     real = Peer(address(bind), port)
     warn_if_reachable(real)
-    network = TcpNetwork(bind=real.host, door=real)
+    network = TcpNetwork(bind=real.host, door=real, backlog=backlog)
     try:
         network.try_door(real)
     except OSError as error:

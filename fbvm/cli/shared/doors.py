@@ -9,13 +9,13 @@ from typing import NoReturn
 from fbvm.cli.shared import status
 from fbvm.cli.shared.terminal import say
 from fbvm.net.addresses import is_reachable
-from fbvm.net.notices import Notice, NoticeKind
+from fbvm.net.notices import EACH_TIME, Notice, NoticeKind
 from fbvm.wire.link import Peer
 
 LISTENING = "listening on "
 """The beginning of what follows the name of a door: host and port."""
-MOST_TURNED_AWAY = 20
-"""Callers of which is told that they were turned away."""
+MOST_CALLERS = 20
+"""Callers of which is told that they wait or were turned away."""
 
 
 def warn_if_reachable(real: Peer) -> None:
@@ -51,16 +51,16 @@ def notice_teller(how_to_map: str, known: Mapping[Peer, Peer] | None = None) -> 
             if endpoint not in (known or {}):
                 say_doors({endpoint: real})
             return
-        if notice.kind is NoticeKind.TURNED_AWAY:
+        if notice.kind in EACH_TIME:
             turned_away += 1
-            if turned_away > MOST_TURNED_AWAY:
+            if turned_away > MOST_CALLERS:
                 return
         said = {
             NoticeKind.NOT_MAPPED: f"{endpoint} is not tried: ports below 1024 belong to the host; "
                                    + how_to_map.format(endpoint=endpoint, port=1000 + endpoint.port),
             NoticeKind.UNUSABLE: f"{endpoint}: {real} cannot be used: {notice.error}",
             NoticeKind.UNREACHED: f"{endpoint}: nobody answers at {real} ({notice.error})",
-            NoticeKind.FULL: f"{endpoint}: {real} has the last socket that waited; others are refused until one waits again",
+            NoticeKind.FULL: f"{endpoint}: a caller waits at {real}, since all sockets are in use",
             NoticeKind.TURNED_AWAY: f"{endpoint}: {real} is turned away, since no socket waits",
         }[notice.kind]  # fmt: skip
         say(said, fg="yellow", err=True)

@@ -18,7 +18,7 @@ from fbvm.record.draw.power import PowerFlow
 from fbvm.record.draw.rung_values import RungValues
 from fbvm.record.draw.sfc_recorder import ChartRecorder
 from fbvm.record.draw.sfc_text import sfc_text
-from fbvm.record.trace.history import observing
+from fbvm.record.trace.observing import observing
 from fbvm.syntax.ladder.drawing.widths import Annotations
 from fbvm.watch.names import Names
 from fbvm.watch.paths import Place

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import Any
 
 import click
 
@@ -21,10 +20,12 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.record.page.data import page_data
 from fbvm.record.page.page import page
+from fbvm.record.recording.recording import Recording
+from fbvm.record.recording.scans import RecordedScans
 from fbvm.record.trace.format import TraceError
 from fbvm.record.trace.reader import Trace
-from fbvm.record.trace.recorder import Recording
-from fbvm.record.trace.signals import recording
+from fbvm.record.trace.recorder import Waveforms
+from fbvm.record.trace.signals import waveforms
 from fbvm.record.trace.source_texts import source_texts
 from fbvm.record.trace.writer import Depth, TraceWriter, source_lines
 from fbvm.watch.paths import UnknownPlace
@@ -84,9 +85,9 @@ def open_trace(path: Path) -> Iterator[Trace]:
         raise click.UsageError(str(error)) from None
 
 
-def recording_of(trace: Trace, names: Sequence[str], scans: range | None) -> Recording:
-    """The recording of some variables in some scans.  Raises UsageError if the trace has no such scans."""
-    made = recording(trace, names, scans)
+def waveforms_of(trace: Trace, names: Sequence[str], scans: range | None) -> Waveforms:
+    """The waveforms of some variables in some scans.  Raises UsageError if the trace has no such scans."""
+    made = waveforms(trace, names, scans)
     if not made.times_ns:
         held = f"scans {trace.scans[0]} to {trace.scans[-1]}" if trace.scans else "no scans yet"
         raise click.UsageError(f"the trace has {held}")
@@ -137,21 +138,17 @@ def write_page(plc: Plc, path: Path | None, files: Sequence[Path], libraries: Se
     if path is None:
         yield wanted
         return
-    with tempfile.TemporaryFile() as temporary:
-        file = cast(BinaryIO, temporary)
-        writer = TraceWriter(plc, file, Depth.STATEMENTS, (), statement_lines(plc.image, files, libraries))
-        try:
-            yield wanted
-        finally:
-            writer.close()
-        file.seek(0)
-        trace = Trace(file)
-        last = max(trace.scans.start, trace.scans.stop - INTERRUPTED_SCANS)
-        scans = range(last, trace.scans.stop) if wanted.only_last and last > trace.scans.start else None
-        if scans:
-            say(f"{named(path)} holds scans {last} to {scans[-1]} only: the run was interrupted", err=True)
-        with writing(path):
-            write_file(path, page(page_data(trace, scans=scans, title=path.stem)))
+    recording = Recording()
+    recorded = recording.add(path.stem, plc)
+    yield wanted
+    recording.close()
+    source = RecordedScans(recorded, statement_lines(plc.image, files, libraries))
+    last = max(source.scans.start, source.scans.stop - INTERRUPTED_SCANS)
+    scans = range(last, source.scans.stop) if wanted.only_last and last > source.scans.start else None
+    if scans:
+        say(f"{named(path)} holds scans {last} to {scans[-1]} only: the run was interrupted", err=True)
+    with writing(path):
+        write_file(path, page(page_data(source, scans=scans, title=path.stem)))
 
 
 def statement_lines(image: Image, files: Sequence[Path], libraries: Sequence[Path]) -> dict[str, dict[int, str]]:

@@ -64,6 +64,14 @@ def engine_for(image: Image, memory: Memory, choice: str = "auto", observed: boo
     return TieredEngine(image, memory)
 
 
+def again_choice(image: Image, choice: str, substituted: bool) -> str:
+    """The choice for executing again what ran on the engine of a `choice`: machine code if that is loaded, since a replay is over
+    before it would pay to make some.  With `substituted` bodies Python."""
+    if substituted or choice == "python":
+        return "python"
+    return "native" if code_of(image).ready else choice
+
+
 def choice_of(engine: object) -> str:
     """The choice by which `engine_for` makes such an engine.  Raises ValueError for what it does not make."""
     for choice, kind in (("auto", TieredEngine), ("python", PythonEngine), ("native", NativeEngine)):

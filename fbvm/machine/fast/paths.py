@@ -119,6 +119,8 @@ class ProgramAlone:
         most = min(most, (io.unit_ns(NEVER) - now_ns - 1) // step_ns)
         if not self._idle or most <= 0 or not io.is_idle(now_ns):
             return 0, None
+        if io.recorder:
+            io.recorder.before(now_ns + step_ns)
         io.changed_words = False
         done, point = self._scans.run(most, now_ns + step_ns, step_ns, budget, spend)
         io.skipped += done

@@ -164,6 +164,8 @@ class WithUnits:
         scans, io = self._scans, self._io
         if self._has_pending_events():
             return 0, None
+        if io.recorder:
+            io.recorder.before(now_ns + step_ns)
         done, point = scans.run(most, now_ns + step_ns, step_ns, budget, spend)
         io.skipped += done - 1
         if point > 0:
@@ -185,14 +187,16 @@ class WithUnits:
             self._io.report_skipped()
         if self._parameters.unfinished:
             self._submit_requests(now_ns)
-        more = False
-        for _, unit, link in self._rows:
+        more, recorder = False, self._io.recorder
+        for number, (_, unit, link) in enumerate(self._rows):
             if link.is_quiet:
                 link.pass_by(1)
                 continue
             events = link.events(now_ns)
             if events:
                 unit.post(events)
+                if recorder:
+                    recorder.received(number, events)
             if not link.is_quiet:
                 more = True
         return more

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from fbvm.base.memory import Memory
+from fbvm.machine.scan.inputs import InputRecorder
 from fbvm.net.journal import Journal
 from fbvm.units.contract import ProcessorUnit, Unit
 from fbvm.wire.link import Link, Network, Request
@@ -35,6 +36,8 @@ class IORefresh:
         """How many refreshes were left out of which the links have not been told."""
         self.changed_words = False
         """True if the units changed words in the last refresh: the program should see them soon."""
+        self.recorder: InputRecorder | None = None
+        """Is told the events of the networks."""
 
     def refresh(self, now_ns: int, journal: Journal | None = None, seen: Callable[[int], None] | None = None) -> bool:
         """One refresh at `now_ns`: each unit exchanges its words and stores what it received; then the networks take the requests
@@ -44,7 +47,9 @@ class IORefresh:
         True if no unit has anything left to do (`is_idle`)."""
         if self.skipped:
             self.report_skipped()
-        memory, changed_words = self.memory, False
+        memory, changed_words, recorder = self.memory, False, self.recorder
+        if recorder:
+            recorder.refresh_begins()
         asked: list[list[Request] | None] = []
         """The requests of each unit; None if its program ran and `finish` has them."""
         for number, attached in enumerate(self.units):
@@ -52,6 +57,8 @@ class IORefresh:
             events = link.events(now_ns)
             if journal:
                 journal.told(number, events)
+            if recorder and events:
+                recorder.received(number, events)
             own = attached.own
             if own is None:
                 asked.append(unit.refresh(memory, events, now_ns))
@@ -69,6 +76,8 @@ class IORefresh:
                 link.submit(requests, now_ns)
             changed_words = changed_words or unit.changed_words
         self.changed_words = changed_words
+        if recorder:
+            recorder.refresh_ended()
         return self.is_idle(now_ns)
 
     def report_skipped(self) -> None:

@@ -14,7 +14,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 
 from fbvm.machine.plc import Plc
-from fbvm.record.trace.recorder import Recorder, Recording, Signal, Track, default_signals
+from fbvm.record.trace.recorder import Recorder, Signal, Track, Waveforms, default_signals
 from fbvm.watch.values import Value
 
 QUIET_SCANS = 12
@@ -82,14 +82,14 @@ def _moved(track: Track, before: dict[Signal, Value]) -> bool:
 
 
 def draw(
-    recorder: Recording,
+    recorder: Waveforms,
     tracks: Sequence[Track] | None = None,
     *,
     width: int | None = None,
     ruler: bool = False,
     compress: bool = False,
 ) -> Chart:
-    """The chart of a recording, or of some of its `tracks`.
+    """The chart of waveforms, or of some of its `tracks`.
 
     `width` in characters wraps the chart, `ruler` adds the numbers of scans, `compress` shortens stretches without changes."""
     tracks = recorder.tracks if tracks is None else tracks

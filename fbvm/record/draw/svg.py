@@ -10,7 +10,7 @@ from html import escape
 
 from fbvm.base.types import EnumType, base
 from fbvm.record.trace.packets import Packet
-from fbvm.record.trace.recorder import Recording, Track
+from fbvm.record.trace.recorder import Track, Waveforms
 from fbvm.watch.values import Value, show_time
 
 ROW, LETTER, MARGIN = 26, 7.3, 8
@@ -34,21 +34,21 @@ text { fill: #e6e8ec; stroke: #14161a } .dim { fill: #9aa2ae } .ground { fill: #
 
 
 class SvgChart:
-    """The time chart of a recording, and of packets with the numbers of their scans."""
+    """The time chart of a waveforms, and of packets with the numbers of their scans."""
 
-    def __init__(self, recording: Recording, packets: Sequence[tuple[int, Packet]] = (), title: str = "") -> None:
-        self._recording, self._title = recording, title
-        self._scans = recording.scans
+    def __init__(self, waveforms: Waveforms, packets: Sequence[tuple[int, Packet]] = (), title: str = "") -> None:
+        self._waveforms, self._title = waveforms, title
+        self._scans = waveforms.scans
         self._packets = [row for row in packets if row[0] in self._scans]
         self._unit = str(self._packets[0][1].source.host) if self._packets else ""
         self._step = min(WIDEST, max(NARROWEST, WANTED / max(1, len(self._scans))))
-        names = [track.signal.label for track in recording.tracks]
+        names = [track.signal.label for track in waveforms.tracks]
         self._left = MARGIN * 2 + LETTER * max([len(name) for name in names] + [8])
         self._top = MARGIN + RULERS + (LANE if self._packets else 0)
 
     def text(self) -> str:
         """The text of the SVG file."""
-        tracks = self._recording.tracks
+        tracks = self._waveforms.tracks
         width = round(self._left + self._step * len(self._scans) + MARGIN)
         height = self._top + ROW * len(tracks) + MARGIN
         rows = [row for at, track in enumerate(tracks) for row in self._row(track, self._top + at * ROW)]
@@ -69,7 +69,7 @@ class SvgChart:
                     if step * self._step >= TICK)  # fmt: skip
         first = -(-self._scans.start // step) * step
         for scan in range(first, self._scans.stop, step):
-            x, when = self._x(scan), show_time(self._recording.times_ns[scan - self._scans.start]).removeprefix("T#")
+            x, when = self._x(scan), show_time(self._waveforms.times_ns[scan - self._scans.start]).removeprefix("T#")
             yield f'<line class="grid" x1="{x}" y1="{MARGIN}" x2="{x}" y2="{height - MARGIN}"/>'
             yield f'<text class="dim" x="{x + 3}" y="{MARGIN + 10}">{scan}</text>'
             yield f'<text class="dim" x="{x + 3}" y="{MARGIN + 28}">{escape(when)}</text>'

@@ -1,4 +1,4 @@
-"""A recording as a value change dump (IEEE 1364), for GTKWave, Surfer and others; needs the package pyvcd.
+"""Waveforms as a value change dump (IEEE 1364), for GTKWave, Surfer and others; needs the package pyvcd.
 
 Programs and instances are scopes, areas are scopes of their addresses, and the number of the scan is a signal.  A
 value changes at the time of the scan at whose end it is new.  Times of the program are integers of nanoseconds.
@@ -11,35 +11,35 @@ from collections.abc import Iterator
 from typing import Any, TextIO
 
 from fbvm.base.types import Elementary, EnumType, RefType, StringType, Type, base, families
-from fbvm.record.trace.recorder import Recording, Signal, Track
+from fbvm.record.trace.recorder import Signal, Track, Waveforms
 from fbvm.watch.values import Value
 
 AREAS_SCOPE = "memory"
 COMMENT = "fbvm"
 
 
-def write_vcd(recording: Recording, file: TextIO) -> None:
-    """Writes a recording as VCD to a text file.  Raises ModuleNotFoundError without the package pyvcd."""
+def write_vcd(waveforms: Waveforms, file: TextIO) -> None:
+    """Writes waveforms as VCD to a text file.  Raises ModuleNotFoundError without the package pyvcd."""
     import vcd  # type: ignore[import-not-found,unused-ignore]
 
     with vcd.VCDWriter(file, timescale="1 ns", date="", comment=COMMENT) as writer:
-        number = writer.register_var(COMMENT, "scan", "integer", 64, init=recording.first)
-        variables = [_register(writer, track) for track in recording.tracks]
-        for scan, (now_ns, changed) in _scans(recording):
+        number = writer.register_var(COMMENT, "scan", "integer", 64, init=waveforms.first)
+        variables = [_register(writer, track) for track in waveforms.tracks]
+        for scan, (now_ns, changed) in _scans(waveforms):
             writer.change(number, now_ns, scan)
             for at, value in changed:
-                writer.change(variables[at], now_ns, _plain(recording.tracks[at].signal, value))
-        if recording.times_ns:
-            writer.close(recording.times_ns[-1])
+                writer.change(variables[at], now_ns, _plain(waveforms.tracks[at].signal, value))
+        if waveforms.times_ns:
+            writer.close(waveforms.times_ns[-1])
 
 
-def _scans(recording: Recording) -> Iterator[tuple[int, tuple[int, list[tuple[int, Value]]]]]:
+def _scans(waveforms: Waveforms) -> Iterator[tuple[int, tuple[int, list[tuple[int, Value]]]]]:
     """Scan, time, and the tracks that change in it with their new values."""
     changes: dict[int, list[tuple[int, Value]]] = {}
-    for at, track in enumerate(recording.tracks):
+    for at, track in enumerate(waveforms.tracks):
         for scan, value in track.changes:
             changes.setdefault(scan, []).append((at, value))
-    for scan, now_ns in zip(recording.scans, recording.times_ns, strict=True):
+    for scan, now_ns in zip(waveforms.scans, waveforms.times_ns, strict=True):
         yield scan, (now_ns, changes.get(scan, []))
 
 

@@ -27,8 +27,8 @@ from fbvm.record.draw.sfc_text import sfc_surface
 from fbvm.record.trace.events import Contact, Event, Frame, NetworkEvent, Statement, Write
 from fbvm.record.trace.format import PHASES
 from fbvm.record.trace.packets import Dissector, Packet
-from fbvm.record.trace.reader import Moment, Trace
 from fbvm.record.trace.recorder import Signal, signals_at
+from fbvm.record.trace.scan_source import Moment, ScanSource
 from fbvm.record.trace.signals import chosen_signals
 from fbvm.record.trace.writer import Depth
 from fbvm.syntax.ladder.drawing.widths import Annotations
@@ -49,7 +49,7 @@ VERSION = 1
 class Collector:
     """A listener that collects the data of a trace."""
 
-    def __init__(self, trace: Trace, signals: Sequence[Signal]) -> None:
+    def __init__(self, trace: ScanSource, signals: Sequence[Signal]) -> None:
         self._trace, self.signals = trace, list(signals)
         self.times_ns: list[int] = []
         self.first = 0
@@ -201,7 +201,7 @@ def _rung(picture: RungPicture, annotations: Annotations) -> list[str]:
     return [head, rung_svg(surface)] if picture.steps else [head]
 
 
-def _words(trace: Trace, runs: list[tuple[int, int]]) -> Iterator[tuple[str, int]]:
+def _words(trace: ScanSource, runs: list[tuple[int, int]]) -> Iterator[tuple[str, int]]:
     """The words of areas in some bytes, each once."""
     areas = [area for area in trace.areas.values() if area.unit_bits == 16 and area.name not in FLAG_AREAS]
     seen: set[tuple[str, int]] = set()
@@ -214,7 +214,7 @@ def _words(trace: Trace, runs: list[tuple[int, int]]) -> Iterator[tuple[str, int
                     yield area.name, address
 
 
-def page_data(trace: Trace, names: Sequence[str] = (), scans: range | None = None, title: str = "", *, prefix: str = "",
+def page_data(trace: ScanSource, names: Sequence[str] = (), scans: range | None = None, title: str = "", *, prefix: str = "",
               pinned: Sequence[str] = ()) -> dict[str, Any]:  # fmt: skip
     """The data of a trace, or of some of its scans and variables.  Raises UnknownPlace, TypeError, TraceError.
 
@@ -232,7 +232,7 @@ def page_data(trace: Trace, names: Sequence[str] = (), scans: range | None = Non
     return {"title": title, "pinned": [name.removeprefix(prefix) for name in pinned], **_as_data(trace, made, prefix)}
 
 
-def _in_order(trace: Trace) -> list[Signal]:
+def _in_order(trace: ScanSource) -> list[Signal]:
     """All signals: first the programs' own variables, then described addresses, then members of instances."""
     programs = {field.name for field in trace.symbols.values() if isinstance(field.type, StructType) and field.type.block}
 
@@ -243,7 +243,7 @@ def _in_order(trace: Trace) -> list[Signal]:
     return sorted((signal for signal in chosen_signals(trace, ()) if not signal.place.is_generated), key=rank)
 
 
-def _as_data(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
+def _as_data(trace: ScanSource, made: Collector, prefix: str) -> dict[str, Any]:
     """What was collected, as JSON can write it; signals without values are left out."""
     times = made.times_ns
     return {
@@ -261,7 +261,7 @@ def _as_data(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _numbered(trace: Trace, made: Collector, prefix: str) -> dict[str, Any]:
+def _numbered(trace: ScanSource, made: Collector, prefix: str) -> dict[str, Any]:
     """The signals that have values, the statements that occur, and the rows, which name both by their places in these lists."""
     kept = [number for number, changes in enumerate(made.changes) if changes]
     signals = {number: at for at, number in enumerate(kept)}
@@ -293,7 +293,7 @@ def _renumbered(row: list[Any], signals: dict[int, int], sites: dict[int, int]) 
     return [sites.get(row[0], row[0]), row[1], *changed]
 
 
-def _located(trace: Trace, signals: Sequence[Signal]) -> Iterator[tuple[str, str]]:
+def _located(trace: ScanSource, signals: Sequence[Signal]) -> Iterator[tuple[str, str]]:
     """Pairs of an address and the variable that is located there."""
     for signal in signals:
         if not signal.place.area:

@@ -1,4 +1,4 @@
-"""Recordings as CSV: one row a scan, one column a variable.
+"""Waveforms as CSV: one row a scan, one column a variable.
 
     scan,time_ms,Main.Start,Main.Delay.ET [ms],D200
     0,0,FALSE,0,7
@@ -15,7 +15,7 @@ from typing import TextIO
 
 from fbvm.base.arithmetic import shortest
 from fbvm.base.types import REAL, EnumType, base, families
-from fbvm.record.trace.recorder import Recording, Signal
+from fbvm.record.trace.recorder import Signal, Waveforms
 from fbvm.watch.values import Value, show
 
 SCAN, TIME_MS = "scan", "time_ms"
@@ -23,13 +23,13 @@ MS = " [ms]"
 DURATIONS = frozenset(("TIME", "LTIME"))
 
 
-def write_csv(recording: Recording, file: TextIO) -> None:
-    """Writes a recording as CSV to a text file that was opened with `newline=""`."""
+def write_csv(waveforms: Waveforms, file: TextIO) -> None:
+    """Writes waveforms as CSV to a text file that was opened with `newline=""`."""
     writer = csv.writer(file, lineterminator="\n")
-    signals = [track.signal for track in recording.tracks]
+    signals = [track.signal for track in waveforms.tracks]
     writer.writerow([SCAN, TIME_MS, *(_heading(signal) for signal in signals)])
-    columns = [track.values(recording.scans) for track in recording.tracks]
-    for scan, now_ns, *values in zip(recording.scans, recording.times_ns, *columns, strict=True):
+    columns = [track.values(waveforms.scans) for track in waveforms.tracks]
+    for scan, now_ns, *values in zip(waveforms.scans, waveforms.times_ns, *columns, strict=True):
         cells = [_cell(signal, value) for signal, value in zip(signals, values, strict=True)]
         writer.writerow([scan, _milliseconds(now_ns), *cells])
 

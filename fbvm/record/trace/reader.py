@@ -10,10 +10,9 @@ from __future__ import annotations
 
 import json
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO
 
 from fbvm.base.areas import Mailbox
 from fbvm.base.files import open_file
@@ -45,47 +44,14 @@ from fbvm.record.trace.format import (
     read_chunk,
     xor,
 )
+from fbvm.record.trace.scan_source import Follower, Moment, ScanSource
 from fbvm.record.trace.writer import FORMAT, Depth
-from fbvm.watch import places
 from fbvm.watch.names import Names
-from fbvm.watch.paths import Place, Span, find
-from fbvm.watch.values import Value
 from fbvm.wire.link import Peer
 from fbvm.wire.tap import TapEvent, TapKind
 
 
-class Follower(Protocol):
-    """Receives the phases and events of a trace, as a `history.Listener` does of a PLC."""
-
-    def phase(self, moment: Moment, phase: Phase) -> None:
-        """Called at the end of a phase; REFRESH is the end of the scan."""
-
-    def event(self, moment: Moment, event: Event) -> None:
-        """Called for each event."""
-
-
-@dataclass
-class Moment:
-    """The PLC at a moment of a trace: its memory, the number of the scan and its time."""
-
-    trace: Trace
-    memory: Memory
-    scans: int = 0
-    now_ns: int = 0
-
-    def find(self, text: str) -> Place | Span:
-        """The place or span of places that `text` names.  Raises UnknownPlace."""
-        return self.trace.find(text)
-
-    def read(self, where: str | Place | Span) -> Value:
-        """The value of a variable, address or range.  Raises UnknownPlace."""
-        found = self.find(where) if isinstance(where, str) else where
-        if isinstance(found, Span):
-            return [places.read(self.memory, place) for place in found.places]
-        return places.read(self.memory, found)
-
-
-class Trace:
+class Trace(ScanSource):
     """A trace in a file that is open for reading.  Raises TraceError if the file is no trace."""
 
     def __init__(self, file: BinaryIO) -> None:
@@ -105,7 +71,7 @@ class Trace:
     def _read_header(self, head: dict[str, Any]) -> None:
         try:
             self.symbols = symbols.from_data(head)
-            self._extents = [(int(start), int(end)) for start, end in head.get("objects", ())]
+            extents = [(int(start), int(end)) for start, end in head.get("objects", ())]
             boxes = tuple(Mailbox(str(name), *map(int, sizes)) for name, *sizes in head["mailboxes"])
             layout = Layout(int(head["slots"]), tuple(head["e_banks"]), boxes)
             self.areas, self.size = layout.areas, layout.size
@@ -119,16 +85,16 @@ class Trace:
             self.bodies = [(str(name), str(kind)) for name, kind in head["bodies"]]
             self.rungs = tuple(_rung(*row) for row in head["rungs"])
             self.charts = tuple(_chart(*row) for row in head.get("charts", ()))
-            self.rung_sites = frozenset(rung.site for rung in self.rungs)
             self.described = dict(head["described"])
             self.meanings: dict[str, dict[int, str]] = {
                 address: {int(value): str(text) for value, text in known.items()}
                 for address, known in head["meanings"].items()}  # fmt: skip
-            self._lines: dict[str, dict[int, str]] = {
+            self.lines = {
                 file: {int(n): str(text) for n, text in rows.items()} for file, rows in head["lines"].items()}
         except (ArithmeticError, LookupError, TypeError, ValueError, AttributeError, RecursionError) as error:
             raise TraceError(f"the trace's header is damaged: {error}") from None
-        self.names = Names(self.symbols, self.areas, self._extents)
+        self.rung_sites = frozenset(rung.site for rung in self.rungs)
+        self.names = Names(self.symbols, self.areas, extents)
 
     @classmethod
     def open(cls, path: Path | str) -> Trace:
@@ -169,21 +135,6 @@ class Trace:
             return range(0)
         return range(self._blocks[0].first, self._blocks[-1].first + self._blocks[-1].scans)
 
-    def find(self, text: str) -> Place | Span:
-        """The place or span of places that `text` names.  Raises UnknownPlace."""
-        return find(self.symbols, self.areas, text)
-
-    def line(self, site: Site) -> str:
-        """The source line of a statement, "" if the trace does not have it."""
-        return self._lines.get(site.file, {}).get(site.line, "")
-
-    def at(self, scan: int) -> Moment:
-        """The PLC at the end of a scan.  Raises ValueError if the scan is not recorded."""
-        moment = next(self.moments(range(scan, scan + 1)), None)
-        if moment is None:
-            raise ValueError(f"scan {scan} is not in the trace, which has {_shown(self.scans)}")
-        return moment
-
     def moments(self, scans: range | None = None) -> Iterator[Moment]:
         """The PLC at the end of each scan; the same object for all scans."""
         for phase, moment in self._play(scans, None):
@@ -219,6 +170,7 @@ class _Player:
     def __init__(self, trace: Trace, cursor: Cursor, memory: Memory, follower: Follower | None, wanted: range) -> None:
         self._cursor, self._follower, self._wanted = cursor, follower, wanted
         self._moment = Moment(trace, memory)
+        self._rung_sites = trace.rung_sites
         self._base = bytearray(memory.size)
         self._touched: list[tuple[int, int]] = []
         self._frames: list[Frame] = []
@@ -273,7 +225,7 @@ class _Player:
             return Return(frame)
         if tag == STATEMENT:
             number = cursor.number()
-            return Statement(number, frame, number in self._moment.trace.rung_sites)
+            return Statement(number, frame, number in self._rung_sites)
         if tag == CONTACT:
             site, value, size = (cursor.number() for _ in range(3))
             return Contact(site, frame, json.loads(cursor.bytes(size)), bool(value))
@@ -328,7 +280,3 @@ def _header(payload: bytes) -> dict[str, Any]:
         raise error if isinstance(error, TraceError) else TraceError(f"the trace's header is damaged: {error}") from None
     made: dict[str, Any] = head
     return made
-
-
-def _shown(scans: Sequence[int]) -> str:
-    return f"scans {scans[0]} to {scans[-1]}" if scans else "no scans"

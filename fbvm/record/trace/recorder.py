@@ -20,7 +20,7 @@ HEXADECIMAL_AREAS = frozenset(("CIO", "W", "H", "A"))
 
 @dataclass(frozen=True)
 class Signal:
-    """One row of a recording: a place, its label, and the description by the unit that has this address."""
+    """One row of waveforms: a place, its label, and the description by the unit that has this address."""
 
     place: Place
     label: str
@@ -69,7 +69,7 @@ class Track:
 
 
 @dataclass
-class Recording:
+class Waveforms:
     """The values of some signals from scan number `first` on, and the time of each scan in nanoseconds."""
 
     tracks: list[Track]
@@ -81,14 +81,14 @@ class Recording:
         """Numbers of the scans that are recorded, counted from 0 at power-on."""
         return range(self.first, self.first + len(self.times_ns))
 
-    def relabelled(self, prefix: str) -> Recording:
-        """The same recording without a prefix of the labels."""
+    def relabelled(self, prefix: str) -> Waveforms:
+        """The same waveforms without a prefix of the labels."""
         tracks = [Track(replace(track.signal, label=track.signal.label.removeprefix(prefix)), track.changes)
                   for track in self.tracks]  # fmt: skip
-        return Recording(tracks, self.first, self.times_ns)
+        return Waveforms(tracks, self.first, self.times_ns)
 
 
-class Recorder(Recording):
+class Recorder(Waveforms):
     """Records signals from the next scan of `plc` until `stop`.
 
     `signals` are paths, addresses, ranges, or pairs of one and its description.  Raises UnknownPlace, and TypeError for an

@@ -34,7 +34,7 @@ from fbvm.record.trace.format import (
     write_chunk,
     xor,
 )
-from fbvm.record.trace.history import observing
+from fbvm.record.trace.observing import observing
 from fbvm.record.trace.outline import outer_statements
 from fbvm.record.trace.packets import add_tap
 from fbvm.record.trace.selection import select

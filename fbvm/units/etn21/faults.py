@@ -37,6 +37,8 @@ class Faults(MutableSequence[Fault]):
         row.require(FIELDS, __name__)
         self._most, self._size = contract.array("ETN21_Faults")[1:]
         self._pack, self._read = row.packer(*FIELDS), row.rows(*FIELDS)
+        self.times_set = 0
+        """How often the list has been changed from outside the program."""
         self._any_switch, self._any_socket = map(contract.constant, ("ETN21_ANY_SWITCH", "ETN21_ANY_SOCKET"))
 
     @property
@@ -58,6 +60,7 @@ class Faults(MutableSequence[Fault]):
                        self._any_socket if fault.socket is None else fault.socket)  # fmt: skip
         self._rows[: len(rows)] = rows
         self._count[0] = len(faults)
+        self.times_set += 1
 
     def __len__(self) -> int:
         return int(self._count[0])

@@ -46,7 +46,7 @@ class Inside:
     def copy(self, odd_filler: int | None) -> Inside:
         """Another processor in the same state."""
         twin = Inside(self.own.copy(), odd_filler)
-        twin.mail.take_over(self.mail)
+        twin.mail.resume(*self.mail.state)
         return twin
 
     def begin(self) -> None:

@@ -182,9 +182,14 @@ class Mail:
         self._later.clear()
         self._behind[0] = 0
 
-    def take_over(self, other: Mail) -> None:
-        """Go on where another one is, of whose processor this one's is a copy."""
-        self._later, self._fresh = [*other._later], {**other._fresh}
+    @property
+    def state(self) -> tuple[tuple[Event, ...], dict[int, int]]:
+        """What is not in the memory of the processor."""
+        return tuple(self._later), {**self._fresh}
+
+    def resume(self, later: tuple[Event, ...], fresh: dict[int, int]) -> None:
+        """Goes on from a `state` of the processor whose memory this one's has by now."""
+        self._later, self._fresh = [*later], {**fresh}
 
     def post(self, events: Iterable[Event]) -> None:
         """Gives events to the program.  Those that do not fit wait for the refresh after, those of unknown channels are lost."""

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import Any
 
 from fbvm.base.areas import NEVER
-from fbvm.units.contract import AreaMemory, Exchanged, ExchangedWords, Moves
+from fbvm.units.contract import AreaMemory, Exchanged, ExchangedWords, Moves, UnitState
 from fbvm.units.etn21 import map as at
 from fbvm.units.etn21.data import AREA_OF_CODE, lengths
 from fbvm.units.etn21.faults import Fault, Faults
@@ -68,6 +68,7 @@ class Etn21:
         self._service_status, self._error_status = at.LINK_UP, 0
         self.changed_words = False
         self._engine = "auto"
+        self._times_set = 0
         self._processor: Inside | None = None
         """Switched on when there is something to do for it: most programs ask nothing of an ETN21."""
         if faults := list(faults):
@@ -97,6 +98,28 @@ class Etn21:
         twin._service_status, twin._error_status = self._service_status, self._error_status
         twin._words, twin.changed_words = self._words, self.changed_words
         return twin
+
+    @property
+    def times_set(self) -> int:
+        """How often faults, link or error status have been set."""
+        return self._times_set + (self._processor.faults.times_set if self._processor else 0)
+
+    @property
+    def state(self) -> UnitState:
+        """All that the unit knows now, beside its arguments."""
+        inside = self._processor
+        memory, mail = (inside.own.memory.snapshot(), inside.mail.state) if inside else (None, None)
+        return UnitState(memory, (self._service_status, self._error_status, self.changed_words, mail))
+
+    def resume(self, state: UnitState, memory: AreaMemory) -> None:
+        """Goes on from a state of a unit with the same arguments, in a PLC with this memory."""
+        self._words = Words(self.layout, memory)
+        self._service_status, self._error_status, self.changed_words, mail = state.other
+        if state.memory is None:
+            self._processor = None
+        else:
+            self._inside.own.memory.restore(state.memory)
+            self._inside.mail.resume(*mail)
 
     @property
     def faults(self) -> Faults:
@@ -143,6 +166,7 @@ class Etn21:
     @link_up.setter
     def link_up(self, up: bool) -> None:
         self._service_status = at.LINK_UP if up else 0
+        self._times_set += 1
         self._inside.report(self._service_status, self._error_status)
 
     @property
@@ -154,6 +178,7 @@ class Etn21:
     def error_status(self, status: int) -> None:
         self._inside.report(self._service_status, status)
         self._error_status = status
+        self._times_set += 1
 
     @cached_property
     def descriptions(self) -> dict[str, str]:

@@ -87,9 +87,11 @@ class Line:
             return self._work(words) if is_at_work else []
         if self._in_use:
             words[at.state] = states.closing
+            words[at.sending] = 0
             return self.close(command == commands.reset)
         if is_mine and not self._unconfirmed_closes and words[at.state] != states.closed:
             words[at.state] = states.closed
+            words[at.sending] = 0  # what was meant for one peer is not sent to the next
         return []
 
     def close(self, reset: bool) -> list[Request]:

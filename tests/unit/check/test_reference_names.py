@@ -21,7 +21,7 @@ from fbvm.record.export.vcd import write_vcd
 from fbvm.record.page.data import page_data
 from fbvm.record.trace.csv_writer import write_csv
 from fbvm.record.trace.reader import Trace
-from fbvm.record.trace.signals import chosen_signals, recording
+from fbvm.record.trace.signals import chosen_signals, waveforms
 from fbvm.record.trace.writer import Depth
 from fbvm.step.session import Session
 from fbvm.step.stop_report import StopReport
@@ -120,12 +120,12 @@ def test_why_and_stepping_say_it(trace: Trace) -> None:
 
 
 def test_charts_and_rows_show_references_that_are_named(trace: Trace) -> None:
-    wanted, rows = recording(trace, ["Main.element", "Main.none"]), io.StringIO(newline="")
+    wanted, rows = waveforms(trace, ["Main.element", "Main.none"]), io.StringIO(newline="")
     assert [track.changes for track in wanted.tracks] == [
         [(0, "-> Main.a[0]"), (1, "-> Main.a[1]"), (2, "-> Main.a[2]")], [(0, None)],
     ]  # fmt: skip
     assert "= -> Main.a[0], -> Main.a[1], -> Main.a[2]" in draw(wanted)
-    assert "Main.element" not in [track.signal.label for track in recording(trace).tracks]
+    assert "Main.element" not in [track.signal.label for track in waveforms(trace).tracks]
     write_csv(wanted, rows)
     assert rows.getvalue().splitlines()[2] == "1,10,-> Main.a[1],"
 
@@ -133,7 +133,7 @@ def test_charts_and_rows_show_references_that_are_named(trace: Trace) -> None:
 def test_a_dump_shows_references_as_texts(trace: Trace) -> None:
     pytest.importorskip("vcd")
     dump = io.StringIO()
-    write_vcd(recording(trace, ["Main.element", "Main.none"]), dump)
+    write_vcd(waveforms(trace, ["Main.element", "Main.none"]), dump)
     assert {"s->_Main.a[2]", "sNULL"} <= set(dump.getvalue().split())
 
 

@@ -11,7 +11,7 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Plc
 from fbvm.record.draw.ladder_text import ladder_text
 from fbvm.record.draw.power import PowerFlow, RungExecution
-from fbvm.record.trace.history import observing
+from fbvm.record.trace.observing import observing
 from fbvm.syntax.ladder.drawing.widths import Annotations
 
 DECLARED = """a, b, c, d, e, f : BOOL; n, m : INT; r : REAL; w : WORD; t : TON; k : CTUD; s : SR; list : ARRAY[0..3] OF BOOL;

@@ -139,8 +139,7 @@ def test_a_long_run_comes_back_now_and_then(monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("disturb", [
     lambda plc: plc.watchers.append(lambda plc: None), lambda plc: plc.phases.append(lambda plc, phase: None),
-    lambda plc: plc.force("D7", 5), lambda plc: plc.remember(3),
-    lambda plc: setattr(plc, "mode", Mode.PROGRAM),
+    lambda plc: plc.force("D7", 5), lambda plc: setattr(plc, "mode", Mode.PROGRAM),
 ])  # fmt: skip
 def test_who_wants_every_scan_gets_it(monkeypatch: pytest.MonkeyPatch, disturb: Any) -> None:
     plc = Plc(IMAGE, engine="native")

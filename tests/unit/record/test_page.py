@@ -21,7 +21,7 @@ from fbvm.record.page.page import page
 from fbvm.record.trace.packets import Packet
 from fbvm.record.trace.reader import Trace
 from fbvm.record.trace.recorder import Signal
-from fbvm.record.trace.signals import recording
+from fbvm.record.trace.signals import waveforms
 from fbvm.record.trace.writer import Depth
 from fbvm.watch.paths import Place, UnknownPlace
 from fbvm.wire.link import Peer
@@ -141,7 +141,7 @@ SPACE = "{http://www.w3.org/2000/svg}"
 
 
 def drawn(trace: Trace, *names: str, passed: tuple[tuple[int, Packet], ...] = ()) -> ElementTree.Element:
-    return ElementTree.fromstring(SvgChart(recording(trace, names), passed, "a <run>").text())
+    return ElementTree.fromstring(SvgChart(waveforms(trace, names), passed, "a <run>").text())
 
 
 def test_bits_are_bars_and_numbers_steps() -> None:

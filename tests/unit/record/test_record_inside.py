@@ -1,4 +1,4 @@
-"""What happens inside a scan, the names of places, states to go back to, and the scan table."""
+"""What happens inside a scan, the names of places, and the scan table."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fbvm.code.image import Image
 from fbvm.machine.plc import Phase, Plc
 from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace.events import Call, Event, ObservedEngine, Read, Return, Statement, Write
-from fbvm.record.trace.history import History, observing
+from fbvm.record.trace.observing import observing
 from fbvm.record.trace.recorder import Signal, signals_of
 from fbvm.watch.names import Names
 
@@ -200,61 +200,6 @@ def test_the_values_within_some_bytes(plc: Plc, names: Names) -> None:
     pair = plc.find("Main.Pairs[1, 1]")
     inside = names.within(pair.offset, pair.type.size)  # type: ignore[union-attr]
     assert [place.name for place in inside] == ["Main.Pairs[1, 1].a", "Main.Pairs[1, 1].b"]
-
-
-# --- history ----------------------------------------------------------------------------------------------------------
-
-
-def steps(plc: Plc, history: History, count: int) -> None:
-    for _ in range(count):
-        if plc.scans % 7 == 3:
-            history.mark_changed()
-            plc.write("Main.Go", not plc.read("Main.Go"))
-        history.before_scan()
-        plc.scan()
-
-
-def test_any_scan_is_found_again(plc: Plc) -> None:
-    history, seen = History(plc, every=5), []
-    for _ in range(40):
-        seen.append(plc.snapshot())
-        steps(plc, history, 1)
-    for scan in (0, 1, 13, 39):
-        twin = history.at(scan)
-        assert (twin.scans, twin.read("Main.n")) == (scan, int.from_bytes(_at(plc, seen[scan]), "little"))
-
-
-def _at(plc: Plc, state: Any) -> bytes:
-    place = plc.find("Main.n")
-    return bytes(state.memory)[place.offset : place.offset + 2]  # type: ignore[union-attr]
-
-
-def test_only_so_many_states_are_kept(plc: Plc) -> None:
-    history = History(plc, every=2, keep=3)
-    steps(plc, history, 30)
-    assert history.scans.stop == 30
-    assert history.scans.start > 10
-    with pytest.raises(ValueError, match="scan 2 is not kept"):
-        history.at(2)
-    with pytest.raises(ValueError, match="scan 31 is not kept"):
-        history.at(31)
-
-
-def test_nothing_is_kept_before_the_first_scan(plc: Plc) -> None:
-    history, log = History(plc), Log()
-    history.replay(range(5), log)
-    assert history.scans == range(0)
-    assert log.rows == []
-
-
-def test_a_scan_is_run_again_with_other_inputs(plc: Plc) -> None:
-    history = History(plc)
-    steps(plc, history, 20)
-    twin = history.at(3)
-    twin.write("Main.Go", False)
-    twin.scan()
-    assert twin.read("Main.n") == 0
-    assert plc.read("Main.n") == 2
 
 
 # --- scan table -------------------------------------------------------------------------------------------------------

@@ -22,9 +22,9 @@ from fbvm.record.draw.table import ScanTable
 from fbvm.record.trace import symbols
 from fbvm.record.trace.events import Call, Event, Frame, Read, Return, Statement, Write
 from fbvm.record.trace.format import MAGIC, Cursor, TraceError, put, xor
-from fbvm.record.trace.history import observing
+from fbvm.record.trace.observing import observing
 from fbvm.record.trace.selection import select
-from fbvm.record.trace.signals import recording
+from fbvm.record.trace.signals import waveforms
 from fbvm.record.trace.writer import START
 from fbvm.watch.names import Names
 from fbvm.watch.paths import UnknownPlace
@@ -156,7 +156,7 @@ def test_the_scan_table_of_a_trace_is_that_of_the_plc() -> None:
     plc = Plc(image())
     names = Names.of(plc.image, plc.memory.areas)
     trace = traced(12, Depth.STATEMENTS)
-    made = recording(trace, ["Main.Start", "Main.Pump", "D200"])
+    made = waveforms(trace, ["Main.Start", "Main.Pump", "D200"])
     signals = [track.signal for track in made.tracks]
     live, told = ScanTable(plc.image.sites, names, signals), ScanTable(trace.sites, trace.names, signals)
     with observing(plc, live):
@@ -204,7 +204,7 @@ def test_only_what_is_selected_is_kept() -> None:
     trace = traced(200, Depth.STATEMENTS, ["Main.Delay", "D200"])
     moment = trace.at(41)
     assert (moment.read("Main.Delay.ET"), moment.read("D200"), moment.read("Main.Both[2].b")) == (50_000_000, 7, 0.0)
-    assert {track.signal.label for track in recording(trace).tracks} == {
+    assert {track.signal.label for track in waveforms(trace).tracks} == {
         "Main.Delay.IN", "Main.Delay.Q", "Main.Delay.ET", "Main.Delay.Running", "Main.Delay.Start", "D200",
     }  # fmt: skip
 
@@ -218,7 +218,7 @@ def test_a_program_stands_for_its_located_variables() -> None:
 
 
 def test_a_chart_of_some_scans() -> None:
-    assert draw(recording(traced(), ["Main.Start", "Main.Pump", "D200"], range(2, 12))) == """
+    assert draw(waveforms(traced(), ["Main.Start", "Main.Pump", "D200"], range(2, 12))) == """
         Main.Start  .#########
         Main.Pump   ......####
         D200        0     |7
@@ -226,7 +226,7 @@ def test_a_chart_of_some_scans() -> None:
 
 
 def test_without_names_what_changed_is_charted() -> None:
-    labels = [track.signal.label for track in recording(traced(12)).tracks]
+    labels = [track.signal.label for track in waveforms(traced(12)).tracks]
     assert "Main.Delay.ET" in labels and "Main.Mode" in labels
     assert "Main.Few" not in labels and "Main.Words[0]" not in labels
 
@@ -360,8 +360,8 @@ def test_references_are_left_out_of_a_chart_of_everything(selected: Sequence[str
                     "both : ARRAY[1..2] OF REF_TO INT; END_VAR\n"
                     "a := a + 1; r := REF(a); p := ADR(a); f REF= a; both[2] := r;\nEND_PROGRAM"))
     trace = Trace(io.BytesIO(record(plc, 3, selected=selected, before=lambda plc: None)))
-    assert [track.signal.label for track in recording(trace).tracks] == ["Main.a"]
-    assert [track.changes for track in recording(trace, ["Main.r", "Main.p"]).tracks] == [[(0, "-> Main.a")]] * 2
+    assert [track.signal.label for track in waveforms(trace).tracks] == ["Main.a"]
+    assert [track.changes for track in waveforms(trace, ["Main.r", "Main.p"]).tracks] == [[(0, "-> Main.a")]] * 2
 
 
 def test_what_references_lead_to_is_read_from_a_trace() -> None:
@@ -373,5 +373,5 @@ def test_what_references_lead_to_is_read_from_a_trace() -> None:
     trace = Trace(io.BytesIO(record(plc, 3, before=lambda plc: None)))
     names = ["Main.r^.n", "Main.r^.next^.n", "Main.p^", "Main.f", "Main.none^"]
     assert [trace.at(2).read(name) for name in names] == [plc.read(name) for name in names] == [3, 7, 7, 3, None]
-    assert [track.changes for track in recording(trace, ["Main.f"]).tracks] == [[(0, 1), (1, 2), (2, 3)]]
-    assert [track.signal.label for track in recording(trace).tracks] == ["Main.a[0].n"]
+    assert [track.changes for track in waveforms(trace, ["Main.f"]).tracks] == [[(0, 1), (1, 2), (2, 3)]]
+    assert [track.signal.label for track in waveforms(trace).tracks] == ["Main.a[0].n"]

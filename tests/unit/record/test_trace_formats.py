@@ -16,11 +16,11 @@ from fbvm.record.export.vcd import write_vcd
 from fbvm.record.trace.csv_reader import CsvError, read_csv
 from fbvm.record.trace.csv_writer import write_csv
 from fbvm.record.trace.reader import Trace
-from fbvm.record.trace.recorder import Recorder, Recording
-from fbvm.record.trace.signals import recording
+from fbvm.record.trace.recorder import Recorder, Waveforms
+from fbvm.record.trace.signals import waveforms
 
 
-def rows(made: Recording) -> str:
+def rows(made: Waveforms) -> str:
     file = io.StringIO(newline="")
     write_csv(made, file)
     return file.getvalue()
@@ -39,7 +39,7 @@ NAMES = ["Main.Pump", "Main.Delay.ET", "Main.Starts.CV", "Main.Mode", "Main.Text
 
 
 def test_a_row_is_a_scan() -> None:
-    assert rows(recording(traced(10), NAMES, range(6, 9))) == """\
+    assert rows(waveforms(traced(10), NAMES, range(6, 9))) == """\
 scan,time_ms,Main.Pump,Main.Delay.ET [ms],Main.Starts.CV,Main.Mode,Main.Text,Main.Both[2].b,D200,CIO 0.00
 6,60,FALSE,30,0,Low,,3.5,0,TRUE
 7,70,FALSE,40,0,Low,,4.0,0,TRUE
@@ -62,9 +62,9 @@ def test_a_real_has_the_digits_that_it_needs() -> None:
 
 
 def test_what_goes_out_comes_in() -> None:
-    text = rows(recording(traced(30), NAMES))
+    text = rows(waveforms(traced(30), NAMES))
     back = as_trace(text)
-    assert rows(recording(back, NAMES)) == text
+    assert rows(waveforms(back, NAMES)) == text
     assert back.at(8).read("Main.Delay.ET") == 50_000_000
     assert back.scans == range(30)
 
@@ -82,7 +82,7 @@ scan,time_ms,Main.d,Main.at_,Main.p[2].n,"Main.p[2].t[-1, 3] [ms]","Main.p[3].t[
 0,0,D#2024-02-29,DT#2024-02-29-12:30:00,18446744073709551615,1,0.001
 1,10,D#2024-02-29,DT#2024-02-29-12:30:00,18446744073709551615,2,0.001
 """
-    assert rows(recording(as_trace(text), names)) == text
+    assert rows(waveforms(as_trace(text), names)) == text
 
 
 def test_a_table_from_elsewhere_becomes_a_trace() -> None:
@@ -121,15 +121,15 @@ def test_what_is_no_such_table(text: str, said: str) -> None:
 def test_any_values_go_out_and_in(values: list[tuple[Any, ...]]) -> None:
     lines = [f'{n},{n},{b!s},{i},{f!r},"x{t.replace(chr(34), chr(34) * 2)}"' for n, (b, i, f, t) in enumerate(values)]
     text = "scan,time_ms,b,i,f,t\n" + "\n".join(lines).replace("True", "TRUE").replace("False", "FALSE") + "\n"
-    again = rows(recording(as_trace(text), ["b", "i", "f", "t"]))
-    assert rows(recording(as_trace(again), ["b", "i", "f", "t"])) == again
+    again = rows(waveforms(as_trace(text), ["b", "i", "f", "t"]))
+    assert rows(waveforms(as_trace(again), ["b", "i", "f", "t"])) == again
     assert len(again.splitlines()) == len(values) + 1
 
 
 # --- VCD --------------------------------------------------------------------------------------------------------------
 
 
-def dump(made: Recording) -> str:
+def dump(made: Waveforms) -> str:
     pytest.importorskip("vcd")
     file = io.StringIO()
     write_vcd(made, file)
@@ -162,7 +162,7 @@ def variables(text: str) -> tuple[dict[str, list[tuple[int, Any]]], list[str]]:
 
 
 def test_pyvcd_reads_it_back() -> None:
-    changes, scopes = variables(dump(recording(traced(12), NAMES)))
+    changes, scopes = variables(dump(waveforms(traced(12), NAMES)))
     assert {"Main", "Main.Delay", "Main.Starts", "fbvm", "memory.D", "memory.CIO"} <= set(scopes)
     assert changes["Main.Pump"] == [(0, "0"), (80_000_000, "1")]
     assert changes["Main.Delay.ET"][-1] == (80_000_000, 50_000_000)
@@ -173,7 +173,7 @@ def test_pyvcd_reads_it_back() -> None:
 
 
 def test_the_scan_is_a_signal() -> None:
-    changes, _ = variables(dump(recording(traced(5), ["D200"])))
+    changes, _ = variables(dump(waveforms(traced(5), ["D200"])))
     assert changes["fbvm.scan"] == [(scan * 10_000_000, scan) for scan in range(5)]
 
 

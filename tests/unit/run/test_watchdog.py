@@ -17,6 +17,7 @@ from fbvm.engine.python.engine import PythonEngine
 from fbvm.machine.plc import STEP_BUDGET
 from fbvm.net.journal import Journal, open_journal
 from fbvm.net.tcp import TcpNetwork
+from fbvm.record.recording.recording import Recording
 from fbvm.run import run, watchdog
 from fbvm.run.replay import Replay
 from fbvm.run.watchdog import FIRST_STEPS, Watchdog
@@ -169,10 +170,11 @@ def network() -> Iterator[TcpNetwork]:
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_a_scan_without_end_is_ended_in_real_time_and_again_by_its_journal(engine: str, network: TcpNetwork) -> None:
+def test_a_scan_without_end_is_ended_in_real_time_and_again_as_recorded(engine: str, network: TcpNetwork) -> None:
     image, file = image_of(ENDLESS), io.StringIO()
     journal = Journal(file)
     plc = Plc(image, engine=engine, budget=1 << 60, journal=journal)
+    recorded = Recording().add("plc", plc)
     plc.watch_cycle.time_ns = 10 * MS
     plc.attach(Etn21(0, "192.168.250.1"), network)
     assert run(plc, scans=3) == "trap"
@@ -190,6 +192,8 @@ def test_a_scan_without_end_is_ended_in_real_time_and_again_by_its_journal(engin
         assert replay.differs is None
         assert replay.plc.read("Main.n") == plc.read("Main.n")
         assert str(replay.plc.trap) == str(plc.trap)
+    assert str(recorded.at(plc.scans).trap) == str(plc.trap)
+    assert bytes(recorded.at(plc.scans).memory.u8) == bytes(plc.memory.u8)
 
 
 @pytest.mark.parametrize("engine", ENGINES)

@@ -14,7 +14,7 @@ from fbvm.record.draw.ladder_svg import ladder_svg
 from fbvm.record.draw.ladder_text import ladder_surface, ladder_text
 from fbvm.record.draw.power import PowerFlow, RungExecution
 from fbvm.record.draw.rung_values import RungValues
-from fbvm.record.trace.history import observing
+from fbvm.record.trace.observing import observing
 from fbvm.syntax.ladder.drawing.widths import Annotations
 
 

@@ -13,7 +13,7 @@ from test_testing_plugin import run
 from fbvm.code.compiler import compile_text
 from fbvm.machine.plc import Plc
 from fbvm.record.trace.branches import branches, statements
-from fbvm.record.trace.history import observing
+from fbvm.record.trace.observing import observing
 from fbvm.testing.coverage import SKIPPED, Coverage, FileCoverage
 from fbvm.testing.coverage_report import cobertura, percent, table, write_pages
 from fbvm.testing.subject import subject

@@ -398,3 +398,23 @@ def test_any_words_in_a_slot_are_survived(content: list[int], commands: list[int
         words[LINE.sending] = content[10]
         rig.step(2)
         assert words[LINE.state] in vars(STATE).values()
+
+
+def test_what_waits_to_be_sent_ends_with_its_connection() -> None:
+    """A program has put a reply down for a caller that is gone; the next one does not get it."""
+    rig = Rig()
+    words, caller = slot(rig.memory), rig.network.attach("192.168.250.9")
+    for number in range(3):
+        command(words, COMMAND.listen, Peer("0.0.0.0", 0), 502)
+        rig.step(2)
+        caller.submit([Connect(1, OWN), Grant(1, 100)], rig.now_ns)
+        rig.step(2)
+        assert words[LINE.state] == STATE.open
+        events = caller.events(rig.now_ns)
+        assert not any(isinstance(event, Received) for event in events), number
+        caller.submit([Close(1, reset=True)], rig.now_ns)
+        rig.step(number)
+        say(words, b"meant for this one")
+        command(words, COMMAND.close)
+        rig.step(3)
+        assert (words[LINE.state], words[LINE.sending]) == (STATE.closed, 0)

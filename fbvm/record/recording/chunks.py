@@ -1,0 +1,174 @@
+"""What a recording keeps of one PLC: keyframes, and behind each the times and the inputs of the scans that follow."""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from fbvm.base.areas import PAGE_BYTES
+from fbvm.base.memory import Snapshot
+from fbvm.machine.state import State
+from fbvm.units.contract import Unit, UnitState
+from fbvm.watch.values import Value
+from fbvm.wire.link import Event, Received
+from fbvm.wire.tap import TapEvent
+
+Writes = list[tuple[int, bytes]]
+"""Bytes that were written: the offset in the flat memory, and the new bytes."""
+SMALL_BYTES = 200
+"""About what a keyframe, or the inputs of one scan, take beside pages and data."""
+
+
+@dataclass
+class ScanInputs:
+    """What came from outside in one scan, beside its time; a scan without any has none of these."""
+
+    scan: int
+    writes: Writes = field(default_factory=list)
+    """What was written into the memory before the scan."""
+    forces: Mapping[str, Value] | None = None
+    """What is forced from this scan on; None if that is what was forced before."""
+    budget: int | None = None
+    """How many statements a scan may execute from this one on; None for as many as before."""
+    settings: dict[int, dict[str, Any]] = field(default_factory=dict)
+    """How units are set from this scan on, by their numbers."""
+    events: dict[int, list[Event]] = field(default_factory=dict)
+    """What the network told units in the I/O refresh, by their numbers."""
+    results: Writes = field(default_factory=list)
+    """What Python functions in place of blocks left in their instances, in the order of their calls."""
+    traffic: list[tuple[int, str, TapEvent]] = field(default_factory=list)
+    """What passed the networks at the units of this PLC: time, address of the unit, event."""
+    watch: tuple[int, int] | None = None
+    """Of a scan that took longer than the watch cycle time: the steps that it had charged, and that time in ns."""
+    refreshed: Writes = field(default_factory=list)
+    """What the I/O refresh changed, if the units of this PLC cannot be run again."""
+
+    @property
+    def is_empty(self) -> bool:
+        """True if nothing came from outside."""
+        found = self.writes or self.settings or self.events or self.results or self.refreshed or self.traffic
+        return not found and self.forces is None and self.budget is None and self.watch is None
+
+    @property
+    def size_bytes(self) -> int:
+        """About how many bytes of memory this takes."""
+        data = sum(len(data) for rows in (self.writes, self.results, self.refreshed) for _, data in rows)
+        events = [event for told in self.events.values() for event in told]
+        data += sum(len(event.data) for event in events if isinstance(event, Received))
+        data += sum(len(event.data) for _, _, event in self.traffic)
+        return SMALL_BYTES * (1 + len(events) + len(self.traffic)) + data
+
+
+class Times:
+    """The times of consecutive scans from number `first` on; those that follow one another in equal steps take one row."""
+
+    def __init__(self, first: int) -> None:
+        self.end = first
+        """The number behind the last scan."""
+        self._scans, self._times_ns, self._steps_ns = array("q"), array("q"), array("q")
+        self._last_ns = self._count = 0
+        """Time of the last scan, and how many scans the last row has."""
+
+    def add(self, now_ns: int, scans: int = 1, step_ns: int = 0) -> None:
+        """Adds some scans: the first at `now_ns`, each other one `step_ns` after the one before."""
+        step = now_ns - self._last_ns
+        fits = scans == 1 or step == step_ns
+        if self._count == 1 and fits:
+            self._steps_ns[-1] = step
+        elif not self._count or not fits or step != self._steps_ns[-1]:
+            self._scans.append(self.end)
+            self._times_ns.append(now_ns)
+            self._steps_ns.append(step_ns)
+            self._count = 0
+        self._count += scans
+        self.end += scans
+        self._last_ns = now_ns + (scans - 1) * step_ns
+
+    def at(self, scan: int) -> int:
+        """The time of a scan."""
+        row = bisect_right(self._scans, scan) - 1
+        return self._times_ns[row] + (scan - self._scans[row]) * self._steps_ns[row]
+
+    def regular(self, scan: int) -> tuple[int, int]:
+        """How many scans, this one among them, follow one another in equal steps, and the step."""
+        row = bisect_right(self._scans, scan)
+        end = self._scans[row] if row < len(self._scans) else self.end
+        return end - scan, self._steps_ns[row - 1]
+
+    def cut(self, scan: int) -> None:
+        """Forgets this scan and those behind it."""
+        rows = bisect_left(self._scans, scan)
+        del self._scans[rows:], self._times_ns[rows:], self._steps_ns[rows:]
+        self.end = min(self.end, scan)
+        self._count = self.end - self._scans[-1] if rows else 0
+        self._last_ns = self.at(self.end - 1) if rows else 0
+
+    @property
+    def size_bytes(self) -> int:
+        """How many bytes the rows take."""
+        return 3 * 8 * len(self._scans)
+
+
+@dataclass(frozen=True)
+class UnitKeyframe:
+    """A unit between two scans: the unit, from which another of its class is made, and its state; None if its refreshes are
+    recorded instead."""
+
+    unit: Unit
+    state: UnitState | None
+
+
+class Chunk:
+    """A keyframe, and the scans up to the next one.
+
+    `units` are the units on the backplane.  `follows` is True if the scans before lead to this keyframe; else the state was
+    changed in between."""
+
+    def __init__(self, state: State, units: Sequence[UnitKeyframe], budget: int, follows: bool) -> None:
+        self.state, self.units, self.budget, self.follows = state, units, budget, follows
+        self.times = Times(state.scans)
+        self.inputs: list[ScanInputs] = []
+        self.inputs_bytes = 0
+
+    @property
+    def first(self) -> int:
+        """The number of the first scan."""
+        return self.state.scans
+
+    def add(self, inputs: ScanInputs) -> None:
+        """Adds the inputs of a scan; those of the last one are completed."""
+        self.inputs.append(inputs)
+        self.inputs_bytes += inputs.size_bytes
+
+    def next_inputs(self, scan: int) -> ScanInputs | None:
+        """The inputs of this scan, or of the next one that has any."""
+        at = bisect_left(self.inputs, scan, key=lambda inputs: inputs.scan)
+        return self.inputs[at] if at < len(self.inputs) else None
+
+    def cut(self, scan: int) -> None:
+        """Forgets this scan and those behind it."""
+        self.times.cut(scan)
+        self.inputs = [inputs for inputs in self.inputs if inputs.scan < scan]
+
+    def size_bytes(self, before: Chunk | None) -> int:
+        """About how many bytes this takes, without the pages that it shares with the chunk before."""
+        snapshots = [*_snapshots(before)] if before else []
+        pages = sum(_pages(new, snapshots[number] if number < len(snapshots) else None)
+                    for number, new in enumerate(_snapshots(self)))  # fmt: skip
+        return pages + SMALL_BYTES + self.inputs_bytes + self.times.size_bytes
+
+
+def _snapshots(chunk: Chunk) -> list[Snapshot]:
+    own = [unit.state.memory for unit in chunk.units if unit.state and unit.state.memory]
+    return [chunk.state.memory, *own]
+
+
+def _pages(new: Snapshot, old: Snapshot | None) -> int:
+    """The bytes of the pages of a snapshot that the other one does not have."""
+    if old is None or len(old.pages) != len(new.pages):
+        return 8 * len(new.pages) + PAGE_BYTES * sum(page is not None for page in new.pages)
+    return 8 * len(new.pages) + PAGE_BYTES * sum(
+        page is not known and page is not None for page, known in zip(new.pages, old.pages, strict=True))

@@ -1,0 +1,221 @@
+"""Executes recorded scans again, on a second PLC with the same program, the same inputs and no network."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Protocol
+
+from fbvm.base.areas import NEVER
+from fbvm.engine.allowance import WHOLE_BUDGET, Allowance
+from fbvm.engine.choice.tiers import again_choice, python_of
+from fbvm.machine.plc import Plc
+from fbvm.machine.scan.refresh import Attached
+from fbvm.record.recording.chunks import Chunk, ScanInputs, Writes
+from fbvm.units.contract import AreaMemory, ResumableUnit, Unit
+from fbvm.wire.link import Event, Request
+from fbvm.wire.tap import Tap, TapEvent
+
+
+class Recorded(Protocol):
+    """What was recorded of a PLC."""
+
+    @property
+    def plc(self) -> Plc: ...
+
+    @property
+    def substituted(self) -> Sequence[int]: ...
+
+    def chunk(self, scan: int) -> Chunk: ...
+
+    def inputs(self, scan: int) -> ScanInputs | None: ...
+
+    def now_ns(self, scan: int) -> int: ...
+
+
+class RecordedLink:
+    """Network and link of a unit at once: tells what was recorded, and takes requests without doing anything."""
+
+    virtual_time = True
+
+    def __init__(self, address: str, tap: Tap | None) -> None:
+        self.address, self.tap = address, tap
+        self.told: list[Event] = []
+        """What it tells in the next refresh."""
+        self.traffic: list[tuple[int, str, TapEvent]] = []
+        """What its tap is told then."""
+
+    @property
+    def is_quiet(self) -> bool:
+        """True if it has nothing to tell."""
+        return not self.told and not self.traffic
+
+    def attach(self, address: str) -> RecordedLink:
+        return self
+
+    def pass_by(self, refreshes: int) -> None:
+        """It counts no refreshes."""
+
+    def submit(self, requests: Iterable[Request], now_ns: int) -> None:
+        """What they led to was recorded."""
+
+    def events(self, now_ns: int) -> list[Event]:
+        told, self.told = self.told, []
+        if self.tap:
+            for passed in self.traffic:
+                self.tap(*passed)
+        self.traffic = []
+        return told
+
+    def close(self) -> None:
+        """There is nothing to end."""
+
+
+class RecordedRefresh:
+    """Stands for a unit whose refreshes cannot be done again: writes what they changed."""
+
+    watched: Sequence[tuple[str, int]] = ()
+    exchanged = None
+    changed_words = False
+
+    def __init__(self, plc: Plc, unit: Unit) -> None:
+        self._plc = plc
+        self.name, self.address = unit.name, unit.address
+        self.descriptions = getattr(unit, "descriptions", {})
+        self.meanings = getattr(unit, "meanings", {})
+        self.configuration: dict[str, Any] = {}
+        self.settings: dict[str, Any] = {}
+        self.writes: Writes = []
+        """What the next refresh changes."""
+
+    @property
+    def wake_ns(self) -> int:
+        """0 if it has something to write, else NEVER."""
+        return 0 if self.writes else NEVER
+
+    def reset(self, memory: AreaMemory) -> list[Request]:
+        return []
+
+    def refresh(self, memory: AreaMemory, events: Sequence[Event], now_ns: int) -> list[Request]:
+        write(self._plc, self.writes)
+        self.writes = []
+        return []
+
+
+class Replay:
+    """A PLC that executes the scans of a recording again, from the keyframe before `scan` on.  `plc` is between two scans."""
+
+    def __init__(self, recorded: Recorded, scan: int) -> None:
+        self._recorded = recorded
+        source, chunk = recorded.plc, recorded.chunk(scan)
+        self._engine = again_choice(source.image, source.engine_choice, bool(recorded.substituted))
+        self.plc = Plc(source.image, source.cycle_ns, budget=chunk.budget, engine=self._engine)
+        self._links: list[RecordedLink] = []
+        self._refreshes: list[RecordedRefresh] = []
+        self._loaded: Chunk | None = None
+        self._results: deque[tuple[int, bytes]] = deque()
+        for body in recorded.substituted:
+            python_of(self.plc.engine).substitute(body, self._play_back)
+        self._load(chunk)
+
+    def advance(self, scan: int) -> None:
+        """Executes scans up to the one before `scan`, as fast as that can be done."""
+        plc = self.plc
+        while plc.scans < scan:
+            if (most := self._regular(scan)) < 2 or not plc.scan_many(most):
+                self.scan()
+        self._enter()
+        plc.cycle_ns = self._recorded.plc.cycle_ns
+
+    def scan(self) -> None:
+        """Executes one scan with its inputs."""
+        self._enter()
+        plc, number = self.plc, self.plc.scans
+        inputs = self._recorded.inputs(number)
+        if inputs and inputs.scan == number:
+            self._apply(inputs)
+        plc.scan(self._recorded.now_ns(number))
+        self._results.clear()
+        plc.engine.allowance = WHOLE_BUDGET
+
+    def _enter(self) -> None:
+        """Puts the PLC into the state of the keyframe before the next scan, if the scan before does not lead to that."""
+        chunk = self._recorded.chunk(self.plc.scans)
+        if chunk is not self._loaded and chunk.first == self.plc.scans and not chunk.follows:
+            self._load(chunk)
+
+    def leave(self) -> None:
+        """Takes the units off, so that the PLC goes on alone."""
+        self.plc.units.clear()
+
+    def _regular(self, scan: int) -> int:
+        """How many scans without inputs follow one another from here to `scan` in equal steps, which `plc.cycle_ns` then is."""
+        plc, number = self.plc, self.plc.scans
+        chunk = self._recorded.chunk(number)
+        if number >= chunk.times.end or chunk.first == number:
+            return 0
+        count, step_ns = chunk.times.regular(number)
+        if count > 1:
+            plc.cycle_ns = step_ns
+        inputs = chunk.next_inputs(number)
+        last = min(scan, number + count, inputs.scan if inputs else scan)
+        return last - number if self._recorded.now_ns(number) == plc.elapsed_ns else 0
+
+    def _load(self, chunk: Chunk) -> None:
+        """Puts the PLC into the state of a keyframe."""
+        plc, self._loaded = self.plc, chunk
+        tap = self._links[0].tap if self._links else None
+        self._links = [RecordedLink(frame.unit.address, tap) for frame in chunk.units]
+        self._refreshes, units = [], list[Unit]()
+        for frame in chunk.units:
+            if frame.state is None:
+                self._refreshes.append(refresh := RecordedRefresh(plc, frame.unit))
+                units.append(refresh)
+            else:
+                units.append(type(frame.unit)(**frame.unit.configuration))
+        attached = [Attached(unit, link, link) for unit, link in zip(units, self._links, strict=True)]
+        plc.resume(chunk.state, attached)
+        for row, frame in zip(attached, chunk.units, strict=True):
+            if row.own:
+                row.own.run_on(self._engine)
+            if frame.state and isinstance(row.unit, ResumableUnit):
+                row.unit.resume(frame.state, plc.memory)
+
+    def _apply(self, inputs: ScanInputs) -> None:
+        plc = self.plc
+        for number, settings in inputs.settings.items():
+            plc.units[number].unit.settings = settings
+        if inputs.forces is not None:
+            self._force(inputs.forces)
+        if inputs.budget is not None:
+            plc.budget = inputs.budget
+        if inputs.watch is not None:
+            steps, plc.watch_cycle.time_ns = inputs.watch
+            plc.engine.allowance = Allowance(plc.budget - steps + 1)
+        write(plc, inputs.writes)
+        for number, events in inputs.events.items():
+            self._links[number].told = list(events)
+        for link in self._links[:1]:  # one of them has all of it, in its order
+            link.traffic = inputs.traffic if link.tap else []
+        for refresh in self._refreshes[-1:]:
+            refresh.writes = inputs.refreshed
+        self._results.extend(inputs.results)
+
+    def _force(self, forces: Mapping[str, Any]) -> None:
+        """Changes what is forced, but not the memory: what a force wrote at once is among the writes."""
+        before = self.plc.memory.snapshot()
+        self.plc.unforce()
+        for name, value in forces.items():
+            self.plc.force(name, value)
+        self.plc.memory.restore(before)
+
+    def _play_back(self, base: int) -> None:
+        """Writes into an instance what Python left there in the recorded scan."""
+        if self._results and self._results[0][0] == base:
+            write(self.plc, [self._results.popleft()])
+
+
+def write(plc: Plc, writes: Iterable[tuple[int, bytes]]) -> None:
+    """Writes bytes into the memory of a PLC."""
+    for offset, data in writes:
+        plc.memory.u8[offset : offset + len(data)] = data

@@ -1,0 +1,91 @@
+"""Charts, tables and causes of a recording in memory are those of a trace that was written while it ran."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import pytest
+from trace_rig import image, press
+
+from fbvm import Etn21, LoopNetwork, Plc, compile_files, compile_text
+from fbvm.net.peers import ModbusPeer
+from fbvm.record.draw.chart import draw
+from fbvm.record.draw.table import ScanTable
+from fbvm.record.draw.why import cause_text, why
+from fbvm.record.page.data import page_data
+from fbvm.record.recording.recording import Recording
+from fbvm.record.recording.scans import RecordedScans
+from fbvm.record.trace.reader import Trace
+from fbvm.record.trace.scan_source import ScanSource
+from fbvm.record.trace.signals import network_events, waveforms
+from fbvm.record.trace.writer import Depth, TraceWriter
+from fbvm.units.port.noc import Noc
+from fbvm.wire.link import Peer
+from fbvm.wire.registers import server
+
+
+def both(plc: Plc, scans: int, depth: Depth = Depth.STATEMENTS, *, presses: bool = True) -> tuple[RecordedScans, Trace]:
+    """A run, recorded in memory and as a trace."""
+    file = io.BytesIO()
+    recorded, writer = Recording().add("plc", plc), TraceWriter(plc, file, depth)
+    for _ in range(scans):
+        if presses:
+            press(plc)
+        plc.scan()
+        if plc.trap:
+            break
+    writer.close()
+    return RecordedScans(recorded, {}, depth=depth), Trace(io.BytesIO(file.getvalue()))
+
+
+def exchanging(path: str, unit: Etn21 | Noc) -> Plc:
+    """A program whose unit talks with a server in memory."""
+    made = compile_files([Path(path)]).image
+    assert made is not None
+    plc, network = Plc(made), LoopNetwork(3)
+    network.place(Peer("192.168.250.1", 502), ModbusPeer(server()))
+    plc.attach(unit, network)
+    return plc
+
+
+def drawings(source: ScanSource) -> list[object]:
+    """What is drawn of some scans."""
+    names = ["Main.Start", "Main.Pump", "D200"]
+    signals = [track.signal for track in waveforms(source, names).tracks]
+    table = ScanTable(source.sites, source.names, signals)
+    source.follow(table, range(5, 30))
+    place = source.find("Main.Pump")
+    return [draw(waveforms(source, names)), table.draw(), page_data(source), source.scans,
+            cause_text(source, why(source, place, 35))]  # type: ignore[arg-type]  # fmt: skip
+
+
+def test_drawings_are_those_of_a_trace() -> None:
+    recorded, trace = both(Plc(image()), 40)
+    assert drawings(recorded) == drawings(trace)
+
+
+def test_a_scan_that_traps_has_an_end() -> None:
+    made = compile_text("PROGRAM Main VAR n : INT := 5; END_VAR n := n - 1; n := 100 / n; n := 5 - n; END_PROGRAM").image
+    assert made is not None
+    recorded, trace = both(Plc(made), 40, presses=False)
+    assert recorded.scans == trace.scans
+    assert page_data(recorded) == page_data(trace)
+
+
+def test_without_what_happened_inside() -> None:
+    recorded, trace = both(Plc(image()), 40, Depth.SCANS)
+    assert page_data(recorded, scans=range(7, 30)) == page_data(trace, scans=range(7, 30))
+    assert [moment.scans for moment in recorded.moments(range(38, 90))] == [38, 39]
+    with pytest.raises(ValueError, match="scan 40 is not in the trace, which has scans 0 to 39"):
+        recorded.at(40)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("path", "unit"), [("tests/bench/poll.st", Etn21(0, "192.168.250.21")), ("examples/mstr.st", Noc())])
+def test_the_network_is_part_of_it(path: str, unit: Etn21 | Noc) -> None:
+    recorded, trace = both(exchanging(path, unit), 30, presses=False)
+    passed = network_events(recorded)
+    assert passed == network_events(trace)
+    assert len(passed) > 5
+    assert page_data(recorded) == page_data(trace)
